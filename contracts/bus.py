@@ -1,0 +1,364 @@
+"""The bus: publish, subscribe, ask, serve and watch over Zenoh, and the same in memory for tests.
+
+Receiving never runs user code on the bus's threads: messages land in a bounded `Mailbox`, whose
+owner takes them when it likes. Decoding happens on taking, so what is dropped costs nothing.
+"""
+
+from __future__ import annotations
+
+import collections
+import json
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Literal, NamedTuple, Protocol, Self
+
+import msgspec
+
+from contracts.codec import Envelope, decode, encode
+from contracts.keys import CHANNELS, Qos, key as channel_key
+from contracts.setup import BusSetup
+
+
+class BusUnreachable(ConnectionError):
+    """No router answers at the endpoint."""
+
+
+class Received:
+    """One message as it lay in the mailbox; `envelope()` decodes it."""
+
+    __slots__ = ("_kind", "_payload", "channel", "key", "received_mono_ns")
+
+    def __init__(self, channel: str, key: str, payload: bytes, kind: type[msgspec.Struct]) -> None:
+        self.channel = channel
+        self.key = key
+        self.received_mono_ns = time.monotonic_ns()
+        self._payload = payload
+        self._kind = kind
+
+    def envelope(self) -> Envelope[Any]:
+        """Return header and message; raises SchemaMismatch."""
+        return decode(self._payload, self._kind, where=self.key)
+
+    def message(self) -> Any:
+        """Return the message alone; raises SchemaMismatch."""
+        return self.envelope().message
+
+
+class Reply(NamedTuple):
+    """The end of a request: a message, or None with the reason in `error`."""
+
+    channel: str
+    tag: Any
+    message: Any | None
+    error: str | None
+    received_mono_ns: int
+
+
+class Request:
+    """A question to answer exactly once."""
+
+    def __init__(
+        self, channel: str, key: str, payload: bytes, answer: Callable[[bytes | None, str], None]
+    ) -> None:
+        self.channel = channel
+        self.key = key
+        self.received_mono_ns = time.monotonic_ns()
+        self._payload = payload
+        self._answer = answer
+
+    def message(self) -> Any:
+        """Return the question; raises SchemaMismatch."""
+        return decode(self._payload, CHANNELS[self.channel].kind, where=self.key).message
+
+    def reply(self, message: msgspec.Struct) -> None:
+        """Answer."""
+        self._answer(encode(message, sent_ns=time.time_ns()), "")
+
+    def refuse(self, reason: str) -> None:
+        """Answer that it cannot be done, and why."""
+        self._answer(None, reason)
+
+
+class Alive(NamedTuple):
+    """A process appeared (`up`) or vanished."""
+
+    key: str
+    up: bool
+    received_mono_ns: int
+
+
+Item = Received | Reply | Request | Alive | Any
+
+
+class Mailbox:
+    """A bounded queue with many writers and one reader.
+
+    When full, `drop_oldest` forgets the oldest item and counts it, `block` makes the writer wait
+    (lock step alone: nothing may block a live drive).
+    """
+
+    def __init__(self, depth: int, *, when_full: Literal["drop_oldest", "block"] = "drop_oldest") -> None:
+        if depth < 1:
+            raise ValueError(f"mailbox depth {depth} must be at least 1")
+        self._items: collections.deque[Item] = collections.deque()
+        self._depth = depth
+        self._block = when_full == "block"
+        self._changed = threading.Condition()
+        self._closed = False
+        self.dropped = 0
+
+    def put(self, item: Item) -> None:
+        """Add an item; after `close`, items are ignored."""
+        with self._changed:
+            if self._block:
+                self._changed.wait_for(lambda: self._closed or len(self._items) < self._depth)
+            if self._closed:
+                return
+            if len(self._items) >= self._depth:
+                self._items.popleft()
+                self.dropped += 1
+            self._items.append(item)
+            self._changed.notify_all()
+
+    def take(self, timeout_s: float | None = 0.0) -> Item | None:
+        """Return the oldest item, or None after `timeout_s` (None waits for ever) or `close`."""
+        with self._changed:
+            if not self._items and timeout_s != 0.0:
+                self._changed.wait_for(lambda: bool(self._items) or self._closed, timeout_s)
+            if not self._items:
+                return None
+            item = self._items.popleft()
+            self._changed.notify_all()
+            return item
+
+    def close(self) -> None:
+        """Wake everyone; later items are ignored."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+
+class Bus(Protocol):
+    """What processes need of a bus; `ids` are `vehicle`, `run`, `process` as in `contracts.keys`."""
+
+    def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
+        """Send one message; never raises for a lost link."""
+
+    def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
+        """Let every message of the channel land in `mailbox` as Received."""
+
+    def request(
+        self, channel: str, message: msgspec.Struct, mailbox: Mailbox, *, tag: Any = None,
+        timeout_s: float = 10.0, **ids: str,
+    ) -> None:  # fmt: skip
+        """Ask; exactly one Reply lands in `mailbox`, also when nobody answers."""
+
+    def serve(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
+        """Let every question on the channel land in `mailbox` as Request."""
+
+    def declare_alive(self, alive_key: str) -> None:
+        """Hold a liveliness token until `close` or the process's end."""
+
+    def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
+        """Let every appearance, past ones included, and every loss land in `mailbox` as Alive."""
+
+    def close(self) -> None:
+        """Undeclare everything."""
+
+
+def ask(bus: Bus, channel: str, message: msgspec.Struct, *, timeout_s: float = 10.0, **ids: str) -> Any:
+    """Ask and wait; returns the reply's message, raises TimeoutError with the reason without one."""
+    mailbox = Mailbox(1)
+    bus.request(channel, message, mailbox, timeout_s=timeout_s, **ids)
+    reply = mailbox.take(timeout_s + 1.0)
+    if not isinstance(reply, Reply) or reply.message is None:
+        reason = reply.error if isinstance(reply, Reply) else "no reply"
+        raise TimeoutError(f"{channel_key(channel, **ids)}: {reason}")
+    return reply.message
+
+
+class _Sequence:
+    """Counts the messages of each key."""
+
+    def __init__(self) -> None:
+        self._next: dict[str, int] = collections.defaultdict(int)
+        self._lock = threading.Lock()
+
+    def take(self, full_key: str) -> int:
+        with self._lock:
+            seq = self._next[full_key]
+            self._next[full_key] = seq + 1
+            return seq
+
+
+def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
+    """Return the Zenoh configuration that was measured to work; see docs/bus.md for each setting."""
+    import zenoh
+
+    config = zenoh.Config()
+    settings: dict[str, Any] = {
+        "mode": "router" if router else "client",
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "scouting/delay": 0,
+        "timestamping/enabled": True,
+        "transport/shared_memory/enabled": False,
+        "transport/link/tx/lease": 3000,
+        "transport/link/tx/queue/size": {
+            "control": 2, "real_time": 16, "interactive_high": 16, "interactive_low": 4,
+            "data_high": 16, "data": 16, "data_low": 2, "background": 2,
+        },
+        "listen/endpoints": [setup.endpoint] if router else [],
+    }  # fmt: skip
+    if not router:
+        settings["connect/endpoints"] = [setup.endpoint]
+        settings["connect/timeout_ms"] = 5000
+        settings["connect/retry"] = {
+            "period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2,
+        }  # fmt: skip
+    for name, value in settings.items():
+        config.insert_json5(name, json.dumps(value))
+    return config
+
+
+class ZenohBus:
+    """The bus over one Zenoh session; a context manager, since an unclosed session hangs at exit."""
+
+    def __init__(self, setup: BusSetup, *, router: bool = False) -> None:
+        import zenoh
+
+        self._zenoh = zenoh
+        self._lossless = setup.lossless
+        self._sequence = _Sequence()
+        self._publishers: dict[str, Any] = {}
+        self._declared: list[Any] = []
+        self._lock = threading.Lock()
+        self._priorities = {
+            "real_time": zenoh.Priority.REAL_TIME,
+            "interactive_high": zenoh.Priority.INTERACTIVE_HIGH,
+            "data_high": zenoh.Priority.DATA_HIGH,
+            "data": zenoh.Priority.DATA,
+            "background": zenoh.Priority.BACKGROUND,
+        }
+        try:
+            self._session = zenoh.open(zenoh_config(setup, router=router))
+        except zenoh.ZError as error:
+            raise BusUnreachable(f"no Zenoh router at {setup.endpoint}: {error}") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _qos(self, qos: Qos) -> dict[str, Any]:
+        control = self._zenoh.CongestionControl
+        return {
+            "priority": self._priorities[qos.priority],
+            "congestion_control": control.BLOCK if qos.block or self._lossless else control.DROP,
+            "express": qos.express,
+        }
+
+    def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
+        """Send one message; see Bus."""
+        full_key = channel_key(channel, **ids)
+        with self._lock:
+            publisher = self._publishers.get(full_key)
+            if publisher is None:
+                publisher = self._session.declare_publisher(
+                    full_key, **self._qos(CHANNELS[channel].qos)
+                )
+                self._publishers[full_key] = publisher
+        publisher.put(
+            encode(message, seq=self._sequence.take(full_key), sent_ns=time.time_ns())
+        )
+
+    def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
+        """Receive into `mailbox`; see Bus."""
+        kind = CHANNELS[channel].kind
+
+        def land(sample: Any) -> None:
+            mailbox.put(Received(channel, str(sample.key_expr), sample.payload.to_bytes(), kind))
+
+        self._declared.append(self._session.declare_subscriber(channel_key(channel, **ids), land))
+
+    def request(
+        self, channel: str, message: msgspec.Struct, mailbox: Mailbox, *, tag: Any = None,
+        timeout_s: float = 10.0, **ids: str,
+    ) -> None:  # fmt: skip
+        """Ask; see Bus."""
+        kind = CHANNELS[channel].reply
+        if kind is None:
+            raise ValueError(f"channel {channel!r} takes no questions")
+        full_key = channel_key(channel, **ids)
+        answered = threading.Event()
+
+        def finish(reply: Any | None, error: str | None) -> None:
+            if not answered.is_set():
+                answered.set()
+                mailbox.put(Reply(channel, tag, reply, error, time.monotonic_ns()))
+
+        def land(reply: Any) -> None:
+            if reply.ok is None:
+                finish(None, reply.err.payload.to_bytes().decode(errors="replace"))
+                return
+            try:
+                finish(decode(reply.ok.payload.to_bytes(), kind, where=full_key).message, None)
+            except ValueError as problem:
+                finish(None, str(problem))
+
+        self._session.get(
+            full_key,
+            self._zenoh.handlers.Callback(land, lambda: finish(None, "no answer"), indirect=False),
+            payload=encode(message, seq=self._sequence.take(full_key), sent_ns=time.time_ns()),
+            timeout=timeout_s,
+            **self._qos(CHANNELS[channel].qos),
+        )
+
+    def serve(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
+        """Answer questions; see Bus."""
+        full_key = channel_key(channel, **ids)
+
+        def land(query: Any) -> None:
+            def answer(data: bytes | None, reason: str) -> None:
+                with query:
+                    if data is None:
+                        query.reply_err(reason.encode())
+                    else:
+                        query.reply(
+                            full_key, data, congestion_control=self._zenoh.CongestionControl.BLOCK
+                        )
+
+            payload = query.payload.to_bytes() if query.payload is not None else b""
+            mailbox.put(Request(channel, full_key, payload, answer))
+
+        self._declared.append(self._session.declare_queryable(full_key, land, complete=True))
+
+    def declare_alive(self, alive_key: str) -> None:
+        """Hold a liveliness token; see Bus."""
+        self._declared.append(self._session.liveliness().declare_token(alive_key))
+
+    def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
+        """Watch liveliness tokens; see Bus."""
+        put = self._zenoh.SampleKind.PUT
+
+        def land(sample: Any) -> None:
+            mailbox.put(Alive(str(sample.key_expr), sample.kind == put, time.monotonic_ns()))
+
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(alive_key, land, history=True)
+        )
+
+    def close(self) -> None:
+        """Close the session; idempotent."""
+        self._publishers.clear()
+        self._declared.clear()
+        if not self._session.is_closed():
+            self._session.close()

@@ -1,0 +1,97 @@
+"""Messages to bytes and back: a fixed header with the schema version, then msgpack.
+
+Header (little-endian, 24 bytes): magic `FTw1`, schema version u16, 2 bytes of zeros, sequence
+number u64, the sender's wall clock in ns i64. A message of another schema version is refused.
+"""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import msgspec
+import numpy as np
+
+from contracts.arrays import array_from_wire, array_to_wire
+
+SCHEMA_VERSION = 1
+MAGIC = b"FTw1"
+_HEADER = struct.Struct("<4sHxxQq")
+
+Message = TypeVar("Message")
+
+
+class SchemaMismatch(ValueError):
+    """Bytes that are no message of this schema version."""
+
+
+class Envelope(NamedTuple, Generic[Message]):
+    """A decoded message with its header."""
+
+    seq: int
+    sent_ns: int
+    message: Message
+
+
+def _to_wire(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return array_to_wire(value)
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a {type(value).__name__} cannot be sent; messages hold structs and arrays")
+
+
+def _from_wire(kind: type, value: Any) -> Any:
+    if getattr(kind, "__origin__", kind) is np.ndarray:
+        dtype, shape, data = value
+        return array_from_wire(dtype, tuple(shape), data)
+    raise TypeError(f"no decoding known for {kind}")
+
+
+_encoder = msgspec.msgpack.Encoder(enc_hook=_to_wire, order="deterministic")
+_decoders: dict[Any, msgspec.msgpack.Decoder[Any]] = {}
+
+
+def encode(message: msgspec.Struct, *, seq: int = 0, sent_ns: int = 0) -> bytes:
+    """Return header and body of one message."""
+    return _HEADER.pack(MAGIC, SCHEMA_VERSION, seq, sent_ns) + _encoder.encode(message)
+
+
+def decode(data: bytes, kind: type[Message], *, where: str = "message") -> Envelope[Message]:
+    """Return the message in `data`; `where` names the key or file in errors.
+
+    Raises SchemaMismatch for other versions, other data, and bodies that do not fit `kind`.
+    """
+    if len(data) < _HEADER.size or data[:4] != MAGIC:
+        raise SchemaMismatch(f"{where}: not a foretwin message ({len(data)} bytes)")
+    _, version, seq, sent_ns = _HEADER.unpack_from(data)
+    if version != SCHEMA_VERSION:
+        raise SchemaMismatch(
+            f"{where}: schema version {version}; this foretwin reads version {SCHEMA_VERSION}"
+        )
+    decoder = _decoders.get(kind)
+    if decoder is None:
+        decoder = _decoders[kind] = msgspec.msgpack.Decoder(kind, dec_hook=_from_wire)
+    try:
+        body = decoder.decode(memoryview(data)[_HEADER.size :])
+    except (msgspec.DecodeError, ValueError, TypeError) as error:
+        raise SchemaMismatch(f"{where}: no valid {kind.__name__}: {error}") from error
+    return Envelope(seq, sent_ns, body)
+
+
+def content_bytes(message: msgspec.Struct) -> bytes:
+    """Return the body alone: equal for equal messages, so it can be hashed."""
+    return _encoder.encode(message)
+
+
+def write_message(message: msgspec.Struct, path: Path) -> None:
+    """Write one message to a file, complete or not at all."""
+    partial = path.with_name(path.name + ".partial")
+    partial.write_bytes(encode(message))
+    partial.replace(path)
+
+
+def read_message(path: Path, kind: type[Message]) -> Message:
+    """Read one message from a file; raises SchemaMismatch naming the file."""
+    return decode(path.read_bytes(), kind, where=str(path)).message

@@ -1,0 +1,153 @@
+"""Conversions between geographic positions and local frames; nothing else in foretwin converts.
+
+A local frame is a transverse Mercator projection centred on its origin (scale 1, WGS84):
+metres, x east, y north, yaw counter-clockwise from the x axis. Never UTM, whose scale is off
+by up to 0.4 m per kilometre.
+"""
+
+from __future__ import annotations
+
+import threading
+from functools import lru_cache
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+import pyproj
+
+from contracts.arrays import Array
+
+
+class GeoPoint(msgspec.Struct, frozen=True):
+    """A position on WGS84; `alt_m` is above the ellipsoid and 0 where unknown."""
+
+    lat_deg: float
+    lon_deg: float
+    alt_m: float = 0.0
+
+    def validate(self) -> GeoPoint:
+        """Return self, or raise ValueError where the position is not on Earth or not finite."""
+        if not (np.isfinite(self.lat_deg) and np.isfinite(self.lon_deg)):
+            raise ValueError(f"position ({self.lat_deg}, {self.lon_deg}) is not finite")
+        if not (-90.0 <= self.lat_deg <= 90.0 and -180.0 <= self.lon_deg <= 180.0):
+            raise ValueError(
+                f"position ({self.lat_deg}, {self.lon_deg}) is outside latitude ±90, longitude ±180"
+            )
+        return self
+
+
+class LocalFrame(msgspec.Struct, frozen=True):
+    """A plane of metres around `origin`: x east, y north, z up."""
+
+    origin: GeoPoint
+
+
+class LocalPoses(NamedTuple):
+    """Positions (N, 2) in metres and yaws (N,) in radians in one local frame."""
+
+    xy_m: Array
+    yaw_rad: Array
+
+
+def wrap_angle(angle_rad: Array | float) -> Array:
+    """Return angles in radians, any shape, wrapped into [-π, π)."""
+    return (np.asarray(angle_rad, dtype=np.float64) + np.pi) % (2.0 * np.pi) - np.pi
+
+
+# A pyproj Transformer must not be shared between threads.
+@lru_cache(maxsize=256)
+def _projection(lat_deg: float, lon_deg: float, _thread: int) -> pyproj.Proj:
+    return pyproj.Proj(
+        proj="tmerc", lat_0=lat_deg, lon_0=lon_deg, k_0=1.0, x_0=0.0, y_0=0.0, ellps="WGS84"
+    )
+
+
+@lru_cache(maxsize=16)
+def _geodetic_from_ecef(_thread: int) -> pyproj.Transformer:
+    return pyproj.Transformer.from_crs("EPSG:4978", "EPSG:4979", always_xy=True)
+
+
+def _projection_of(frame: LocalFrame) -> pyproj.Proj:
+    return _projection(frame.origin.lat_deg, frame.origin.lon_deg, threading.get_ident())
+
+
+def local_from_geo(
+    frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | float
+) -> Array:
+    """Project positions in degrees, shape (N,) or scalar, to (N, 2) or (2,) metres in `frame`."""
+    x_m, y_m = _projection_of(frame)(
+        np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64)
+    )
+    return np.stack([np.asarray(x_m), np.asarray(y_m)], axis=-1)
+
+
+def geo_from_local(frame: LocalFrame, xy_m: Array) -> Array:
+    """Return (N, 2) or (2,) latitude, longitude in degrees of metres in `frame`."""
+    xy = np.asarray(xy_m, dtype=np.float64)
+    lon_deg, lat_deg = _projection_of(frame)(xy[..., 0], xy[..., 1], inverse=True)
+    return np.stack([np.asarray(lat_deg), np.asarray(lon_deg)], axis=-1)
+
+
+def geo_from_ecef(xyz_m: Array) -> Array:
+    """Return (N, 3) latitude, longitude (degrees), altitude (m) of (N, 3) ECEF metres."""
+    xyz = np.asarray(xyz_m, dtype=np.float64)
+    lon_deg, lat_deg, alt_m = _geodetic_from_ecef(threading.get_ident()).transform(
+        xyz[..., 0], xyz[..., 1], xyz[..., 2]
+    )
+    return np.stack([np.asarray(lat_deg), np.asarray(lon_deg), np.asarray(alt_m)], axis=-1)
+
+
+def grid_convergence(
+    frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | float
+) -> Array:
+    """Return the angle in radians from true to grid directions, positive counter-clockwise.
+
+    Spherical transverse Mercator convergence, Snyder (1987), Map Projections, eq. 8-8 region:
+    tan γ = tan(λ − λ0) sin φ. Within 100 km the ellipsoid changes it by less than 1e-6 rad.
+    """
+    dlon = np.radians(np.asarray(lon_deg, dtype=np.float64) - frame.origin.lon_deg)
+    return np.arctan(np.tan(dlon) * np.sin(np.radians(np.asarray(lat_deg, dtype=np.float64))))
+
+
+def local_from_geo_yaw(
+    frame: LocalFrame,
+    yaw_rad: Array | float,
+    lat_deg: Array | float,
+    lon_deg: Array | float,
+) -> Array:
+    """Turn yaws from true east at their own position into yaws from the x axis of `frame`."""
+    return wrap_angle(np.asarray(yaw_rad) + grid_convergence(frame, lat_deg, lon_deg))
+
+
+def geo_from_local_yaw(frame: LocalFrame, yaw_rad: Array | float, xy_m: Array) -> Array:
+    """Turn yaws from the x axis of `frame` at (N, 2) `xy_m` into yaws from true east there."""
+    geo = geo_from_local(frame, xy_m)
+    return wrap_angle(np.asarray(yaw_rad) - grid_convergence(frame, geo[..., 0], geo[..., 1]))
+
+
+def target_from_source(
+    target: LocalFrame, source: LocalFrame, xy_m: Array, yaw_rad: Array | float
+) -> LocalPoses:
+    """Move poses, (N, 2) metres and (N,) radians, from frame `source` into frame `target`."""
+    if target == source:
+        return LocalPoses(np.asarray(xy_m, dtype=np.float64), np.asarray(yaw_rad, dtype=np.float64))
+    geo = geo_from_local(source, xy_m)
+    true_yaw = geo_from_local_yaw(source, yaw_rad, xy_m)
+    return LocalPoses(
+        local_from_geo(target, geo[..., 0], geo[..., 1]),
+        local_from_geo_yaw(target, true_yaw, geo[..., 0], geo[..., 1]),
+    )
+
+
+def base_from_sensor(
+    xy_m: Array, yaw_rad: Array | float, body_from_sensor_m: tuple[float, float, float]
+) -> Array:
+    """Return base_link positions (N, 2) of sensors seen at (N, 2) `xy_m` with body yaw (N,).
+
+    `body_from_sensor_m` is the sensor's position in body axes (x forward, y left, z up).
+    """
+    yaw = np.asarray(yaw_rad, dtype=np.float64)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    x, y, _ = body_from_sensor_m
+    lever = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+    return np.asarray(xy_m, dtype=np.float64) - lever

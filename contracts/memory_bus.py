@@ -1,0 +1,102 @@
+"""The bus in one process, for tests: same calls, same mailboxes, no network."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import msgspec
+
+from contracts.bus import Alive, Mailbox, Received, Reply, Request
+from contracts.codec import decode, encode
+from contracts.keys import CHANNELS, key as channel_key
+
+
+def _matches(pattern: str, full_key: str) -> bool:
+    parts, words = pattern.split("/"), full_key.split("/")
+    return len(parts) == len(words) and all(
+        part in ("*", word) for part, word in zip(parts, words, strict=True)
+    )
+
+
+class MemoryBus:
+    """Delivers at once, in the publisher's thread; share one object between all sides."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._subscribers: list[tuple[str, str, Mailbox]] = []
+        self._servers: dict[str, Mailbox] = {}
+        self._alive: set[str] = set()
+        self._watchers: list[tuple[str, Mailbox]] = []
+        self._seq: dict[str, int] = {}
+
+    def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
+        """Send one message; see Bus."""
+        full_key = channel_key(channel, **ids)
+        with self._lock:
+            seq = self._seq.get(full_key, 0)
+            self._seq[full_key] = seq + 1
+            receivers = [box for pattern, _, box in self._subscribers if _matches(pattern, full_key)]
+        data = encode(message, seq=seq, sent_ns=time.time_ns())
+        for mailbox in receivers:
+            mailbox.put(Received(channel, full_key, data, CHANNELS[channel].kind))
+
+    def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
+        """Receive into `mailbox`; see Bus."""
+        with self._lock:
+            self._subscribers.append((channel_key(channel, **ids), channel, mailbox))
+
+    def request(
+        self, channel: str, message: msgspec.Struct, mailbox: Mailbox, *, tag: Any = None,
+        timeout_s: float = 10.0, **ids: str,
+    ) -> None:  # fmt: skip
+        """Ask; a question nobody serves is answered at once with an error."""
+        full_key = channel_key(channel, **ids)
+        kind = CHANNELS[channel].reply
+        if kind is None:
+            raise ValueError(f"channel {channel!r} takes no questions")
+        server = self._servers.get(full_key)
+
+        def answer(data: bytes | None, reason: str) -> None:
+            reply = None if data is None else decode(data, kind, where=full_key).message
+            mailbox.put(Reply(channel, tag, reply, reason or None, time.monotonic_ns()))
+
+        if server is None:
+            answer(None, "no answer")
+            return
+        server.put(Request(channel, full_key, encode(message), answer))
+
+    def serve(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
+        """Answer questions; see Bus."""
+        self._servers[channel_key(channel, **ids)] = mailbox
+
+    def declare_alive(self, alive_key: str) -> None:
+        """Hold a liveliness token; see Bus."""
+        self._set_alive(alive_key, up=True)
+
+    def lose(self, alive_key: str) -> None:
+        """Let a token vanish, as a killed process would."""
+        self._set_alive(alive_key, up=False)
+
+    def _set_alive(self, alive_key: str, *, up: bool) -> None:
+        with self._lock:
+            (self._alive.add if up else self._alive.discard)(alive_key)
+            watchers = [box for pattern, box in self._watchers if _matches(pattern, alive_key)]
+        for mailbox in watchers:
+            mailbox.put(Alive(alive_key, up, time.monotonic_ns()))
+
+    def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
+        """Watch liveliness tokens; see Bus."""
+        with self._lock:
+            self._watchers.append((alive_key, mailbox))
+            known = [full_key for full_key in self._alive if _matches(alive_key, full_key)]
+        for full_key in sorted(known):
+            mailbox.put(Alive(full_key, True, time.monotonic_ns()))
+
+    def close(self) -> None:
+        """Forget everything."""
+        with self._lock:
+            self._subscribers.clear()
+            self._servers.clear()
+            self._watchers.clear()

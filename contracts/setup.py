@@ -1,0 +1,100 @@
+"""What each process is started with: one JSON file, named on its command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from contracts.frames import LocalFrame
+from contracts.vehicle import VehicleParameters
+
+_Setup = TypeVar("_Setup", bound="ProcessSetup")
+
+
+class BusSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How to reach the bus; `lossless` makes every publisher wait rather than drop (lock step)."""
+
+    endpoint: str
+    lossless: bool = False
+
+
+class ProcessSetup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every process knows: the run, its own id, the bus, and where its log goes."""
+
+    run_id: str
+    process_id: str
+    vehicle_id: str
+    bus: BusSetup
+    log_file: str
+
+
+class ReplaySetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A recorded drive; times are seconds from the log's start. `speed` None is lock step."""
+
+    log: str
+    start_s: float = 0.0
+    end_s: float | None = None
+    speed: float | None = 1.0
+
+
+class StandinSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The stand-in car; `path_file` is a JSON object with lat_deg, lon_deg, speed_mps arrays."""
+
+    path_file: str
+    parameters_file: str | None = None
+    end_s: float | None = None
+    speed: float | None = 1.0
+    seed: int = 0
+    plan_shift_m: float = 0.0
+    """Moves the published plan to the left: a known error, for tests of the plan comparison."""
+
+
+class RecorderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Writes the vehicle's channels to one MCAP file."""
+
+    file: str
+
+
+class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A worker of one role; `drive_frame` is the frame of MirrorSample."""
+
+    role: str
+    worlds_dir: str
+    vehicle: VehicleParameters
+    drive_frame: LocalFrame
+    control_hz: float = 20.0
+    mirror_window_s: float = 8.0
+    mirror_rate_hz: float = 10.0
+    commands_recorded: bool = False
+    threads: int = 1
+
+
+class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Builds Worlds from one map into one folder, through a cache shared between runs."""
+
+    map: str
+    worlds_dir: str
+    cache_dir: str
+
+
+class ViewerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Writes `file`; `live` adds a window (native), a browser server (web) or nothing (none)."""
+
+    file: str
+    worlds_dir: str
+    drive_frame: LocalFrame
+    live: str = "none"
+    title: str = "foretwin"
+    start_stamp_ns: int = 0
+
+
+def write_setup(setup: ProcessSetup, path: Path) -> None:
+    """Write a setup as JSON."""
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(setup), indent=2))
+
+
+def read_setup(path: Path, kind: type[_Setup]) -> _Setup:
+    """Read a setup of type `kind`; raises msgspec.ValidationError naming the field at fault."""
+    return msgspec.json.decode(path.read_bytes(), type=kind)

@@ -1,0 +1,52 @@
+"""Parameters of a vehicle: each a value with a standard deviation and where it came from."""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class Parameter(msgspec.Struct, frozen=True):
+    """One number with its uncertainty (one standard deviation, None where unknown) and source."""
+
+    value: float
+    std: float | None = None
+    source: str = "default"
+
+
+class VehicleParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a planar vehicle model needs, in SI units, with base_link at the rear-axle centre.
+
+    Cornering stiffnesses are per axle. `steering_ratio` is steering wheel over tyre angle,
+    `steering_offset_rad` is added at the tyre. Delays are from command to actuator.
+    """
+
+    name: str
+    mass_kg: Parameter
+    yaw_inertia_kgm2: Parameter
+    wheelbase_m: Parameter
+    cog_from_rear_axle_m: Parameter
+    cog_height_m: Parameter
+    front_cornering_stiffness_npr: Parameter
+    rear_cornering_stiffness_npr: Parameter
+    friction: Parameter
+    steering_ratio: Parameter
+    steering_offset_rad: Parameter
+    steering_delay_s: Parameter
+    max_tire_angle_rad: Parameter
+    max_tire_rate_radps: Parameter
+    drag_npv2: Parameter
+    """Force over speed squared, N/(m/s)²."""
+    rolling_resistance_n: Parameter
+    drive_gain: Parameter
+    """Achieved over commanded acceleration when driving."""
+    brake_gain: Parameter
+    """Achieved over commanded deceleration when braking."""
+    max_drive_accel_mps2: Parameter
+    max_brake_decel_mps2: Parameter
+    wheel_inertia_mass_factor: Parameter
+    """Effective over real mass along the road, for the wheels' spin inertia."""
+    length_m: Parameter
+    width_m: Parameter
+    height_m: Parameter
+    rear_overhang_m: Parameter
+    """From the rear bumper to the rear axle."""

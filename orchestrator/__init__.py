@@ -1,0 +1,1 @@
+"""Route ahead, mission, supervision, results, configuration, and the command line."""

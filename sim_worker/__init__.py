@@ -1,0 +1,1 @@
+"""Vehicle model, futures, twin, shadow and ghost, metrics, and the worker process."""

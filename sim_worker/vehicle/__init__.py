@@ -1,0 +1,1 @@
+"""The planar vehicle model and its parameters."""

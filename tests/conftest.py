@@ -1,0 +1,26 @@
+"""Fixtures shared by all tests: the folder of real data, and a warning-free start."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if os.environ.get("FORETWIN_DATA"):
+        return
+    skip = pytest.mark.skip(reason="FORETWIN_DATA is not set: no real drives and maps here")
+    for item in items:
+        if "real_data" in item.keywords:
+            item.add_marker(skip)
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """The folder of real drives and maps; tests that use it are marked real_data."""
+    folder = Path(os.environ["FORETWIN_DATA"])
+    if not folder.is_dir():
+        raise FileNotFoundError(f"FORETWIN_DATA names {folder}, which is no folder")
+    return folder

@@ -1,0 +1,1 @@
+"""What one sees: the Rerun recording, its blueprint, and the viewer process."""

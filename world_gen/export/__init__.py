@@ -1,0 +1,1 @@
+"""Exports of a World, one file per format."""
