@@ -1,0 +1,36 @@
+"""Junctions as a driver sees them, found in the road graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from contracts.arrays import Array
+from contracts.world import IntersectionSummary
+from world_gen.road_graph import DirectedEdge
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JunctionArm:
+    """One road that meets a junction.
+
+    `outward` are the directed edges that leave the junction's nodes along this road, whichever
+    way cars may drive them: one for a street, two for a dual carriageway.
+    """
+
+    name: str
+    bearing_rad: float
+    outward: tuple[DirectedEdge, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Junction:
+    """One junction: `nodes` are all OSM graph nodes inside it, `inner` the edges between them."""
+
+    summary: IntersectionSummary
+    centre_xy_m: Array
+    nodes: frozenset[int]
+    inner: tuple[int, ...]
+    """Indices of the edges inside the junction (ring, short links between carriageways)."""
+    arms: tuple[JunctionArm, ...]
+    radius_m: float
+    """Distance from the centre to the farthest node of the junction."""
