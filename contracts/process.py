@@ -1,0 +1,128 @@
+"""How every process of a run lives: reads its setup, joins the bus, says it is alive, and leaves.
+
+A process leaves when the run ends (`run_end`), when it is told to (SIGTERM), or when the
+orchestrator is gone. Ctrl-C is the orchestrator's business: children ignore SIGINT.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from contracts.bus import Alive, Bus, Mailbox, ZenohBus
+from contracts.keys import alive_key
+from contracts.setup import ProcessSetup, read_setup
+
+_Setup = TypeVar("_Setup", bound=ProcessSetup)
+
+ORCHESTRATOR_GRACE_S = 5.0
+"""A lost link comes back within this time, or the orchestrator is taken for gone."""
+
+
+class JsonLines(logging.Formatter):
+    """One JSON object per line: wall time, process, level, text, and the traceback if any."""
+
+    def __init__(self, process_id: str) -> None:
+        super().__init__()
+        self._process_id = process_id
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the record as one line."""
+        line = {
+            "wall_s": round(record.created, 3),
+            "process": self._process_id,
+            "level": record.levelname.lower(),
+            "source": record.name,
+            "text": record.getMessage(),
+        }
+        if record.exc_info:
+            line["traceback"] = self.formatException(record.exc_info)
+        return json.dumps(line, ensure_ascii=False)
+
+
+def log_to_file(setup: ProcessSetup) -> None:
+    """Send the process's log to the run's file; short appends of several processes interleave."""
+    handler = logging.FileHandler(setup.log_file, encoding="utf-8", delay=True)
+    handler.setFormatter(JsonLines(setup.process_id))
+    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
+
+
+class ProcessLife:
+    """Tells a process when its run is over; `over` is cheap to ask."""
+
+    def __init__(self, setup: ProcessSetup, bus: Bus) -> None:
+        self._setup = setup
+        self._bus = bus
+        self._mailbox = Mailbox(16)
+        self._orchestrator_seen = False
+        self._orchestrator_gone_since: float | None = None
+        self.terminated = threading.Event()
+        bus.subscribe("run_end", self._mailbox, run=setup.run_id)
+        bus.watch_alive(alive_key(run=setup.run_id, process="orchestrator"), self._mailbox)
+
+    def ready(self) -> None:
+        """Declare the process alive: it can take work from now on."""
+        self._bus.declare_alive(
+            alive_key(run=self._setup.run_id, process=self._setup.process_id)
+        )
+
+    @property
+    def orchestrator_ready(self) -> bool:
+        """Whether the orchestrator has said that it can receive."""
+        self._look()
+        return self._orchestrator_seen
+
+    @property
+    def over(self) -> bool:
+        """Whether the process should finish what it holds and leave."""
+        self._look()
+        gone = self._orchestrator_gone_since
+        if gone is not None and time.monotonic() - gone > ORCHESTRATOR_GRACE_S:
+            self.terminated.set()
+        return self.terminated.is_set()
+
+    def _look(self) -> None:
+        while (item := self._mailbox.take()) is not None:
+            if not isinstance(item, Alive):
+                self.terminated.set()
+            elif item.up:
+                self._orchestrator_seen = True
+                self._orchestrator_gone_since = None
+            elif self._orchestrator_seen:
+                self._orchestrator_gone_since = time.monotonic()
+
+
+def run_process(
+    kind: type[_Setup], serve: Callable[[_Setup, Bus, ProcessLife], None], argv: list[str] | None = None
+) -> None:
+    """Run `serve` as this process's work, with `--setup FILE` from the command line.
+
+    Leaves through os._exit: a library's exit handler must not hold up the end of a drive.
+    """
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--setup", type=Path, required=True, help="JSON file written by foretwin")
+    setup = read_setup(parser.parse_args(argv).setup, kind)
+    log_to_file(setup)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    code = 0
+    try:
+        with ZenohBus(setup.bus) as bus:
+            life = ProcessLife(setup, bus)
+            signal.signal(signal.SIGTERM, lambda *_: life.terminated.set())
+            serve(setup, bus, life)
+    except Exception:
+        logging.getLogger(setup.process_id).exception("ended by an error")
+        code = 1
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)

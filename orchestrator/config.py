@@ -1,0 +1,154 @@
+"""The configuration of a drive: one TOML file, flags over it, checked into one frozen struct."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+View = Literal["auto", "native", "web", "none"]
+Source = Literal["auto", "log", "standin", "live"]
+
+HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
+"""The horizons at which the nominal future is compared with the drive."""
+
+
+class ConfigError(ValueError):
+    """A setting that cannot be used; the message names it and what would be right."""
+
+
+class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Everything that decides what a drive does; times in seconds of the drive.
+
+    `speed` None is lock step (`--speed max`). `rate_hz` counts rounds per wall second; in lock
+    step, where no wall clock exists, per second of the drive.
+    """
+
+    map: str | None = None
+    route: str | None = None
+    """A GPX or GeoJSON file, or `from-log`; None predicts the route from the road graph."""
+    log: str | None = None
+    source: Source = "auto"
+    start_s: float = 0.0
+    end_s: float | None = None
+    speed: float | None = 1.0
+    workers: int = 2
+    futures: int = 64
+    futures_per_job: int = 32
+    rate_hz: float = 2.0
+    horizon_s: float = 8.0
+    planner: str = "pure_pursuit_idm"
+    seed: int = 0
+    vehicle: str | None = None
+    vehicle_id: str = "ego"
+    view: View = "auto"
+    out: str = "runs"
+    radius_m: float = 150.0
+    look_ahead_s: float = 60.0
+    cache_dir: str | None = None
+    endpoint: str | None = None
+    """Where the router listens, such as tcp/127.0.0.1:7447; None takes a free loopback port."""
+    standin_end_s: float | None = None
+    standin_plan_shift_m: float = 0.0
+
+    def validate(self) -> DriveConfig:
+        """Return self, or raise ConfigError naming the first setting that cannot be used."""
+        checks: tuple[tuple[bool, str], ...] = (
+            (self.workers >= 1, f"--workers {self.workers}: at least 1"),
+            (self.futures >= 1, f"--futures {self.futures}: at least 1"),
+            (self.futures_per_job >= 1, f"futures_per_job {self.futures_per_job}: at least 1"),
+            (0.0 < self.rate_hz <= 50.0, f"--rate {self.rate_hz}: above 0, at most 50"),
+            (1.0 <= self.horizon_s <= 60.0, f"--horizon {self.horizon_s}: 1 to 60 seconds"),
+            (
+                self.speed is None or (math.isfinite(self.speed) and 0.0 < self.speed <= 1000.0),
+                f"--speed {self.speed}: above 0, at most 1000, or max",
+            ),
+            (self.start_s >= 0.0, f"--start {self.start_s}: not negative"),
+            (
+                self.end_s is None or self.end_s > self.start_s,
+                f"--end {self.end_s}: after --start {self.start_s}",
+            ),
+            (20.0 <= self.radius_m <= 2000.0, f"radius_m {self.radius_m}: 20 to 2000"),
+            (5.0 <= self.look_ahead_s <= 600.0, f"look_ahead_s {self.look_ahead_s}: 5 to 600"),
+            (
+                self.source != "log" or self.log is not None,
+                "source log needs --log FILE",
+            ),
+            (
+                self.route != "from-log" or self.log is not None,
+                "--route from-log needs --log FILE",
+            ),
+            (
+                self.log is None or self.map is not None,
+                "--log needs --map FILE: the embedded map holds no real drive",
+            ),
+            (
+                self.map is None or self.log is not None or self.route is not None
+                or self.source == "live",
+                "--map needs --log FILE (a recorded drive), --route FILE (the stand-in car drives "
+                "it) or --source live",
+            ),
+        )  # fmt: skip
+        for holds, text in checks:
+            if not holds:
+                raise ConfigError(text)
+        return self
+
+    @property
+    def lock_step(self) -> bool:
+        """Whether no clock runs: every round complete, results a pure function of the input."""
+        return self.speed is None
+
+    @property
+    def resolved_source(self) -> Literal["log", "standin", "live"]:
+        """What `auto` means here."""
+        if self.source != "auto":
+            return self.source
+        return "log" if self.log is not None else "standin"
+
+    @property
+    def worlds_cache(self) -> Path:
+        """The folder where Worlds are kept between runs."""
+        if self.cache_dir is not None:
+            return Path(self.cache_dir)
+        base = os.environ.get("XDG_CACHE_HOME")
+        return (Path(base) if base else Path.home() / ".cache") / "foretwin" / "worlds"
+
+
+def load_config(path: Path | None, overrides: dict[str, Any]) -> DriveConfig:
+    """Read the TOML file, lay the flags that were given over it, and check the whole.
+
+    `speed` may be a number or `max` in both. Raises FileNotFoundError or ConfigError, one line.
+    """
+    values: dict[str, Any] = {}
+    where = "flags"
+    if path is not None:
+        if not path.is_file():
+            raise FileNotFoundError(f"configuration {path}: no such file")
+        where = str(path)
+        try:
+            values = msgspec.toml.decode(path.read_bytes())
+        except msgspec.DecodeError as error:
+            raise ConfigError(f"{path}: not TOML: {error}") from error
+    values |= {name: value for name, value in overrides.items() if value is not None}
+    if "speed" in values:
+        values["speed"] = parse_speed(values["speed"])
+    try:
+        config = msgspec.convert(values, DriveConfig)
+    except msgspec.ValidationError as error:
+        known = ", ".join(DriveConfig.__struct_fields__)
+        raise ConfigError(f"{where}: {error} (known settings: {known})") from error
+    return config.validate()
+
+
+def parse_speed(value: object) -> float | None:
+    """Return the replay speed, None for `max`; raises ConfigError."""
+    if value == "max":
+        return None
+    try:
+        return float(str(value))
+    except ValueError:
+        raise ConfigError(f"--speed {value}: a number above 0, or max") from None

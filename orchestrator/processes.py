@@ -1,0 +1,136 @@
+"""The table of processes that a drive consists of, and what each is started with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+from contracts.setup import (
+    BuilderSetup,
+    ProcessSetup,
+    RecorderSetup,
+    ReplaySetup,
+    StandinSetup,
+    ViewerSetup,
+    WorkerSetup,
+)
+from orchestrator.plan import DrivePlan
+
+ORCHESTRATOR = "orchestrator"
+BUILDER = "builder"
+MIRROR = "mirror"
+VEHICLE = "vehicle"
+
+WhenDead = Literal["restart", "report", "end_drive"]
+
+
+class ProcessRow(NamedTuple):
+    """One kind of process: its module, when it runs, how many, what follows from its death."""
+
+    name: str
+    module: str
+    runs: Callable[[DrivePlan], bool]
+    count: Callable[[DrivePlan], int]
+    when_dead: WhenDead
+    setup: Callable[[DrivePlan, str], ProcessSetup]
+
+
+def _one(_: DrivePlan) -> int:
+    return 1
+
+
+def _always(_: DrivePlan) -> bool:
+    return True
+
+
+def _base(plan: DrivePlan, process_id: str) -> dict[str, object]:
+    return {
+        "run_id": plan.run_id,
+        "process_id": process_id,
+        "vehicle_id": plan.config.vehicle_id,
+        "bus": plan.bus,
+        "log_file": str(plan.folder / "log.jsonl"),
+    }
+
+
+def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return WorkerSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        role="mirror" if process_id == MIRROR else "futures",
+        worlds_dir=str(plan.worlds_dir),
+        vehicle=plan.vehicle,
+        drive_frame=plan.drive_frame,
+        commands_recorded=plan.commands_recorded,
+    )
+
+
+def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return BuilderSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        map=str(plan.map_file),
+        worlds_dir=str(plan.worlds_dir),
+        cache_dir=str(plan.config.worlds_cache),
+    )
+
+
+def _recorder(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return RecorderSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        file=str(plan.folder / "drive.mcap"),
+    )
+
+
+def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return ViewerSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        file=str(plan.folder / "monitor.rrd"),
+        worlds_dir=str(plan.worlds_dir),
+        drive_frame=plan.drive_frame,
+        live=plan.live_view,
+        title=f"foretwin {plan.run_id}",
+        start_stamp_ns=plan.start_stamp_ns,
+    )
+
+
+def _replay(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return ReplaySetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        log=str(plan.log_file),
+        start_s=plan.config.start_s,
+        end_s=plan.config.end_s,
+        speed=plan.config.speed,
+    )
+
+
+def _standin(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return StandinSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        path_file=str(plan.standin_path_file),
+        end_s=plan.config.end_s,
+        speed=plan.config.speed,
+        seed=plan.config.seed,
+        plan_shift_m=plan.config.standin_plan_shift_m,
+    )
+
+
+def _source_is(source: str) -> Callable[[DrivePlan], bool]:
+    return lambda plan: plan.config.resolved_source == source
+
+
+PROCESSES: tuple[ProcessRow, ...] = (
+    ProcessRow(BUILDER, "orchestrator.world_builder", _always, _one, "restart", _builder),
+    ProcessRow("w", "sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker),
+    ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
+    ProcessRow("recorder", "telemetry.recorder", _always, _one, "report", _recorder),
+    ProcessRow("viewer", "viewer", _always, _one, "report", _viewer),
+    ProcessRow(VEHICLE, "telemetry.replay", _source_is("log"), _one, "end_drive", _replay),
+    ProcessRow(VEHICLE, "telemetry.standin", _source_is("standin"), _one, "end_drive", _standin),
+)
+"""In the order in which they are started; the vehicle waits for the orchestrator's token."""
+
+
+def process_ids(row: ProcessRow, plan: DrivePlan) -> tuple[str, ...]:
+    """Return the ids of a row's processes: its name, numbered where there are several kinds."""
+    if row.name == "w":
+        return tuple(f"w{index}" for index in range(row.count(plan)))
+    return (row.name,)

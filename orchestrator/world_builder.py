@@ -1,0 +1,59 @@
+"""The process that builds Worlds in the background: `python -m orchestrator.world_builder`."""
+
+from __future__ import annotations
+
+import logging
+import time
+from pathlib import Path
+
+from contracts.bus import Bus, Mailbox, Request
+from contracts.process import ProcessLife, run_process
+from contracts.setup import BuilderSetup
+from contracts.simulation import BuildReply
+from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
+from world_gen.read_osm import read_map
+from world_gen.world_store import WorldStore
+
+log = logging.getLogger("builder")
+
+
+def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
+    """Read the map once, then answer build requests until the run ends."""
+    osm = read_map(Path(setup.map))
+    graph = build_road_graph(osm)
+    junctions = {j.summary.id: j for j in find_intersections(osm, graph)}
+    store = WorldStore(Path(setup.worlds_dir))
+    mailbox = Mailbox(256)
+    bus.serve("build", mailbox, run=setup.run_id, process=setup.process_id)
+    life.ready()
+    while not life.over:
+        request = mailbox.take(0.1)
+        if not isinstance(request, Request):
+            continue
+        wanted = request.message()
+        junction = junctions.get(wanted.intersection_id)
+        if junction is None:
+            request.refuse(f"the map holds no intersection {wanted.intersection_id!r}")
+            continue
+        started = time.perf_counter()
+        try:
+            world, cached = store.cached_build(
+                osm, graph, junction, radius_m=wanted.radius_m, cache=Path(setup.cache_dir)
+            )
+        except Exception as error:
+            log.exception("world of %s", wanted.intersection_id)
+            request.refuse(f"world of {wanted.intersection_id}: {type(error).__name__}: {error}")
+            continue
+        request.reply(
+            BuildReply(
+                intersection_id=wanted.intersection_id,
+                world_id=world.id,
+                seconds=time.perf_counter() - started,
+                cached=cached,
+            )
+        )
+
+
+if __name__ == "__main__":
+    run_process(BuilderSetup, serve_builds)
