@@ -9,6 +9,8 @@ from typing import Any, Literal
 
 import msgspec
 
+from contracts.errors import UserError
+
 View = Literal["auto", "native", "web", "none"]
 Source = Literal["auto", "log", "standin", "live"]
 
@@ -16,7 +18,7 @@ HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 """The horizons at which the nominal future is compared with the drive."""
 
 
-class ConfigError(ValueError):
+class ConfigError(UserError):
     """A setting that cannot be used; the message names it and what would be right."""
 
 

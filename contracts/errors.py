@@ -1,0 +1,7 @@
+"""The one error that means: the input cannot be used, and the user can mend it."""
+
+from __future__ import annotations
+
+
+class UserError(ValueError):
+    """One line that names the file, field or value at fault and what would be right."""

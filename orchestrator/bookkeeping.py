@@ -1,0 +1,128 @@
+"""What a drive counts: telemetry received and lost, futures, errors of prediction, latencies."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import defaultdict
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from contracts.simulation import Comparison
+from orchestrator.rounds import RoundDone
+
+
+def percentile(values: list[float], q: float) -> float | None:
+    """Return the q-th percentile, None of nothing."""
+    return round(float(np.percentile(values, q)), 3) if values else None
+
+
+@dataclass(slots=True)
+class TelemetryCount:
+    """Samples by key: received, lost (gaps in the sender's numbering), and their age."""
+
+    received: int = 0
+    lost: int = 0
+    by_channel: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    ages_ms: list[float] = field(default_factory=list)
+    _next: dict[str, int] = field(default_factory=dict)
+
+    def take(self, *, key: str, channel: str, seq: int, age_ms: float) -> None:
+        """Count one sample."""
+        expected = self._next.get(key)
+        if expected is not None and seq > expected:
+            self.lost += seq - expected
+        self._next[key] = seq + 1
+        self.received += 1
+        self.by_channel[channel] += 1
+        self.ages_ms.append(age_ms)
+
+    def settle(self, published: dict[str, int]) -> None:
+        """Count what the vehicle says it published and that never came, before a first sample too."""
+        missing = sum(max(0, sent - self.by_channel[name]) for name, sent in published.items())
+        self.lost = max(self.lost, missing)
+
+    def record(self, skipped_invalid: int) -> dict[str, Any]:
+        """Return the `telemetry` part of run.json."""
+        return {
+            "received": self.received,
+            "lost": self.lost,
+            "skipped_invalid": skipped_invalid,
+            "age_ms_p50": percentile(self.ages_ms, 50),
+            "age_ms_p95": percentile(self.ages_ms, 95),
+        }
+
+
+@dataclass(slots=True)
+class FuturesCount:
+    """Futures of complete rounds, and the hash of all their trajectories in order."""
+
+    rounds: int = 0
+    count: int = 0
+    distinct: int = 0
+    distinct_min: int | None = None
+    sim_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    latencies_ms: list[float] = field(default_factory=list)
+    _hash: Any = field(default_factory=hashlib.sha256)
+
+    def take(self, done: RoundDone, *, distinct: int) -> str:
+        """Count one round; returns the hash of its trajectories alone."""
+        own = hashlib.sha256()
+        own.update(f"{done.order.stamp_ns}".encode())
+        for result in done.results:
+            own.update(np.ascontiguousarray(result.trajectory.states).tobytes())
+            own.update(np.ascontiguousarray(result.outcome.collided).tobytes())
+            self.count += len(result.variant_indices)
+            self.sim_seconds += result.sim_seconds
+            self.cpu_seconds += result.cpu_seconds
+        self._hash.update(own.digest())
+        self.rounds += 1
+        self.distinct += distinct
+        self.distinct_min = distinct if self.distinct_min is None else min(self.distinct_min, distinct)
+        self.latencies_ms.append(done.latency_ms)
+        return own.hexdigest()
+
+    def record(self, *, missed: int) -> dict[str, Any]:
+        """Return the `futures` part of run.json; `rounds` counts the complete ones."""
+        return {
+            "count": self.count,
+            "distinct": self.distinct,
+            "distinct_min_per_round": self.distinct_min,
+            "missed_rounds": missed,
+            "rounds": self.rounds,
+            "sim_seconds": round(self.sim_seconds, 3),
+            "cpu_seconds": round(self.cpu_seconds, 3),
+            "sha256": self._hash.hexdigest(),
+        }
+
+
+@dataclass(slots=True)
+class ComparisonCount:
+    """Mean displacement errors by horizon: the nominal future and two baselines on the same data."""
+
+    errors: dict[float, list[tuple[float, float, float]]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
+
+    def take(self, comparison: Comparison) -> None:
+        """Count one comparison."""
+        self.errors[comparison.horizon_s].append(
+            (
+                comparison.nominal.ade_m,
+                comparison.constant_velocity.ade_m,
+                comparison.constant_turn_rate.ade_m,
+            )
+        )
+
+    def record(self, *, independent: bool) -> dict[str, Any]:
+        """Return the `comparison` part of run.json."""
+        means = {f"{h:g}": np.mean(rows, axis=0) for h, rows in sorted(self.errors.items())}
+        return {
+            "ade_m": {h: round(float(m[0]), 4) for h, m in means.items()},
+            "constant_velocity_ade_m": {h: round(float(m[1]), 4) for h, m in means.items()},
+            "constant_turn_rate_ade_m": {h: round(float(m[2]), 4) for h, m in means.items()},
+            "count": {f"{h:g}": len(rows) for h, rows in sorted(self.errors.items())},
+            "independent": independent,
+        }

@@ -1,0 +1,169 @@
+"""The command line: what every command takes. The work is in the modules they import when run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from contracts.errors import UserError
+
+EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
+
+app = typer.Typer(
+    name="foretwin",
+    help="A low-fidelity digital twin that drives ahead of a real car.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+MapArgument = Annotated[Path, typer.Argument(help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")]
+OutOption = Annotated[Path, typer.Option("--out", help="file to write")]
+
+
+@app.command()
+def drive(
+    config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
+    map_file: Annotated[str | None, typer.Option("--map", help="map of the place")] = None,
+    route: Annotated[
+        str | None, typer.Option(help="GPX or GeoJSON file, or from-log; default: predicted")
+    ] = None,
+    log: Annotated[str | None, typer.Option(help="recorded drive to replay")] = None,
+    source: Annotated[
+        str | None, typer.Option(help="log, standin, live (a car on the bus), or auto")
+    ] = None,
+    start: Annotated[float | None, typer.Option(help="seconds into the log")] = None,
+    end: Annotated[float | None, typer.Option(help="seconds into the log")] = None,
+    speed: Annotated[
+        str | None, typer.Option(help="replay speed, or max for lock step [default: 1]")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="worker processes [default: 2]")] = None,
+    futures: Annotated[int | None, typer.Option(help="futures per round [default: 64]")] = None,
+    rate: Annotated[
+        float | None, typer.Option(help="rounds per wall second [default: 2]")
+    ] = None,
+    horizon: Annotated[float | None, typer.Option(help="seconds ahead [default: 8]")] = None,
+    planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of the variants [default: 0]")] = None,
+    vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
+    view: Annotated[
+        str | None, typer.Option(help="auto, native, web or none [default: auto]")
+    ] = None,
+    out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,
+) -> None:
+    """Drive ahead of a car: worlds for the coming junctions, futures, live comparison."""
+    from orchestrator.config import load_config
+    from orchestrator.drive import drive as run_drive
+
+    settings = load_config(
+        config,
+        {
+            "map": map_file, "route": route, "log": log, "source": source, "start_s": start,
+            "end_s": end, "speed": speed, "workers": workers, "futures": futures, "rate_hz": rate,
+            "horizon_s": horizon, "planner": planner, "seed": seed, "vehicle": vehicle,
+            "view": view, "out": out,
+        },
+    )  # fmt: skip
+    raise typer.Exit(run_drive(settings))
+
+
+@app.command()
+def intersections(
+    map_file: MapArgument,
+    route: Annotated[
+        Path | None, typer.Option(help="only those along this GPX or GeoJSON line")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
+) -> None:
+    """List the junctions of a map, each one as a driver sees it."""
+    from orchestrator.map_commands import list_intersections
+
+    list_intersections(map_file, route=route, as_json=as_json)
+
+
+@app.command()
+def world(
+    map_file: MapArgument,
+    out: OutOption,
+    at: Annotated[str | None, typer.Option(help="LAT,LON: the junction nearest to it")] = None,
+    junction_id: Annotated[str | None, typer.Option("--id", help="the junction's id")] = None,
+    radius: Annotated[float, typer.Option(help="metres around the junction")] = 150.0,
+    file_format: Annotated[str, typer.Option("--format", help="mjcf or png")] = "mjcf",
+) -> None:
+    """Write the World of one junction: a MuJoCo model or a top-down picture."""
+    from orchestrator.map_commands import write_world
+
+    write_world(
+        map_file, at=at, junction_id=junction_id, radius_m=radius, file_format=file_format, out=out
+    )
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(help="recorded drive")],
+    target: Annotated[Path, typer.Argument(help="MCAP file to write")],
+) -> None:
+    """Convert a recorded drive to MCAP with ROS 2 messages."""
+    from orchestrator.log_commands import convert_log
+
+    convert_log(source, target)
+
+
+@app.command()
+def view(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")]) -> None:
+    """Open the recording of a run in the viewer."""
+    from orchestrator.log_commands import open_view
+
+    raise typer.Exit(open_view(run_folder))
+
+
+@app.command()
+def doctor() -> None:
+    """Say what this machine has and what is missing."""
+    from orchestrator.doctor import examine
+
+    raise typer.Exit(examine())
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; returns 0 done, 1 internal error, 2 the user's input, 130 Ctrl-C."""
+    try:
+        result = app(arguments, standalone_mode=False)
+    except (UserError, FileNotFoundError, IsADirectoryError, PermissionError) as error:
+        print(f"foretwin: {_one_line(error)}", file=sys.stderr)
+        return EXIT_USER
+    except (KeyboardInterrupt, typer.Abort):
+        print("foretwin: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except Exception as error:
+        return _report(error)
+    return result if isinstance(result, int) else 0
+
+
+def _report(error: Exception) -> int:
+    """Say an unexpected error in one line; the traceback goes to a file."""
+    if hasattr(error, "show") and hasattr(error, "exit_code"):  # the command line's own errors
+        error.show()
+        return int(error.exit_code)
+    import tempfile
+    import traceback
+
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="foretwin-", suffix=".log", delete=False, encoding="utf-8"
+    ) as file:
+        traceback.print_exception(error, file=file)
+    print(
+        f"foretwin: internal error: {type(error).__name__}: {_one_line(error)} "
+        f"(traceback in {file.name})",
+        file=sys.stderr,
+    )
+    return EXIT_INTERNAL
+
+
+def _one_line(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror.lower()}"
+    return " ".join(str(error).split())
