@@ -1,0 +1,211 @@
+"""Reads and checks everything a drive needs before anything is written."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.drive import VehicleInfo
+from contracts.errors import UserError
+from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from contracts.setup import BusSetup
+from contracts.vehicle import VehicleParameters
+from orchestrator.config import ConfigError, DriveConfig
+from orchestrator.doctor import has_display
+from orchestrator.endpoints import free_endpoint
+from orchestrator.line_matching import match_line
+from orchestrator.road_index import RoadIndex
+from orchestrator.route import Route
+from orchestrator.standin_path import StandinPath, standin_path
+from sim_worker.planners.registry import load_planner
+from sim_worker.vehicle.parameters import load_vehicle
+from telemetry.logs import line_of_log, open_log, read_line
+from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
+from world_gen.intersections import Junction
+from world_gen.osm_map import OsmMap
+from world_gen.read_osm import read_map
+from world_gen.road_graph import RoadGraph
+
+EMBEDDED = Path(__file__).parent / "embedded"
+EMBEDDED_MAP = EMBEDDED / "drawn_town.osm"
+EMBEDDED_ROUTE = EMBEDDED / "route.geojson"
+NEAR_ROAD_M = 50.0
+"""A log none of whose positions lies this near to a road was not driven in this map."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveInputs:
+    """Everything read: nothing here has touched the folder of runs yet."""
+
+    config: DriveConfig
+    map_file: Path
+    osm: OsmMap
+    graph: RoadGraph
+    index: RoadIndex
+    junctions: tuple[Junction, ...]
+    routes: tuple[Route, ...]
+    route_source: str
+    drive_frame: LocalFrame
+    vehicle: VehicleParameters
+    log_file: Path | None
+    info: VehicleInfo | None
+    standin: StandinPath | None
+
+    @property
+    def commands_recorded(self) -> bool:
+        """Whether the vehicle sends the commands that its automated driving gives."""
+        return self.info is None or "control" in self.info.sends
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrivePlan(DriveInputs):
+    """The inputs with a run's id, its folder and its bus."""
+
+    run_id: str
+    folder: Path
+    bus: BusSetup
+    live_view: str
+
+    @property
+    def worlds_dir(self) -> Path:
+        """Where this run's Worlds lie."""
+        return self.folder / "worlds"
+
+    @property
+    def processes_dir(self) -> Path:
+        """Where the setups of this run's processes lie."""
+        return self.folder / "processes"
+
+    @property
+    def standin_path_file(self) -> Path:
+        """What the stand-in car drives."""
+        return self.processes_dir / "standin_path.json"
+
+    @property
+    def start_stamp_ns(self) -> int:
+        """The stamp of drive time 0."""
+        return 0 if self.info is None else self.info.start_stamp_ns
+
+
+def read_inputs(config: DriveConfig) -> DriveInputs:
+    """Read map, log, route and vehicle; raises UserError or FileNotFoundError, one line each."""
+    try:
+        load_planner(config.planner)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
+    map_file = Path(config.map) if config.map else EMBEDDED_MAP
+    osm = read_map(map_file)
+    graph = build_road_graph(osm)
+    index = RoadIndex(graph)
+    junctions = find_intersections(osm, graph)
+    source = config.resolved_source
+    info, positions, log_file = None, None, None
+    if source == "log":
+        log_file = Path(config.log or "")
+        info, positions = _read_log(config, log_file, index, map_file)
+    routes, route_source = _routes(config, graph, index, positions)
+    standin = None
+    if source == "standin":
+        standin = standin_path(graph, routes[0], junctions, end_s=config.end_s)
+    if positions is not None:
+        origin = positions[0]
+    elif standin is not None:
+        origin = np.array([standin.lat_deg[0], standin.lon_deg[0]])
+    else:
+        origin = np.array([graph.frame.origin.lat_deg, graph.frame.origin.lon_deg])
+    return DriveInputs(
+        config=config,
+        map_file=map_file,
+        osm=osm,
+        graph=graph,
+        index=index,
+        junctions=junctions,
+        routes=routes,
+        route_source=route_source,
+        drive_frame=LocalFrame(GeoPoint(float(origin[0]), float(origin[1]))),
+        vehicle=vehicle,
+        log_file=log_file,
+        info=info,
+        standin=standin,
+    )
+
+
+def _read_log(
+    config: DriveConfig, log_file: Path, index: RoadIndex, map_file: Path
+) -> tuple[VehicleInfo, Array]:
+    """Return what the log says of itself and its positions (N, 2) between start and end."""
+    if not log_file.exists():
+        raise FileNotFoundError(f"recorded drive {log_file}: no such file or folder")
+    log = open_log(log_file)
+    line = line_of_log(log, start_s=config.start_s, end_s=config.end_s)
+    positions = np.stack([line.lat_deg, line.lon_deg], axis=-1)
+    if len(positions) == 0:
+        raise UserError(
+            f"{log_file}: no position between --start {config.start_s:g} and --end "
+            f"{config.end_s if config.end_s is not None else 'its end'}"
+        )
+    xy = local_from_geo(index.graph.frame, positions[:, 0], positions[:, 1])
+    every = max(1, len(xy) // 500)
+    if not any(index.near(point, NEAR_ROAD_M) for point in xy[::every]):
+        raise UserError(
+            f"{map_file}: holds no position of the drive {log_file} (which begins at "
+            f"{positions[0, 0]:.5f}, {positions[0, 1]:.5f}); the map covers "
+            f"{_bounds_text(index.graph)}"
+        )
+    return log.info, positions
+
+
+def _bounds_text(graph: RoadGraph) -> str:
+    xy = np.array(list(graph.node_xy_m.values()))
+    low, high = geo_from_local(graph.frame, np.stack([xy.min(axis=0), xy.max(axis=0)]))
+    return f"{low[0]:.4f},{low[1]:.4f} to {high[0]:.4f},{high[1]:.4f}"
+
+
+def _routes(
+    config: DriveConfig, graph: RoadGraph, index: RoadIndex, positions: Array | None
+) -> tuple[tuple[Route, ...], str]:
+    """Return the given routes, none where the route is predicted, and where they came from."""
+    if config.route == "from-log":
+        assert positions is not None  # checked with the configuration
+        name = f"--route from-log of {config.log}"
+        return match_line(graph, positions, name=name, index=index).routes, "from-log"
+    route_file = config.route
+    if route_file is None and config.map is None:
+        route_file = str(EMBEDDED_ROUTE)
+    if route_file is None:
+        return (), "predicted"
+    line = read_line(Path(route_file))
+    lat_lon = np.stack([line.lat_deg, line.lon_deg], axis=-1)
+    name = f"--route {route_file}"
+    return match_line(graph, lat_lon, name=name, index=index).routes, "given"
+
+
+def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
+    """Create the run's folder and return the plan of the drive; the first write of all."""
+    config = inputs.config
+    out = Path(config.out)
+    run_id = f"{now:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
+    folder = out / run_id
+    for sub in ("worlds", "results", "processes"):
+        (folder / sub).mkdir(parents=True, exist_ok=sub != "worlds")
+    live = config.view
+    if live == "auto":
+        live = "native" if has_display() else "none"
+    plan = DrivePlan(
+        **{name: getattr(inputs, name) for name in DriveInputs.__dataclass_fields__},
+        run_id=run_id,
+        folder=folder.resolve(),
+        bus=BusSetup(endpoint=config.endpoint or free_endpoint(), lossless=config.lock_step),
+        live_view=live,
+    )
+    if plan.standin is not None:
+        plan.standin_path_file.write_text(json.dumps(plan.standin.as_json()), encoding="utf-8")
+    return plan
