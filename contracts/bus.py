@@ -1,7 +1,7 @@
-"""The bus: publish, subscribe, ask, serve and watch over Zenoh, and the same in memory for tests.
+"""The bus: publish, subscribe, ask, serve and watch over Zenoh.
 
-Receiving never runs user code on the bus's threads: messages land in a bounded `Mailbox`, whose
-owner takes them when it likes. Decoding happens on taking, so what is dropped costs nothing.
+What arrives lands in a `contracts.mailbox.Mailbox`; `contracts.memory_bus` is the same without a
+network.
 """
 
 from __future__ import annotations
@@ -10,141 +10,38 @@ import collections
 import json
 import threading
 import time
-from collections.abc import Callable
 from types import TracebackType
-from typing import Any, Literal, NamedTuple, Protocol, Self
+from typing import Any, Protocol, Self
 
 import msgspec
 
-from contracts.codec import Envelope, decode, encode
-from contracts.keys import CHANNELS, Qos, key as channel_key
+from contracts.codec import decode, encode
+from contracts.keys import CHANNELS, Qos
+from contracts.keys import key as channel_key
+from contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
 from contracts.setup import BusSetup
 
+__all__ = [
+    "Alive",
+    "Bus",
+    "BusUnreachable",
+    "Item",
+    "Mailbox",
+    "Received",
+    "Reply",
+    "Request",
+    "ZenohBus",
+    "ask",
+    "zenoh_config",
+]
 
-class BusUnreachable(ConnectionError):
+
+class BusUnreachable(ConnectionError):  # noqa: N818
     """No router answers at the endpoint."""
 
 
-class Received:
-    """One message as it lay in the mailbox; `envelope()` decodes it."""
-
-    __slots__ = ("_kind", "_payload", "channel", "key", "received_mono_ns")
-
-    def __init__(self, channel: str, key: str, payload: bytes, kind: type[msgspec.Struct]) -> None:
-        self.channel = channel
-        self.key = key
-        self.received_mono_ns = time.monotonic_ns()
-        self._payload = payload
-        self._kind = kind
-
-    def envelope(self) -> Envelope[Any]:
-        """Return header and message; raises SchemaMismatch."""
-        return decode(self._payload, self._kind, where=self.key)
-
-    def message(self) -> Any:
-        """Return the message alone; raises SchemaMismatch."""
-        return self.envelope().message
-
-
-class Reply(NamedTuple):
-    """The end of a request: a message, or None with the reason in `error`."""
-
-    channel: str
-    tag: Any
-    message: Any | None
-    error: str | None
-    received_mono_ns: int
-
-
-class Request:
-    """A question to answer exactly once."""
-
-    def __init__(
-        self, channel: str, key: str, payload: bytes, answer: Callable[[bytes | None, str], None]
-    ) -> None:
-        self.channel = channel
-        self.key = key
-        self.received_mono_ns = time.monotonic_ns()
-        self._payload = payload
-        self._answer = answer
-
-    def message(self) -> Any:
-        """Return the question; raises SchemaMismatch."""
-        return decode(self._payload, CHANNELS[self.channel].kind, where=self.key).message
-
-    def reply(self, message: msgspec.Struct) -> None:
-        """Answer."""
-        self._answer(encode(message, sent_ns=time.time_ns()), "")
-
-    def refuse(self, reason: str) -> None:
-        """Answer that it cannot be done, and why."""
-        self._answer(None, reason)
-
-
-class Alive(NamedTuple):
-    """A process appeared (`up`) or vanished."""
-
-    key: str
-    up: bool
-    received_mono_ns: int
-
-
-Item = Received | Reply | Request | Alive | Any
-
-
-class Mailbox:
-    """A bounded queue with many writers and one reader.
-
-    When full, `drop_oldest` forgets the oldest item and counts it, `block` makes the writer wait
-    (lock step alone: nothing may block a live drive).
-    """
-
-    def __init__(self, depth: int, *, when_full: Literal["drop_oldest", "block"] = "drop_oldest") -> None:
-        if depth < 1:
-            raise ValueError(f"mailbox depth {depth} must be at least 1")
-        self._items: collections.deque[Item] = collections.deque()
-        self._depth = depth
-        self._block = when_full == "block"
-        self._changed = threading.Condition()
-        self._closed = False
-        self.dropped = 0
-
-    def put(self, item: Item) -> None:
-        """Add an item; after `close`, items are ignored."""
-        with self._changed:
-            if self._block:
-                self._changed.wait_for(lambda: self._closed or len(self._items) < self._depth)
-            if self._closed:
-                return
-            if len(self._items) >= self._depth:
-                self._items.popleft()
-                self.dropped += 1
-            self._items.append(item)
-            self._changed.notify_all()
-
-    def take(self, timeout_s: float | None = 0.0) -> Item | None:
-        """Return the oldest item, or None after `timeout_s` (None waits for ever) or `close`."""
-        with self._changed:
-            if not self._items and timeout_s != 0.0:
-                self._changed.wait_for(lambda: bool(self._items) or self._closed, timeout_s)
-            if not self._items:
-                return None
-            item = self._items.popleft()
-            self._changed.notify_all()
-            return item
-
-    def close(self) -> None:
-        """Wake everyone; later items are ignored."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-
 class Bus(Protocol):
-    """What processes need of a bus; `ids` are `vehicle`, `run`, `process` as in `contracts.keys`."""
+    """What processes need of a bus; `ids` are those of `contracts.keys.key`."""
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
         """Send one message; never raises for a lost link."""
@@ -171,8 +68,10 @@ class Bus(Protocol):
         """Undeclare everything."""
 
 
-def ask(bus: Bus, channel: str, message: msgspec.Struct, *, timeout_s: float = 10.0, **ids: str) -> Any:
-    """Ask and wait; returns the reply's message, raises TimeoutError with the reason without one."""
+def ask(
+    bus: Bus, channel: str, message: msgspec.Struct, *, timeout_s: float = 10.0, **ids: str
+) -> Any:
+    """Ask and return the answer; raises TimeoutError with the reason where there is none."""
     mailbox = Mailbox(1)
     bus.request(channel, message, mailbox, timeout_s=timeout_s, **ids)
     reply = mailbox.take(timeout_s + 1.0)
@@ -197,7 +96,7 @@ class _Sequence:
 
 
 def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
-    """Return the Zenoh configuration that was measured to work; see docs/bus.md for each setting."""
+    """Return the Zenoh configuration; docs/bus.md gives the reason for each setting."""
     import zenoh
 
     config = zenoh.Config()
@@ -227,7 +126,7 @@ def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
 
 
 class ZenohBus:
-    """The bus over one Zenoh session; a context manager, since an unclosed session hangs at exit."""
+    """The bus over one Zenoh session; use it as a context manager: unclosed, it hangs at exit."""
 
     def __init__(self, setup: BusSetup, *, router: bool = False) -> None:
         import zenoh
@@ -246,7 +145,7 @@ class ZenohBus:
             "background": zenoh.Priority.BACKGROUND,
         }
         try:
-            self._session = zenoh.open(zenoh_config(setup, router=router))
+            self._session: Any = zenoh.open(zenoh_config(setup, router=router))
         except zenoh.ZError as error:
             raise BusUnreachable(f"no Zenoh router at {setup.endpoint}: {error}") from error
 
@@ -254,7 +153,10 @@ class ZenohBus:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -276,9 +178,7 @@ class ZenohBus:
                     full_key, **self._qos(CHANNELS[channel].qos)
                 )
                 self._publishers[full_key] = publisher
-        publisher.put(
-            encode(message, seq=self._sequence.take(full_key), sent_ns=time.time_ns())
-        )
+        publisher.put(encode(message, seq=self._sequence.take(full_key), sent_ns=time.time_ns()))
 
     def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
         """Receive into `mailbox`; see Bus."""

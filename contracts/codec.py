@@ -22,7 +22,7 @@ _HEADER = struct.Struct("<4sHxxQq")
 Message = TypeVar("Message")
 
 
-class SchemaMismatch(ValueError):
+class SchemaMismatch(ValueError):  # noqa: N818
     """Bytes that are no message of this schema version."""
 
 

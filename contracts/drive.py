@@ -1,7 +1,7 @@
-"""Messages of the drive: what a vehicle measures, commands and plans, and the state estimated from it.
+"""Messages of the drive: what a vehicle measures, commands and plans, and its estimated state.
 
 Every message carries `stamp_ns`, the vehicle's own clock; `VehicleInfo.time_base` says which.
-Drive time is `stamp_ns − VehicleInfo.start_stamp_ns`.
+Drive time is `stamp_ns - VehicleInfo.start_stamp_ns`.
 """
 
 from __future__ import annotations

@@ -50,30 +50,36 @@ class LocalPoses(NamedTuple):
 
 
 def wrap_angle(angle_rad: Array | float) -> Array:
-    """Return angles in radians, any shape, wrapped into [-π, π)."""
+    """Return angles in radians, any shape, wrapped into [-π, π]."""
     return (np.asarray(angle_rad, dtype=np.float64) + np.pi) % (2.0 * np.pi) - np.pi
 
 
-# A pyproj Transformer must not be shared between threads.
-@lru_cache(maxsize=256)
-def _projection(lat_deg: float, lon_deg: float, _thread: int) -> pyproj.Proj:
+class _Projections(threading.local):
+    """The projections of one thread: pyproj's objects must not be shared between threads."""
+
+    def __init__(self) -> None:
+        self.local = lru_cache(maxsize=256)(_new_projection)
+        self.geodetic_from_ecef = lru_cache(maxsize=1)(_new_geodetic_from_ecef)
+
+
+def _new_projection(lat_deg: float, lon_deg: float) -> pyproj.Proj:
     return pyproj.Proj(
         proj="tmerc", lat_0=lat_deg, lon_0=lon_deg, k_0=1.0, x_0=0.0, y_0=0.0, ellps="WGS84"
     )
 
 
-@lru_cache(maxsize=16)
-def _geodetic_from_ecef(_thread: int) -> pyproj.Transformer:
+def _new_geodetic_from_ecef() -> pyproj.Transformer:
     return pyproj.Transformer.from_crs("EPSG:4978", "EPSG:4979", always_xy=True)
 
 
+_projections = _Projections()
+
+
 def _projection_of(frame: LocalFrame) -> pyproj.Proj:
-    return _projection(frame.origin.lat_deg, frame.origin.lon_deg, threading.get_ident())
+    return _projections.local(frame.origin.lat_deg, frame.origin.lon_deg)
 
 
-def local_from_geo(
-    frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | float
-) -> Array:
+def local_from_geo(frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | float) -> Array:
     """Project positions in degrees, shape (N,) or scalar, to (N, 2) or (2,) metres in `frame`."""
     x_m, y_m = _projection_of(frame)(
         np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64)
@@ -91,22 +97,22 @@ def geo_from_local(frame: LocalFrame, xy_m: Array) -> Array:
 def geo_from_ecef(xyz_m: Array) -> Array:
     """Return (N, 3) latitude, longitude (degrees), altitude (m) of (N, 3) ECEF metres."""
     xyz = np.asarray(xyz_m, dtype=np.float64)
-    lon_deg, lat_deg, alt_m = _geodetic_from_ecef(threading.get_ident()).transform(
+    lon_deg, lat_deg, alt_m = _projections.geodetic_from_ecef().transform(
         xyz[..., 0], xyz[..., 1], xyz[..., 2]
     )
     return np.stack([np.asarray(lat_deg), np.asarray(lon_deg), np.asarray(alt_m)], axis=-1)
 
 
-def grid_convergence(
-    frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | float
-) -> Array:
+def grid_convergence(frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | float) -> Array:
     """Return the angle in radians from true to grid directions, positive counter-clockwise.
 
-    Spherical transverse Mercator convergence, Snyder (1987), Map Projections, eq. 8-8 region:
-    tan γ = tan(λ − λ0) sin φ. Within 100 km the ellipsoid changes it by less than 1e-6 rad.
+    Spherical transverse Mercator: the tangent of the convergence is tan(lon - lon0) sin(lat)
+    (Snyder, 1987, Map Projections, chapter 8). Within 100 km the ellipsoid changes it by less
+    than 1e-6 rad.
     """
     dlon = np.radians(np.asarray(lon_deg, dtype=np.float64) - frame.origin.lon_deg)
-    return np.arctan(np.tan(dlon) * np.sin(np.radians(np.asarray(lat_deg, dtype=np.float64))))
+    lat = np.radians(np.asarray(lat_deg, dtype=np.float64))
+    return np.asarray(np.arctan(np.tan(dlon) * np.sin(lat)))
 
 
 def local_from_geo_yaw(

@@ -8,9 +8,10 @@ from typing import Any
 
 import msgspec
 
-from contracts.bus import Alive, Mailbox, Received, Reply, Request
 from contracts.codec import decode, encode
-from contracts.keys import CHANNELS, key as channel_key
+from contracts.keys import CHANNELS
+from contracts.keys import key as channel_key
+from contracts.mailbox import Alive, Mailbox, Received, Reply, Request
 
 
 def _matches(pattern: str, full_key: str) -> bool:
@@ -37,7 +38,9 @@ class MemoryBus:
         with self._lock:
             seq = self._seq.get(full_key, 0)
             self._seq[full_key] = seq + 1
-            receivers = [box for pattern, _, box in self._subscribers if _matches(pattern, full_key)]
+            receivers = [
+                box for pattern, _, box in self._subscribers if _matches(pattern, full_key)
+            ]
         data = encode(message, seq=seq, sent_ns=time.time_ns())
         for mailbox in receivers:
             mailbox.put(Received(channel, full_key, data, CHANNELS[channel].kind))

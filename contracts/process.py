@@ -71,9 +71,7 @@ class ProcessLife:
 
     def ready(self) -> None:
         """Declare the process alive: it can take work from now on."""
-        self._bus.declare_alive(
-            alive_key(run=self._setup.run_id, process=self._setup.process_id)
-        )
+        self._bus.declare_alive(alive_key(run=self._setup.run_id, process=self._setup.process_id))
 
     @property
     def orchestrator_ready(self) -> bool:
@@ -102,7 +100,9 @@ class ProcessLife:
 
 
 def run_process(
-    kind: type[_Setup], serve: Callable[[_Setup, Bus, ProcessLife], None], argv: list[str] | None = None
+    kind: type[_Setup],
+    serve: Callable[[_Setup, Bus, ProcessLife], None],
+    argv: list[str] | None = None,
 ) -> None:
     """Run `serve` as this process's work, with `--setup FILE` from the command line.
 

@@ -183,7 +183,7 @@ class HorizonError(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Comparison(msgspec.Struct, frozen=True, kw_only=True):
-    """The nominal future of one round against what the car did, with two baselines on the same data."""
+    """The nominal future of a round against what the car did, with two baselines."""
 
     round_id: int
     stamp_ns: int
@@ -202,9 +202,9 @@ class PlanComparison(msgspec.Struct, frozen=True, kw_only=True):
     plan_stamp_ns: int
     horizon_s: float
     difference: HorizonError
-    """The plan's error seen from the nominal future (positive lateral: the plan lies to the left)."""
+    """The plan seen from the nominal future; positive lateral: the plan lies to the left."""
     path_offset_m: float
-    """Mean signed lateral distance of the plan's path from the route's lane centre, positive left."""
+    """Mean lateral distance of the plan's path from the route's lane centre, positive left."""
 
 
 class PlaneState(msgspec.Struct, frozen=True):

@@ -68,7 +68,7 @@ class Arm(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Lane(msgspec.Struct, frozen=True, kw_only=True):
-    """One lane; `centerline` (N, 2) in driving direction. Neighbours as a driver in it sees them."""
+    """One lane; `centerline` (N, 2) in driving direction, neighbours as its driver sees them."""
 
     id: str
     osm_way: int

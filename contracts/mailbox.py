@@ -1,0 +1,138 @@
+"""What lies in a mailbox, and the mailbox itself: the bounded queue between the bus and a process.
+
+Receiving never runs user code on the bus's threads: messages land in a bounded `Mailbox`, whose
+owner takes them when it likes. Decoding happens on taking, so what is dropped costs nothing.
+"""
+
+from __future__ import annotations
+
+import collections
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple
+
+import msgspec
+
+from contracts.codec import Envelope, decode, encode
+from contracts.keys import CHANNELS
+
+
+class Received:
+    """One message as it lay in the mailbox; `envelope()` decodes it."""
+
+    __slots__ = ("_kind", "_payload", "channel", "key", "received_mono_ns")
+
+    def __init__(self, channel: str, key: str, payload: bytes, kind: type[msgspec.Struct]) -> None:
+        self.channel = channel
+        self.key = key
+        self.received_mono_ns = time.monotonic_ns()
+        self._payload = payload
+        self._kind = kind
+
+    def envelope(self) -> Envelope[Any]:
+        """Return header and message; raises SchemaMismatch."""
+        return decode(self._payload, self._kind, where=self.key)
+
+    def message(self) -> Any:
+        """Return the message alone; raises SchemaMismatch."""
+        return self.envelope().message
+
+
+class Reply(NamedTuple):
+    """The end of a request: a message, or None with the reason in `error`."""
+
+    channel: str
+    tag: Any
+    message: Any | None
+    error: str | None
+    received_mono_ns: int
+
+
+class Request:
+    """A question to answer exactly once."""
+
+    def __init__(
+        self, channel: str, key: str, payload: bytes, answer: Callable[[bytes | None, str], None]
+    ) -> None:
+        self.channel = channel
+        self.key = key
+        self.received_mono_ns = time.monotonic_ns()
+        self._payload = payload
+        self._answer = answer
+
+    def message(self) -> Any:
+        """Return the question; raises SchemaMismatch."""
+        return decode(self._payload, CHANNELS[self.channel].kind, where=self.key).message
+
+    def reply(self, message: msgspec.Struct) -> None:
+        """Answer."""
+        self._answer(encode(message, sent_ns=time.time_ns()), "")
+
+    def refuse(self, reason: str) -> None:
+        """Answer that it cannot be done, and why."""
+        self._answer(None, reason)
+
+
+class Alive(NamedTuple):
+    """A process appeared (`up`) or vanished."""
+
+    key: str
+    up: bool
+    received_mono_ns: int
+
+
+Item = Received | Reply | Request | Alive | Any
+
+
+class Mailbox:
+    """A bounded queue with many writers and one reader.
+
+    When full, `drop_oldest` forgets the oldest item and counts it, `block` makes the writer wait
+    (lock step alone: nothing may block a live drive).
+    """
+
+    def __init__(
+        self, depth: int, *, when_full: Literal["drop_oldest", "block"] = "drop_oldest"
+    ) -> None:
+        if depth < 1:
+            raise ValueError(f"mailbox depth {depth} must be at least 1")
+        self._items: collections.deque[Item] = collections.deque()
+        self._depth = depth
+        self._block = when_full == "block"
+        self._changed = threading.Condition()
+        self._closed = False
+        self.dropped = 0
+
+    def put(self, item: Item) -> None:
+        """Add an item; after `close`, items are ignored."""
+        with self._changed:
+            if self._block:
+                self._changed.wait_for(lambda: self._closed or len(self._items) < self._depth)
+            if self._closed:
+                return
+            if len(self._items) >= self._depth:
+                self._items.popleft()
+                self.dropped += 1
+            self._items.append(item)
+            self._changed.notify_all()
+
+    def take(self, timeout_s: float | None = 0.0) -> Item | None:
+        """Return the oldest item, or None after `timeout_s` (None waits for ever) or `close`."""
+        with self._changed:
+            if not self._items and timeout_s != 0.0:
+                self._changed.wait_for(lambda: bool(self._items) or self._closed, timeout_s)
+            if not self._items:
+                return None
+            item = self._items.popleft()
+            self._changed.notify_all()
+            return item
+
+    def close(self) -> None:
+        """Wake everyone; later items are ignored."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def __len__(self) -> int:
+        return len(self._items)
