@@ -78,7 +78,7 @@ def _format_of(path: Path, data: bytes) -> str:
     if b"<osm" in data[:4096]:
         return "osm"
     raise MapError(
-        f"{path}: not an OSM file (expected XML with an <osm> element, plain, gzip or bzip2, or PBF)"
+        f"{path}: not an OSM file (expected OSM XML, plain or packed with gzip or bzip2, or PBF)"
     )
 
 
@@ -122,13 +122,17 @@ class _Decoded:
 
 def _filtered(source: Any, store: Any) -> Iterator[Any]:
     osm = osmium.osm
-    return iter(
-        osmium.FileProcessor(source, osm.NODE | osm.WAY | osm.RELATION)
-        .with_locations(store)
-        .with_filter(osmium.filter.KeyFilter(*NODE_KEYS).enable_for(osm.NODE))
-        .with_filter(osmium.filter.KeyFilter(*WAY_KEYS).enable_for(osm.WAY))
-        .with_filter(osmium.filter.KeyFilter("type").enable_for(osm.RELATION))
-    )
+    processor = osmium.FileProcessor(source, osm.NODE | osm.WAY | osm.RELATION)
+    processor.with_locations(store)
+    for entity, keys in (
+        (osm.NODE, NODE_KEYS),
+        (osm.WAY, WAY_KEYS),
+        (osm.RELATION, ("type",)),
+    ):
+        wanted = osmium.filter.KeyFilter(*keys)
+        wanted.enable_for(entity)
+        processor.with_filter(wanted)
+    return iter(processor)
 
 
 def _by_id(source: Any, entity: Any, ids: set[int]) -> Iterator[Any]:
@@ -174,7 +178,8 @@ def _locations(source: Any, store: Any, wanted: set[int]) -> dict[int, tuple[flo
             found[node] = (location.lat, location.lon)
     if negative:
         # Editors number what is not yet uploaded below zero; osmium's index holds no such ids.
-        for item in osmium.FileProcessor(source, osmium.osm.NODE):
+        items: Iterator[Any] = iter(osmium.FileProcessor(source, osmium.osm.NODE))
+        for item in items:
             if item.id in negative and item.location.valid():
                 found[item.id] = (item.location.lat, item.location.lon)
     return found
