@@ -1,1 +1,9 @@
-"""Readers of recorded drives, one file per format."""
+"""Recorded drives of any kind, read as the messages a live car would send."""
+
+from __future__ import annotations
+
+from telemetry.logs.log import Log, LogError
+from telemetry.logs.opening import open_log
+from telemetry.logs.route_line import RouteLine, line_of_log, read_line
+
+__all__ = ["Log", "LogError", "RouteLine", "line_of_log", "open_log", "read_line"]

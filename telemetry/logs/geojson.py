@@ -1,0 +1,135 @@
+"""Reader of GeoJSON lines (RFC 7946): lines with times as logs, any line as a route.
+
+Declares: degrees on WGS84, longitude before latitude, altitude in metres above the ellipsoid.
+Times are no part of the standard; they are read from the properties `coordTimes` (as toGeoJSON
+writes them) or `times`: ISO 8601, or numbers, which are seconds since 1970, or milliseconds
+where they exceed 1e11. Reference point the receiver's antenna, its place on the car unknown.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from contracts.drive import GnssFix, VehicleInfo
+from contracts.frames import GeoPoint
+from telemetry.logs.gpx import stamp_ns_from_iso
+from telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+
+_TIME_NAMES = ("coordTimes", "times")
+
+
+class GeoLine(NamedTuple):
+    """One LineString: positions as (longitude, latitude, altitude), and its properties."""
+
+    positions: list[tuple[float, float, float]]
+    properties: dict[str, Any]
+
+
+def geojson_lines(path: Path) -> list[GeoLine]:
+    """Return all lines in a FeatureCollection, Feature or bare geometry, in file order.
+
+    The parts of a MultiLineString count as lines of their own. Raises LogError naming what the
+    file holds instead, where it holds none.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise LogError(f"{path}: no valid JSON: {error}") from None
+    seen: list[str] = []
+    lines = list(_lines(document, {}, seen))
+    if not lines:
+        held = ", ".join(sorted(set(seen))) or "nothing"
+        raise LogError(f"{path}: holds no LineString but {held}")
+    return lines
+
+
+def _lines(node: object, properties: dict[str, Any], seen: list[str]) -> Iterator[GeoLine]:
+    if not isinstance(node, dict):
+        return
+    kind = node.get("type")
+    if kind == "FeatureCollection":
+        for feature in node.get("features") or []:
+            yield from _lines(feature, {}, seen)
+    elif kind == "GeometryCollection":
+        for geometry in node.get("geometries") or []:
+            yield from _lines(geometry, properties, seen)
+    elif kind == "Feature":
+        yield from _lines(node.get("geometry"), node.get("properties") or {}, seen)
+    elif kind in ("LineString", "MultiLineString"):
+        given = node.get("coordinates") or []
+        several = kind == "MultiLineString"
+        for part in given if several else [given]:
+            positions = [_position(position) for position in part]
+            if positions:
+                yield GeoLine(positions, {} if several else properties)
+            else:
+                seen.append(f"an empty {kind}")
+    else:
+        seen.append(str(kind))
+
+
+def _position(position: object) -> tuple[float, float, float]:
+    try:
+        lon_deg, lat_deg, *rest = (float(number) for number in position)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        return math.nan, math.nan, 0.0
+    return lon_deg, lat_deg, rest[0] if rest else 0.0
+
+
+def open_geojson(path: Path) -> Log:
+    """Open the first line that has times; raises LogError where no line has."""
+    line, times = _timed_line(path)
+    if len(times) != len(line.positions):
+        raise LogError(f"{path}: {len(times)} times for a line of {len(line.positions)} positions")
+    stamps_ns = [_stamp_ns(time) for time in times]
+    known_ns = [stamp for stamp in stamps_ns if stamp is not None]
+    if not known_ns:
+        raise LogError(f"{path}: no time of the line is ISO 8601 or a number, such as {times[0]!r}")
+
+    def read(skipped: Counter[str]) -> Iterator[Sample]:
+        for stamp_ns, (lon_deg, lat_deg, alt_m) in zip(stamps_ns, line.positions, strict=True):
+            if stamp_ns is None:
+                skipped[UNREADABLE_ROW] += 1
+                continue
+            position = GeoPoint(lat_deg, lon_deg, alt_m)
+            yield "gnss", GnssFix(stamp_ns=stamp_ns, position=position)
+
+    return Log(
+        info=VehicleInfo(
+            vehicle_id="car",
+            time_base="utc",
+            start_stamp_ns=known_ns[0],
+            end_stamp_ns=max(known_ns),
+            source=path.name,
+            reference_point="antenna",
+            sends=("gnss",),
+        ),
+        declared=Declared(
+            units="degrees, m", frame="WGS84", time_base="UTC", reference_point="antenna"
+        ),
+        read=read,
+    )
+
+
+def _timed_line(path: Path) -> tuple[GeoLine, list[Any]]:
+    for line in geojson_lines(path):
+        groups = (line.properties, line.properties.get("coordinateProperties") or {})
+        for group in groups:
+            for name in _TIME_NAMES:
+                times = group.get(name) if isinstance(group, dict) else None
+                if isinstance(times, list) and times:
+                    return line, times
+    raise LogError(f"{path}: line without time; usable as --route only")
+
+
+def _stamp_ns(time: object) -> int | None:
+    if isinstance(time, str):
+        return stamp_ns_from_iso(time)
+    if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
+        return None
+    return round(time * 1e6) if abs(time) > 1e11 else round(time * 1e9)

@@ -1,0 +1,120 @@
+"""What a recorded drive is, whatever file it came from, and what of it is refused."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+
+from contracts import drive
+
+Sample = tuple[str, msgspec.Struct]
+"""Channel name of contracts.keys and its message."""
+
+POSITION_NOT_FINITE = "position not finite"
+POSITION_ZERO = "position (0, 0)"
+POSITION_OFF_EARTH = "position off Earth"
+VALUE_NOT_FINITE = "value not finite"
+TIME_BACKWARDS = "time backwards"
+TIME_DOUBLED = "time doubled"
+TIME_BEFORE_ZERO = "time before zero"
+UNREADABLE_ROW = "unreadable row"
+FILE_CUT_SHORT = "file cut short"
+
+
+class LogError(ValueError):
+    """A log that cannot be read: one line with the file, the line or field, and what would do."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Declared:
+    """What a reader holds to be true of its source, in words for people."""
+
+    units: str
+    frame: str
+    time_base: str
+    reference_point: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Log:
+    """One recorded drive: its facts, and its samples as often as they are asked for.
+
+    `read` yields samples in stamp order and counts what it cannot read in the counter it is given.
+    """
+
+    info: drive.VehicleInfo
+    declared: Declared
+    read: Callable[[Counter[str]], Iterator[Sample]]
+    skipped: Counter[str] = field(default_factory=Counter)
+    """Samples refused by reason, as far as the latest `samples()` has come."""
+
+    def samples(self) -> Iterator[Sample]:
+        """Yield every valid telemetry sample in stamp order; the rest is counted in `skipped`."""
+        self.skipped.clear()
+        yield from screened(self.read(self.skipped), self.skipped)
+
+
+def screened(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sample]:
+    """Drop samples with impossible values, and those whose clock stands still or runs backwards.
+
+    Time is judged per channel (per group for signals), since sensors overtake one another.
+    """
+    latest: dict[object, int] = {}
+    for channel, message in samples:
+        fault = fault_of(message)
+        stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
+        stream = (channel, getattr(message, "group_id", None))
+        before_ns = latest.get(stream)
+        if fault is None and before_ns is not None and stamp_ns <= before_ns:
+            fault = TIME_DOUBLED if stamp_ns == before_ns else TIME_BACKWARDS
+        if fault is not None:
+            skipped[fault] += 1
+            continue
+        latest[stream] = stamp_ns
+        yield channel, message
+
+
+def fault_of(message: msgspec.Struct) -> str | None:
+    """Return why a message is refused, or None."""
+    if message.stamp_ns < 0:  # type: ignore[attr-defined]
+        return TIME_BEFORE_ZERO
+    if isinstance(message, drive.GnssFix):
+        return fault_of_position(message.position.lat_deg, message.position.lon_deg)
+    numbers = _NUMBERS.get(type(message))
+    if numbers is not None and not all(
+        math.isfinite(value) for value in numbers(message) if value is not None
+    ):
+        return VALUE_NOT_FINITE
+    return None
+
+
+def fault_of_position(lat_deg: float, lon_deg: float) -> str | None:
+    """Return why a position cannot be one, or None; (0, 0) is what receivers say without a fix."""
+    if not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):
+        return POSITION_NOT_FINITE
+    if lat_deg == 0.0 and lon_deg == 0.0:
+        return POSITION_ZERO
+    if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+        return POSITION_OFF_EARTH
+    return None
+
+
+def _plan_numbers(plan: drive.PlannedTrajectory) -> tuple[float, ...]:
+    # One sum tells of any NaN or infinity without a loop over the points.
+    arrays = (plan.time_from_stamp_s, plan.lat_deg, plan.lon_deg, plan.yaw_rad, plan.speed_mps)
+    return tuple(float(array.sum()) for array in arrays)
+
+
+_NUMBERS: dict[type, Callable[[Any], tuple[float | None, ...]]] = {
+    drive.ImuSample: lambda m: (*m.accel_mps2, *m.rate_radps),
+    drive.SpeedSample: lambda m: (m.speed_mps,),
+    drive.HeadingSample: lambda m: (m.yaw_rad, m.yaw_rate_radps),
+    drive.SteeringSample: lambda m: (m.steering_wheel_rad, m.tire_angle_rad),
+    drive.ControlCommand: lambda m: (m.accel_mps2, m.steering_wheel_rad, m.tire_angle_rad),
+    drive.PlannedTrajectory: _plan_numbers,
+}

@@ -1,0 +1,52 @@
+"""Choosing the reader of a recorded drive by what the file is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
+from telemetry.logs.geojson import open_geojson
+from telemetry.logs.gpx import open_gpx
+from telemetry.logs.log import Log, LogError
+from telemetry.logs.smartloc import is_smartloc, open_smartloc
+
+KINDS = (
+    "MCAP with ROS 2 messages (.mcap), CSV with a declaration (.csv), GPX (.gpx), "
+    "GeoJSON lines (.geojson, .json), smartLoc ground truth (point3 text), comma2k19 segment folder"
+)
+
+
+def open_log(path: Path, *, declaration: Path | None = None) -> Log:
+    """Open a recorded drive, choosing the reader by content, then by name.
+
+    `declaration` is the TOML that declares a CSV's columns; without it `NAME.csv.toml` beside the
+    file. Raises FileNotFoundError for a missing file and LogError for one that is no log.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: no such file")
+    if path.is_dir():
+        if is_comma2k19(path):
+            return open_comma2k19(path)
+        raise LogError(f"{path}: a folder that is no comma2k19 segment; known logs: {KINDS}")
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if not head:
+        raise LogError(f"{path}: the file is empty")
+    suffix = path.suffix.lower()
+    if head.startswith(b"\x89MCAP0") or suffix == ".mcap":
+        from telemetry.logs.ros2_mcap import open_mcap
+
+        return open_mcap(path)
+    text = head.decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
+    if is_smartloc(text):
+        return open_smartloc(path)
+    if suffix == ".gpx" or (text.startswith("<") and "<gpx" in text):
+        return open_gpx(path)
+    if suffix in (".geojson", ".json") or text.startswith("{"):
+        return open_geojson(path)
+    if suffix == ".csv" or declaration is not None:
+        from telemetry.logs.csv_table import open_csv
+
+        return open_csv(path, declaration=declaration)
+    raise LogError(f"{path}: no known log; known are {KINDS}")
