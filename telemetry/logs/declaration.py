@@ -1,0 +1,225 @@
+"""What a CSV's columns mean, declared in TOML: fields, units, frame, time, reference point.
+
+```toml
+reference_point = "GNSS antenna"            # and body_from_antenna_m = [x, y, z] where known
+[time]
+column = "millis"
+unit = "ms"                                 # s, ms, us, ns, iso8601
+base = "utc"                                # utc, boot, log
+[position]
+frame = "wgs84"                             # wgs84: latitude, longitude; ecef: x, y, z;
+latitude = { column = "lat", unit = "deg" } # projected: easting, northing, and epsg
+longitude = { column = "lon", unit = "deg" }
+[speed]
+forward = { column = "speed", unit = "km/h" } # or east and north, whose length is taken
+```
+
+`negate = true` turns a column's sign. `new_when = ["column", …]` in a section yields a sample only
+where one of these columns differs from the row before, for sources that repeat old values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from contracts.drive import TimeBase
+from telemetry.logs import units
+from telemetry.logs.log import LogError
+
+
+class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One column and its unit."""
+
+    column: str
+    unit: str | None = None
+    negate: bool = False
+
+
+class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every section may hold."""
+
+    new_when: tuple[str, ...] = ()
+
+
+class TimeSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The clock of the rows."""
+
+    column: str
+    base: TimeBase
+    unit: str | None = None
+
+
+class PositionSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Positions; `epsg` is the code of a projected system, such as 32633 for UTM zone 33N."""
+
+    frame: Literal["wgs84", "ecef", "projected"]
+    epsg: int | None = None
+    latitude: Column | None = None
+    longitude: Column | None = None
+    easting: Column | None = None
+    northing: Column | None = None
+    x: Column | None = None
+    y: Column | None = None
+    z: Column | None = None
+    altitude: Column | None = None
+    std: Column | None = None
+
+
+class SpeedSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Speed: `forward`, or `east` and `north`."""
+
+    forward: Column | None = None
+    east: Column | None = None
+    north: Column | None = None
+
+
+class HeadingSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Heading or course: where zero lies, which way it grows, and what to add to the column.
+
+    `north` tells whether angles count from true north (east) or from the grid's of
+    `position.epsg`. Rows slower than `min_speed_mps` are left out: a course over ground means
+    nothing at a standstill.
+    """
+
+    yaw: Column
+    zero: Literal["north", "east"]
+    direction: Literal["clockwise", "counterclockwise"]
+    north: Literal["true", "grid"] = "true"
+    offset_deg: float = 0.0
+    min_speed_mps: float = 0.0
+    yaw_rate: Column | None = None
+    """Counter-clockwise from above; `negate` where it is not."""
+
+
+class ImuSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Specific force (+9.8 m/s² upwards at rest) and rates along the named body axes."""
+
+    axes: Literal["forward-left-up", "forward-right-down"]
+    accel_x: Column
+    accel_y: Column
+    accel_z: Column
+    rate_x: Column
+    rate_y: Column
+    rate_z: Column
+
+
+class SteeringSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Steering, positive to the left; `negate` where it is not."""
+
+    wheel: Column | None = None
+    tire: Column | None = None
+
+
+class ControlSection(Section, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Commands, positive to the left; `negate` where they are not."""
+
+    accel: Column
+    wheel: Column | None = None
+    tire: Column | None = None
+
+
+class Declaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The declaration of one kind of CSV."""
+
+    time: TimeSection
+    position: PositionSection
+    reference_point: str
+    body_from_antenna_m: tuple[float, float, float] | None = None
+    delimiter: str = ","
+    speed: SpeedSection | None = None
+    heading: HeadingSection | None = None
+    imu: ImuSection | None = None
+    steering: SteeringSection | None = None
+    control: ControlSection | None = None
+
+
+UNITS: dict[str, Mapping[str, float]] = {
+    **dict.fromkeys(("latitude", "longitude"), units.GEOGRAPHIC_ANGLE),
+    **dict.fromkeys(("easting", "northing", "x", "y", "z", "altitude", "std"), units.LENGTH),
+    **dict.fromkeys(("forward", "east", "north"), units.SPEED),
+    **dict.fromkeys(("accel", "accel_x", "accel_y", "accel_z"), units.ACCELERATION),
+    **dict.fromkeys(("rate_x", "rate_y", "rate_z", "yaw_rate"), units.ANGULAR_RATE),
+    **dict.fromkeys(("yaw", "wheel", "tire"), units.ANGLE),
+}
+"""Valid units by field, with the factor into the project's unit."""
+
+
+def read_declaration(path: Path) -> Declaration:
+    """Read and check a declaration; raises FileNotFoundError, or LogError naming the field."""
+    try:
+        declaration = msgspec.toml.decode(path.read_bytes(), type=Declaration)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise LogError(f"{path}: {error}") from None
+    _check_time(path, declaration.time)
+    _check_position(path, declaration.position, declaration.heading)
+    if declaration.speed is not None:
+        present = set(columns_of(declaration.speed))
+        if present not in ({"forward"}, {"east", "north"}):
+            raise LogError(f"{path}: [speed] needs either 'forward' or 'east' and 'north'")
+    for section in sections_of(declaration).values():
+        for field, column in columns_of(section).items():
+            factor_of(path, field, column)
+    return declaration
+
+
+def sections_of(declaration: Declaration) -> dict[str, Section]:
+    """Return the present sections by the channel that they feed."""
+    given = {
+        "gnss": declaration.position,
+        "speed": declaration.speed,
+        "heading": declaration.heading,
+        "imu": declaration.imu,
+        "steering": declaration.steering,
+        "control": declaration.control,
+    }
+    return {channel: section for channel, section in given.items() if section is not None}
+
+
+def columns_of(section: Section) -> dict[str, Column]:
+    """Return the declared columns of a section by field."""
+    return {
+        name: value
+        for name in section.__struct_fields__
+        if isinstance(value := getattr(section, name), Column)
+    }
+
+
+def factor_of(path: Path, field: str, column: Column) -> float:
+    """Return the factor of a column into the project's unit, its sign included.
+
+    Raises LogError naming the column and the valid units.
+    """
+    valid = UNITS[field]
+    if column.unit is None or column.unit not in valid:
+        told = "no unit" if column.unit is None else f"unknown unit {column.unit!r}"
+        raise LogError(f"{path}: column {column.column!r}: {told}; valid: {', '.join(valid)}")
+    return -valid[column.unit] if column.negate else valid[column.unit]
+
+
+def _check_time(path: Path, time: TimeSection) -> None:
+    valid = (*units.TIME_NS, units.ISO_TIME)
+    if time.unit not in valid:
+        told = "no unit" if time.unit is None else f"unknown unit {time.unit!r}"
+        raise LogError(f"{path}: column {time.column!r}: {told}; valid: {', '.join(valid)}")
+
+
+def _check_position(path: Path, position: PositionSection, heading: HeadingSection | None) -> None:
+    needed = {
+        "wgs84": ("latitude", "longitude"),
+        "ecef": ("x", "y", "z"),
+        "projected": ("easting", "northing"),
+    }[position.frame]
+    present = set(columns_of(position)) - {"std", "altitude"}
+    if present != set(needed) or (position.frame == "ecef" and position.altitude is not None):
+        raise LogError(
+            f"{path}: [position] in frame {position.frame!r} needs exactly {', '.join(needed)}"
+            f" (and may have altitude, std); it has {', '.join(sorted(present)) or 'none'}"
+        )
+    if (position.frame == "projected") != (position.epsg is not None):
+        raise LogError(f"{path}: [position] epsg belongs to frame 'projected', and to it alone")
+    if heading is not None and heading.north == "grid" and position.epsg is None:
+        raise LogError(f"{path}: [heading] north = 'grid' needs a position in frame 'projected'")
