@@ -1,0 +1,25 @@
+"""A planner that tracks the path at its target speed and sees nobody: the careless driver."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim_worker.planners.base import PlannerOutput, PlannerView
+from sim_worker.planners.tracking import pure_pursuit
+from sim_worker.vehicle.actuation import resistance_mps2
+
+_TIME_CONSTANT_S = 1.0
+_LIMIT_MPS2 = 2.0
+
+
+class ConstantSpeed:
+    """Reaches its target speed, then keeps it through curves and into other road users."""
+
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        """Answer one control tick."""
+        speed = view.states[:, 3]
+        accel = (view.target_speed_mps - speed) / _TIME_CONSTANT_S
+        accel = np.clip(accel, -_LIMIT_MPS2, _LIMIT_MPS2 * np.clip(view.speed_factor, 0.3, 2.0))
+        stands = (np.abs(speed) < 0.05) & (view.target_speed_mps < 0.05)
+        command = accel + resistance_mps2(view.vehicle, speed)
+        return PlannerOutput(np.where(stands, -_LIMIT_MPS2, command), pure_pursuit(view))

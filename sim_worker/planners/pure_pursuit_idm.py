@@ -1,0 +1,70 @@
+"""The planner under test that comes with foretwin: pure pursuit, intelligent-driver model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contracts.arrays import Array
+from sim_worker.planners.base import PlannerOutput, PlannerView
+from sim_worker.planners.tracking import pure_pursuit
+from sim_worker.vehicle.actuation import resistance_mps2
+
+MAX_ACCEL_MPS2 = 1.5
+COMFORT_DECEL_MPS2 = 2.0
+MAX_DECEL_MPS2 = 8.0
+TIME_GAP_S = 1.5
+STANDSTILL_GAP_M = 2.0
+LATERAL_ACCEL_MPS2 = 2.5
+EXPONENT = 4.0
+_CURVE_TIME_S = 0.5
+_HOLD_SPEED_MPS = 0.3
+_HOLD_MPS2 = -2.0
+
+
+class PurePursuitIdm:
+    """Keeps its lane, slows for curves, follows what is ahead, and holds where it has stopped."""
+
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        """Answer one control tick."""
+        speed = np.maximum(view.states[:, 3], 0.0)
+        accel = np.minimum(self._free(view, speed), self._curves(view, speed))
+        accel = accel - self._interaction(view, speed)
+        accel = np.clip(accel, -MAX_DECEL_MPS2, None)
+        command = accel + resistance_mps2(view.vehicle, speed)
+        hold = (speed < _HOLD_SPEED_MPS) & (accel <= 0.0)
+        return PlannerOutput(np.where(hold, _HOLD_MPS2, command), pure_pursuit(view))
+
+    def _free(self, view: PlannerView, speed: Array) -> Array:
+        """Free-road acceleration; above the target speed it approaches the comfortable one.
+
+        Treiber, Hennecke, Helbing (2000), Phys. Rev. E 62, eq. 2; above the target speed the
+        improved form of Treiber and Kesting (2013), Traffic Flow Dynamics, eq. 11.22.
+        """
+        start = MAX_ACCEL_MPS2 * np.clip(view.speed_factor, 0.3, 2.0)
+        target = np.maximum(view.target_speed_mps, 0.0)
+        allowed = np.maximum(target, 0.1)
+        ratio = speed / allowed
+        below = start * (1.0 - ratio**EXPONENT)
+        above = -COMFORT_DECEL_MPS2 * (
+            1.0 - np.maximum(ratio, 1.0) ** (-start * EXPONENT / COMFORT_DECEL_MPS2)
+        )
+        return np.where(target < 0.05, -COMFORT_DECEL_MPS2, np.where(ratio <= 1.0, below, above))
+
+    def _curves(self, view: PlannerView, speed: Array) -> Array:
+        """Acceleration that follows the speed profile of the curves ahead."""
+        profile = view.path.speed_profile(
+            lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
+        )
+        ahead = view.arc_m + _CURVE_TIME_S * speed
+        allowed = view.speed_factor * view.path.at_nodes(profile, ahead)
+        return (allowed - speed) / _CURVE_TIME_S
+
+    def _interaction(self, view: PlannerView, speed: Array) -> Array:
+        """IDM deceleration for what is ahead: a (s* / s)², s* = s0 + v T + v Δv / (2 √(a b))."""
+        gap = np.maximum(view.lead_gap_m, 0.1)
+        approach = speed * (speed - view.lead_speed_mps)
+        wanted = STANDSTILL_GAP_M + np.maximum(
+            speed * TIME_GAP_S + approach / (2.0 * np.sqrt(MAX_ACCEL_MPS2 * COMFORT_DECEL_MPS2)),
+            0.0,
+        )
+        return np.asarray(MAX_ACCEL_MPS2 * np.square(wanted / gap))

@@ -1,0 +1,46 @@
+"""Planners by name: those of foretwin, and any that an installed package offers.
+
+A package adds one with an entry point in the group `foretwin.planners` whose object is a class
+without arguments that follows `sim_worker.planners.base.Planner`.
+"""
+
+from __future__ import annotations
+
+import functools
+from importlib.metadata import entry_points
+
+from sim_worker.planners.base import Planner
+from sim_worker.planners.constant_speed import ConstantSpeed
+from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+
+GROUP = "foretwin.planners"
+
+_BUILT_IN: dict[str, type[Planner]] = {
+    "pure_pursuit_idm": PurePursuitIdm,
+    "constant_speed": ConstantSpeed,
+}
+
+
+def planner_names() -> tuple[str, ...]:
+    """Return all known names, the built-in ones first."""
+    offered = {point.name for point in entry_points(group=GROUP)}
+    return (*_BUILT_IN, *sorted(offered - _BUILT_IN.keys()))
+
+
+@functools.cache
+def load_planner(name: str) -> Planner:
+    """Return the planner of that name; raises ValueError naming the known ones."""
+    if name in _BUILT_IN:
+        return _BUILT_IN[name]()
+    for point in entry_points(group=GROUP):
+        if point.name == name:
+            try:
+                planner = point.load()()
+            except Exception as error:
+                raise ValueError(
+                    f"planner {name!r} ({point.value}) fails to load: {error}"
+                ) from error
+            if not callable(getattr(planner, "plan", None)):
+                raise ValueError(f"planner {name!r} ({point.value}) has no method plan(view)")
+            return planner  # type: ignore[no-any-return]
+    raise ValueError(f"unknown planner {name!r}; known: {', '.join(planner_names())}")

@@ -1,0 +1,80 @@
+"""Vehicle parameters from TOML, checked, with the derived numbers that several models need."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+
+import msgspec
+
+from contracts.vehicle import Parameter, VehicleParameters
+
+DEFAULT_FILE = Path(__file__).with_name("bmw_320i.toml")
+GRAVITY_MPS2 = 9.81
+
+_MAY_BE_ZERO = {"drag_npv2", "rolling_resistance_n", "steering_delay_s", "rear_overhang_m"}
+_ANY_SIGN = {"steering_offset_rad"}
+
+
+def load_vehicle(path: Path | None = None) -> VehicleParameters:
+    """Read a vehicle's parameters; None gives the bundled BMW 320i.
+
+    Raises FileNotFoundError for a missing file and ValueError, in one line with the file and the
+    field, for anything that is no vehicle.
+    """
+    source = DEFAULT_FILE if path is None else path
+    try:
+        text = source.read_text(encoding="utf-8")
+    except (FileNotFoundError, IsADirectoryError) as error:
+        raise FileNotFoundError(f"no vehicle file {source}") from error
+    except UnicodeDecodeError as error:
+        raise ValueError(f"vehicle file {source} is no UTF-8 text") from error
+    try:
+        vehicle = msgspec.convert(tomllib.loads(text), VehicleParameters)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"vehicle file {source} is no TOML: {error}") from error
+    except msgspec.ValidationError as error:
+        raise ValueError(f"vehicle file {source}: {error}") from error
+    try:
+        return check_vehicle(vehicle)
+    except ValueError as error:
+        raise ValueError(f"vehicle file {source}: {error}") from error
+
+
+def check_vehicle(vehicle: VehicleParameters) -> VehicleParameters:
+    """Return `vehicle`, or raise ValueError naming the first field that is out of range."""
+    for field in msgspec.structs.fields(vehicle):
+        parameter = getattr(vehicle, field.name)
+        if not isinstance(parameter, Parameter):
+            continue
+        value = parameter.value
+        if not math.isfinite(value):
+            raise ValueError(f"{field.name} is {value}; it must be a finite number")
+        if field.name in _ANY_SIGN:
+            continue
+        if value < 0.0 or (value == 0.0 and field.name not in _MAY_BE_ZERO):
+            least = "zero or more" if field.name in _MAY_BE_ZERO else "more than zero"
+            raise ValueError(f"{field.name} is {value}; it must be {least}")
+    if vehicle.cog_from_rear_axle_m.value >= vehicle.wheelbase_m.value:
+        raise ValueError(
+            f"cog_from_rear_axle_m {vehicle.cog_from_rear_axle_m.value} must be less than "
+            f"wheelbase_m {vehicle.wheelbase_m.value}"
+        )
+    if vehicle.max_tire_angle_rad.value >= math.pi / 2:
+        raise ValueError(f"max_tire_angle_rad {vehicle.max_tire_angle_rad.value} must be below π/2")
+    return vehicle
+
+
+def understeer_gradient(vehicle: VehicleParameters) -> float:
+    """Return K in rad per m/s², with tyre angle δ = L/R + K·a_y (Gillespie 1992, eq. 6-15)."""
+    wheelbase = vehicle.wheelbase_m.value
+    rear = vehicle.cog_from_rear_axle_m.value
+    return (
+        vehicle.mass_kg.value
+        / wheelbase
+        * (
+            rear / vehicle.front_cornering_stiffness_npr.value
+            - (wheelbase - rear) / vehicle.rear_cornering_stiffness_npr.value
+        )
+    )
