@@ -232,9 +232,7 @@ class ZenohBus:
                     if data is None:
                         query.reply_err(reason.encode())
                     else:
-                        query.reply(
-                            full_key, data, congestion_control=self._zenoh.CongestionControl.BLOCK
-                        )
+                        query.reply(full_key, data)
 
             payload = query.payload.to_bytes() if query.payload is not None else b""
             mailbox.put(Request(channel, full_key, payload, answer))

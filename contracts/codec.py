@@ -39,7 +39,7 @@ def _to_wire(value: Any) -> Any:
         return array_to_wire(value)
     if isinstance(value, np.generic):
         return value.item()
-    raise TypeError(f"a {type(value).__name__} cannot be sent; messages hold structs and arrays")
+    raise TypeError(f"type {type(value).__name__} cannot be sent; messages hold structs and arrays")
 
 
 def _from_wire(kind: type, value: Any) -> Any:

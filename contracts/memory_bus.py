@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from contracts.codec import decode, encode
+from contracts.codec import SchemaMismatch, decode, encode
 from contracts.keys import CHANNELS
 from contracts.keys import key as channel_key
 from contracts.mailbox import Alive, Mailbox, Received, Reply, Request
@@ -62,8 +62,14 @@ class MemoryBus:
         server = self._servers.get(full_key)
 
         def answer(data: bytes | None, reason: str) -> None:
-            reply = None if data is None else decode(data, kind, where=full_key).message
-            mailbox.put(Reply(channel, tag, reply, reason or None, time.monotonic_ns()))
+            reply: Any | None = None
+            error: str | None = reason
+            if data is not None:
+                try:
+                    reply, error = decode(data, kind, where=full_key).message, None
+                except SchemaMismatch as problem:
+                    error = str(problem)
+            mailbox.put(Reply(channel, tag, reply, error, time.monotonic_ns()))
 
         if server is None:
             answer(None, "no answer")

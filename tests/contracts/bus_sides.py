@@ -1,0 +1,118 @@
+"""Two sides of one bus for tests, in memory or over Zenoh, and waiting for a condition."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any, NamedTuple
+
+from contracts.bus import Bus, Mailbox, Received, ZenohBus
+from contracts.drive import SpeedSample
+from contracts.memory_bus import MemoryBus
+from contracts.setup import BusSetup
+
+DEADLINE_S = 20.0
+
+ROUTER = """
+import sys
+from contracts.bus import ZenohBus
+from contracts.setup import BusSetup
+with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True):
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+MEMBER = """
+import sys
+from contracts.bus import Mailbox, ZenohBus
+from contracts.setup import BusSetup
+with ZenohBus(BusSetup(endpoint=sys.argv[1])) as bus:
+    bus.declare_alive(sys.argv[2])
+    bus.serve("prepare", Mailbox(1), run="r1", process="w0")
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+class Sides(NamedTuple):
+    """`near` and `far` reach each other; `lose` lets a token of `far` vanish."""
+
+    near: Bus
+    far: Bus
+    lose: Callable[[str], None]
+
+
+def free_endpoint() -> str:
+    """Return a loopback endpoint that was free a moment ago."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+
+
+@contextmanager
+def memory_sides() -> Iterator[Sides]:
+    """Both sides are one MemoryBus."""
+    bus = MemoryBus()
+    yield Sides(bus, bus, bus.lose)
+    bus.close()
+
+
+@contextmanager
+def zenoh_sides(*, lossless: bool = False) -> Iterator[Sides]:
+    """A router and two clients, each with a session of its own."""
+    setup = BusSetup(endpoint=free_endpoint(), lossless=lossless)
+    with ExitStack() as stack:
+        stack.enter_context(ZenohBus(setup, router=True))
+        near = stack.enter_context(ZenohBus(setup))
+        far = stack.enter_context(ZenohBus(setup))
+        yield Sides(near, far, lambda _: far.close())
+
+
+@contextmanager
+def python(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Run code in a fresh interpreter that says `ready`; it is ended with the block."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    with process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+            yield process
+        finally:
+            process.kill()
+
+
+def take(mailbox: Mailbox, deadline_s: float = DEADLINE_S) -> Any:
+    """Return the next item; fails where none comes in time."""
+    item = mailbox.take(deadline_s)
+    assert item is not None, f"nothing came within {deadline_s} s"
+    return item
+
+
+def take_until(mailbox: Mailbox, wanted: Callable[[Any], bool]) -> Any:
+    """Return the first item that is wanted; fails where none comes in time."""
+    deadline = time.monotonic() + DEADLINE_S
+    while time.monotonic() < deadline:
+        item = mailbox.take(0.2)
+        if item is not None and wanted(item):
+            return item
+    raise AssertionError(f"nothing wanted came within {DEADLINE_S} s")
+
+
+def publish_until_received(sender: Bus, mailbox: Mailbox, *, vehicle: str = "ego") -> Received:
+    """Publish a speed of -1 until one lands: from then on sender and receiver know each other."""
+    deadline = time.monotonic() + DEADLINE_S
+    while time.monotonic() < deadline:
+        sender.publish("speed", SpeedSample(stamp_ns=0, speed_mps=-1.0), vehicle=vehicle)
+        if (item := mailbox.take(0.05)) is not None:
+            assert isinstance(item, Received)
+            while mailbox.take(0.1) is not None:
+                pass
+            return item
+    raise AssertionError("sender and receiver never met")

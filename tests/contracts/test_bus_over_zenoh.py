@@ -1,0 +1,124 @@
+"""What only a network can do: lose processes, lose the router, refuse to be reached."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+
+import pytest
+
+from contracts.bus import BusUnreachable, Mailbox, ZenohBus
+from contracts.drive import SpeedSample
+from contracts.keys import alive_key
+from contracts.setup import BusSetup
+from contracts.simulation import PrepareRequest
+from tests.contracts.bus_sides import (
+    MEMBER,
+    ROUTER,
+    free_endpoint,
+    publish_until_received,
+    python,
+    take,
+    take_until,
+    zenoh_sides,
+)
+
+W0 = {"run": "r1", "process": "w0"}
+
+
+def test_a_killed_process_is_seen_at_once_and_its_questions_end() -> None:
+    setup = BusSetup(endpoint=free_endpoint())
+    alive, replies = Mailbox(10), Mailbox(10)
+    with ZenohBus(setup, router=True) as bus:
+        bus.watch_alive(alive_key(run="r1", process="*"), alive)
+        with python(MEMBER, setup.endpoint, alive_key(**W0)) as member:
+            assert take(alive).up
+            bus.request("prepare", PrepareRequest(world_id="abc"), replies, **W0)
+            assert replies.take(0.2) is None
+            killed_at = time.monotonic_ns()
+            member.kill()
+
+            gone, reply = take(alive), take(replies)
+
+    assert not gone.up
+    assert gone.received_mono_ns - killed_at < 1_000_000_000
+    assert reply.error == "no answer"
+    assert reply.received_mono_ns - killed_at < 1_000_000_000
+
+
+def test_clients_find_a_router_that_was_killed_and_started_again() -> None:
+    setup = BusSetup(endpoint=free_endpoint())
+    mailbox, alive = Mailbox(10), Mailbox(10)
+    with ExitStack() as stack:
+        router = stack.enter_context(python(ROUTER, setup.endpoint))
+        sender = stack.enter_context(ZenohBus(setup))
+        receiver = stack.enter_context(ZenohBus(setup))
+        receiver.subscribe("speed", mailbox, vehicle="ego")
+        receiver.watch_alive(alive_key(run="r1", process="*"), alive)
+        sender.declare_alive(alive_key(**W0))
+        publish_until_received(sender, mailbox)
+        assert take(alive).up
+
+        router.kill()
+        assert not take(alive).up
+        sender.publish("speed", SpeedSample(stamp_ns=1, speed_mps=1.0), vehicle="ego")
+        stack.enter_context(python(ROUTER, setup.endpoint))
+
+        publish_until_received(sender, mailbox)
+        assert take_until(alive, lambda item: item.up).key == alive_key(**W0)
+
+
+def test_a_lossless_bus_waits_for_a_slow_reader() -> None:
+    count = 2000
+    mailbox = Mailbox(1, when_full="block")
+    with zenoh_sides(lossless=True) as sides:
+        sides.far.subscribe("speed", mailbox, vehicle="ego")
+        publish_until_received(sides.near, mailbox)
+        for n in range(100):
+            sides.near.publish("speed", SpeedSample(stamp_ns=n, speed_mps=0.0), vehicle="ego")
+        stamps = [take(mailbox).message().stamp_ns for _ in range(100)]
+        for n in range(100, count):
+            sides.near.publish("speed", SpeedSample(stamp_ns=n, speed_mps=0.0), vehicle="ego")
+            stamps.append(take(mailbox).message().stamp_ns)
+        mailbox.close()
+
+    assert stamps == list(range(count))
+
+
+def test_a_question_that_is_never_answered_times_out() -> None:
+    questions, replies = Mailbox(10), Mailbox(10)
+    with zenoh_sides() as sides:
+        sides.far.serve("prepare", questions, **W0)
+        for _ in range(100):
+            sides.near.request(
+                "prepare", PrepareRequest(world_id="a"), replies, timeout_s=0.5, **W0
+            )
+            if (question := questions.take(0.1)) is not None:
+                break
+
+        reply = take_until(replies, lambda item: item.error != "no answer")
+        question.refuse("too late")
+
+        assert reply.message is None
+        assert "timeout" in reply.error.lower()
+        assert replies.take(0.2) is None
+
+
+def test_no_router_is_one_clear_line() -> None:
+    endpoint = free_endpoint()
+
+    with pytest.raises(BusUnreachable, match=f"no Zenoh router at {endpoint}"):
+        ZenohBus(BusSetup(endpoint=endpoint))
+
+
+def test_closing_twice_is_harmless_and_ends_receiving() -> None:
+    with zenoh_sides() as sides:
+        mailbox = Mailbox(10)
+        sides.far.subscribe("speed", mailbox, vehicle="ego")
+        publish_until_received(sides.near, mailbox)
+        sides.far.close()
+        sides.far.close()
+
+        sides.near.publish("speed", SpeedSample(stamp_ns=1, speed_mps=1.0), vehicle="ego")
+
+        assert mailbox.take(0.2) is None

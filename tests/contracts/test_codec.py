@@ -1,0 +1,144 @@
+"""Messages survive the wire; anything that is no message of this version is refused as such."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contracts.codec import (
+    SCHEMA_VERSION,
+    SchemaMismatch,
+    content_bytes,
+    decode,
+    encode,
+    read_message,
+    write_message,
+)
+from contracts.drive import GnssFix, PlannedTrajectory, SpeedSample
+from contracts.frames import GeoPoint
+from contracts.keys import CHANNELS
+from contracts.simulation import FuturesResult
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+from tests.contracts.messages import messages, same
+
+KINDS = {channel.kind for channel in CHANNELS.values()}
+KINDS |= {channel.reply for channel in CHANNELS.values() if channel.reply is not None}
+KINDS |= {World, VehicleParameters}
+
+PLAN = PlannedTrajectory(
+    stamp_ns=12,
+    time_from_stamp_s=np.array([0.0, 0.1]),
+    lat_deg=np.array([52.1, 52.2]),
+    lon_deg=np.array([13.1, 13.2]),
+    yaw_rad=np.array([0.0, np.nan]),
+    speed_mps=np.array([3.0, 4.0]),
+)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS, key=lambda kind: kind.__name__))
+@given(data=st.data())
+@settings(max_examples=10, deadline=None)
+def test_every_message_survives_the_wire(kind: type, data: st.DataObject) -> None:
+    message = data.draw(messages(kind))
+
+    envelope = decode(encode(message, seq=7, sent_ns=-3), kind)
+
+    assert same(envelope.message, message)
+    assert (envelope.seq, envelope.sent_ns) == (7, -3)
+
+
+def test_equal_messages_have_equal_content_whatever_their_header() -> None:
+    fix = GnssFix(stamp_ns=1, position=GeoPoint(52.0, 13.0))
+    again = decode(encode(fix, seq=9, sent_ns=5), GnssFix).message
+
+    assert content_bytes(again) == content_bytes(fix)
+    assert content_bytes(GnssFix(stamp_ns=2, position=fix.position)) != content_bytes(fix)
+
+
+@pytest.mark.parametrize("array", [np.ones((2, 3))[:, ::2], np.arange(3, dtype=">f8")])
+def test_arrays_of_any_layout_arrive_contiguous_and_little_endian(array: np.ndarray) -> None:
+    plan = PlannedTrajectory(
+        stamp_ns=0, time_from_stamp_s=array, lat_deg=array, lon_deg=array, yaw_rad=array,
+        speed_mps=array,
+    )  # fmt: skip
+
+    arrived = decode(encode(plan), PlannedTrajectory).message.yaw_rad
+
+    assert arrived.dtype == np.dtype("<f8")
+    assert np.array_equal(arrived, array)
+
+
+def test_another_schema_version_is_refused_with_both_versions_named() -> None:
+    data = bytearray(encode(SpeedSample(stamp_ns=1, speed_mps=2.0)))
+    struct.pack_into("<H", data, 4, SCHEMA_VERSION + 1)
+
+    with pytest.raises(SchemaMismatch) as caught:
+        decode(bytes(data), SpeedSample, where="foretwin/v1/vehicle/ego/telemetry/speed")
+
+    assert str(caught.value) == (
+        "foretwin/v1/vehicle/ego/telemetry/speed: schema version 2; this foretwin reads version 1"
+    )
+
+
+@pytest.mark.parametrize("data", [b"", b"FTw1", b"\x00" * 24, b"<osm>" + b"." * 100])
+def test_other_data_is_no_message(data: bytes) -> None:
+    with pytest.raises(SchemaMismatch, match="not a foretwin message"):
+        decode(data, SpeedSample)
+
+
+def test_a_message_of_another_type_is_refused_by_name() -> None:
+    data = encode(GnssFix(stamp_ns=1, position=GeoPoint(0.0, 0.0)))
+
+    with pytest.raises(SchemaMismatch, match="no valid SpeedSample"):
+        decode(data, SpeedSample)
+
+
+@given(where=st.integers(0, 10_000), byte=st.integers(0, 255), cut=st.integers(0, 400))
+def test_corrupted_bytes_are_a_schema_mismatch_or_another_message(
+    where: int, byte: int, cut: int
+) -> None:
+    data = bytearray(encode(PLAN))
+    data[where % len(data)] = byte
+    data = data[: len(data) - cut] if cut % 2 else data
+
+    try:
+        message = decode(bytes(data), PlannedTrajectory).message
+    except SchemaMismatch:
+        return
+    assert isinstance(message, PlannedTrajectory)
+
+
+@given(body=st.binary(max_size=200))
+def test_random_bodies_raise_nothing_but_schema_mismatch(body: bytes) -> None:
+    header = encode(PLAN)[:24]
+    for kind in (PlannedTrajectory, FuturesResult, World):
+        with pytest.raises(SchemaMismatch):
+            decode(header + body, kind)
+
+
+def test_deeply_nested_bodies_are_refused() -> None:
+    with pytest.raises(SchemaMismatch):
+        decode(encode(PLAN)[:24] + b"\x91" * 100_000, PlannedTrajectory)
+
+
+def test_files_hold_one_whole_message(tmp_path: Path) -> None:
+    path = tmp_path / "plan.bin"
+
+    write_message(PLAN, path)
+
+    assert same(read_message(path, PlannedTrajectory), PLAN)
+    assert [p.name for p in tmp_path.iterdir()] == ["plan.bin"]
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(SchemaMismatch, match=r"plan\.bin"):
+        read_message(path, PlannedTrajectory)
+
+
+def test_only_structs_and_arrays_can_be_sent() -> None:
+    with pytest.raises(TypeError, match="type object cannot be sent"):
+        encode(SpeedSample(stamp_ns=1, speed_mps=object()))  # type: ignore[arg-type]

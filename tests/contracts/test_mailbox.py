@@ -1,0 +1,100 @@
+"""A mailbox is bounded, counts what it forgets, and never keeps anyone waiting after it closed."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contracts.mailbox import Mailbox
+
+
+@given(depth=st.integers(1, 20), count=st.integers(0, 60))
+def test_a_full_mailbox_forgets_the_oldest_and_counts_it(depth: int, count: int) -> None:
+    mailbox = Mailbox(depth)
+    for item in range(count):
+        mailbox.put(item)
+
+    kept = min(depth, count)
+
+    assert len(mailbox) == kept
+    assert [mailbox.take() for _ in range(kept)] == list(range(count - kept, count))
+    assert mailbox.dropped == count - kept
+    assert mailbox.take() is None
+
+
+def test_a_blocking_mailbox_makes_the_writer_wait_and_loses_nothing() -> None:
+    mailbox = Mailbox(2, when_full="block")
+    writer = threading.Thread(target=lambda: [mailbox.put(item) for item in range(100)])
+    writer.start()
+
+    taken = [mailbox.take(5.0) for _ in range(100)]
+    writer.join(5.0)
+
+    assert taken == list(range(100))
+    assert mailbox.dropped == 0
+    assert not writer.is_alive()
+
+
+def test_many_writers_lose_nothing_while_there_is_room() -> None:
+    mailbox = Mailbox(4000)
+    writers = [
+        threading.Thread(target=lambda n=n: [mailbox.put((n, i)) for i in range(1000)])
+        for n in range(4)
+    ]
+    for writer in writers:
+        writer.start()
+
+    taken = [mailbox.take(5.0) for _ in range(4000)]
+
+    for n in range(4):
+        assert [i for writer, i in taken if writer == n] == list(range(1000))
+    assert mailbox.dropped == 0
+
+
+def test_take_waits_for_the_next_item() -> None:
+    mailbox = Mailbox(1)
+    reader_ready = threading.Event()
+
+    def write() -> None:
+        reader_ready.wait(5.0)
+        mailbox.put("late")
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    assert mailbox.take() is None
+    reader_ready.set()
+
+    assert mailbox.take(None) == "late"
+    writer.join(5.0)
+
+
+def test_closing_wakes_reader_and_writer() -> None:
+    full, empty = Mailbox(1, when_full="block"), Mailbox(1)
+    full.put("first")
+    taken: list[object] = []
+    threads = [
+        threading.Thread(target=lambda: full.put("second")),
+        threading.Thread(target=lambda: taken.append(empty.take(None))),
+    ]
+    for thread in threads:
+        thread.start()
+
+    full.close()
+    empty.close()
+    for thread in threads:
+        thread.join(5.0)
+
+    assert not any(thread.is_alive() for thread in threads)
+    assert taken == [None]
+    assert full.take() == "first"
+    assert full.take() is None
+    full.put("third")
+    assert len(full) == 0
+
+
+def test_a_mailbox_without_room_is_refused() -> None:
+    with pytest.raises(ValueError, match="depth 0"):
+        Mailbox(0)
