@@ -1,0 +1,250 @@
+"""One drive from its inputs to its files: starts the processes, runs the loop, ends everything."""
+
+from __future__ import annotations
+
+import datetime
+import logging
+import signal
+import time
+from types import FrameType
+
+from contracts.bus import Alive, Mailbox, Reply, ZenohBus
+from contracts.drive import InfoRequest
+from contracts.keys import alive_key, process_of_alive_key
+from contracts.process import log_to_file
+from contracts.setup import ProcessSetup
+from contracts.simulation import RunEnd
+from contracts.world import ATTRIBUTION
+from orchestrator.conductor import Conductor
+from orchestrator.config import DriveConfig
+from orchestrator.instructions import Tell
+from orchestrator.live_loop import LiveLoop
+from orchestrator.lock_step import LockStepLoop
+from orchestrator.mission import Mission, MissionSettings
+from orchestrator.plan import DrivePlan, make_plan, read_inputs
+from orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids
+from orchestrator.progress import ProgressLine
+from orchestrator.results import ResultTables
+from orchestrator.run_record import run_record, versions, write_record
+from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
+
+log = logging.getLogger(ORCHESTRATOR)
+
+START_TIMEOUT_S = 60.0
+END_GRACE_S = 20.0
+"""What recorder and viewer get to write at the end of a drive."""
+INTERRUPT_GRACE_S = 1.2
+
+EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
+
+
+class DriveError(RuntimeError):
+    """A drive that could not go on; the message says why."""
+
+
+class _Interrupt:
+    """Remembers Ctrl-C and SIGTERM; the loops ask, nothing is torn away in the middle."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._remember)
+
+    def _remember(self, _number: int, _frame: FrameType | None) -> None:
+        self.asked = True
+
+
+def drive(config: DriveConfig) -> int:
+    """Run one drive; returns its exit code. Raises UserError before anything is written."""
+    inputs = read_inputs(config)
+    plan = make_plan(inputs, datetime.datetime.now())
+    log_to_file(
+        ProcessSetup(
+            run_id=plan.run_id,
+            process_id=ORCHESTRATOR,
+            vehicle_id=config.vehicle_id,
+            bus=plan.bus,
+            log_file=str(plan.folder / "log.jsonl"),
+        )
+    )
+    return _Drive(plan).run()
+
+
+class _Drive:
+    """The processes of one drive and the loop over them."""
+
+    def __init__(self, plan: DrivePlan) -> None:
+        self._plan = plan
+        self._interrupt = _Interrupt()
+        self._supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
+        self._vehicle_lost = False
+        self._mission = Mission(
+            plan.graph,
+            plan.junctions,
+            plan.routes,
+            MissionSettings(
+                radius_m=plan.config.radius_m,
+                look_ahead_s=plan.config.look_ahead_s,
+                horizon_s=plan.config.horizon_s,
+            ),
+            index=plan.index,
+        )
+
+    def run(self) -> int:
+        """Run to the end, whatever ends it; the run's files are complete afterwards."""
+        plan = self._plan
+        started_s = time.monotonic()
+        log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
+        with ZenohBus(plan.bus, router=True) as bus:
+            tables = ResultTables(
+                plan.folder / "results",
+                {"run_id": plan.run_id, "attribution": ATTRIBUTION, "map": plan.osm.sha256},
+            )
+            conductor = Conductor(plan, bus, self._mission, tables)
+            exit_word, code = "failed", EXIT_FAILED
+            with ProgressLine(conductor, self._mission) as line:
+                line.say(f"run {plan.folder}")
+                try:
+                    exit_word, code = self._go(bus, conductor, line)
+                except Exception:
+                    log.exception("the drive ended by an error")
+                    raise
+                finally:
+                    self._end(bus, conductor, line, exit_word, started_s)
+        return code
+
+    def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
+        conductor.join()
+        self._start_processes()
+        if not self._join_processes(bus, conductor):
+            return "interrupted", EXIT_INTERRUPTED
+        bus.declare_alive(alive_key(run=self._plan.run_id, process=ORCHESTRATOR))
+
+        def housekeeping(now_s: float) -> None:
+            self._look_after(conductor, now_s)
+            line.update(now_s)
+
+        loop = LockStepLoop if self._plan.config.lock_step else LiveLoop
+        ended = loop(conductor, housekeeping=housekeeping, stop=self._stop).run()
+        if self._vehicle_lost and not self._interrupt.asked:
+            raise DriveError("the vehicle's process died; see log.jsonl")
+        if not ended:
+            return "interrupted", EXIT_INTERRUPTED
+        conductor.finish()
+        return "completed", EXIT_DONE
+
+    def _stop(self) -> bool:
+        return self._interrupt.asked or self._vehicle_lost
+
+    def _start_processes(self) -> None:
+        for row in PROCESSES:
+            if row.runs(self._plan):
+                for process_id in process_ids(row, self._plan):
+                    self._supervisor.start(row, row.setup(self._plan, process_id))
+
+    def _join_processes(self, bus: ZenohBus, conductor: Conductor) -> bool:
+        """Wait until every process is there and the vehicle has introduced itself."""
+        expected = {
+            process_id
+            for row in PROCESSES
+            if row.runs(self._plan)
+            for process_id in process_ids(row, self._plan)
+        }
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while not expected <= conductor.alive:
+            if self._stop():
+                return False
+            self._look_after(conductor, time.monotonic())
+            if time.monotonic() > deadline:
+                missing = ", ".join(sorted(expected - conductor.alive))
+                raise DriveError(f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl")
+            item = conductor.mailbox.take(0.1)
+            if item is not None:
+                conductor.handle(item)
+        return self._ask_info(bus, conductor, deadline)
+
+    def _ask_info(self, bus: ZenohBus, conductor: Conductor, deadline: float) -> bool:
+        answers = Mailbox(4)
+        while not self._stop():
+            bus.request(
+                "info", InfoRequest(), answers, timeout_s=2.0, vehicle=self._plan.config.vehicle_id
+            )
+            reply = answers.take(3.0)
+            if isinstance(reply, Reply) and reply.message is not None:
+                conductor.take_info(reply.message)
+                self._mission.start_stamp_ns = reply.message.start_stamp_ns
+                return True
+            # A live car may start its telemetry when it likes; a process of ours may not.
+            if self._plan.config.resolved_source != "live" and time.monotonic() > deadline:
+                raise DriveError("the vehicle does not say what it is; see log.jsonl")
+        return False
+
+    def _look_after(self, conductor: Conductor, now_s: float) -> None:
+        for death in self._supervisor.poll(now_s):
+            text = f"{death.process_id} ended with code {death.exit_code}"
+            if death.restarted:
+                conductor.tell(Tell("warning", f"{text}; started again"))
+            elif death.row.when_dead == "end_drive":
+                conductor.tell(Tell("error", text))
+                self._vehicle_lost = True
+            else:
+                conductor.tell(Tell("error", f"{text}; the drive goes on without it"))
+            # The token of a killed process vanishes by itself; a hung link would take longer.
+            gone = alive_key(run=self._plan.run_id, process=death.process_id)
+            if process_of_alive_key(gone) in conductor.alive:
+                conductor.handle(Alive(gone, False, time.monotonic_ns()))
+
+    def _end(
+        self,
+        bus: ZenohBus,
+        conductor: Conductor,
+        line: ProgressLine,
+        exit_word: str,
+        started_s: float,
+    ) -> None:
+        plan = self._plan
+        stamp = conductor.state.stamp_ns if conductor.state else 0
+        bus.publish("run_end", RunEnd(stamp_ns=stamp), run=plan.run_id)
+        quick = exit_word != "completed"
+        killed = self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else END_GRACE_S)
+        if killed:
+            log.warning("had to kill %s", ", ".join(killed))
+        while (item := conductor.mailbox.take()) is not None:
+            conductor.handle(item)
+        conductor.tables.close()
+        now_s = time.monotonic()
+        record = run_record(
+            plan,
+            conductor,
+            self._mission,
+            self._supervisor,
+            exit_word=exit_word,
+            wall_s=now_s - started_s,
+            mono_s=now_s,
+        )
+        write_record(record, plan.folder / "run.json")
+        logging.shutdown()
+        fold_stderr(plan.processes_dir, plan.folder / "log.jsonl")
+        line.say(summary_text(record))
+
+
+def summary_text(record: dict[str, object]) -> str:
+    """Return what the engineer reads at the end of a drive."""
+    futures = record["futures"]
+    assert isinstance(futures, dict)
+    junctions = record["intersections"]
+    assert isinstance(junctions, list)
+    lines = [
+        f"{record['exit']}: {len(junctions)} junctions, {futures['count']} futures in "
+        f"{futures['rounds']} rounds ({futures['missed_rounds']} missed), "
+        f"state to result p95 {record['state_to_result_ms_p95']} ms"
+    ]
+    lines += [
+        f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "
+        f"{junction['name'] or junction['id']}  world ready "
+        f"{junction['world_ready_before_s']:.1f} s before"
+        for junction in junctions
+    ]
+    return "\n".join([*lines, ATTRIBUTION])
+
+

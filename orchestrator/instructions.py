@@ -1,0 +1,50 @@
+"""What the mission tells the shell to do: the vocabulary between the pure core and the processes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from contracts.simulation import PathAhead
+
+
+@dataclass(frozen=True, slots=True)
+class BuildWorld:
+    """Have the World of a junction built."""
+
+    junction_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class UseWorld:
+    """From now on this World counts; None is open ground."""
+
+    world_id: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """Tell the engineer."""
+
+    level: Literal["info", "warning", "error"]
+    text: str
+
+
+Instruction = BuildWorld | UseWorld | Tell
+
+
+@dataclass(frozen=True, slots=True)
+class RoundIntent:
+    """A round that should run now: in which World, along which path, at which speed."""
+
+    junction_id: str
+    world_id: str
+    path: PathAhead
+    cruise_speed_mps: float
+
+
+@dataclass(frozen=True, slots=True)
+class NotReady:
+    """A round should run now, but cannot."""
+
+    reason: str

@@ -1,0 +1,89 @@
+"""The live loop: telemetry comes when it comes, rounds start by the wall clock, nothing waits."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from contracts.bus import Received
+from contracts.keys import TELEMETRY_CHANNELS
+from orchestrator.conductor import Conductor
+
+HOUSEKEEPING_S = 0.1
+LAST_ROUND_GRACE_S = 1.0
+STALE_AFTER_S = 1.0
+"""No round starts from a state older than this, in seconds of the drive's clock."""
+
+
+class LiveLoop:
+    """Runs a conductor until the vehicle's drive ends or `stop` says so.
+
+    A round falls due `rate_hz` times a wall second. It starts with the first state received from
+    then on, so that a slow GNSS does not make results older than need be, and at the latest half
+    a period later. The start of a round closes the one before: what is not complete is missed.
+    """
+
+    def __init__(
+        self,
+        conductor: Conductor,
+        *,
+        housekeeping: Callable[[float], None],
+        stop: Callable[[], bool],
+    ) -> None:
+        self._conductor = conductor
+        self._housekeeping = housekeeping
+        self._stop = stop
+        self._period_s = 1.0 / conductor.plan.config.rate_hz
+        self._speed = conductor.plan.config.speed or 1.0
+
+    def run(self) -> bool:
+        """Return True where the drive ended by itself, False where it was stopped."""
+        conductor = self._conductor
+        next_due_s = time.monotonic()
+        next_housekeeping_s = next_due_s
+        while not self._stop():
+            now_s = time.monotonic()
+            if now_s >= next_housekeeping_s:
+                self._housekeeping(now_s)
+                next_housekeeping_s = now_s + HOUSEKEEPING_S
+            seen = conductor.state_count
+            item = conductor.mailbox.take(
+                max(0.0, min(next_housekeeping_s, next_due_s + 0.5 * self._period_s) - now_s)
+            )
+            if item is not None:
+                conductor.handle(item)
+            now_s = time.monotonic()
+            fresh = conductor.state_count > seen
+            if now_s >= next_due_s and (fresh or now_s >= next_due_s + 0.5 * self._period_s):
+                conductor.desk.expire()
+                self._start_round(now_s)
+                # A machine that was asleep does not catch up on rounds; the grid stays.
+                periods = max(1, int((now_s - next_due_s) / self._period_s))
+                next_due_s += periods * self._period_s
+            if conductor.end is not None and not self._telemetry_waits():
+                self._let_finish()
+                return True
+        return False
+
+    def _start_round(self, now_s: float) -> None:
+        conductor = self._conductor
+        age_s = (now_s - conductor.state_receipt_ns / 1e9) * self._speed
+        if conductor.state is not None and age_s <= STALE_AFTER_S:
+            conductor.start_round()
+
+    def _telemetry_waits(self) -> bool:
+        return len(self._conductor.mailbox) > 0
+
+    def _let_finish(self) -> None:
+        """Give the last round its time and take what the mirror still has to say."""
+        conductor = self._conductor
+        deadline = time.monotonic() + LAST_ROUND_GRACE_S
+        while time.monotonic() < deadline and conductor.desk.open_rounds:
+            item = conductor.mailbox.take(0.05)
+            if item is not None:
+                conductor.handle(item)
+
+
+def is_telemetry(item: object) -> bool:
+    """Whether a mailbox item is a sample from the vehicle."""
+    return isinstance(item, Received) and item.channel in TELEMETRY_CHANNELS

@@ -1,0 +1,395 @@
+"""The mission: follows the car along its route, says which Worlds to build, and which rounds to run.
+
+A state machine without bus and clock: states and worlds in, instructions out. Wall times come in
+as arguments and are only remembered, never decided upon.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from contracts.drive import VehicleState
+from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, target_from_source
+from contracts.simulation import PathAhead
+from contracts.world import World
+from orchestrator.arrival import ArrivalPredictor
+from orchestrator.cruise import CruiseSpeed
+from orchestrator.driving_path import driving_path
+from orchestrator.instructions import BuildWorld, Instruction, NotReady, RoundIntent, Tell, UseWorld
+from orchestrator.junctions_ahead import UpcomingJunction
+from orchestrator.map_matching import MapMatcher, Match
+from orchestrator.road_index import RoadIndex
+from orchestrator.route import Route
+from orchestrator.route_follower import Progress, RouteFollower
+from world_gen.intersections import Junction
+from world_gen.road_graph import RoadGraph
+
+MissionState = Literal["waiting", "following", "off_map"]
+
+MATCH_PERIOD_NS = 100_000_000
+KEEP_PAST_CENTRE_M = 20.0
+"""A junction stays the current one until the car is this far past its centre."""
+PATH_BEHIND_M = 10.0
+PATH_SPARE_M = 60.0
+ALTERNATIVES_M = 300.0
+"""On a predicted route, Worlds of junctions that other turns lead to are built this far ahead."""
+FAR_AHEAD_M = 3000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionSettings:
+    """What decides when Worlds are built and rounds run."""
+
+    radius_m: float = 150.0
+    look_ahead_s: float = 60.0
+    horizon_s: float = 8.0
+
+
+@dataclass(slots=True)
+class Visit:
+    """One junction on the way: when its World was asked for, ready, entered and passed."""
+
+    junction: Junction
+    seen_mono_s: float
+    world: World | None = None
+    ready_mono_s: float | None = None
+    built_at_s: float | None = None
+    entered_mono_s: float | None = None
+    arrived_at_s: float | None = None
+    failed: bool = False
+    rounds: int = 0
+    futures: int = 0
+
+
+class Mission:
+    """One drive along one route."""
+
+    def __init__(
+        self,
+        graph: RoadGraph,
+        junctions: tuple[Junction, ...],
+        routes: tuple[Route, ...],
+        settings: MissionSettings,
+        *,
+        index: RoadIndex | None = None,
+        start_stamp_ns: int = 0,
+    ) -> None:
+        self.state: MissionState = "waiting"
+        self.start_stamp_ns = start_stamp_ns
+        self._graph = graph
+        self._settings = settings
+        index = index or RoadIndex(graph)
+        self._matcher = MapMatcher(graph, index=index)
+        self._follower = RouteFollower(graph, junctions, routes, index=index)
+        self._arrival = ArrivalPredictor()
+        self._cruise = CruiseSpeed()
+        self._given = bool(routes)
+        self._visits: dict[str, Visit] = {}
+        self._arrived: list[Visit] = []
+        self._upcoming: tuple[UpcomingJunction, ...] = ()
+        self._arrival_in_s: dict[str, float] = {}
+        self._progress: Progress | None = None
+        self._match: Match | None = None
+        self._current: str | None = None
+        self._passed_s_m: float | None = None
+        self._car: VehicleState | None = None
+        self._last_match_ns: int | None = None
+        self._stretches_told = 0
+        self._off_route_told = False
+
+    # What comes in.
+
+    def on_state(self, state: VehicleState, *, mono_s: float) -> list[Instruction]:
+        """Take where the car is."""
+        self._car = state
+        self._cruise.update(state)
+        self._arrival.update(state)
+        if not self._time_to_match(state):
+            return []
+        lat, lon = state.position.lat_deg, state.position.lon_deg
+        xy = local_from_geo(self._graph.frame, lat, lon)
+        yaw = float(local_from_geo_yaw(self._graph.frame, state.yaw_rad, lat, lon))
+        self._match = self._matcher.update(xy, yaw, state.yaw_valid, state.speed_mps)
+        self._progress = self._follower.update(self._match)
+        if self._progress is None:
+            return self._off_map()
+        told: list[Instruction] = []
+        if self.state != "following":
+            text = "on the map" if self.state == "waiting" else "back on the map"
+            told.append(Tell("info", f"{text}: {self._match_text()}"))
+            self.state = "following"
+        for passed in self._progress.passed:
+            told += self._arrive(passed.junction.summary.id, passed.centre_s_m, state, mono_s)
+        self._look_ahead(mono_s)
+        told += self._wanted_worlds(mono_s)
+        told += self._choose_current()
+        told += self._tell_deviations()
+        return told
+
+    def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:
+        """A junction's World is built and loaded by the workers."""
+        visit = self._visits[junction_id]
+        visit.world = world
+        visit.ready_mono_s = mono_s
+        visit.built_at_s = self.drive_time_s
+        return self._choose_current()
+
+    def on_world_failed(self, junction_id: str, *, mono_s: float) -> list[Instruction]:
+        """A junction's World cannot be built; the drive goes on without it."""
+        self._visits[junction_id].failed = True
+        self._visits[junction_id].ready_mono_s = None
+        return []
+
+    def on_round(self, junction_id: str, *, futures: int) -> None:
+        """A round for a junction is complete."""
+        visit = self._visits[junction_id]
+        visit.rounds += 1
+        visit.futures += futures
+
+    # What goes out.
+
+    @property
+    def drive_time_s(self) -> float:
+        """Seconds since the drive's start, by the vehicle's clock."""
+        if self._car is None:
+            return 0.0
+        return (self._car.stamp_ns - self.start_stamp_ns) / 1e9
+
+    @property
+    def next_junction(self) -> tuple[str, float] | None:
+        """Name of the junction ahead and seconds until the car is there."""
+        if not self._upcoming:
+            return None
+        summary = self._upcoming[0].junction.summary
+        return summary.name or summary.id, self._arrival_in_s[summary.id]
+
+    def worlds_ahead(self) -> list[str]:
+        """Ids of the Worlds that the coming rounds need, the current one first."""
+        ids = [self._current] if self._current else []
+        ids += [ahead.junction.summary.id for ahead in self._upcoming]
+        worlds = [self._visits[i].world for i in dict.fromkeys(ids) if i in self._visits]
+        return [world.id for world in worlds if world is not None]
+
+    def plan_round(self) -> RoundIntent | NotReady | None:
+        """Return the round to run now; None where no junction is within the look-ahead."""
+        car, progress = self._car, self._progress
+        if self.state != "following" or car is None or progress is None:
+            return None
+        within = [
+            ahead
+            for ahead in self._upcoming
+            if self._arrival_in_s[ahead.junction.summary.id] <= self._settings.look_ahead_s
+        ]
+        if not within and self._current is None:
+            return None
+        visit = self._visits.get(self._current) if self._current else None
+        if visit is None or visit.world is None:
+            return NotReady("the world is not ready")
+        if not car.yaw_valid:
+            return NotReady("the heading is not known")
+        return RoundIntent(
+            junction_id=visit.junction.summary.id,
+            world_id=visit.world.id,
+            path=self._path_ahead(visit.world.frame, car.speed_mps),
+            cruise_speed_mps=self._cruise.speed_mps,
+        )
+
+    def _path_ahead(self, frame: LocalFrame, speed_mps: float) -> PathAhead:
+        assert self._progress is not None
+        s_m = self._progress.s_m
+        reach_m = self._settings.horizon_s * max(speed_mps + 8.0, 15.0) + PATH_SPARE_M
+        geometry = driving_path(
+            self._graph, self._follower.route, s_from_m=s_m - PATH_BEHIND_M, s_to_m=s_m + reach_m
+        )
+        moved = target_from_source(
+            frame, self._graph.frame, geometry.xy_m, np.zeros(len(geometry.xy_m))
+        )
+        return PathAhead(xy_m=moved.xy_m, speed_limit_mps=geometry.speed_limit_mps)
+
+    def records(self, *, mono_s: float) -> list[dict[str, Any]]:
+        """Return the `intersections` of run.json: those that the car reached, in order."""
+        return [_record(visit, mono_s) for visit in self._arrived]
+
+    @property
+    def off_road(self) -> list[dict[str, Any]]:
+        """Stretches driven where the map says that cars may not."""
+        return [
+            {
+                "reason": s.reason,
+                "name": s.name,
+                "way_ids": list(s.way_ids),
+                "length_m": round(s.length_m, 1),
+            }
+            for s in self._matcher.off_road_stretches
+        ]
+
+    # Inside.
+
+    def _time_to_match(self, state: VehicleState) -> bool:
+        last = self._last_match_ns
+        if last is not None and 0 <= state.stamp_ns - last < MATCH_PERIOD_NS:
+            return False
+        self._last_match_ns = state.stamp_ns
+        return True
+
+    def _match_text(self) -> str:
+        assert self._match is not None
+        edge = self._match.directed_edge.edge
+        return f"{edge.name or edge.road_class} (way {edge.way_id})"
+
+    def _off_map(self) -> list[Instruction]:
+        self._upcoming = ()
+        self._passed_s_m = None
+        if self.state == "off_map" or self.state == "waiting":
+            return []
+        self.state = "off_map"
+        told: list[Instruction] = [Tell("warning", "off the map: no rounds until the car is back")]
+        if self._current is not None:
+            self._current = None
+            told.append(UseWorld(None))
+        return told
+
+    def _arrive(
+        self, junction_id: str, centre_s_m: float, state: VehicleState, mono_s: float
+    ) -> list[Instruction]:
+        visit = self._visits.get(junction_id)
+        told: list[Instruction] = []
+        if visit is None or visit.arrived_at_s is not None:
+            # Seen for the first time when it is passed already, or passed once more.
+            junction = next(
+                p.junction for p in self._progress_passed() if p.junction.summary.id == junction_id
+            )
+            world = visit.world if visit else None
+            visit = self._see(junction, mono_s)
+            visit.world = world
+            if world is not None:
+                visit.ready_mono_s, visit.built_at_s = mono_s, self.drive_time_s
+            else:
+                told.append(BuildWorld(junction_id))
+        visit.arrived_at_s = (state.stamp_ns - self.start_stamp_ns) / 1e9
+        if visit.entered_mono_s is None:
+            visit.entered_mono_s = mono_s
+        self._arrived.append(visit)
+        self._passed_s_m = centre_s_m
+        summary = visit.junction.summary
+        told.append(
+            Tell("info", f"passed {summary.kind} {summary.name or summary.id} ({summary.control})")
+        )
+        return told
+
+    def _progress_passed(self) -> Any:
+        return self._progress.passed if self._progress else ()
+
+    def _see(self, junction: Junction, mono_s: float) -> Visit:
+        visit = Visit(junction, mono_s)
+        self._visits[junction.summary.id] = visit
+        return visit
+
+    def _look_ahead(self, mono_s: float) -> None:
+        assert self._progress is not None
+        self._upcoming = self._follower.upcoming(FAR_AHEAD_M)
+        self._arrival_in_s = {
+            ahead.junction.summary.id: self._arrival.seconds_until(
+                self._follower.route, self._progress.s_m, ahead.distance_m
+            )
+            for ahead in self._upcoming
+        }
+        for ahead in self._upcoming:
+            visit = self._visits.get(ahead.junction.summary.id)
+            if (
+                visit is not None
+                and visit.arrived_at_s is None
+                and visit.entered_mono_s is None
+                and ahead.distance_m <= self._settings.radius_m
+            ):
+                visit.entered_mono_s = mono_s
+
+    def _wanted_worlds(self, mono_s: float) -> list[Instruction]:
+        wanted = [
+            ahead.junction
+            for ahead in self._upcoming
+            if self._arrival_in_s[ahead.junction.summary.id] <= self._settings.look_ahead_s
+        ]
+        if not self._given or (self._progress is not None and self._progress.off_route):
+            wanted += [a.junction for a in self._follower.alternatives(ALTERNATIVES_M)]
+        told: list[Instruction] = []
+        for junction in wanted:
+            visit = self._visits.get(junction.summary.id)
+            if visit is None:
+                self._see(junction, mono_s)
+                told.append(BuildWorld(junction.summary.id))
+            elif visit.arrived_at_s is not None and visit.world is not None:
+                # A second passage: the World is there already.
+                again = self._see(junction, mono_s)
+                again.world, again.ready_mono_s = visit.world, mono_s
+                again.built_at_s = self.drive_time_s
+        return told
+
+    def _choose_current(self) -> list[Instruction]:
+        """The junction just passed stays current for a while; then the next one within reach."""
+        progress = self._progress
+        if progress is None:
+            return []
+        if self._passed_s_m is not None:
+            if progress.s_m - self._passed_s_m < KEEP_PAST_CENTRE_M and self._current is not None:
+                return []
+            self._passed_s_m = None
+        chosen = None
+        for ahead in self._upcoming:
+            junction_id = ahead.junction.summary.id
+            visit = self._visits.get(junction_id)
+            if visit is not None and visit.world is not None and not visit.failed:
+                if self._arrival_in_s[junction_id] <= self._settings.look_ahead_s:
+                    chosen = junction_id
+                break
+            if visit is not None and not visit.failed:
+                break
+        if chosen == self._current:
+            return []
+        self._current = chosen
+        visit = self._visits[chosen] if chosen else None
+        return [UseWorld(visit.world.id if visit and visit.world else None)]
+
+    def _tell_deviations(self) -> list[Instruction]:
+        told: list[Instruction] = []
+        assert self._progress is not None
+        if self._progress.off_route != self._off_route_told:
+            self._off_route_told = self._progress.off_route
+            text = "left the given route; the way ahead is predicted"
+            if not self._off_route_told:
+                text = "back on the given route"
+            told.append(Tell("warning" if self._off_route_told else "info", text))
+        stretches = self._matcher.off_road_stretches
+        if len(stretches) > self._stretches_told:
+            self._stretches_told = len(stretches)
+            last = stretches[-1]
+            why = {
+                "no_car_road": "which the map does not give to cars",
+                "against_one_way": "against a one-way street of the map",
+            }[last.reason]
+            ways = ", ".join(str(way) for way in last.way_ids)
+            told.append(Tell("warning", f"drives on {last.name or 'a way'} {why} (way {ways})"))
+        return told
+
+
+def _record(visit: Visit, mono_s: float) -> dict[str, Any]:
+    summary = visit.junction.summary
+    entered = visit.entered_mono_s if visit.entered_mono_s is not None else mono_s
+    # A World that never came is late by all the time since it was needed.
+    ready = visit.ready_mono_s if visit.ready_mono_s is not None else max(mono_s, entered)
+    return {
+        "id": summary.id,
+        "kind": summary.kind,
+        "name": summary.name,
+        "control": summary.control,
+        "lat": summary.lat,
+        "lon": summary.lon,
+        "arrived_at_s": None if visit.arrived_at_s is None else round(visit.arrived_at_s, 3),
+        "built_at_s": None if visit.built_at_s is None else round(visit.built_at_s, 3),
+        "world_ready_before_s": round(entered - ready, 3),
+        "rounds": visit.rounds,
+        "futures": visit.futures,
+    }

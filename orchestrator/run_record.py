@@ -1,0 +1,85 @@
+"""The record of a run: `run.json`, written at the start and, complete, at the end."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import platform
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from contracts.world import ATTRIBUTION
+from orchestrator.bookkeeping import percentile
+from orchestrator.conductor import Conductor
+from orchestrator.mission import Mission
+from orchestrator.plan import DrivePlan
+from orchestrator.supervisor import Supervisor
+
+_PACKAGES = ("foretwin", "mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "numpy", "shapely")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries that decide results."""
+    found = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = "not installed as a package"
+    return found
+
+
+def run_record(
+    plan: DrivePlan,
+    conductor: Conductor,
+    mission: Mission,
+    supervisor: Supervisor,
+    *,
+    exit_word: str,
+    wall_s: float,
+    mono_s: float,
+) -> dict[str, Any]:
+    """Return everything that run.json says."""
+    futures = conductor.futures
+    # Without a word of the mirror, whether commands were recorded decides.
+    independent = conductor.mirror_independent
+    if independent is None:
+        independent = plan.commands_recorded
+    return {
+        "run_id": plan.run_id,
+        "exit": exit_word,
+        "versions": versions(),
+        "map": {"file": str(plan.map_file), "sha256": plan.osm.sha256, "attribution": ATTRIBUTION},
+        "seed": plan.config.seed,
+        "route_source": plan.route_source,
+        "config": msgspec.to_builtins(plan.config),
+        "intersections": mission.records(mono_s=mono_s),
+        "telemetry": conductor.telemetry.record(conductor.skipped_invalid),
+        "futures": futures.record(missed=conductor.desk.missed + conductor.not_ready_rounds),
+        "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
+        "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),
+        "comparison": conductor.comparisons.record(independent=independent),
+        "workers": {
+            "started": plan.config.workers,
+            "restarted": supervisor.restarted,
+            "requeued_jobs": conductor.desk.requeued_jobs,
+            "late_results": conductor.desk.late_results,
+        },
+        "dropped": {
+            "orchestrator_mailbox": conductor.mailbox.dropped,
+            "result_rows": conductor.tables.dropped,
+            **{f"refused_{name}": count for name, count in sorted(conductor.refused.items())},
+        },
+        "off_road": mission.off_road,
+        "drive_time_s": round(mission.drive_time_s, 3),
+        "wall_s": round(wall_s, 3),
+    }
+
+
+def write_record(record: dict[str, Any], file: Path) -> None:
+    """Write run.json, complete or not at all."""
+    partial = file.with_suffix(".partial")
+    partial.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    partial.replace(file)
