@@ -1,0 +1,156 @@
+"""The viewer process: `python -m viewer --setup FILE`; `--open RRD` shows a recording."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from contracts.bus import Bus, Mailbox, Received
+from contracts.process import ProcessLife, run_process
+from contracts.setup import ViewerSetup
+from viewer.blueprint import drive_blueprint
+from viewer.live_viewer import HOST, NoViewerError, live_viewer, rerun_program
+from viewer.monitor import RUN_CHANNELS, VEHICLE_CHANNELS, Monitor, read_world
+from viewer.rows import APPLICATION_ID, Row
+from viewer.sinks import FileStream, LiveStream
+
+MAILBOX_DEPTH = 4096
+FLUSH_PERIOD_S = 0.5
+QUIET_S = 0.25
+"""At the end the mailbox must stay empty for this long: messages of other keys may lag behind."""
+DRAIN_S = 3.0
+LIVE_CLOSE_S = 1.0
+
+_log = logging.getLogger("viewer")
+
+
+class Recorder:
+    """Takes messages from a mailbox and writes their rows to the file and the live stream."""
+
+    def __init__(self, setup: ViewerSetup, messages: Mailbox) -> None:
+        self._messages = messages
+        self._dropped_told = 0
+        self._flushed_s = time.monotonic()
+        self._monitor = Monitor(
+            drive_frame=setup.drive_frame,
+            start_stamp_ns=setup.start_stamp_ns,
+            title=setup.title,
+            load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
+        )
+        blueprint = drive_blueprint()
+        self._live_viewer = live_viewer(setup.live)
+        self._file = FileStream(
+            Path(setup.file), recording_id=setup.run_id, title=setup.title, blueprint=blueprint
+        )
+        self._live = (
+            None
+            if self._live_viewer is None
+            else LiveStream(self._live_viewer.open, recording_id=setup.run_id, blueprint=blueprint)
+        )
+        self._write(self._monitor.opening())
+        self._file.flush()
+
+    def take_one(self, timeout_s: float) -> bool:
+        """Write the rows of one message; False where none came in time."""
+        item = self._messages.take(timeout_s)
+        if isinstance(item, Received):
+            try:
+                rows = self._monitor.handle(item.channel, item.message())
+            except ValueError as problem:
+                rows = self._monitor.note("error", str(problem))
+            self._write(rows)
+        if time.monotonic() - self._flushed_s > FLUSH_PERIOD_S:
+            self._tell_dropped()
+            self._file.flush()
+            self._flushed_s = time.monotonic()
+        return item is not None
+
+    def drain(self) -> None:
+        """Write what still lies in the mailbox, in bounded time."""
+        deadline_s = time.monotonic() + DRAIN_S
+        while self.take_one(QUIET_S) and time.monotonic() < deadline_s:
+            pass
+
+    def close(self, *, keep_window: bool) -> None:
+        """Complete the file, then give the live view a moment; bounded even if it is frozen."""
+        self._tell_dropped()
+        self._file.close()
+        if self._live is not None and self._live_viewer is not None:
+            self._live.close(LIVE_CLOSE_S)
+            if self._live.dropped:
+                _log.info("the live view missed %d rows; the file has them", self._live.dropped)
+            self._live_viewer.end(keep_window)
+
+    def _write(self, rows: list[Row]) -> None:
+        self._file.write(rows)
+        if self._live is not None:
+            self._live.write(rows)
+
+    def _tell_dropped(self) -> None:
+        dropped = self._messages.dropped
+        if dropped > self._dropped_told:
+            text = f"{dropped - self._dropped_told} messages dropped, {dropped} in all"
+            _log.warning(text)
+            self._write(self._monitor.note("warning", text))
+            self._dropped_told = dropped
+
+
+def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
+    """Record until the run is over."""
+    messages = Mailbox(MAILBOX_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
+    run_end = Mailbox(1)
+    recorder = Recorder(setup, messages)
+    for channel in VEHICLE_CHANNELS:
+        bus.subscribe(channel, messages, vehicle=setup.vehicle_id)
+    for channel in RUN_CHANNELS:
+        bus.subscribe(channel, messages, run=setup.run_id)
+    bus.subscribe("run_end", run_end, run=setup.run_id)
+    life.ready()
+    while not life.over:
+        recorder.take_one(0.1)
+    recorder.drain()
+    messages.close()
+    recorder.close(keep_window=len(run_end) > 0)
+
+
+def show(recording: Path) -> None:
+    """Become the native viewer of `recording`, with today's layout."""
+    if not recording.is_file():
+        raise FileNotFoundError(f"no recording {recording}")
+    has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform.startswith("linux") and not has_display:
+        raise NoViewerError(
+            f"no display to show {recording} on; "
+            f"`python -m viewer.picture {recording} OUT.png` renders a picture without one"
+        )
+    program = str(rerun_program())
+    layout = Path(tempfile.mkdtemp(prefix="foretwin-")) / "layout.rbl"
+    drive_blueprint().save(APPLICATION_ID, str(layout))
+    os.execv(program, [program, "--bind", HOST, "--port", "auto", str(recording), str(layout)])
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the viewer; returns only where it cannot, with the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m viewer", description=__doc__)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--setup", type=Path, metavar="FILE", help="a ViewerSetup as JSON")
+    what.add_argument("--open", type=Path, metavar="RRD", help="show an existing recording")
+    given = parser.parse_args(arguments)
+    try:
+        if given.open is not None:
+            show(given.open)
+        # Leaves through os._exit: Rerun's flush at exit never ends with a frozen viewer.
+        run_process(ViewerSetup, serve, ["--setup", str(given.setup)])
+    except (OSError, ValueError) as problem:
+        print(f"viewer: {problem}", file=sys.stderr)
+        return 2
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,124 @@
+"""The layout: junction, chase and map on the left, gaps and comparisons on the right."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from viewer.rows import TIMELINE
+
+MainView = Literal["Intersection", "Chase", "Map"]
+MAIN_VIEWS: tuple[str, ...] = get_args(MainView)
+GAP_VIEWS = {
+    "pos_m": "Position gap, m",
+    "yaw_deg": "Heading gap, deg",
+    "speed_mps": "Speed gap, m/s",
+}
+BACKGROUND = (16, 18, 24)
+
+
+def drive_blueprint(
+    *, main: MainView = "Intersection", detail: Literal["Comparison", "Scenarios"] = "Comparison"
+) -> rrb.Blueprint:
+    """Return the layout with `main` on top on the left and `detail` below the gap plots.
+
+    The intersection view looks at the entity /world/focus, which lies between the car and the
+    junction at every instant, so it follows the drive also when a recording is scrubbed.
+    """
+    last_30_s = rrb.VisibleTimeRange(
+        TIMELINE,
+        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-30.0),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+    intersection = rrb.Spatial3DView(
+        origin="/world/focus",
+        contents=["/world/**"],
+        name="Intersection",
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital,
+            position=(-34.0, -46.0, 74.0),
+            look_target=(0.0, 0.0, 0.0),
+            eye_up=(0.0, 0.0, 1.0),
+        ),
+        background=BACKGROUND,
+        line_grid=False,
+    )
+    chase = rrb.Spatial3DView(
+        origin="/world/ego/real",
+        contents=["/world/**"],
+        name="Chase",
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital,
+            position=(-17.0, 0.0, 9.0),
+            look_target=(7.0, 0.0, 0.0),
+            eye_up=(0.0, 0.0, 1.0),
+        ),
+        background=BACKGROUND,
+        line_grid=False,
+    )
+    gaps = [
+        _plot(f"/gap/{quantity}", name, last_30_s, legend=quantity == "pos_m")
+        for quantity, name in GAP_VIEWS.items()
+    ]
+    comparison = rrb.Horizontal(
+        _plot("/comparison/ade_m/4", "ADE at 4 s, m", last_30_s, legend=True),
+        _plot("/comparison/ade_m/8", "ADE at 8 s, m", last_30_s, legend=False),
+        name="Comparison",
+    )
+    short = rrb.Horizontal(
+        _plot("/comparison/ade_m/1", "ADE at 1 s, m", last_30_s, legend=True),
+        _plot("/comparison/ade_m/2", "ADE at 2 s, m", last_30_s, legend=False),
+        name="1 s and 2 s",
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(
+                rrb.TextDocumentView(origin="/status", name="Status", titlebar=False),
+                rrb.Tabs(
+                    intersection, chase, rrb.MapView(origin="/geo", name="Map", zoom=16.5),
+                    active_tab=main,
+                ),
+                rrb.Tabs(
+                    rrb.StateTimelineView(origin="/workers/state", name="Workers"),
+                    rrb.TextLogView(origin="/events", name="Events"),
+                    rrb.TimeSeriesView(
+                        origin="/workers/rtf", name="Real-time factor", time_ranges=last_30_s
+                    ),
+                    active_tab="Workers",
+                ),
+                row_shares=[0.32, 6.0, 1.7],
+            ),
+            rrb.Vertical(
+                *gaps,
+                rrb.Tabs(
+                    comparison,
+                    short,
+                    _plot("/comparison/plan", "Plan", last_30_s, legend=True),
+                    rrb.TextDocumentView(origin="/scenarios/table", name="Scenarios"),
+                    active_tab=0 if detail == "Comparison" else 3,
+                ),
+                row_shares=[1.0, 1.0, 1.0, 1.6],
+            ),
+            column_shares=[3.0, 2.0],
+        ),
+        rrb.TopPanel(state="hidden"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+        auto_layout=False,
+        auto_views=False,
+    )  # fmt: skip
+
+
+def _plot(
+    origin: str, name: str, time_ranges: rrb.VisibleTimeRange, *, legend: bool
+) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=origin,
+        name=name,
+        time_ranges=time_ranges,
+        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+        plot_legend=rrb.PlotLegend(rr.blueprint.Corner2D.LeftTop, visible=legend),
+    )

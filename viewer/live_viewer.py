@@ -1,0 +1,132 @@
+"""The Rerun program itself: found, started on this machine's own address, and ended."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import os
+import socket
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+HOST = "127.0.0.1"
+PORT = 9876
+WEB_PORT = 9090
+START_S = 20.0
+LIVE_CHOICES = ("native", "web", "none")
+
+_log = logging.getLogger(__name__)
+
+
+class NoViewerError(ValueError):
+    """No viewer can be shown as asked; the message says what would work."""
+
+
+def address(port: int) -> str:
+    """Return the address at which a viewer on this machine takes recordings."""
+    return f"rerun+http://{HOST}:{port}/proxy"
+
+
+def rerun_program() -> Path:
+    """Return the Rerun binary itself: the `rerun` script is a wrapper that signals do not pass."""
+    spec = importlib.util.find_spec("rerun_cli")
+    folders = [] if spec is None else list(spec.submodule_search_locations or [])
+    for folder in folders:
+        for name in ("rerun", "rerun.exe", "Rerun.app/Contents/MacOS/Rerun"):
+            path = Path(folder) / name
+            if path.is_file():
+                return path
+    raise NoViewerError("the rerun program is missing; install the package rerun-sdk again")
+
+
+def free_port() -> int:
+    """Return a TCP port that was free a moment ago."""
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+def answers(port: int) -> bool:
+    """Return whether something listens on `port` of this machine."""
+    with socket.socket() as probe:
+        probe.settimeout(0.5)
+        return probe.connect_ex((HOST, port)) == 0
+
+
+def wait_until_it_answers(process: subprocess.Popen[bytes], port: int) -> None:
+    """Return once `process` listens on `port`; raises NoViewerError when it ends or is slow."""
+    deadline = time.monotonic() + START_S
+    while not answers(port):
+        if process.poll() is not None:
+            raise NoViewerError(
+                f"the viewer ended with code {process.returncode}; is there a display?"
+            )
+        if time.monotonic() > deadline:
+            raise NoViewerError(f"the viewer did not listen on port {port} within {START_S:.0f} s")
+        time.sleep(0.05)
+
+
+def start_program(*arguments: str, port: int) -> subprocess.Popen[bytes]:
+    """Start Rerun listening on `port` of this machine alone, in a session of its own."""
+    return subprocess.Popen(
+        [str(rerun_program()), "--bind", HOST, "--port", str(port), *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "RERUN_APP_ONLY": "true"},
+        start_new_session=True,
+    )
+
+
+class LiveViewer(NamedTuple):
+    """How a live viewer is reached: `open()` starts it if need be, `end(keep_window)` ends it.
+
+    What was not started here is left alone. A native window may outlive the run, for the engineer
+    to look at; a web server never does.
+    """
+
+    open: Callable[[], str]
+    end: Callable[[bool], None]
+
+
+def live_viewer(live: str) -> LiveViewer | None:
+    """Return the live viewer for `live`, one of native, web, none, or an address.
+
+    Raises NoViewerError for anything else.
+    """
+    if live == "none":
+        return None
+    if live.startswith(("rerun://", "rerun+http://", "rerun+https://")):
+        return LiveViewer(lambda: live, lambda _keep: None)
+    if live not in LIVE_CHOICES:
+        raise NoViewerError(
+            f"live view {live!r} must be {', '.join(LIVE_CHOICES)} or an address rerun+http://…/proxy"
+        )
+    started: list[subprocess.Popen[bytes]] = []
+
+    def open_native() -> str:
+        if not answers(PORT):
+            process = start_program("--hide-welcome-screen", "--expect-data-soon", port=PORT)
+            started.append(process)
+            wait_until_it_answers(process, PORT)
+        return address(PORT)
+
+    def open_web() -> str:
+        port, web_port = free_port(), WEB_PORT if not answers(WEB_PORT) else free_port()
+        process = start_program("--serve-web", "--web-viewer-port", str(web_port), port=port)
+        started.append(process)
+        wait_until_it_answers(process, port)
+        _log.info(
+            "web view: http://%s:%d/?url=rerun%%2Bhttp://%s:%d/proxy", HOST, web_port, HOST, port
+        )
+        return address(port)
+
+    def end(keep_window: bool) -> None:
+        if live == "web" or not keep_window:
+            for process in started:
+                process.terminate()
+
+    return LiveViewer(open_native if live == "native" else open_web, end)

@@ -1,0 +1,229 @@
+"""The drive as rows: the cars, where they have been, the plan, the gap, and where the eye looks."""
+
+from __future__ import annotations
+
+import collections
+
+import numpy as np
+import rerun as rr
+
+from contracts.arrays import Array
+from contracts.drive import GnssFix, PlannedTrajectory, VehicleState
+from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, wrap_angle
+from contracts.simulation import MirrorSample, PlaneState
+from viewer.meshes import Colour
+from viewer.rows import Row, static
+
+REAL: Colour = (245, 246, 250)
+TWIN: Colour = (0, 200, 255)
+SHADOW: Colour = (178, 132, 255)
+GHOST: Colour = (255, 120, 200)
+PLAN: Colour = (88, 150, 255)
+LIMIT: Colour = (229, 72, 66)
+
+CARS: dict[str, tuple[Colour, float]] = {
+    "real": (REAL, 0.0),
+    "twin": (TWIN, 0.02),
+    "shadow": (SHADOW, 0.05),
+    "ghost": (GHOST, 0.08),
+}
+"""Colour of each car, and by how many metres its wireframe stands off, so that all are seen."""
+
+CAR_LENGTH_M, CAR_WIDTH_M, CAR_HEIGHT_M, REAR_OVERHANG_M = 4.5, 1.8, 1.5, 0.95
+"""A drawn car; base_link is the rear-axle centre on the ground."""
+
+GAP_LIMITS = {"pos_m": 1.5, "yaw_deg": 5.0, "speed_mps": 1.0}
+"""The lines drawn in the gap plots: beyond them a gap is worth a look."""
+
+TRAIL_S = 10.0
+PERIOD_NS = 95_000_000
+"""Cars and gaps are logged at most at about 10 Hz of drive time."""
+FOCUS_REACH_M = 32.0
+FOCUS_TIME_CONSTANT_S = 1.5
+
+
+def static_rows() -> list[Row]:
+    """Return what never changes: axes, the cars' boxes, the colours of the curves."""
+    rows = [static("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)]
+    for name, (colour, margin_m) in CARS.items():
+        half = [
+            CAR_LENGTH_M / 2 + margin_m,
+            CAR_WIDTH_M / 2 + margin_m,
+            CAR_HEIGHT_M / 2 + margin_m,
+        ]
+        centre = [CAR_LENGTH_M / 2 - REAR_OVERHANG_M, 0.0, CAR_HEIGHT_M / 2 + 0.05]
+        rows.append(
+            static(
+                f"world/ego/{name}",
+                rr.Boxes3D(
+                    half_sizes=[half],
+                    centers=[centre],
+                    colors=[colour],
+                    radii=0.04,
+                    fill_mode="solid" if name == "real" else "majorwireframe",
+                ),
+            )
+        )
+    for quantity in GAP_LIMITS:
+        for name, colour, width in (("twin", TWIN, 2.0), ("shadow", SHADOW, 1.5)):
+            rows.append(
+                static(
+                    f"gap/{quantity}/{name}",
+                    rr.SeriesLines(colors=colour, names=name, widths=width),
+                )
+            )
+        count = 1 if quantity == "pos_m" else 2
+        rows.append(
+            static(
+                f"gap/{quantity}/limit",
+                rr.SeriesLines(
+                    colors=[LIMIT] * count,
+                    names=["limit"] if count == 1 else ["limit", "-limit"],
+                    widths=[1.0] * count,
+                ),
+            )
+        )
+    return rows
+
+
+class DriveLog:
+    """Turns the drive's messages into rows of one drive frame, at most 10 of an entity a second."""
+
+    def __init__(self, drive_frame: LocalFrame) -> None:
+        self._frame = drive_frame
+        self._last_ns: dict[str, int] = {}
+        self._trail: collections.deque[tuple[int, Array, tuple[float, float]]] = collections.deque()
+        self._yaw_rad = 0.0
+        self._junction: Array | None = None
+        self._focus: Array | None = None
+
+    def _due(self, what: str, drive_ns: int) -> bool:
+        last = self._last_ns.get(what)
+        if last is not None and 0 <= drive_ns - last < PERIOD_NS:
+            return False
+        self._last_ns[what] = drive_ns
+        return True
+
+    def look_at(self, centre_m: Array | None) -> None:
+        """Let the intersection view lean towards the junction at (2,) `centre_m`."""
+        self._junction = centre_m
+
+    def state(self, state: VehicleState, drive_ns: int) -> list[Row]:
+        """Return the real car's pose, its trail, its place on the map, and the view's focus."""
+        if state.yaw_valid:
+            self._yaw_rad = float(
+                local_from_geo_yaw(
+                    self._frame, state.yaw_rad, state.position.lat_deg, state.position.lon_deg
+                )
+            )
+        if not self._due("state", drive_ns):
+            return []
+        here = local_from_geo(self._frame, state.position.lat_deg, state.position.lon_deg)
+        lat_lon = (state.position.lat_deg, state.position.lon_deg)
+        self._trail.append((drive_ns, here, lat_lon))
+        while drive_ns - self._trail[0][0] > TRAIL_S * 1e9 or self._trail[0][0] > drive_ns:
+            self._trail.popleft()
+        rows = [
+            Row("world/ego/real", drive_ns, _pose(here, self._yaw_rad)),
+            Row("world/focus", drive_ns, rr.Transform3D(translation=self._look(here, drive_ns))),
+            Row(
+                "geo/ego/real",
+                drive_ns,
+                rr.GeoPoints(lat_lon=[lat_lon], radii=rr.Radius.ui_points(9), colors=[TWIN]),
+            ),
+        ]
+        if len(self._trail) > 1:
+            path = np.array([point for _, point, _ in self._trail])
+            rows.append(
+                Row(
+                    "world/ego/trail/real",
+                    drive_ns,
+                    rr.LineStrips3D(
+                        [np.column_stack([path, np.full(len(path), 0.1)])],
+                        colors=[REAL],
+                        radii=0.12,
+                    ),
+                )
+            )
+            rows.append(
+                Row(
+                    "geo/ego/trail",
+                    drive_ns,
+                    rr.GeoLineStrings(
+                        lat_lon=[[place for _, _, place in self._trail]],
+                        radii=rr.Radius.ui_points(2.5),
+                        colors=[TWIN],
+                    ),
+                )
+            )
+        return rows
+
+    def _look(self, here: Array, drive_ns: int) -> list[float]:
+        """Move the focus smoothly to between the car and the junction it is concerned with."""
+        wanted = here + 15.0 * np.array([np.cos(self._yaw_rad), np.sin(self._yaw_rad)])
+        if self._junction is not None:
+            towards = self._junction - here
+            distance_m = float(np.hypot(*towards))
+            if distance_m > 1e-6:
+                wanted = here + towards * min(1.0, FOCUS_REACH_M / distance_m)
+        last_ns = self._last_ns.get("focus")
+        if self._focus is None or last_ns is None or not 0 <= drive_ns - last_ns < 5e9:
+            self._focus = wanted
+        else:
+            weight = 1.0 - np.exp(-(drive_ns - last_ns) / (FOCUS_TIME_CONSTANT_S * 1e9))
+            self._focus = self._focus + weight * (wanted - self._focus)
+        self._last_ns["focus"] = drive_ns
+        return [float(self._focus[0]), float(self._focus[1]), 0.0]
+
+    def gnss(self, fix: GnssFix, drive_ns: int) -> list[Row]:
+        """Return the antenna's raw position on the map."""
+        if not self._due("gnss", drive_ns):
+            return []
+        place = [fix.position.lat_deg, fix.position.lon_deg]
+        points = rr.GeoPoints(lat_lon=[place], radii=rr.Radius.ui_points(3), colors=[GHOST])
+        return [Row("geo/gnss", drive_ns, points)]
+
+    def plan(self, plan: PlannedTrajectory, drive_ns: int) -> list[Row]:
+        """Return the car's own plan as a line."""
+        if len(plan.lat_deg) < 2 or not self._due("plan", drive_ns):
+            return []
+        xy_m = local_from_geo(self._frame, plan.lat_deg, plan.lon_deg)
+        line = np.column_stack([xy_m, np.full(len(xy_m), 0.22)])
+        return [Row("world/plan", drive_ns, rr.LineStrips3D([line], colors=[PLAN], radii=0.22))]
+
+    def mirror(self, sample: MirrorSample, drive_ns: int) -> list[Row]:
+        """Return the poses of twin, shadow and ghost, and the gaps to the real car."""
+        if not self._due("mirror", drive_ns):
+            return []
+        real, shadow = sample.real, sample.shadow
+        rows = [
+            Row(f"world/ego/{name}", drive_ns, _pose(np.array([car.x_m, car.y_m]), car.yaw_rad))
+            for name, car in (("twin", sample.twin), ("shadow", shadow), ("ghost", sample.ghost))
+        ]
+        twin_gap = (sample.gap_m, np.degrees(sample.gap_yaw_rad), sample.gap_speed_mps)
+        for (quantity, limit), twin, other in zip(
+            GAP_LIMITS.items(), twin_gap, _gap(shadow, real), strict=True
+        ):
+            limits = [limit] if quantity == "pos_m" else [limit, -limit]
+            rows += [
+                Row(f"gap/{quantity}/twin", drive_ns, rr.Scalars(float(twin))),
+                Row(f"gap/{quantity}/shadow", drive_ns, rr.Scalars(float(other))),
+                Row(f"gap/{quantity}/limit", drive_ns, rr.Scalars(limits)),
+            ]
+        return rows
+
+
+def _gap(car: PlaneState, real: PlaneState) -> tuple[float, float, float]:
+    """Return distance in metres, yaw in degrees and speed in m/s of `car` minus `real`."""
+    return (
+        float(np.hypot(car.x_m - real.x_m, car.y_m - real.y_m)),
+        float(np.degrees(wrap_angle(car.yaw_rad - real.yaw_rad))),
+        car.speed_mps - real.speed_mps,
+    )
+
+
+def _pose(xy_m: Array, yaw_rad: float) -> rr.Transform3D:
+    return rr.Transform3D(
+        translation=[float(xy_m[0]), float(xy_m[1]), 0.0],
+        quaternion=rr.Quaternion(xyzw=[0.0, 0.0, np.sin(yaw_rad / 2.0), np.cos(yaw_rad / 2.0)]),
+    )

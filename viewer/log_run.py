@@ -1,0 +1,85 @@
+"""The run itself as rows: workers, progress in one line, events."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+
+from contracts.simulation import Event, Progress, WorkerStatus
+from contracts.world import ATTRIBUTION
+from viewer.rows import Row, path_part, plain_text, static
+
+WORKER_COLOURS = {
+    "starting": 0x607D8BFF,
+    "idle": 0x90A4AEFF,
+    "busy": 0x43A047FF,
+    "dead": 0xE53935FF,
+}
+LEVELS = {
+    "info": rr.TextLogLevel.INFO,
+    "warning": rr.TextLogLevel.WARN,
+    "error": rr.TextLogLevel.ERROR,
+}
+
+
+class RunLog:
+    """Turns the run's messages into rows; a worker's colours come with its first status."""
+
+    def __init__(self, title: str) -> None:
+        self._title = plain_text(title)
+        self._states: dict[str, str] = {}
+
+    def static_rows(self) -> list[Row]:
+        """Return the status line as it reads before the first progress."""
+        return [static("about", _document(f"{self._title} · map data {ATTRIBUTION}"))]
+
+    def first_status(self) -> Row:
+        """Return the status line at drive time 0."""
+        return Row("status", 0, _document(f"**{self._title}** · map data {ATTRIBUTION}"), True)
+
+    def worker(self, status: WorkerStatus, drive_ns: int) -> list[Row]:
+        """Return a change of state and the real-time factor."""
+        part = path_part(status.worker_id)
+        rows: list[Row] = []
+        if status.worker_id not in self._states:
+            rows.append(
+                static(
+                    f"workers/state/{part}",
+                    rr.StateConfiguration(
+                        values=list(WORKER_COLOURS),
+                        labels=list(WORKER_COLOURS),
+                        colors=np.array(list(WORKER_COLOURS.values()), dtype=np.uint32),
+                    ),
+                )
+            )
+            rows.append(static(f"workers/rtf/{part}", rr.SeriesLines(names=status.worker_id)))
+        if self._states.get(status.worker_id) != status.state:
+            self._states[status.worker_id] = status.state
+            rows.append(Row(f"workers/state/{part}", drive_ns, rr.StateChange(state=status.state)))
+        if status.rtf is not None:
+            rows.append(Row(f"workers/rtf/{part}", drive_ns, rr.Scalars(status.rtf)))
+        return rows
+
+    def progress(self, progress: Progress, drive_ns: int) -> list[Row]:
+        """Return the status line."""
+        ahead = "no junction ahead"
+        if progress.next_intersection is not None:
+            ahead = f"next **{plain_text(progress.next_intersection)}**"
+            if progress.arrival_in_s is not None:
+                ahead += f" in {progress.arrival_in_s:.0f} s"
+        text = (
+            f"**{progress.drive_time_s:.1f} s** · {plain_text(progress.mission_state)} · {ahead} · "
+            f"{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped · "
+            f"map data {ATTRIBUTION}"
+        )
+        return [Row("status", drive_ns, _document(text))]
+
+
+def rows_of_event(event: Event, drive_ns: int) -> list[Row]:
+    """Return one line of the event log."""
+    text = f"{plain_text(event.source)}: {plain_text(event.text)}"
+    return [Row("events", drive_ns, rr.TextLog(text, level=LEVELS[event.level]))]
+
+
+def _document(text: str) -> rr.TextDocument:
+    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

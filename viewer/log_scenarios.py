@@ -1,0 +1,139 @@
+"""Futures as rows: the fan of paths, the worst of them, the error against reality."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import rerun as rr
+
+from contracts.arrays import Array, Array32
+from contracts.simulation import Comparison, PlanComparison, RoundView
+from viewer.log_drive import PLAN, TWIN
+from viewer.meshes import Colour
+from viewer.rows import Row, static, table_cell
+
+SAFE, WATCH, CRITICAL = (56, 176, 92), (255, 184, 28), (234, 62, 56)
+NOMINAL: Colour = (250, 250, 255)
+BASELINES: dict[str, tuple[Colour, str]] = {
+    "nominal": (TWIN, "nominal future"),
+    "constant_velocity": ((255, 176, 66), "constant velocity"),
+    "constant_turn_rate": ((190, 190, 120), "constant turn rate"),
+}
+"""Colour and name of each prediction that is compared with the real drive."""
+HORIZONS_S = (1, 2, 4, 8)
+
+FUTURE_POINTS = 33
+"""Points drawn of each future; more only makes the file larger."""
+WORST_SHOWN = 12
+
+
+def static_rows() -> list[Row]:
+    """Return names and colours of the comparison's curves."""
+    rows = [
+        static(
+            f"comparison/ade_m/{horizon_s}/{name}",
+            rr.SeriesLines(colors=colour, names=label, widths=2.0 if name == "nominal" else 1.2),
+        )
+        for horizon_s in HORIZONS_S
+        for name, (colour, label) in BASELINES.items()
+    ]
+    for name, colour, label in (
+        ("ade_m", PLAN, "plan to nominal, mean"),
+        ("path_offset_m", (255, 176, 66), "plan to lane centre, left +"),
+    ):
+        rows.append(static(f"comparison/plan/{name}", rr.SeriesLines(colors=colour, names=label)))
+    return rows
+
+
+def criticality_colours(criticality: Array | Array32) -> npt.NDArray[np.uint8]:
+    """Return (S, 3) colours from green over amber to red for (S,) criticality in 0..1."""
+    ramp = np.array([SAFE, WATCH, CRITICAL], dtype=np.float64)
+    place = np.clip(np.nan_to_num(np.asarray(criticality, dtype=np.float64), nan=1.0), 0.0, 1.0) * 2
+    low = np.minimum(place.astype(np.intp), 1)
+    share = (place - low)[:, None]
+    return np.asarray(ramp[low] * (1.0 - share) + ramp[low + 1] * share, dtype=np.uint8)
+
+
+def rows_of_round(view: RoundView, drive_ns: int) -> list[Row]:
+    """Return the futures as one entity, and the table of the worst."""
+    table = rr.TextDocument(scenario_table(view), media_type=rr.MediaType.MARKDOWN)
+    return [*_futures(view, drive_ns), Row("scenarios/table", drive_ns, table)]
+
+
+def no_futures(drive_ns: int) -> list[Row]:
+    """Return the row that takes the last round's futures away."""
+    return [Row("world/futures", drive_ns, rr.Clear(recursive=False))]
+
+
+def _futures(view: RoundView, drive_ns: int) -> list[Row]:
+    count, points = view.xy_m.shape[:2]
+    if count == 0 or points < 2:
+        return no_futures(drive_ns)
+    chosen = np.unique(np.linspace(0, points - 1, min(points, FUTURE_POINTS)).round().astype(int))
+    # Rounded to 1/64 m, paths compress to a third.
+    paths = np.round(view.xy_m[:, chosen].astype(np.float64) * 64.0) / 64.0
+    usable = np.isfinite(paths).all(axis=(1, 2))
+    criticality = np.nan_to_num(np.asarray(view.criticality, dtype=np.float64), nan=1.0)
+    colours = criticality_colours(criticality)
+    radii = 0.07 + 0.06 * np.clip(criticality, 0.0, 1.0)
+    heights = 0.25 + 0.15 * np.clip(criticality, 0.0, 1.0)
+    if 0 <= view.nominal_index < count:
+        colours[view.nominal_index] = NOMINAL
+        radii[view.nominal_index] = 0.24
+        heights[view.nominal_index] = 0.5
+    strips = np.concatenate(
+        [paths, np.broadcast_to(heights[:, None, None], (*paths.shape[:2], 1))], axis=2
+    )[usable]
+    return [
+        Row(
+            "world/futures",
+            drive_ns,
+            rr.LineStrips3D(
+                list(strips.astype(np.float32)), colors=colours[usable], radii=radii[usable]
+            ),
+        )
+    ]
+
+
+def scenario_table(view: RoundView) -> str:
+    """Return Markdown: what the round holds, and its worst futures, worst first."""
+    clearance = (
+        "no other road user"
+        if view.min_clearance_m is None
+        else f"least clearance {view.min_clearance_m:.1f} m"
+    )
+    lines = [
+        f"**{len(view.names)} futures** from {table_cell(view.intersection_id)} · "
+        f"{view.collided} collide · {clearance} · {view.latency_ms:.0f} ms",
+        "",
+        "| # | future | criticality | |",
+        "|--:|:--|--:|:--|",
+    ]
+    criticality = np.nan_to_num(np.asarray(view.criticality, dtype=np.float64), nan=1.0)
+    worst = np.argsort(-criticality, kind="stable")[:WORST_SHOWN]
+    for index in worst:
+        value = float(criticality[index])
+        verdict = "collides" if value >= 1.0 else "close" if value >= 0.5 else "clear"
+        name = view.names[index] if index < len(view.names) else str(index)
+        lines.append(f"| {index} | {table_cell(name)} | {value:.2f} | {verdict} |")
+    return "\n".join(lines)
+
+
+def rows_of_comparison(comparison: Comparison, drive_ns: int) -> list[Row]:
+    """Return the mean displacement error of the nominal future and of both baselines."""
+    base = f"comparison/ade_m/{comparison.horizon_s:g}"
+    return [
+        Row(f"{base}/nominal", drive_ns, rr.Scalars(comparison.nominal.ade_m)),
+        Row(f"{base}/constant_velocity", drive_ns, rr.Scalars(comparison.constant_velocity.ade_m)),
+        Row(
+            f"{base}/constant_turn_rate", drive_ns, rr.Scalars(comparison.constant_turn_rate.ade_m)
+        ),
+    ]
+
+
+def rows_of_plan_comparison(comparison: PlanComparison, drive_ns: int) -> list[Row]:
+    """Return how far the car's plan lies from the nominal future and from the lane's centre."""
+    return [
+        Row("comparison/plan/ade_m", drive_ns, rr.Scalars(comparison.difference.ade_m)),
+        Row("comparison/plan/path_offset_m", drive_ns, rr.Scalars(comparison.path_offset_m)),
+    ]

@@ -1,0 +1,205 @@
+"""A World as rows: roads, crossings, signals, islands, buildings, and the map view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from contracts.arrays import Array
+from contracts.frames import LocalFrame, geo_from_local, target_from_source
+from contracts.world import Provenance, World
+from viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
+from viewer.rows import Row, path_part
+
+ROAD: Colour = (58, 61, 68)
+JUNCTION: Colour = (70, 74, 84)
+ISLAND: Colour = (66, 92, 66)
+PAINT: Colour = (226, 228, 232)
+LANE_EDGE: Colour = (138, 143, 152)
+KERB: Colour = (112, 116, 124)
+CONNECTION: Colour = (84, 118, 150)
+SIGNAL: Colour = (255, 196, 64)
+BUILDING: dict[Provenance, Colour] = {
+    "tagged": (168, 174, 186),
+    "inferred": (146, 152, 164),
+    "default": (122, 127, 138),
+}
+"""The lighter, the better its height is known."""
+
+ROAD_HEIGHT_M = 0.0
+JUNCTION_HEIGHT_M = 0.02
+ISLAND_HEIGHT_M = 0.12
+PAINT_HEIGHT_M = 0.05
+LINE_HEIGHT_M = 0.06
+SIGNAL_HEIGHT_M = 5.0
+STRIPE_M = 0.5
+"""Width of a zebra stripe and of the gap to the next."""
+
+
+def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> list[Row]:
+    """Return the rows that show `world` in `drive_frame` from `drive_ns` on."""
+    move = _Mover(world.frame, drive_frame)
+    base = f"world/map/{path_part(world.id)}"
+
+    def row(name: str, components: rr.AsComponents) -> Row:
+        return Row(f"{base}/{name}", drive_ns, components, lasting=True)
+
+    rows: list[Row] = []
+    surface = [Polygon(area.outline, area.holes) for area in world.road_surface]
+    junction = [] if world.junction_area is None else [world.junction_area]
+    if surface:
+        rows.append(
+            row("roads/surface", _archetype(
+                flat_mesh(move.polygons(surface), height_m=ROAD_HEIGHT_M, colour=ROAD)
+            ))
+        )  # fmt: skip
+    if junction:
+        inside = [Polygon(area.outline, area.holes) for area in junction]
+        rows.append(
+            row("roads/junction", _archetype(
+                flat_mesh(move.polygons(inside), height_m=JUNCTION_HEIGHT_M, colour=JUNCTION)
+            ))
+        )  # fmt: skip
+    edges = [
+        offset_left(lane.centerline, side * lane.width_m.value / 2.0)
+        for lane in world.lanes
+        for side in (1.0, -1.0)
+    ]
+    for name, lines, colour, radius_m in (
+        ("roads/lanes", edges, LANE_EDGE, 0.05),
+        ("roads/kerbs", world.kerbs, KERB, 0.09),
+        ("roads/connections", [c.centerline for c in world.connections], CONNECTION, 0.05),
+        ("stop_lines", [line.ends for line in world.stop_lines], PAINT, 0.16),
+    ):
+        if lines:
+            rows.append(row(name, _lines(move.lines(lines), colour, radius_m)))
+    stripes = [
+        Polygon(stripe)
+        for crossing in world.crossings
+        for stripe in zebra_stripes(crossing.line, width_m=crossing.width_m.value)
+    ]
+    if stripes:
+        mesh = flat_mesh(move.polygons(stripes), height_m=PAINT_HEIGHT_M, colour=PAINT)
+        rows.append(row("crossings", _archetype(mesh)))
+    if world.islands:
+        islands = [Polygon(area.outline, area.holes) for area in world.islands]
+        mesh = flat_mesh(move.polygons(islands), height_m=ISLAND_HEIGHT_M, colour=ISLAND)
+        rows.append(row("islands", _archetype(mesh)))
+    if world.signals:
+        rows += _signal_rows(world, move, f"{base}/signals", drive_ns)
+    if world.buildings:
+        footprints = [Polygon(building.outline, building.holes) for building in world.buildings]
+        mesh = prism_mesh(
+            move.polygons(footprints),
+            low_m=[building.min_height_m for building in world.buildings],
+            high_m=[building.height_m.value for building in world.buildings],
+            colours=[BUILDING[building.height_m.source] for building in world.buildings],
+        )
+        rows.append(row("buildings", _archetype(mesh)))
+    if world.lanes:
+        rows.append(
+            Row(
+                f"geo/roads/{path_part(world.id)}",
+                drive_ns,
+                rr.GeoLineStrings(
+                    lat_lon=[geo_from_local(world.frame, lane.centerline) for lane in world.lanes],
+                    radii=rr.Radius.ui_points(1.2),
+                    colors=[[150, 156, 168]] * len(world.lanes),
+                ),
+                lasting=True,
+            )
+        )
+    return rows
+
+
+def world_centre(world: World, *, drive_frame: LocalFrame) -> Array:
+    """Return (2,) metres of the junction's centre, the World's origin, in `drive_frame`."""
+    moved = target_from_source(drive_frame, world.frame, np.zeros((1, 2)), np.zeros(1))
+    return moved.xy_m.reshape(2)
+
+
+def offset_left(line: Array, distance_m: float) -> Array:
+    """Return the polyline (N, 2) moved to its left; negative distances move it to the right.
+
+    Corners are mitred, at most twice as far as `distance_m`.
+    """
+    line = np.asarray(line, dtype=np.float64)
+    along: Array = np.diff(line, axis=0)
+    along /= np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
+    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    before, after = np.vstack([left[:1], left]), np.vstack([left, left[-1:]])
+    # The mitre is (before + after) / (1 + cos of the bend).
+    scale = np.maximum(1.0 + np.sum(before * after, axis=1), 0.5)
+    mitre: Array = (before + after) / scale[:, None]
+    return line + distance_m * mitre
+
+
+def zebra_stripes(line: Array, *, width_m: float) -> list[Array]:
+    """Return the stripes, each (4, 2), of a crossing from kerb to kerb along `line` (2, 2)."""
+    start, end = np.asarray(line, dtype=np.float64)
+    length_m = float(np.hypot(*(end - start)))
+    if length_m < STRIPE_M:
+        return []
+    along = (end - start) / length_m
+    across = np.array([-along[1], along[0]]) * width_m / 2.0
+    begins = np.arange(STRIPE_M / 2.0, length_m - STRIPE_M / 2.0, 2.0 * STRIPE_M)
+    return [
+        np.array([a - across, b - across, b + across, a + across])
+        for a, b in ((start + along * s, start + along * (s + STRIPE_M)) for s in begins)
+    ]
+
+
+class _Mover:
+    """Moves many small arrays into the drive's frame with one projection each call."""
+
+    def __init__(self, source: LocalFrame, target: LocalFrame) -> None:
+        self._source = source
+        self._target = target
+
+    def lines(self, lines: Sequence[Array]) -> list[Array]:
+        every = np.concatenate([np.asarray(line, dtype=np.float64) for line in lines])
+        moved = target_from_source(self._target, self._source, every, np.zeros(len(every))).xy_m
+        return np.split(moved, np.cumsum([len(line) for line in lines])[:-1])
+
+    def polygons(self, polygons: Sequence[Polygon]) -> list[Polygon]:
+        if not polygons:
+            return []
+        rings = iter(
+            self.lines([ring for shape in polygons for ring in (shape.outline, *shape.holes)])
+        )
+        return [Polygon(next(rings), tuple(next(rings) for _ in shape.holes)) for shape in polygons]
+
+
+def _archetype(mesh: Mesh) -> rr.Mesh3D:
+    return rr.Mesh3D(
+        vertex_positions=mesh.vertices_m,
+        vertex_normals=mesh.normals,
+        vertex_colors=mesh.colours,
+        triangle_indices=mesh.triangles,
+    )
+
+
+def _lines(lines: Sequence[Array], colour: Colour, radius_m: float) -> rr.LineStrips3D:
+    return rr.LineStrips3D(
+        [np.column_stack([line, np.full(len(line), LINE_HEIGHT_M)]) for line in lines],
+        colors=[colour] * len(lines),
+        radii=[radius_m] * len(lines),
+    )
+
+
+def _signal_rows(world: World, move: _Mover, path: str, drive_ns: int) -> list[Row]:
+    heads = np.array([signal.position for signal in world.signals], dtype=np.float64)
+    tops = np.column_stack([move.lines([heads[:, :2]])[0], heads[:, 2]])
+    tops[:, 2] = np.where(tops[:, 2] > 0.5, tops[:, 2], SIGNAL_HEIGHT_M)
+    feet = tops * [1.0, 1.0, 0.0]
+    return [
+        Row(path, drive_ns, rr.Points3D(tops, colors=[SIGNAL] * len(tops), radii=0.35), True),
+        Row(
+            f"{path}/poles",
+            drive_ns,
+            rr.LineStrips3D(np.stack([feet, tops], axis=1), colors=[KERB] * len(tops), radii=0.06),
+            True,
+        ),
+    ]

@@ -1,0 +1,135 @@
+"""Messages to rows: one dispatch over all channels the viewer listens to."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from contracts.arrays import Array
+from contracts.codec import read_message
+from contracts.frames import LocalFrame
+from contracts.simulation import ActiveWorld, Event, WorldNotice
+from contracts.world import World
+from viewer import log_drive, log_scenarios
+from viewer.log_drive import DriveLog
+from viewer.log_run import RunLog, rows_of_event
+from viewer.log_scenarios import (
+    no_futures,
+    rows_of_comparison,
+    rows_of_plan_comparison,
+    rows_of_round,
+)
+from viewer.log_world import rows_of_world, world_centre
+from viewer.rows import Row
+
+VEHICLE_CHANNELS = ("state", "gnss", "plan", "end")
+RUN_CHANNELS = (
+    "round", "comparison", "plan_comparison", "mirror", "active_world", "world", "worker_status",
+    "progress", "event",
+)  # fmt: skip
+
+_log = logging.getLogger(__name__)
+
+
+def read_world(worlds_dir: Path, world_id: str) -> World:
+    """Return the World of that id; OSError or SchemaMismatch where its file cannot be read."""
+    if Path(world_id).name != world_id:
+        raise FileNotFoundError(f"{world_id!r} is no name of a World")
+    return read_message(worlds_dir / f"{world_id}.world", World)
+
+
+class Monitor:
+    """Turns each message into rows, in drive time since `start_stamp_ns`.
+
+    `load_world` returns the World of an id. A message that cannot be shown becomes an event in
+    the recording, never an exception.
+    """
+
+    def __init__(
+        self,
+        *,
+        drive_frame: LocalFrame,
+        start_stamp_ns: int,
+        title: str,
+        load_world: Callable[[str], World],
+    ) -> None:
+        self._frame = drive_frame
+        self._start_ns = start_stamp_ns
+        self._load_world = load_world
+        self._drive = DriveLog(drive_frame)
+        self._run = RunLog(title)
+        self._centres: dict[str, Array] = {}
+        self._now_ns = 0
+        self._handlers: dict[str, Callable[[Any, int], list[Row]]] = {
+            "state": self._drive.state,
+            "gnss": self._drive.gnss,
+            "plan": self._drive.plan,
+            "end": lambda end, ns: self._say("info", f"vehicle: {end.reason}", ns),
+            "round": rows_of_round,
+            "comparison": rows_of_comparison,
+            "plan_comparison": rows_of_plan_comparison,
+            "mirror": self._drive.mirror,
+            "active_world": self._active_world,
+            "world": self._world,
+            "worker_status": self._run.worker,
+            "progress": self._run.progress,
+            "event": rows_of_event,
+        }
+
+    def opening(self) -> list[Row]:
+        """Return the rows that come before every message."""
+        return [
+            *log_drive.static_rows(),
+            *log_scenarios.static_rows(),
+            *self._run.static_rows(),
+            self._run.first_status(),
+        ]
+
+    def handle(self, channel: str, message: Any) -> list[Row]:
+        """Return the rows of one message."""
+        stamp_ns = getattr(message, "stamp_ns", None)
+        # A WorldNotice carries no stamp: it counts from the latest instant seen.
+        drive_ns = self._now_ns if stamp_ns is None else stamp_ns - self._start_ns
+        if channel in ("state", "mirror"):
+            self._now_ns = max(self._now_ns, drive_ns)
+        try:
+            return self._handlers[channel](message, drive_ns)
+        except Exception as problem:  # one odd message must not end the recording
+            _log.exception("message on %s cannot be shown", channel)
+            return self._say("error", f"{channel} at {drive_ns / 1e9:.2f} s: {problem}", drive_ns)
+
+    def note(self, level: str, text: str) -> list[Row]:
+        """Return an event of the viewer itself at the latest drive time."""
+        return self._say(level, text, self._now_ns)
+
+    def _say(self, level: Any, text: str, drive_ns: int) -> list[Row]:
+        event = Event(stamp_ns=drive_ns, level=level, source="viewer", text=text)
+        return rows_of_event(event, drive_ns)
+
+    def _world(self, notice: WorldNotice, drive_ns: int) -> list[Row]:
+        return self._show_world(notice.world_id, drive_ns)
+
+    def _show_world(self, world_id: str, drive_ns: int) -> list[Row]:
+        if world_id in self._centres:
+            return []
+        try:
+            world = self._load_world(world_id)
+        except (OSError, ValueError) as problem:
+            return self._say("error", f"World {world_id} is not shown: {problem}", drive_ns)
+        self._centres[world_id] = world_centre(world, drive_frame=self._frame)
+        return rows_of_world(world, drive_frame=self._frame, drive_ns=drive_ns)
+
+    def _active_world(self, active: ActiveWorld, drive_ns: int) -> list[Row]:
+        if active.world_id is None:
+            self._drive.look_at(None)
+            return no_futures(drive_ns)
+        rows = self._show_world(active.world_id, drive_ns)
+        self._drive.look_at(self._centres.get(active.world_id))
+        return rows
+
+
+def handled_channels() -> Iterable[str]:
+    """Return every channel `Monitor.handle` knows."""
+    return (*VEHICLE_CHANNELS, *RUN_CHANNELS)

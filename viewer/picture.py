@@ -1,0 +1,152 @@
+"""Pictures of a recording without a display: `python -m viewer.picture RRD OUT.png --at 39`."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from rerun.experimental import ViewerClient
+
+from viewer.blueprint import MAIN_VIEWS, MainView, drive_blueprint
+from viewer.live_viewer import (
+    NoViewerError,
+    address,
+    free_port,
+    start_program,
+    wait_until_it_answers,
+)
+from viewer.rows import APPLICATION_ID, TIMELINE
+
+SETTLE_S = 60.0
+POLL_S = 0.25
+SIZE = (1600, 1000)
+
+
+class Picture(NamedTuple):
+    """The whole window as PNG, and each visible view by its name."""
+
+    window: bytes
+    views: dict[str, bytes]
+
+
+def has_vulkan() -> bool:
+    """Return whether a Vulkan driver is installed, which the headless viewer needs."""
+    folders = [Path(root) / "vulkan/icd.d" for root in ("/usr/share", "/usr/local/share", "/etc")]
+    return any(any(folder.glob("*.json")) for folder in folders if folder.is_dir())
+
+
+def take_picture(
+    recording: Path,
+    *,
+    at_s: float | None = None,
+    main: MainView = "Intersection",
+    detail: Literal["Comparison", "Scenarios"] = "Comparison",
+    size: tuple[int, int] = SIZE,
+) -> Picture:
+    """Render `recording` at drive time `at_s` (None: its end) with today's layout.
+
+    Raises FileNotFoundError without the file, NoViewerError where nothing can be rendered.
+    """
+    if not recording.is_file():
+        raise FileNotFoundError(f"no recording {recording}")
+    if sys.platform.startswith("linux") and not has_vulkan():
+        raise NoViewerError("no Vulkan driver to render with; on Debian: mesa-vulkan-drivers")
+    with tempfile.TemporaryDirectory(prefix="foretwin-") as folder:
+        layout = Path(folder) / "layout.rbl"
+        drive_blueprint(main=main, detail=detail).save(APPLICATION_ID, str(layout))
+        port = free_port()
+        program = start_program(
+            "--headless", "--hide-welcome-screen", "--window-size", f"{size[0]}x{size[1]}",
+            port=port,
+        )  # fmt: skip
+        try:
+            wait_until_it_answers(program, port)
+            client = ViewerClient.connect(address(port))
+            client.open([str(recording.resolve()), str(layout)])
+            return _settled(client, at_s)
+        finally:
+            _end(program)
+
+
+def render_recording(
+    recording: Path,
+    out: Path,
+    *,
+    at_s: float | None = None,
+    main: MainView = "Intersection",
+    detail: Literal["Comparison", "Scenarios"] = "Comparison",
+    size: tuple[int, int] = SIZE,
+) -> None:
+    """Write the window of `take_picture` to `out` as PNG."""
+    out.write_bytes(take_picture(recording, at_s=at_s, main=main, detail=detail, size=size).window)
+
+
+def _settled(client: ViewerClient, at_s: float | None) -> Picture:
+    """Move the time cursor and wait until everything is loaded and two windows look the same."""
+    deadline_s = time.monotonic() + SETTLE_S
+    last = b""
+    placed = False
+    while time.monotonic() < deadline_s:
+        state = client.get_state()
+        timelines = [t for rec in state.recordings for t in rec.timelines if t.name == TIMELINE]
+        ends = [t.end for t in timelines if t.end is not None]
+        if state.loading or not ends or state.active_recording is None:
+            time.sleep(POLL_S)
+            continue
+        if not placed:
+            moment_ns = max(ends) if at_s is None else round(at_s * 1e9)
+            client.set_time(TIMELINE, duration=np.timedelta64(moment_ns, "ns"), play_state="paused")
+            placed = True
+            continue
+        window = client.take_screenshot()
+        if window == last:
+            views = {
+                view.name: client.take_screenshot(view.view_id)
+                for view in state.views
+                if view.visible
+            }
+            return Picture(window, views)
+        last = window
+        time.sleep(POLL_S)
+    raise NoViewerError(f"the picture did not settle within {SETTLE_S:.0f} s")
+
+
+def _end(program: subprocess.Popen[bytes]) -> None:
+    program.terminate()
+    try:
+        program.wait(5.0)
+    except subprocess.TimeoutExpired:
+        program.kill()
+        program.wait()
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write one picture; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m viewer.picture", description=__doc__)
+    parser.add_argument("recording", type=Path, metavar="RRD")
+    parser.add_argument("out", type=Path, metavar="OUT.png")
+    parser.add_argument("--at", type=float, metavar="S", help="drive time; default: the end")
+    parser.add_argument("--main", choices=MAIN_VIEWS, default="Intersection")
+    parser.add_argument("--detail", choices=("Comparison", "Scenarios"), default="Comparison")
+    parser.add_argument("--size", metavar="WxH", default=f"{SIZE[0]}x{SIZE[1]}")
+    given = parser.parse_args(arguments)
+    try:
+        width, height = (int(part) for part in given.size.split("x"))
+        render_recording(
+            given.recording, given.out, at_s=given.at, main=given.main, detail=given.detail,
+            size=(width, height),
+        )  # fmt: skip
+    except (OSError, ValueError) as problem:
+        print(f"viewer.picture: {problem}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,65 @@
+"""What is logged: one row per entity and instant, independent of the stream it goes to."""
+
+from __future__ import annotations
+
+import unicodedata
+from typing import NamedTuple
+
+import rerun as rr
+
+APPLICATION_ID = "foretwin"
+TIMELINE = "drive_time"
+
+_SAFE_BEYOND_LATIN = frozenset("–—‘’“”„•…→←↑↓≤≥≈−")  # noqa: RUF001
+"""Signs of our own texts; every font of the viewer has them."""
+_LAST_LATIN = 0x24F
+
+
+class Row(NamedTuple):
+    """Components of one entity at one instant.
+
+    `drive_ns` is drive time in nanoseconds, None for what holds at all times. `lasting` rows are
+    few and everything else is unreadable without them (the map, colours, names): a crowded live
+    viewer loses them last.
+    """
+
+    path: str
+    drive_ns: int | None
+    components: rr.AsComponents
+    lasting: bool = False
+
+
+def static(path: str, components: rr.AsComponents) -> Row:
+    """Return a row that holds at all times."""
+    return Row(path, None, components, lasting=True)
+
+
+def plain_text(text: str) -> str:
+    """Return `text` with what the viewer's fonts lack replaced by `?`.
+
+    Rerun 0.41's headless viewer crashes on CJK, Arabic and emoji glyphs, and street names have
+    them. Letters with a Latin base keep it.
+    """
+    out: list[str] = []
+    for letter in unicodedata.normalize("NFC", text):
+        if letter == "\n" or letter in _SAFE_BEYOND_LATIN:
+            out.append(letter)
+        elif ord(letter) <= _LAST_LATIN:
+            out.append(letter if letter.isprintable() else " ")
+        else:
+            base = [c for c in unicodedata.normalize("NFKD", letter) if ord(c) <= _LAST_LATIN]
+            if base:
+                out.extend(base)
+            elif not unicodedata.combining(letter):
+                out.append("?")
+    return "".join(out)
+
+
+def table_cell(text: str) -> str:
+    """Return `plain_text` fit for one cell of a Markdown table."""
+    return plain_text(text).replace("\n", " ").replace("|", "/")
+
+
+def path_part(text: str) -> str:
+    """Return `text` escaped as one part of an entity path."""
+    return str(rr.escape_entity_path_part(plain_text(text)))

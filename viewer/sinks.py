@@ -1,0 +1,137 @@
+"""Two streams of one recording: a file that is always complete, and a live view that may stall."""
+
+from __future__ import annotations
+
+import collections
+import logging
+import threading
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from viewer.rows import APPLICATION_ID, TIMELINE, Row
+
+LIVE_ROWS = 256
+LASTING_ROWS = 4096
+FLUSH_S = 3.0
+
+_log = logging.getLogger(__name__)
+
+
+def _stream(recording_id: str, *, send_properties: bool) -> rr.RecordingStream:
+    stream = rr.RecordingStream(
+        APPLICATION_ID, recording_id=recording_id, send_properties=send_properties
+    )
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    return stream
+
+
+def _emit(stream: rr.RecordingStream, row: Row) -> None:
+    if row.drive_ns is None:
+        stream.log(row.path, row.components, static=True)
+        return
+    stream.set_time(TIMELINE, duration=np.timedelta64(row.drive_ns, "ns"))
+    stream.log(row.path, row.components)
+
+
+class FileStream:
+    """The recording as a file, written by the caller's own thread."""
+
+    def __init__(
+        self, path: Path, *, recording_id: str, title: str, blueprint: rrb.Blueprint
+    ) -> None:
+        self._stream = _stream(recording_id, send_properties=True)
+        self._stream.save(path, default_blueprint=blueprint)
+        self._stream.send_recording_name(title)
+
+    def write(self, rows: Iterable[Row]) -> None:
+        """Append rows."""
+        for row in rows:
+            _emit(self._stream, row)
+
+    def flush(self) -> None:
+        """Bring what was written to the file, in bounded time."""
+        try:
+            self._stream.flush(timeout_sec=FLUSH_S)
+        except RuntimeError as problem:
+            _log.warning("the recording could not be flushed: %s", problem)
+
+    def close(self) -> None:
+        """Flush and write the footer."""
+        self.flush()
+        self._stream.disconnect()
+
+
+class LiveStream:
+    """The recording for a window or browser, written by a thread of its own.
+
+    `log()` blocks once an absent or frozen viewer has taken about 200 MB. So rows wait in a
+    bounded queue: the oldest are dropped and counted, the map and other lasting rows last.
+    `open_viewer` starts the viewer if need be and returns its address; it runs in the thread.
+    """
+
+    def __init__(
+        self,
+        open_viewer: Callable[[], str],
+        *,
+        recording_id: str,
+        blueprint: rrb.Blueprint,
+    ) -> None:
+        self._open_viewer = open_viewer
+        self._recording_id = recording_id
+        self._blueprint = blueprint
+        self._lasting: collections.deque[Row] = collections.deque()
+        self._rows: collections.deque[Row] = collections.deque()
+        self._changed = threading.Condition()
+        self._closing = False
+        self._done = threading.Event()
+        self.dropped = 0
+        self.failed: str | None = None
+        threading.Thread(target=self._pump, name="live", daemon=True).start()
+
+    def write(self, rows: Iterable[Row]) -> None:
+        """Queue rows; never waits."""
+        with self._changed:
+            for row in rows:
+                queue, depth = (
+                    (self._lasting, LASTING_ROWS) if row.lasting else (self._rows, LIVE_ROWS)
+                )
+                if len(queue) >= depth:
+                    queue.popleft()
+                    self.dropped += 1
+                queue.append(row)
+            self._changed.notify()
+
+    def close(self, timeout_s: float) -> bool:
+        """Send what is queued; returns whether all went out within `timeout_s`."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify()
+        return self._done.wait(timeout_s)
+
+    def _next(self) -> Row | None:
+        with self._changed:
+            while True:
+                if self._lasting:
+                    return self._lasting.popleft()
+                if self._rows:
+                    return self._rows.popleft()
+                if self._closing:
+                    return None
+                self._changed.wait()
+
+    def _pump(self) -> None:
+        try:
+            stream = _stream(self._recording_id, send_properties=False)
+            stream.connect_grpc(self._open_viewer(), default_blueprint=self._blueprint)
+            while (row := self._next()) is not None:
+                _emit(stream, row)
+            stream.flush(timeout_sec=FLUSH_S)
+        except Exception as problem:  # the drive goes on without a window
+            _log.warning("no live view: %s", problem)
+            self.failed = str(problem)
+        self._done.set()
