@@ -1,0 +1,31 @@
+"""The stand-in car on the live keys: `python -m telemetry.standin --setup FILE`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from contracts.setup import StandinSetup
+from telemetry.standin.parameters import read_parameters
+from telemetry.standin.path import read_path
+from telemetry.standin.source import StandinSource
+from telemetry.vehicle_process import main, run_vehicle
+
+
+def run(setup: StandinSetup) -> None:
+    """Drive the path of `setup` until the run ends."""
+    file = None if setup.parameters_file is None else Path(setup.parameters_file)
+    parameters = read_parameters(file)
+    source = StandinSource(
+        read_path(Path(setup.path_file), driver=parameters.driver),
+        parameters,
+        vehicle_id=setup.vehicle_id,
+        seed=setup.seed,
+        end_s=setup.end_s,
+        plan_shift_m=setup.plan_shift_m,
+    )
+    run_vehicle(source, setup, speed=setup.speed)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:], StandinSetup, run, program="telemetry.standin"))

@@ -1,0 +1,162 @@
+"""CommonRoad's multi-body car (BMW 320i) with actuators, from standstill on.
+
+Althoff, Würsching (2020), CommonRoad: Vehicle Models. The model's point is the centre of gravity;
+everything that leaves this module is of base_link, the rear-axle centre.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from vehiclemodels.init_mb import init_mb
+from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
+from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
+
+from contracts.arrays import Array
+from telemetry.standin.parameters import CarParameters
+
+STEP_S = 0.002
+"""Runge-Kutta step: at 4 ms the tyres' slip is unstable below 0.5 m/s."""
+_SLOW_MPS = 0.8
+_ROLLING_MPS = 1.0
+_MAX_TIRE_RATE_RADPS = 0.4
+_MAX_TIRE_ANGLE_RAD = 0.6
+_X, _Y, _ANGLE, _VX, _YAW, _YAW_RATE, _VY = 0, 1, 2, 3, 4, 5, 10
+
+
+class CarMotion(NamedTuple):
+    """The true motion of base_link in the local frame; velocities in body axes."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    vx_mps: float
+    vy_mps: float
+    yaw_rate_radps: float
+    tire_angle_rad: float
+    accel_x_mps2: float
+    """Forward acceleration of the centre of gravity, as an accelerometer on level ground reads."""
+    accel_y_mps2: float
+
+
+class MultiBodyCar:
+    """Integrates one car; `step` takes what the driver asks for and applies it with delay and gain.
+
+    The tyres' slip is divided by the speed, so below 0.8 m/s (above 1 m/s when speeding up) the
+    wheels roll without slip instead: the kinematic bicycle.
+    """
+
+    def __init__(
+        self,
+        parameters: CarParameters,
+        *,
+        x_m: float,
+        y_m: float,
+        yaw_rad: float,
+        speed_mps: float = 0.0,
+    ) -> None:
+        """Place base_link at (x_m, y_m)."""
+        self._parameters = parameters
+        self._model = parameters_vehicle2()
+        self._cog_m = self._model.b
+        self.wheelbase_m: float = self._model.a + self._model.b
+        self._state = [0.0] * 29
+        self._accel = (0.0, 0.0)
+        self._steering_queue = [0.0] * max(1, round(parameters.steering_delay_s / STEP_S))
+        self._drive_queue = [0.0] * max(1, round(parameters.drive_delay_s / STEP_S))
+        self._tick = 0
+        self._multi_body = speed_mps > _ROLLING_MPS
+        self._place(
+            x_m + self._cog_m * math.cos(yaw_rad),
+            y_m + self._cog_m * math.sin(yaw_rad),
+            yaw_rad,
+            speed_mps,
+            0.0,
+        )
+
+    def _place(self, x: float, y: float, yaw: float, speed: float, angle: float) -> None:
+        """Put the centre of gravity at (x, y), rolling; `speed` is the rear axle's."""
+        yaw_rate = speed * math.tan(angle) / self.wheelbase_m
+        slip = math.atan(self._cog_m * math.tan(angle) / self.wheelbase_m)
+        core = [x, y, angle, speed / math.cos(slip), yaw, yaw_rate, slip]
+        self._state = [float(value) for value in init_mb(core, self._model)]
+
+    def motion(self) -> CarMotion:
+        """Return the true motion of base_link."""
+        state = self._state
+        yaw = state[_YAW]
+        return CarMotion(
+            x_m=state[_X] - self._cog_m * math.cos(yaw),
+            y_m=state[_Y] - self._cog_m * math.sin(yaw),
+            yaw_rad=yaw,
+            vx_mps=state[_VX],
+            vy_mps=state[_VY] - self._cog_m * state[_YAW_RATE],
+            yaw_rate_radps=state[_YAW_RATE],
+            tire_angle_rad=state[_ANGLE],
+            accel_x_mps2=self._accel[0],
+            accel_y_mps2=self._accel[1],
+        )
+
+    def step(self, *, accel_mps2: float, steering_wheel_rad: float) -> None:
+        """Go on by STEP_S with the demanded acceleration and steering-wheel angle."""
+        slot = self._tick % len(self._steering_queue)
+        wheel, self._steering_queue[slot] = self._steering_queue[slot], steering_wheel_rad
+        slot = self._tick % len(self._drive_queue)
+        demanded, self._drive_queue[slot] = self._drive_queue[slot], accel_mps2
+        self._tick += 1
+        given, state = self._parameters, self._state
+        target = wheel / given.steering_ratio + given.steering_offset_rad
+        target = min(max(target, -_MAX_TIRE_ANGLE_RAD), _MAX_TIRE_ANGLE_RAD)
+        rate = given.steering_gain_ps * (target - state[_ANGLE])
+        rate = min(max(rate, -_MAX_TIRE_RATE_RADPS), _MAX_TIRE_RATE_RADPS)
+        speed = state[_VX]
+        accel = demanded * (given.drive_gain if demanded > 0.0 else given.brake_gain)
+        if speed > 0.05:
+            drag = given.drag_npv2 * speed * speed + given.rolling_resistance_n
+            accel -= drag / self._model.m
+        before = (state[_VX], state[_VY], state[_YAW_RATE])
+        if self._multi_body and speed < _SLOW_MPS:
+            self._multi_body = False
+        elif not self._multi_body and speed > _ROLLING_MPS:
+            self._multi_body = True
+        if self._multi_body:
+            self._step_multi_body(rate, accel)
+        else:
+            self._step_rolling(rate, accel)
+        after = self._state
+        spin = after[_YAW_RATE]
+        self._accel = (
+            (after[_VX] - before[0]) / STEP_S - spin * after[_VY],
+            (after[_VY] - before[1]) / STEP_S + spin * after[_VX],
+        )
+
+    def _step_multi_body(self, rate: float, accel: float) -> None:
+        def slope(at: Array) -> Array:
+            return np.array(vehicle_dynamics_mb(at.tolist(), [rate, accel], self._model))
+
+        start = np.array(self._state)
+        k1 = slope(start)
+        k2 = slope(start + 0.5 * STEP_S * k1)
+        k3 = slope(start + 0.5 * STEP_S * k2)
+        k4 = slope(start + STEP_S * k3)
+        result = start + STEP_S / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        if not np.isfinite(result).all():
+            raise ArithmeticError("the stand-in's multi-body model diverged")
+        self._state = result.tolist()
+
+    def _step_rolling(self, rate: float, accel: float) -> None:
+        motion = self.motion()
+        speed = max(0.0, motion.vx_mps + accel * STEP_S)
+        # A tyre that stands is turned by the same motor as one that rolls.
+        angle = motion.tire_angle_rad + rate * STEP_S
+        distance = 0.5 * (motion.vx_mps + speed) * STEP_S
+        turn = distance * math.tan(angle) / self.wheelbase_m
+        yaw = motion.yaw_rad + turn
+        middle = motion.yaw_rad + 0.5 * turn
+        x = motion.x_m + distance * math.cos(middle)
+        y = motion.y_m + distance * math.sin(middle)
+        self._place(
+            x + self._cog_m * math.cos(yaw), y + self._cog_m * math.sin(yaw), yaw, speed, angle
+        )

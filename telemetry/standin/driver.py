@@ -1,0 +1,133 @@
+"""The stand-in's own controller: feed-forward of the path's curvature, and feedback on its errors.
+
+Deliberately another one than the planners under test: the path is followed by its curvature ahead
+and by feedback along the distance (offset and heading), the speed by the profile's own slope.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from telemetry.standin.car import CarMotion
+from telemetry.standin.parameters import CarParameters, DriverParameters
+from telemetry.standin.path import DrivenPath
+
+_NEAR_STOP_M = 0.4
+_STANDING_MPS = 0.02
+_SPEED_GAIN_PS = 1.2
+_STEERING_LAG_S = 0.09
+"""Of the steering motor, which the driver has learnt to anticipate."""
+
+
+class DriverCommand(NamedTuple):
+    """What the driver asks for."""
+
+    accel_mps2: float
+    steering_wheel_rad: float
+
+
+class PlanPoint(NamedTuple):
+    """Where the driver means to be: distance along the path and speed."""
+
+    s_m: float
+    speed_mps: float
+
+
+class Driver:
+    """Drives a path from its beginning, waits at each stop, and is `arrived` after the last."""
+
+    def __init__(
+        self,
+        path: DrivenPath,
+        parameters: DriverParameters,
+        *,
+        car: CarParameters,
+        wheelbase_m: float,
+        period_s: float,
+    ) -> None:
+        """`period_s` is the time between two `command` calls."""
+        self._path = path
+        self._parameters = parameters
+        self._car = car
+        self._wheelbase_m = wheelbase_m
+        self._period_s = period_s
+        self._s_m = 0.0
+        self._next_stop = 0
+        self._waited_s = 0.0
+        self.arrived = False
+
+    def command(self, motion: CarMotion) -> DriverCommand:
+        """Return what to ask of the car, and keep track of the stops."""
+        self._s_m = self._path.locate(motion.x_m, motion.y_m, near_s_m=self._s_m)
+        self._wait(motion.vx_mps)
+        return DriverCommand(
+            accel_mps2=self._accel(self._s_m, motion.vx_mps, self._next_stop),
+            steering_wheel_rad=self._steering_wheel(motion),
+        )
+
+    def _wait(self, speed_mps: float) -> None:
+        remaining = self._path.stops_m[self._next_stop] - self._s_m
+        if speed_mps > _STANDING_MPS or remaining > 1.0:
+            return
+        self._waited_s += self._period_s
+        if self._waited_s < self._parameters.dwell_s:
+            return
+        if self._next_stop + 1 < len(self._path.stops_m):
+            self._next_stop += 1
+            self._waited_s = 0.0
+        else:
+            self.arrived = True
+
+    def _wished_speed(self, s_m: float, stop: int) -> float:
+        """Return the speed at a place, braking for stop number `stop`."""
+        remaining = self._path.stops_m[stop] - s_m
+        profile = self._path.speed_at(s_m)
+        braking = math.sqrt(2.0 * self._parameters.comfort_decel_mps2 * max(0.0, remaining))
+        return min(profile, braking)
+
+    def _accel(self, s_m: float, speed_mps: float, stop: int) -> float:
+        given = self._parameters
+        if self._path.stops_m[stop] - s_m < _NEAR_STOP_M and speed_mps < 1.2:
+            return -1.0 if speed_mps < 0.5 else -given.comfort_decel_mps2
+        ahead = s_m + speed_mps * self._car.drive_delay_s
+        wished = self._wished_speed(ahead, stop)
+        later = self._wished_speed(ahead + 0.5, stop)
+        slope = (later * later - wished * wished) / 1.0
+        slope = min(max(slope, -given.comfort_decel_mps2), 0.0)
+        accel = slope + _SPEED_GAIN_PS * (wished - speed_mps)
+        return min(max(accel, -given.max_decel_mps2), given.max_accel_mps2)
+
+    def _steering_wheel(self, motion: CarMotion) -> float:
+        speed = motion.vx_mps
+        here = self._path.at(self._s_m)
+        lag_s = self._car.steering_delay_s + _STEERING_LAG_S
+        ahead = self._path.at(self._s_m + speed * lag_s)
+        offset = math.cos(here.yaw_rad) * (motion.y_m - here.y_m) - math.sin(here.yaw_rad) * (
+            motion.x_m - here.x_m
+        )
+        turned = math.remainder(motion.yaw_rad - here.yaw_rad, math.tau)
+        # Offset and heading along the distance obey e'' = κ_asked - κ: critically damped.
+        stiffness = min(0.35, 2.0 / max(speed, 1.0))
+        curvature = (
+            ahead.curvature_pm - stiffness * stiffness * offset - 2.0 * stiffness * math.sin(turned)
+        )
+        angle = math.atan(self._wheelbase_m * min(max(curvature, -0.25), 0.25))
+        return angle * self._car.steering_ratio
+
+    def plan(self, speed_mps: float) -> list[PlanPoint]:
+        """Return where the driver means to be at each `plan_step_s` over its horizon, now first."""
+        given = self._parameters
+        s, speed, stop, waited = self._s_m, max(0.0, speed_mps), self._next_stop, self._waited_s
+        points = []
+        for _ in range(round(given.plan_horizon_s / given.plan_step_s) + 1):
+            points.append(PlanPoint(s, speed))
+            accel = self._accel(s, speed, stop)
+            faster = max(0.0, speed + accel * given.plan_step_s)
+            s = min(s + 0.5 * (speed + faster) * given.plan_step_s, self._path.length_m)
+            speed = faster
+            if speed == 0.0 and self._path.stops_m[stop] - s < 1.0:
+                waited += given.plan_step_s
+                if waited >= given.dwell_s and stop + 1 < len(self._path.stops_m):
+                    stop, waited = stop + 1, 0.0
+        return points

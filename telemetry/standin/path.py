@@ -1,0 +1,141 @@
+"""The path that the stand-in's driver follows, with the speed it would like at each point."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from telemetry.standin.parameters import DriverParameters
+
+_SPACING_M = 0.5
+_CREEP_MPS = 1.5
+_MAX_CURVATURE_PM = 0.17
+_SMOOTHING_M = (1.0, 1.5, 2.0, 3.0, 4.0)
+
+
+class PathPoint(NamedTuple):
+    """One point of the path in the local frame."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    curvature_pm: float
+
+
+class DrivenPath:
+    """A smooth path of base_link, sampled every half metre, in a frame at its first point.
+
+    `speed_mps` respects the given speeds, lateral acceleration and comfortable braking before
+    bends; stops are apart, in `stops_m`: the driver brakes for the next one only.
+    """
+
+    def __init__(
+        self, lat_deg: Array, lon_deg: Array, speed_mps: Array, *, driver: DriverParameters
+    ) -> None:
+        """Take positions (N,) in degrees with wished speeds (N,); 0 asks for a stop there.
+
+        Raises ValueError for arrays of other sizes, numbers that are not finite, or less than 5 m.
+        """
+        if not (len(lat_deg) == len(lon_deg) == len(speed_mps) >= 2):
+            raise ValueError(
+                f"path of {len(lat_deg)} latitudes, {len(lon_deg)} longitudes and "
+                f"{len(speed_mps)} speeds; three lists of one length, at least 2, are needed"
+            )
+        if not np.isfinite(np.concatenate([lat_deg, lon_deg, speed_mps])).all():
+            raise ValueError("path holds a number that is not finite")
+        if np.any(speed_mps < 0.0):
+            raise ValueError("path holds a negative speed; the stand-in drives forwards")
+        self.frame = LocalFrame(GeoPoint(float(lat_deg[0]), float(lon_deg[0])))
+        xy = local_from_geo(self.frame, lat_deg, lon_deg)
+        given_s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+        if given_s[-1] < 5.0:
+            raise ValueError(f"path is {given_s[-1]:.1f} m long; at least 5 m are needed")
+        fresh = np.concatenate([[True], np.diff(given_s) > 1e-6])
+        count = max(11, int(given_s[-1] / _SPACING_M) + 1)
+        even_s = np.linspace(0.0, given_s[-1], count)
+        dense = np.stack([np.interp(even_s, given_s[fresh], xy[fresh, k]) for k in (0, 1)], axis=1)
+        for sigma_m in _SMOOTHING_M:
+            self.xy_m = _smoothed(dense, sigma_m / (even_s[1] - even_s[0]))
+            step = np.hypot(*np.diff(self.xy_m, axis=0).T)
+            self.s_m: Array = np.concatenate([[0.0], np.cumsum(step)])
+            tangent = np.gradient(self.xy_m, self.s_m, axis=0)
+            self.yaw_rad: Array = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
+            self.curvature_pm: Array = np.gradient(self.yaw_rad, self.s_m)
+            if np.abs(self.curvature_pm).max() <= _MAX_CURVATURE_PM:
+                break
+        self.length_m = float(self.s_m[-1])
+        moving = fresh & (speed_mps > 0.0)
+        if not moving.any():
+            raise ValueError("path holds no speed above 0")
+        # The smoothing shortens the path a little: stretch the given distances to it.
+        along = given_s * self.length_m / given_s[-1]
+        wished = np.interp(self.s_m, along[moving], speed_mps[moving])
+        bend = np.sqrt(driver.lateral_accel_mps2 / np.maximum(np.abs(self.curvature_pm), 1e-4))
+        self.speed_mps = _braked(
+            np.maximum(np.minimum(wished, bend), _CREEP_MPS), step, driver.comfort_decel_mps2
+        )
+        standing = speed_mps == 0.0
+        begins = standing & ~np.concatenate([[False], standing[:-1]])
+        between = along[begins & (along > 5.0) & (along < self.length_m - 5.0)]
+        self.stops_m: tuple[float, ...] = (*between.tolist(), self.length_m - 2.0)
+
+    def at(self, s_m: float) -> PathPoint:
+        """Return the point at a distance along the path, held at its ends."""
+        x, y = (float(np.interp(s_m, self.s_m, self.xy_m[:, k])) for k in (0, 1))
+        yaw = float(np.interp(s_m, self.s_m, self.yaw_rad))
+        return PathPoint(x, y, yaw, float(np.interp(s_m, self.s_m, self.curvature_pm)))
+
+    def speed_at(self, s_m: float) -> float:
+        """Return the wished speed at a distance along the path, without regard to stops."""
+        return float(np.interp(s_m, self.s_m, self.speed_mps))
+
+    def locate(self, x_m: float, y_m: float, *, near_s_m: float) -> float:
+        """Return how far along the path a point is, looking a few metres around `near_s_m`."""
+        first = max(0, int(np.searchsorted(self.s_m, near_s_m - 3.0)) - 1)
+        window = self.xy_m[first : first + 24]
+        nearest = first + int(np.argmin((window[:, 0] - x_m) ** 2 + (window[:, 1] - y_m) ** 2))
+        px, py = self.xy_m[nearest]
+        yaw = self.yaw_rad[nearest]
+        along = (x_m - px) * math.cos(yaw) + (y_m - py) * math.sin(yaw)
+        return float(min(max(self.s_m[nearest] + along, 0.0), self.length_m))
+
+
+def _smoothed(xy_m: Array, sigma: float) -> Array:
+    """Blur points (N, 2) along the path by a Gaussian of `sigma` points; the ends stay."""
+    half = min(int(4 * sigma) + 1, len(xy_m) - 1)
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / sigma) ** 2)
+    kernel /= kernel.sum()
+    padded = np.pad(xy_m, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
+    return np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in (0, 1)], axis=1)
+
+
+def _braked(speed_mps: Array, step_m: Array, decel_mps2: float) -> Array:
+    """Lower speeds (N,) so that none asks for more than `decel_mps2` to reach the next."""
+    result = speed_mps.copy()
+    for i in range(len(result) - 2, -1, -1):
+        result[i] = min(result[i], math.sqrt(result[i + 1] ** 2 + 2.0 * decel_mps2 * step_m[i]))
+    return result
+
+
+def read_path(file: Path, *, driver: DriverParameters) -> DrivenPath:
+    """Read a JSON object with lists lat_deg, lon_deg, speed_mps.
+
+    Raises ValueError naming the file and what is wrong, FileNotFoundError without a file.
+    """
+    try:
+        given = json.loads(file.read_text(encoding="utf-8"))
+        lat, lon, speed = (
+            np.asarray(given[name], dtype=np.float64)
+            for name in ("lat_deg", "lon_deg", "speed_mps")
+        )
+        return DrivenPath(lat, lon, speed, driver=driver)
+    except KeyError as missing:
+        raise ValueError(f"{file}: no list {missing}; lat_deg, lon_deg, speed_mps needed") from None
+    except (ValueError, TypeError) as problem:
+        raise ValueError(f"{file}: {problem}") from problem

@@ -1,0 +1,130 @@
+"""What the stand-in car sends: its sensors' samples with noise, its commands, plan and status."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.drive import (
+    GnssFix,
+    ImuSample,
+    PlannedTrajectory,
+    SpeedSample,
+    SteeringSample,
+    VehicleStatus,
+)
+from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from telemetry.standin.car import CarMotion
+from telemetry.standin.driver import PlanPoint
+from telemetry.standin.parameters import CarParameters, SensorParameters
+from telemetry.standin.path import DrivenPath
+
+_GRAVITY_MPS2 = 9.80665
+
+
+class Period(NamedTuple):
+    """A channel and its period in milliseconds."""
+
+    channel: str
+    period_ms: int
+
+
+SCHEDULE = (
+    Period("imu", 10),
+    Period("speed", 20),
+    Period("steering", 20),
+    Period("control", 20),
+    Period("status", 100),
+    Period("plan", 100),
+    Period("gnss", 100),
+)
+"""In the order of publishing at one stamp."""
+
+
+class Sensors:
+    """Turns the true motion into samples; each sensor has a random stream of its own."""
+
+    def __init__(
+        self, parameters: SensorParameters, car: CarParameters, *, frame: LocalFrame, seed: int
+    ) -> None:
+        self._parameters = parameters
+        self._car = car
+        self._frame = frame
+        streams = np.random.SeedSequence(seed).spawn(4)
+        self._gnss, self._imu, self._speed, self._steering = map(np.random.default_rng, streams)
+
+    def gnss(self, stamp_ns: int, motion: CarMotion) -> GnssFix:
+        """Return the antenna's position with noise."""
+        forward, left, up = self._parameters.body_from_antenna_m
+        cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        xy = np.array(
+            [
+                motion.x_m + cos * forward - sin * left,
+                motion.y_m + sin * forward + cos * left,
+            ]
+        )
+        std = self._parameters.gnss_std_m
+        lat, lon = geo_from_local(self._frame, xy + self._gnss.normal(0.0, std, 2))
+        return GnssFix(stamp_ns=stamp_ns, position=GeoPoint(float(lat), float(lon), up), std_m=std)
+
+    def imu(self, stamp_ns: int, motion: CarMotion) -> ImuSample:
+        """Return specific force and rates at the centre of gravity, the gyro with its bias."""
+        given = self._parameters
+        force = self._imu.normal(0.0, given.accel_std_mps2, 3)
+        rate = self._imu.normal(0.0, given.gyro_std_radps, 3)
+        return ImuSample(
+            stamp_ns=stamp_ns,
+            accel_mps2=(
+                motion.accel_x_mps2 + float(force[0]),
+                motion.accel_y_mps2 + float(force[1]),
+                _GRAVITY_MPS2 + float(force[2]),
+            ),
+            rate_radps=(
+                float(rate[0]),
+                float(rate[1]),
+                motion.yaw_rate_radps + given.gyro_bias_radps + float(rate[2]),
+            ),
+        )
+
+    def speed(self, stamp_ns: int, motion: CarMotion) -> SpeedSample:
+        """Return the rear wheels' speed; wheels that stand give exactly 0, without noise."""
+        noise = float(self._speed.normal(0.0, self._parameters.speed_std_mps))
+        moving = motion.vx_mps > 0.02
+        return SpeedSample(
+            stamp_ns=stamp_ns, speed_mps=max(0.0, motion.vx_mps + noise) if moving else 0.0
+        )
+
+    def steering(self, stamp_ns: int, motion: CarMotion) -> SteeringSample:
+        """Return the angle at the steering wheel, as the car's bus would."""
+        noise = float(self._steering.normal(0.0, self._parameters.steering_wheel_std_rad))
+        angle = motion.tire_angle_rad - self._car.steering_offset_rad
+        return SteeringSample(
+            stamp_ns=stamp_ns, steering_wheel_rad=angle * self._car.steering_ratio + noise
+        )
+
+
+def status(stamp_ns: int) -> VehicleStatus:
+    """Return that the car drives itself, in gear."""
+    return VehicleStatus(stamp_ns=stamp_ns, control_mode="autonomous", gear="drive")
+
+
+def planned_trajectory(
+    stamp_ns: int, points: list[PlanPoint], path: DrivenPath, *, step_s: float, shift_m: float
+) -> PlannedTrajectory:
+    """Return the driver's plan on its path, moved by `shift_m` to the left."""
+    s = np.array([point.s_m for point in points])
+    yaw = np.interp(s, path.s_m, path.yaw_rad)
+    xy: Array = np.stack([np.interp(s, path.s_m, path.xy_m[:, k]) for k in (0, 1)], axis=1)
+    xy = xy + shift_m * np.stack([-np.sin(yaw), np.cos(yaw)], axis=1)
+    geo = geo_from_local(path.frame, xy)
+    return PlannedTrajectory(
+        stamp_ns=stamp_ns,
+        time_from_stamp_s=np.arange(len(points), dtype=np.float64) * step_s,
+        lat_deg=geo[:, 0],
+        lon_deg=geo[:, 1],
+        yaw_rad=geo_from_local_yaw(path.frame, yaw, xy),
+        speed_mps=np.array([point.speed_mps for point in points]),
+    )
