@@ -80,7 +80,9 @@ class FuturesCount:
         self._hash.update(own.digest())
         self.rounds += 1
         self.distinct += distinct
-        self.distinct_min = distinct if self.distinct_min is None else min(self.distinct_min, distinct)
+        self.distinct_min = (
+            distinct if self.distinct_min is None else min(self.distinct_min, distinct)
+        )
         self.latencies_ms.append(done.latency_ms)
         return own.hexdigest()
 

@@ -42,9 +42,7 @@ def drive(
     ] = None,
     workers: Annotated[int | None, typer.Option(help="worker processes [default: 2]")] = None,
     futures: Annotated[int | None, typer.Option(help="futures per round [default: 64]")] = None,
-    rate: Annotated[
-        float | None, typer.Option(help="rounds per wall second [default: 2]")
-    ] = None,
+    rate: Annotated[float | None, typer.Option(help="rounds per wall second [default: 2]")] = None,
     horizon: Annotated[float | None, typer.Option(help="seconds ahead [default: 8]")] = None,
     planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the variants [default: 0]")] = None,
@@ -113,7 +111,9 @@ def convert(
 
 
 @app.command()
-def view(run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")]) -> None:
+def view(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
+) -> None:
     """Open the recording of a run in the viewer."""
     from orchestrator.log_commands import open_view
 

@@ -8,22 +8,15 @@ from __future__ import annotations
 import logging
 import time
 from collections import Counter
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
+from sim_worker.metrics.comparison import compare_plan
+
 from contracts.bus import Alive, Bus, Mailbox, Received, Reply
-from contracts.codec import SchemaMismatch, read_message
+from contracts.codec import SchemaMismatch
 from contracts.drive import DriveEnd, PlannedTrajectory, VehicleInfo, VehicleState
 from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key
-from contracts.simulation import (
-    ActiveWorld,
-    BuildRequest,
-    Event,
-    FuturesJob,
-    PrepareRequest,
-    WorldNotice,
-)
+from contracts.simulation import ActiveWorld, Event, FuturesJob
 from contracts.world import World
 from orchestrator.bookkeeping import ComparisonCount, FuturesCount, TelemetryCount
 from orchestrator.comparisons import ComparisonDesk
@@ -41,32 +34,20 @@ from orchestrator.result_rows import (
 )
 from orchestrator.results import ResultTables
 from orchestrator.rounds import RoundDesk, RoundDone, RoundOrder
-from sim_worker.metrics.comparison import compare_plan
+from orchestrator.world_desk import WorldDesk
 from sim_worker.variants import plan_variants
 from telemetry.estimator import StateEstimator
 
 log = logging.getLogger(ORCHESTRATOR)
 
 MAILBOX_DEPTH = 16384
-BUILD_TIMEOUT_S = 60.0
 JOB_TIMEOUT_S = 20.0
-
-
-@dataclass(frozen=True, slots=True)
-class ReadyWorld:
-    """A built World and the workers that have not loaded it yet."""
-
-    junction_id: str
-    world: World
-    pending: set[str]
 
 
 class Conductor:
     """The state of one drive between its messages."""
 
-    def __init__(
-        self, plan: DrivePlan, bus: Bus, mission: Mission, tables: ResultTables
-    ) -> None:
+    def __init__(self, plan: DrivePlan, bus: Bus, mission: Mission, tables: ResultTables) -> None:
         self.plan = plan
         self.bus = bus
         self.mission = mission
@@ -85,12 +66,19 @@ class Conductor:
         self.state: VehicleState | None = None
         self.state_receipt_ns = 0
         self.state_count = 0
-        self.worlds: dict[str, ReadyWorld] = {}
+        self.worlds = WorldDesk(
+            plan,
+            bus,
+            self.mailbox,
+            on_ready=self._world_ready,
+            on_failed=self._world_failed,
+            on_warning=lambda text: self.tell(Tell("warning", text)),
+        )
         self.not_ready_rounds = 0
         self.refused: Counter[str] = Counter()
         self.mirror_stamp_ns = 0
         self.mirror_independent: bool | None = None
-        self.builds_pending: set[str] = set()
+        self.rtf: dict[str, float] = {}
         self._estimator: StateEstimator | None = None
         self._variants = plan_variants(
             count=plan.config.futures, seed=plan.config.seed, planners=[plan.config.planner]
@@ -149,9 +137,11 @@ class Conductor:
             case Reply(channel="job"):
                 self._job_reply(item)
             case Reply(channel="build"):
-                self._build_reply(item)
+                self.worlds.build_reply(
+                    item, workers=self.desk.workers, builder_up=BUILDER in self.alive
+                )
             case Reply(channel="prepare"):
-                self._prepare_reply(item)
+                self.worlds.prepare_reply(item)
             case Alive():
                 self._alive(item)
             case _:
@@ -200,8 +190,7 @@ class Conductor:
         for instruction in instructions:
             match instruction:
                 case BuildWorld(junction_id):
-                    self.builds_pending.add(junction_id)
-                    self._ask_build(junction_id)
+                    self.worlds.build(junction_id)
                 case UseWorld(world_id):
                     self._active_world = world_id
                     self.publish_active_world()
@@ -214,69 +203,12 @@ class Conductor:
         active = ActiveWorld(stamp_ns=stamp, world_id=self._active_world)
         self.bus.publish("active_world", active, run=self.plan.run_id)
 
-    def _ask_build(self, junction_id: str) -> None:
-        self.bus.request(
-            "build",
-            BuildRequest(intersection_id=junction_id, radius_m=self.plan.config.radius_m),
-            self.mailbox,
-            tag=junction_id,
-            timeout_s=BUILD_TIMEOUT_S,
-            run=self.plan.run_id,
-            process=BUILDER,
-        )
+    def _world_ready(self, junction_id: str, world: World) -> None:
+        self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
 
-    def _build_reply(self, reply: Reply) -> None:
-        junction_id = reply.tag
-        if reply.message is None:
-            if BUILDER not in self.alive or reply.error == "no answer":
-                self.refused["build_retried"] += 1
-                return  # asked again when the builder is back
-            self.builds_pending.discard(junction_id)
-            self.tell(Tell("error", f"no world for {junction_id}: {reply.error}"))
-            self.obey(self.mission.on_world_failed(junction_id, mono_s=time.monotonic()))
-            return
-        answer = reply.message
-        file = self.plan.worlds_dir / f"{answer.world_id}.world"
-        world = read_message(file, World)
-        ready = ReadyWorld(junction_id, world, set(self.desk.workers))
-        self.worlds[answer.world_id] = ready
-        log.info(
-            "world %s of %s in %.2f s%s", answer.world_id, junction_id, answer.seconds,
-            " from the cache" if answer.cached else "",
-        )  # fmt: skip
-        notice = WorldNotice(
-            world_id=answer.world_id, intersection_id=junction_id, file=Path(file).name
-        )
-        self.bus.publish("world", notice, run=self.plan.run_id)
-        for worker_id in sorted(ready.pending):
-            self._ask_prepare(worker_id, answer.world_id)
-        if not ready.pending:
-            self._world_ready(ready)
-
-    def _ask_prepare(self, worker_id: str, world_id: str) -> None:
-        self.bus.request(
-            "prepare",
-            PrepareRequest(world_id=world_id),
-            self.mailbox,
-            tag=(worker_id, world_id),
-            timeout_s=BUILD_TIMEOUT_S,
-            run=self.plan.run_id,
-            process=worker_id,
-        )
-
-    def _prepare_reply(self, reply: Reply) -> None:
-        worker_id, world_id = reply.tag
-        if reply.message is None and worker_id in self.alive:
-            self.tell(Tell("warning", f"{worker_id} could not load {world_id}: {reply.error}"))
-        ready = self.worlds[world_id]
-        if worker_id in ready.pending:
-            ready.pending.discard(worker_id)
-            if not ready.pending:
-                self._world_ready(ready)
-
-    def _world_ready(self, ready: ReadyWorld) -> None:
-        self.builds_pending.discard(ready.junction_id)
-        self.obey(self.mission.on_world(ready.junction_id, ready.world, mono_s=time.monotonic()))
+    def _world_failed(self, junction_id: str, reason: str) -> None:
+        self.tell(Tell("error", f"no world for {junction_id}: {reason}"))
+        self.obey(self.mission.on_world_failed(junction_id, mono_s=time.monotonic()))
 
     # Processes.
 
@@ -292,23 +224,19 @@ class Conductor:
             elif process_id == MIRROR:
                 self.publish_active_world()
             elif process_id == BUILDER:
-                for junction_id in sorted(self.builds_pending):
-                    self._ask_build(junction_id)
+                self.worlds.builder_up()
             return
         self.alive.discard(process_id)
         log.info("lost %s", process_id)
         if process_id.startswith("w"):
             self.desk.worker_down(process_id)
-            for ready in list(self.worlds.values()):
-                if process_id in ready.pending:
-                    ready.pending.discard(process_id)
-                    if not ready.pending:
-                        self._world_ready(ready)
+            self.worlds.worker_down(process_id)
+            self.give_out()
 
     def _catch_up(self, worker_id: str) -> None:
         """Let a worker that comes later load what the coming rounds need."""
         for world_id in self.mission.worlds_ahead():
-            self._ask_prepare(worker_id, world_id)
+            self.worlds.prepare(worker_id, world_id)
 
     # Rounds.
 
@@ -365,6 +293,8 @@ class Conductor:
         if reply.message is None and reply.error != "no answer":
             self.refused["job"] += 1
             self.tell(Tell("error", f"{worker_id}: {reply.error}"))
+        if reply.message is not None and reply.message.cpu_seconds > 0.0:
+            self.rtf[worker_id] = reply.message.sim_seconds / reply.message.cpu_seconds
         done = self.desk.result(worker_id, job, reply.message, reply.received_mono_ns)
         if done is not None:
             self._round_done(done)
@@ -375,7 +305,7 @@ class Conductor:
         state, plan, intent = self._seeds.pop(order.round_id)
         for stale in [r for r in self._seeds if r < order.round_id]:
             del self._seeds[stale]
-        world = self.worlds[order.world_id].world
+        world = self.worlds.world(order.world_id)
         view, rows, distinct = future_rows(done, self._variants)
         sha = self.futures.take(done, distinct=distinct)
         self.mission.on_round(order.junction_id, futures=len(rows))

@@ -35,7 +35,9 @@ def examine() -> int:
 
 def _python() -> Finding:
     good = sys.version_info >= (3, 11)
-    return Finding("Python", "ok" if good else "missing", f"{platform.python_version()}, 3.11 or newer")
+    return Finding(
+        "Python", "ok" if good else "missing", f"{platform.python_version()}, 3.11 or newer"
+    )
 
 
 def _cores() -> Finding:
@@ -58,12 +60,12 @@ def _packages() -> Finding:
 
 
 def _bus() -> Finding:
+    import threading
+
     from contracts.bus import Mailbox, ZenohBus, ask
     from contracts.drive import InfoRequest, VehicleInfo
     from contracts.setup import BusSetup
     from orchestrator.endpoints import free_endpoint
-
-    import threading
 
     setup = BusSetup(endpoint=free_endpoint())
     with ZenohBus(setup, router=True) as router, ZenohBus(setup) as client:
@@ -89,9 +91,9 @@ def _bus() -> Finding:
 
 
 def _clock() -> Finding:
-    from sim_worker.vehicle.clock import disable_step_clock
+    from sim_worker.vehicle.clock import silence_step_clock
 
-    if disable_step_clock():
+    if silence_step_clock():
         return Finding("MuJoCo's step clock", "ok", "switched off (steps take about a third less)")
     return Finding("MuJoCo's step clock", "note", "cannot be switched off here; steps are slower")
 

@@ -246,5 +246,3 @@ def summary_text(record: dict[str, object]) -> str:
         for junction in junctions
     ]
     return "\n".join([*lines, ATTRIBUTION])
-
-

@@ -56,7 +56,7 @@ class LockStepLoop:
             assert advanced is not None
             for sample in self._in_order():
                 conductor.take_telemetry(sample)
-            self._wait("worlds", lambda: not conductor.builds_pending)
+            self._wait("worlds", lambda: not conductor.worlds.building)
             if not advanced.ended and conductor.start_round():
                 self._wait("the round", lambda: not conductor.desk.open_rounds)
             if self._stop():
@@ -83,8 +83,7 @@ class LockStepLoop:
             raise LockStepError(f"the vehicle's process does not answer: {self._vehicle_failed}")
         advanced = self._advanced
         return advanced is not None and all(
-            self._received.get(channel, 0) >= count
-            for channel, count in advanced.published.items()
+            self._received.get(channel, 0) >= count for channel, count in advanced.published.items()
         )
 
     def _wait_for_end(self) -> None:

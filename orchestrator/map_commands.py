@@ -6,11 +6,11 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from world_gen.find_intersections import find_intersections
 
 from contracts.errors import UserError
 from contracts.frames import local_from_geo
 from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.read_osm import read_map
@@ -40,18 +40,15 @@ def list_intersections(map_file: Path, *, route: Path | None, as_json: bool) -> 
     table = Table("id", "kind", "control", "arms", "lat", "lon", "name", title=str(map_file))
     for junction in junctions:
         s = junction.summary
-        table.add_row(
-            s.id, s.kind, s.control, str(s.arms), f"{s.lat:.6f}", f"{s.lon:.6f}", s.name
-        )
+        table.add_row(s.id, s.kind, s.control, str(s.arms), f"{s.lat:.6f}", f"{s.lon:.6f}", s.name)
     Console().print(table)
 
 
-def _along(
-    graph: RoadGraph, junctions: tuple[Junction, ...], route: Path
-) -> tuple[Junction, ...]:
+def _along(graph: RoadGraph, junctions: tuple[Junction, ...], route: Path) -> tuple[Junction, ...]:
+    from world_gen.find_intersections import junctions_on_route
+
     from orchestrator.map_matching import match_line
     from telemetry.logs import read_line
-    from world_gen.find_intersections import junctions_on_route
 
     line = read_line(route)
     matched = match_line(graph, line.lat_deg, line.lon_deg, name=str(route))
@@ -115,5 +112,7 @@ def _nearest(osm: OsmMap, junctions: tuple[Junction, ...], at: str, map_file: Pa
     away = [float(np.hypot(*(j.centre_xy_m - here))) for j in junctions]
     best = int(np.argmin(away))
     if not away[best] <= FARTHEST_M:
-        raise UserError(f"--at {at}: the nearest intersection of {map_file} is {away[best]:.0f} m away")
+        raise UserError(
+            f"--at {at}: the nearest intersection of {map_file} is {away[best]:.0f} m away"
+        )
     return junctions[best]
