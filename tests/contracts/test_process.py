@@ -1,0 +1,127 @@
+"""A process of a run leaves when it should, and says in the log why it ended otherwise."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from contracts.bus import Alive, Mailbox, ZenohBus
+from contracts.keys import alive_key
+from contracts.setup import BusSetup, ProcessSetup, write_setup
+from contracts.simulation import RunEnd
+from tests.contracts.bus_sides import DEADLINE_S, free_endpoint, take
+
+RUN = {"run": "r1"}
+
+WAITER = """
+import time
+from contracts.process import run_process
+from contracts.setup import ProcessSetup
+
+def serve(setup, bus, life):
+    life.ready()
+    while not life.over:
+        life.terminated.wait(0.02)
+
+run_process(ProcessSetup, serve)
+"""
+
+FAILER = """
+from contracts.process import run_process
+from contracts.setup import ProcessSetup
+
+def serve(setup, bus, life):
+    raise RuntimeError("the wheels came off")
+
+run_process(ProcessSetup, serve)
+"""
+
+
+class Run:
+    """A bus with the orchestrator on it, and the setup of one process `p0`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.setup = ProcessSetup(
+            run_id="r1",
+            process_id="p0",
+            vehicle_id="ego",
+            bus=BusSetup(endpoint=free_endpoint()),
+            log_file=str(folder / "log.jsonl"),
+        )
+        self._file = folder / "p0.json"
+        write_setup(self.setup, self._file)
+        self.bus = ZenohBus(self.setup.bus, router=True)
+        self.alive = Mailbox(10)
+        self.bus.watch_alive(alive_key(process="p0", **RUN), self.alive)
+        self.bus.declare_alive(alive_key(process="orchestrator", **RUN))
+
+    @contextmanager
+    def process(self, code: str) -> Iterator[subprocess.Popen[bytes]]:
+        with subprocess.Popen([sys.executable, "-c", code, "--setup", str(self._file)]) as process:
+            try:
+                yield process
+            finally:
+                process.kill()
+
+    def log(self) -> list[dict[str, object]]:
+        return [json.loads(line) for line in Path(self.setup.log_file).read_text().splitlines()]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Iterator[Run]:
+    one = Run(tmp_path)
+    yield one
+    one.bus.close()
+
+
+def test_it_leaves_when_the_run_ends(run: Run) -> None:
+    with run.process(WAITER) as process:
+        up = take(run.alive)
+        run.bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
+
+        assert process.wait(DEADLINE_S) == 0
+        assert isinstance(up, Alive)
+        assert not take(run.alive).up
+
+
+def test_it_leaves_on_sigterm(run: Run) -> None:
+    with run.process(WAITER) as process:
+        take(run.alive)
+        process.terminate()
+
+        assert process.wait(DEADLINE_S) == 0
+
+
+def test_it_leaves_when_the_orchestrator_is_gone(run: Run) -> None:
+    with run.process(WAITER) as process:
+        take(run.alive)
+        run.bus.close()
+
+        assert process.wait(DEADLINE_S) == 0
+
+
+def test_ctrl_c_is_left_to_the_orchestrator(run: Run) -> None:
+    with run.process(WAITER) as process:
+        take(run.alive)
+        process.send_signal(2)
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.5)
+        run.bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
+
+        assert process.wait(DEADLINE_S) == 0
+
+
+def test_an_error_ends_it_with_code_1_and_stands_in_the_log(run: Run) -> None:
+    with run.process(FAILER) as process:
+        assert process.wait(DEADLINE_S) == 1
+
+    (line,) = run.log()
+    assert line["process"] == "p0"
+    assert line["level"] == "error"
+    assert "the wheels came off" in str(line["traceback"])
