@@ -1,0 +1,104 @@
+"""The house: whose names are whose, who knows whom, how long a file may be, what is not written."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("contracts", "telemetry", "world_gen", "sim_worker", "orchestrator", "viewer")
+LIMIT_LINES = 300
+
+MACHINE_PATH = re.compile(r"(?<![\w.~-])/(?:work|root|home)(?=/|\b)")
+INDEX_ADDRESS = re.compile(r"pypi" + r"\.org|pythonhosted|index-url|simple/\s*$", re.MULTILINE)
+HEAVY = ("mujoco", "rerun", "numpy", "zenoh", "pyarrow", "matplotlib", "scipy", "osmium")
+
+
+def tracked_files() -> list[Path]:
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if listed.returncode != 0:
+        pytest.skip("not a git checkout: no list of the project's files")
+    return [ROOT / name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
+
+
+def texts() -> list[tuple[str, str]]:
+    found = []
+    for path in tracked_files():
+        data = path.read_bytes()
+        if b"\0" not in data and path != Path(__file__):
+            found.append((str(path.relative_to(ROOT)), data.decode("utf-8")))
+    return found
+
+
+def test_only_our_distribution_owns_the_rooms() -> None:
+    owners = importlib.metadata.packages_distributions()
+
+    strangers = {room: owners.get(room, []) for room in ROOMS}
+
+    assert {room: set(names) - {"foretwin"} for room, names in strangers.items()} == {
+        room: set() for room in ROOMS
+    }
+
+
+def test_rooms_import_only_what_the_table_allows() -> None:
+    checked = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports"], cwd=ROOT, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_zenoh_is_known_to_the_bus_alone() -> None:
+    importing = re.compile(r"^\s*(?:import|from) zenoh\b", re.MULTILINE)
+    rooms = [(name, text) for name, text in texts() if name.split("/")[0] in ROOMS]
+
+    assert [name for name, text in rooms if importing.search(text)] == ["contracts/bus.py"]
+
+
+def test_python_files_stay_readable() -> None:
+    lengths = {name: text.count("\n") for name, text in texts() if name.endswith(".py")}
+
+    assert {name: n for name, n in lengths.items() if n > LIMIT_LINES} == {}
+
+
+def test_no_file_is_named_after_nothing() -> None:
+    nameless = {"utils", "util", "common", "helpers", "helper", "manager", "misc"}
+    names = [path.relative_to(ROOT) for path in tracked_files()]
+
+    assert [str(n) for n in names if nameless & {*n.parts[:-1], n.stem}] == []
+
+
+def test_no_file_holds_a_machine_path_or_an_index_address() -> None:
+    found = [
+        f"{name}: {match.group()}"
+        for name, text in texts()
+        for pattern in (MACHINE_PATH, INDEX_ADDRESS)
+        for match in pattern.finditer(text)
+    ]
+
+    assert found == []
+
+
+def test_pins_are_exact() -> None:
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pins = [line for line in lines if line and not line.startswith("#")]
+
+    assert pins
+    assert [line for line in pins if not re.fullmatch(r"[A-Za-z0-9._-]+==[^\s;,*]+", line)] == []
+
+
+def test_the_command_line_starts_without_heavy_libraries() -> None:
+    code = "import sys, orchestrator.__main__; print(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+
+    assert set(run.stdout.split()) & set(HEAVY) == set()
