@@ -40,11 +40,10 @@ from telemetry.kinematic_filter import (
     X,
     Y,
 )
+from telemetry.measured import Measured
 from telemetry.position_gate import PositionGate
 
 _STATE_PERIOD_NS = 20_000_000
-_FRESH_NS = 1_000_000_000
-"""A quantity counts as measured while its last sample is younger than this."""
 _UNKNOWN_STD_M = 0.01
 """Of positions that state none, until they turn out worse."""
 _ROUGH_INNOVATION_M = 0.5
@@ -70,10 +69,13 @@ class StateEstimator:
         """`steering_ratio` is steering wheel over tyre; the offset is added at the tyre."""
         self._info = info
         self._wheelbase_m = wheelbase_m
-        self._steering_ratio = steering_ratio
-        self._steering_offset_rad = steering_offset_rad
         self._lever = info.body_from_antenna_m or (0.0, 0.0, 0.0)
         self._gate = PositionGate()
+        self._measured = Measured(
+            steering_ratio=steering_ratio,
+            steering_offset_rad=steering_offset_rad,
+            skipped=self._gate.skipped,
+        )
         self._frame: LocalFrame | None = None
         self._start_ns = 0
         self._filter: KinematicFilter | None = None
@@ -81,10 +83,6 @@ class StateEstimator:
         self._state_stamp_ns: int | None = None
         self._convergence_rad = 0.0
         self._altitude_m = 0.0
-        self._last_ns: dict[str, int] = {}
-        self._measured_ns: dict[str, int] = {}
-        self._speed_mps = 0.0
-        self._steering: SteeringSample | None = None
         self._innovation_m = 0.0
         self._shifts = 0
         self._standing = False
@@ -101,15 +99,8 @@ class StateEstimator:
         """
         if channel == "gnss":
             return self._position(message)
-        if channel not in ("imu", "speed", "heading", "steering"):
+        if not self._measured.take(channel, message):
             return None
-        if message.stamp_ns < self._last_ns.get(channel, message.stamp_ns):
-            self.skipped[f"{channel}_time_backwards"] += 1
-            return None
-        if not _finite(message):
-            self.skipped[f"{channel}_not_finite"] += 1
-            return None
-        self._last_ns[channel] = message.stamp_ns
         self._take(message)
         return self._due(message.stamp_ns)
 
@@ -118,9 +109,7 @@ class StateEstimator:
     def _take(self, message: Any) -> None:
         filter_ = self._advance(message.stamp_ns)
         match message:
-            case SpeedSample(stamp_ns=stamp_ns, speed_mps=speed):
-                self._measured_ns["speed_mps"] = stamp_ns
-                self._speed_mps = speed
+            case SpeedSample(speed_mps=speed):
                 self._standing = abs(speed) < _STANDING_MPS
                 if filter_ is None:
                     return
@@ -132,41 +121,23 @@ class StateEstimator:
                     filter_.stand()
                 else:
                     filter_.correct_speed(speed, 0.05 + 0.005 * abs(speed))
-            case ImuSample(stamp_ns=stamp_ns, accel_mps2=accel, rate_radps=rate):
-                self._measured_ns["yaw_rate_radps"] = stamp_ns
-                self._measured_ns["accel_mps2"] = stamp_ns
+            case ImuSample(accel_mps2=accel, rate_radps=rate):
                 if filter_ is not None:
                     filter_.correct_yaw_rate(rate[2], 0.01, biased=True)
                     filter_.correct_accel(accel[0], 0.5)
             case HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw, yaw_rate_radps=yaw_rate):
-                self._measured_ns["yaw_rad"] = stamp_ns
                 local_yaw = yaw + self._convergence_rad
                 if filter_ is None:
                     self._start(stamp_ns, local_yaw, yaw_std_rad=0.02)
                     return
                 filter_.correct_yaw(local_yaw, 0.01)
                 if yaw_rate is not None:
-                    self._measured_ns["yaw_rate_radps"] = stamp_ns
                     filter_.correct_yaw_rate(yaw_rate, 0.01, biased=False)
-            case SteeringSample(stamp_ns=stamp_ns):
-                self._measured_ns["tire_angle_rad"] = stamp_ns
-                self._steering = message
-                angle = self._measured_tire_angle_rad()
+            case SteeringSample():
+                angle = self._measured.tire_angle_rad
                 if filter_ is not None and angle is not None:
                     # Understeer and an unknown offset make steering a rough witness of the path.
                     filter_.correct_curvature(math.tan(angle) / self._wheelbase_m, 0.03)
-
-    def _measured_tire_angle_rad(self) -> float | None:
-        if self._steering is None:
-            return None
-        if self._steering.tire_angle_rad is not None:
-            return self._steering.tire_angle_rad
-        wheel = self._steering.steering_wheel_rad
-        return None if wheel is None else wheel / self._steering_ratio + self._steering_offset_rad
-
-    def _fresh(self, quantity: str, stamp_ns: int) -> bool:
-        measured_ns = self._measured_ns.get(quantity)
-        return measured_ns is not None and stamp_ns - measured_ns <= _FRESH_NS
 
     # Positions.
 
@@ -180,7 +151,11 @@ class StateEstimator:
         time_s = (fix.stamp_ns - self._start_ns) * 1e-9
         recent = self._gate.recent
         held = bool(recent) and bool(np.array_equal(recent[-1].xy_m, xy))
-        if held and self._fresh("speed_mps", fix.stamp_ns) and abs(self._speed_mps) > 0.5:
+        if (
+            held
+            and self._measured.fresh("speed_mps", fix.stamp_ns)
+            and abs(self._measured.speed_mps) > 0.5
+        ):
             self.skipped["gnss_repeated"] += 1  # a slow receiver's last answer, sent once more
             return None
         lever = self._lever[:2]
@@ -227,13 +202,13 @@ class StateEstimator:
         self._shifts = 0
         yaw_before = filter_.mean[YAW]
         filter_.correct_position(xy, std, lever)
-        if not self._measured_ns.get("speed_mps"):
+        if not self._measured.fresh("speed_mps", self._filter_stamp_ns):
             self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
             if self._standing:
                 filter_.stand()
         if self._standing:
             filter_.mean[YAW] = yaw_before
-        elif not filter_.may_reverse and not self._fresh("yaw_rad", self._filter_stamp_ns):
+        elif not filter_.may_reverse and not self._measured.fresh("yaw_rad", self._filter_stamp_ns):
             course = self._gate.course(1.0 + 5.0 * std, within_s=3.0)
             if course is not None and abs(math.remainder(course - yaw_before, math.tau)) > 1.75:
                 self._turn_to_course(filter_)
@@ -246,21 +221,23 @@ class StateEstimator:
 
     def _start_from_course(self, stamp_ns: int, std: float) -> None:
         course = self._gate.course(max(1.0, 5.0 * std))
-        if course is None or (self._fresh("speed_mps", stamp_ns) and abs(self._speed_mps) < 0.3):
+        if course is None or (
+            self._measured.fresh("speed_mps", stamp_ns) and abs(self._measured.speed_mps) < 0.3
+        ):
             return
-        if self._fresh("speed_mps", stamp_ns) and self._speed_mps < -0.1:
+        if self._measured.fresh("speed_mps", stamp_ns) and self._measured.speed_mps < -0.1:
             course += math.pi
         self._start(stamp_ns, course, yaw_std_rad=0.15)
 
     def _start(self, stamp_ns: int, yaw_rad: float, *, yaw_std_rad: float) -> None:
         if not self._gate.recent:
             return
-        measured = self._fresh("speed_mps", stamp_ns)
+        measured = self._measured.fresh("speed_mps", stamp_ns)
         xy = base_from_sensor(self._gate.recent[-1].xy_m, yaw_rad, self._lever)
         self._filter = KinematicFilter(
             xy_m=xy,
             yaw_rad=yaw_rad,
-            speed_mps=self._speed_mps if measured else self._gate.speed_mps(),
+            speed_mps=self._measured.speed_mps if measured else self._gate.speed_mps(),
             yaw_std_rad=yaw_std_rad,
         )
         self._filter_stamp_ns = stamp_ns
@@ -284,7 +261,7 @@ class StateEstimator:
     def _passes_through(self, fix: GnssFix) -> bool:
         if fix.std_m is None:
             return self._innovation_m <= _ROUGH_INNOVATION_M
-        return fix.std_m <= 0.05 and not self._measured_ns
+        return fix.std_m <= 0.05 and not self._measured.anything
 
     def _place(self, fix: GnssFix | None) -> GeoPoint:
         assert self._frame is not None
@@ -300,10 +277,9 @@ class StateEstimator:
 
     def _state(self, stamp_ns: int, fix: GnssFix | None) -> VehicleState:
         self._state_stamp_ns = stamp_ns
-        names = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
-        estimated = tuple(name for name in names if not self._fresh(name, stamp_ns))
-        measured_angle = None if "tire_angle_rad" in estimated else self._measured_tire_angle_rad()
-        wheel = None if self._steering is None else self._steering.steering_wheel_rad
+        estimated = self._measured.estimated(stamp_ns)
+        angle = None if "tire_angle_rad" in estimated else self._measured.tire_angle_rad
+        wheel = self._measured.steering_wheel_rad
         position = self._place(fix)
         filter_ = self._filter
         if filter_ is None:
@@ -313,18 +289,18 @@ class StateEstimator:
                 stamp_ns=stamp_ns,
                 position=position,
                 yaw_rad=0.0,
-                speed_mps=self._speed_mps if known else 0.0,
+                speed_mps=self._measured.speed_mps if known else 0.0,
                 yaw_rate_radps=0.0,
                 accel_mps2=0.0,
-                tire_angle_rad=measured_angle,
+                tire_angle_rad=angle,
                 steering_wheel_rad=wheel,
                 position_std_m=None if fix is None else fix.std_m,
                 estimated=estimated,
                 yaw_valid=False,
             )
         spread = np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
-        if measured_angle is None:
-            measured_angle = math.atan(self._wheelbase_m * filter_.mean[CURVATURE])
+        if angle is None:
+            angle = math.atan(self._wheelbase_m * filter_.mean[CURVATURE])
         return VehicleState(
             vehicle_id=self._info.vehicle_id,
             stamp_ns=stamp_ns,
@@ -333,7 +309,7 @@ class StateEstimator:
             speed_mps=0.0 if self._standing else float(filter_.mean[SPEED]),
             yaw_rate_radps=0.0 if self._standing else filter_.yaw_rate_radps,
             accel_mps2=0.0 if self._standing else float(filter_.mean[ACCEL]),
-            tire_angle_rad=measured_angle,
+            tire_angle_rad=angle,
             steering_wheel_rad=wheel,
             position_std_m=float(math.hypot(spread[X], spread[Y]) / math.sqrt(2.0)),
             yaw_std_rad=float(spread[YAW]),
@@ -345,13 +321,3 @@ class StateEstimator:
     def gyro_bias_radps(self) -> float:
         """The gyro's bias as learnt so far; 0 before the heading is known."""
         return 0.0 if self._filter is None else float(self._filter.mean[GYRO_BIAS])
-
-
-def _finite(message: Any) -> bool:
-    """Return whether every number of a sample is finite."""
-    for name in message.__struct_fields__:
-        value = getattr(message, name)
-        numbers = value if isinstance(value, tuple) else (value,)
-        if not all(math.isfinite(n) for n in numbers if isinstance(n, float)):
-            return False
-    return True

@@ -1,0 +1,97 @@
+"""What a vehicle has measured lately: the latest samples, their age, and which were refused."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any
+
+from contracts.drive import SpeedSample, SteeringSample
+
+FRESH_NS = 1_000_000_000
+"""A quantity counts as measured while its last sample is younger than this."""
+MOTION_FIELDS = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
+"""Fields of VehicleState that are either measured or estimated."""
+_CHANNEL_FIELDS = {
+    "imu": ("yaw_rate_radps", "accel_mps2"),
+    "speed": ("speed_mps",),
+    "heading": ("yaw_rad",),
+    "steering": ("tire_angle_rad",),
+}
+
+
+class Measured:
+    """Remembers samples beside positions; `skipped` counts what it refused, by reason."""
+
+    def __init__(
+        self, *, steering_ratio: float, steering_offset_rad: float, skipped: Counter[str]
+    ) -> None:
+        self._steering_ratio = steering_ratio
+        self._steering_offset_rad = steering_offset_rad
+        self._skipped = skipped
+        self._sample_ns: dict[str, int] = {}
+        self._field_ns: dict[str, int] = {}
+        self._steering: SteeringSample | None = None
+        self.speed_mps = 0.0
+        """The last measured speed; 0 before there is one."""
+
+    def take(self, channel: str, message: Any) -> bool:
+        """Remember a sample; return False for one that is refused or says nothing of the motion."""
+        fields = _CHANNEL_FIELDS.get(channel)
+        if fields is None:
+            return False
+        stamp_ns = message.stamp_ns
+        if stamp_ns < self._sample_ns.get(channel, stamp_ns):
+            self._skipped[f"{channel}_time_backwards"] += 1
+            return False
+        if not _finite(message):
+            self._skipped[f"{channel}_not_finite"] += 1
+            return False
+        self._sample_ns[channel] = stamp_ns
+        for name in fields:
+            self._field_ns[name] = stamp_ns
+        if getattr(message, "yaw_rate_radps", None) is not None:
+            self._field_ns["yaw_rate_radps"] = stamp_ns
+        if isinstance(message, SpeedSample):
+            self.speed_mps = message.speed_mps
+        elif isinstance(message, SteeringSample):
+            self._steering = message
+        return True
+
+    @property
+    def anything(self) -> bool:
+        """Whether any sample beside positions has come."""
+        return bool(self._sample_ns)
+
+    def fresh(self, name: str, stamp_ns: int) -> bool:
+        """Return whether field `name` was measured within a second before `stamp_ns`."""
+        measured_ns = self._field_ns.get(name)
+        return measured_ns is not None and stamp_ns - measured_ns <= FRESH_NS
+
+    def estimated(self, stamp_ns: int) -> tuple[str, ...]:
+        """Return the names of the motion fields that are not fresh."""
+        return tuple(name for name in MOTION_FIELDS if not self.fresh(name, stamp_ns))
+
+    @property
+    def steering_wheel_rad(self) -> float | None:
+        """The last measured angle at the steering wheel."""
+        return None if self._steering is None else self._steering.steering_wheel_rad
+
+    @property
+    def tire_angle_rad(self) -> float | None:
+        """The last measured angle at the tyres, or what the steering wheel's implies."""
+        if self._steering is None:
+            return None
+        if self._steering.tire_angle_rad is not None:
+            return self._steering.tire_angle_rad
+        wheel = self._steering.steering_wheel_rad
+        return None if wheel is None else wheel / self._steering_ratio + self._steering_offset_rad
+
+
+def _finite(message: Any) -> bool:
+    for name in message.__struct_fields__:
+        value = getattr(message, name)
+        numbers = value if isinstance(value, tuple) else (value,)
+        if not all(math.isfinite(number) for number in numbers if isinstance(number, float)):
+            return False
+    return True
