@@ -1,0 +1,276 @@
+"""The roads around a junction in the World's frame, and the places where their lanes meet."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+import shapely.ops
+
+from contracts.arrays import Array
+from contracts.frames import GeoPoint, LocalFrame, target_from_source
+from contracts.world import DrivingSide
+from world_gen.cross_section import CrossSection, cross_section
+from world_gen.intersections import Junction
+from world_gen.map_index import MapIndex
+from world_gen.polyline import direction_at, unit, without_repeats
+from world_gen.road_graph import DirectedEdge, RoadEdge
+
+RING_KINDS = ("roundabout", "circular")
+CORNER_M = 3.5
+"""Room between the kerb of the other road and a lane's end: makes turns wider than 4 m radius."""
+RING_CORNER_M = 1.5
+MAX_TRIM_M = 22.0
+_LEG_LOOK_M = 45.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cluster:
+    """Graph nodes where lanes end and begin: one junction, one node of a ring, or a lone node.
+
+    `legs` leave the cluster outward; `inner` edges lie within and have no lanes of their own.
+    """
+
+    key: str
+    nodes: frozenset[int]
+    inner: frozenset[int]
+    legs: tuple[DirectedEdge, ...]
+    main: bool
+    ring: bool
+
+    @property
+    def plain(self) -> bool:
+        """Whether one road merely goes on here."""
+        return len(self.legs) == 2 and len(self.nodes) == 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """Everything around one junction in the World's frame; edges and sections by edge index."""
+
+    frame: LocalFrame
+    junction: Junction
+    radius_m: float
+    driving_side: DrivingSide
+    edges: Mapping[int, RoadEdge]
+    sections: Mapping[int, CrossSection]
+    clusters: tuple[Cluster, ...]
+    trims_m: Mapping[tuple[int, bool], float]
+    """Metres cut off an edge's lanes by (edge index, at its end node)."""
+    ring_edges: frozenset[int]
+
+    def section(self, edge: DirectedEdge) -> CrossSection:
+        """Return the cross-section of a directed edge's road."""
+        return self.sections[edge.edge.index]
+
+
+def is_ring_edge(edge: RoadEdge) -> bool:
+    """Return whether an edge is part of a roundabout's or other circular junction's ring."""
+    return edge.tags.get("junction") in RING_KINDS
+
+
+def world_frame(junction: Junction) -> LocalFrame:
+    """Return the frame of a junction's World: its origin is the junction's centre."""
+    return LocalFrame(GeoPoint(junction.summary.lat, junction.summary.lon))
+
+
+def surroundings(index: MapIndex, junction: Junction, radius_m: float) -> Surroundings:
+    """Collect the roads within `radius_m` of the junction's centre and cluster their nodes."""
+    graph = index.graph
+    frame = world_frame(junction)
+    wanted = set(index.car_edges_within(np.asarray(junction.centre_xy_m), radius_m))
+    wanted.update(i for i in junction.inner if _drivable(graph.edges[i]))
+    wanted.update(
+        leg.edge.index for arm in junction.arms for leg in arm.outward if _drivable(leg.edge)
+    )
+    edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
+    sections = {i: cross_section(edge, graph.driving_side) for i, edge in edges.items()}
+    clusters = _clusters(index, junction, edges, radius_m)
+    ring_edges = frozenset(i for i in junction.inner if i in edges and is_ring_edge(edges[i]))
+    return Surroundings(
+        frame=frame,
+        junction=junction,
+        radius_m=radius_m,
+        driving_side=graph.driving_side,
+        edges=edges,
+        sections=sections,
+        clusters=clusters,
+        trims_m=_trims(clusters, edges, sections),
+        ring_edges=ring_edges,
+    )
+
+
+def _drivable(edge: RoadEdge) -> bool:
+    return edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
+
+
+def _in_frame(
+    edges: list[RoadEdge], frame: LocalFrame, map_frame: LocalFrame
+) -> dict[int, RoadEdge]:
+    if not edges:
+        return {}
+    joined = np.concatenate([edge.xy_m for edge in edges])
+    moved = target_from_source(frame, map_frame, joined, 0.0).xy_m
+    ends = np.cumsum([len(edge.xy_m) for edge in edges])[:-1]
+    return {
+        edge.index: dataclasses.replace(edge, xy_m=xy)
+        for edge, xy in zip(edges, np.split(moved, ends), strict=True)
+        if len(without_repeats(xy)) >= 2
+    }
+
+
+def _clusters(
+    index: MapIndex, junction: Junction, edges: Mapping[int, RoadEdge], radius_m: float
+) -> tuple[Cluster, ...]:
+    leaving: dict[int, list[DirectedEdge]] = {}
+    near: set[int] = set(junction.nodes)
+    for edge in edges.values():
+        for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
+            leaving.setdefault(directed.start_node, []).append(directed)
+            if np.hypot(*directed.xy_m[0]) <= radius_m:
+                near.add(directed.start_node)
+    others = {id(j): j for node in sorted(near) if (j := index.junction_of_node.get(node))}
+    groups: list[tuple[frozenset[int], frozenset[int], bool, bool]] = []
+    for j in (junction, *(j for j in others.values() if j.summary.id != junction.summary.id)):
+        groups.extend(_groups_of(j, leaving, main=j.summary.id == junction.summary.id))
+    taken = frozenset().union(*(nodes for nodes, *_ in groups))
+    groups.extend((frozenset([n]), frozenset(), False, False) for n in sorted(near - taken))
+    found = []
+    for nodes, inner, main, ring in groups:
+        legs = tuple(
+            d for node in sorted(nodes) for d in leaving.get(node, ()) if d.edge.index not in inner
+        )
+        if len(legs) >= 2:
+            found.append(
+                Cluster(
+                    key=str(min(nodes)), nodes=nodes, inner=inner, legs=legs, main=main, ring=ring
+                )
+            )
+    return tuple(found)
+
+
+def _groups_of(
+    junction: Junction, leaving: Mapping[int, list[DirectedEdge]], *, main: bool
+) -> list[tuple[frozenset[int], frozenset[int], bool, bool]]:
+    """A ring is driven node by node, every other junction in one go."""
+    on_ring = {
+        node for node in junction.nodes if any(is_ring_edge(d.edge) for d in leaving.get(node, ()))
+    }
+    if junction.summary.kind in RING_KINDS and on_ring:
+        return [(frozenset([n]), frozenset(), main, n in on_ring) for n in sorted(junction.nodes)]
+    nodes = frozenset(node for node in junction.nodes if node in leaving)
+    return [(nodes, frozenset(junction.inner), main, False)] if nodes else []
+
+
+def _trims(
+    clusters: tuple[Cluster, ...],
+    edges: Mapping[int, RoadEdge],
+    sections: Mapping[int, CrossSection],
+) -> dict[tuple[int, bool], float]:
+    trims: dict[tuple[int, bool], float] = {}
+    for cluster in clusters:
+        if cluster.plain:
+            values = _plain_trims(cluster, sections)
+        elif len(cluster.nodes) == 1:
+            values = _node_trims(cluster, sections)
+        else:
+            values = _area_trims(cluster, edges, sections)
+        for leg, value in zip(cluster.legs, values, strict=True):
+            trims[leg.edge.index, leg.reverse] = min(value, MAX_TRIM_M)
+    for index, edge in edges.items():
+        start, end = trims.get((index, False), 0.0), trims.get((index, True), 0.0)
+        room = 0.8 * edge.length_m
+        if start + end > room:
+            # What is left is shared in proportion, so that a lane of some length remains.
+            trims[index, False] = start * room / (start + end)
+            trims[index, True] = end * room / (start + end)
+    return trims
+
+
+def _plain_trims(cluster: Cluster, sections: Mapping[int, CrossSection]) -> list[float]:
+    """Lanes of one road run on where they fit; where lanes change they get room for a taper."""
+    a, b = (sections[leg.edge.index] for leg in cluster.legs)
+    first, second = cluster.legs
+    if lateral_positions(first, a, outward=False) == lateral_positions(second, b, outward=True):
+        bend = math.acos(float(np.clip(-heading_out(first) @ heading_out(second), -1.0, 1.0)))
+        reach = max(a.half_width_m, b.half_width_m)
+        return [0.0, 0.0] if bend < math.radians(35.0) else [reach * math.tan(bend / 2) + 2.0] * 2
+    return [min(6.0, 0.3 * leg.edge.length_m) for leg in cluster.legs]
+
+
+def lateral_positions(
+    leg: DirectedEdge, section: CrossSection, *, outward: bool
+) -> list[tuple[float, bool]]:
+    """Return (metres left, driven that way) of lanes, seen along or against an outward leg."""
+    flip = leg.reverse == outward
+    found = [
+        (round(-lane.left_m if flip else lane.left_m, 2), lane.reverse == flip)
+        for lane in section.lanes
+    ]
+    return sorted(found)
+
+
+def heading_out(leg: DirectedEdge, look_m: float = 8.0) -> Array:
+    """Return the unit direction (2,) in which a leg leaves, averaged over `look_m`."""
+    xy = without_repeats(leg.xy_m)
+    steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+    reach = min(look_m, float(steps[-1]))
+    target = np.array([np.interp(reach, steps, xy[:, 0]), np.interp(reach, steps, xy[:, 1])])
+    gap = target - xy[0]
+    return unit(gap) if math.hypot(*gap) > 0.1 else direction_at(xy, 0.0)
+
+
+def _node_trims(cluster: Cluster, sections: Mapping[int, CrossSection]) -> list[float]:
+    """Cut each leg where the kerbs of straight legs from one point cross, and a corner more."""
+    heads = np.array([heading_out(leg) for leg in cluster.legs])
+    half = np.array([sections[leg.edge.index].half_width_m for leg in cluster.legs])
+    on_ring = np.array([is_ring_edge(leg.edge) for leg in cluster.legs])
+    cos = np.clip(heads @ heads.T, -1.0, 1.0)
+    sin = np.sqrt(1.0 - cos * cos)
+    reach = (half[None, :] + half[:, None] * cos) / np.maximum(sin, 0.2)
+    reach = np.where(cos < -0.94, 0.0, reach)  # the road goes straight on
+    np.fill_diagonal(reach, 0.0)
+    corner = np.where(on_ring, RING_CORNER_M, CORNER_M)
+    return [float(v) for v in np.maximum(reach.max(axis=1), 0.0) + corner]
+
+
+def _area_trims(
+    cluster: Cluster, edges: Mapping[int, RoadEdge], sections: Mapping[int, CrossSection]
+) -> list[float]:
+    """Cut each leg where it has left the carriageways of all other roads of the cluster."""
+    near = [shapely.LineString(without_repeats(leg.xy_m)) for leg in cluster.legs]
+    near = [shapely.ops.substring(line, 0.0, _LEG_LOOK_M) for line in near]
+    widths = [sections[leg.edge.index].half_width_m for leg in cluster.legs]
+    legs = shapely.buffer(near, widths, cap_style="flat")
+    inside = [
+        shapely.buffer(shapely.LineString(edges[i].xy_m), sections[i].half_width_m)
+        for i in sorted(cluster.inner)
+        if i in edges
+    ]
+    heads = [heading_out(leg, 15.0) for leg in cluster.legs]
+    values = []
+    for i, leg in enumerate(legs):
+        # A leg beside this one, going the same way, is the other carriageway of the same road.
+        others = [
+            legs[j]
+            for j in range(len(legs))
+            if j != i
+            and not (
+                heads[i] @ heads[j] > 0.85
+                and cluster.legs[i].start_node != cluster.legs[j].start_node
+            )
+        ]
+        overlap = shapely.intersection(leg, shapely.union_all([*others, *inside]))
+        reach = 0.0
+        for part in shapely.get_parts(overlap):
+            if part.area > 0.05 and shapely.distance(part, shapely.Point(near[i].coords[0])) < 15.0:
+                at = shapely.line_locate_point(
+                    near[i], shapely.points(shapely.get_coordinates(part))
+                )
+                reach = max(reach, float(at.max()))
+        values.append(reach + CORNER_M)
+    return values

@@ -1,0 +1,229 @@
+"""Connections: which lane leads to which through a junction, and the curve between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
+from contracts.world import Connection, DrivingSide, LineControl, Quantity, Turn
+from world_gen.clusters import Cluster, Surroundings
+from world_gen.lanes import LaneDraft, LaneSet
+from world_gen.movements import Movement
+from world_gen.polyline import offset, rounded, turn_curve, unit, without_repeats
+
+_LONG_PATH_M = 25.0
+_MAX_DETOUR_M = 9.0
+
+
+@dataclass(slots=True)
+class ConnectionDraft:
+    """A connection while the World is being built."""
+
+    id: str
+    start: LaneDraft
+    end: LaneDraft
+    turn: Turn
+    centerline: Array
+    width_m: Quantity
+    cluster: Cluster
+    movement: Movement
+    control: LineControl = "none"
+    conflicts_with: tuple[str, ...] = ()
+    yields_to: tuple[str, ...] = ()
+
+    def finished(self) -> Connection:
+        """Return the connection as the World holds it."""
+        return Connection(
+            id=self.id,
+            from_lane_id=self.start.id,
+            to_lane_id=self.end.id,
+            turn=self.turn,
+            centerline=self.centerline,
+            width_m=self.width_m,
+            control=self.control,
+            conflicts_with=self.conflicts_with,
+            yields_to=self.yields_to,
+        )
+
+
+def connect(
+    cluster: Cluster,
+    ways: tuple[Movement, ...],
+    around: Surroundings,
+    lanes: LaneSet,
+    notes: list[str],
+) -> list[ConnectionDraft]:
+    """Return the connections of one cluster and enter them as successors of their lanes."""
+    found: list[ConnectionDraft] = []
+    for leg in cluster.legs:
+        mine = [
+            m
+            for m in ways
+            if (m.toward.edge.index, m.toward.reverse) == (leg.edge.index, not leg.reverse)
+        ]
+        if not mine:
+            continue
+        toward = mine[0].toward
+        starts = lanes.incoming(toward, around.section(toward).driven(reverse=toward.reverse))
+        for movement in _by_tags(mine, starts):
+            away = movement.away
+            ends = lanes.outgoing(away, around.section(away).driven(reverse=away.reverse))
+            if not starts or not ends:
+                continue
+            chosen = _starting_lanes(movement, starts, mine, len(ends))
+            if not chosen:
+                notes.append(
+                    f"way {toward.edge.way_id}: its turn lanes leave no lane for "
+                    f"{movement.turn} into way {away.edge.way_id}; left out"
+                )
+                continue
+            for a, b in _pairs(chosen, ends, movement.turn, around.driving_side, cluster):
+                found.append(_connection(a, b, movement, cluster, around))
+    for connection in found:
+        connection.start.successors.append(connection.id)
+        if connection.start.plan.turns_source != "tagged":
+            turns = dict.fromkeys((*connection.start.turns, connection.turn))
+            connection.start.turns = tuple(turns)
+    return found
+
+
+def _by_tags(ways: list[Movement], starts: list[LaneDraft]) -> list[Movement]:
+    """Let turn lanes correct a turn's name: a tagged `left` that no other movement takes up."""
+    tagged = {t for lane in starts for t in lane.plan.turns if lane.plan.turns_source == "tagged"}
+    if not tagged or any(lane.plan.turns_source != "tagged" for lane in starts):
+        return ways
+    have = {m.turn for m in ways}
+    corrected = []
+    for movement in ways:
+        turn = movement.turn
+        if turn not in tagged and turn != "u_turn":
+            side: Turn = "left" if movement.angle_rad > 0 else "right"
+            for candidate in (side, "straight"):
+                if candidate in tagged and candidate not in have:
+                    turn = candidate
+                    break
+        corrected.append(
+            Movement(
+                toward=movement.toward,
+                away=movement.away,
+                inside=movement.inside,
+                turn=turn,
+                angle_rad=movement.angle_rad,
+            )
+        )
+    return corrected
+
+
+def _starting_lanes(
+    movement: Movement, starts: list[LaneDraft], ways: list[Movement], room: int
+) -> list[LaneDraft]:
+    """Return the lanes, from the left, from which this movement begins."""
+    turn = movement.turn
+    if any(lane.plan.turns_source == "tagged" for lane in starts):
+        wanted = {turn, "left"} if turn == "u_turn" else {turn}
+        fits = [
+            lane
+            for lane in starts
+            if wanted & set(lane.plan.turns) or (lane.plan.turns_source != "tagged")
+        ]
+        return fits[:1] if turn == "u_turn" else fits
+    cars = [lane for lane in starts if lane.kind == "driving"] or starts
+    if turn in ("left", "u_turn"):
+        return cars[:1]
+    if turn == "right":
+        return cars[-1:]
+    have = {m.turn for m in ways}
+    straight = list(starts)
+    if len(straight) > max(room, 1) and "left" in have:
+        straight = straight[1:]
+    if len(straight) > max(room, 1) and "right" in have:
+        straight = straight[:-1]
+    return straight
+
+
+def _pairs(
+    starts: list[LaneDraft],
+    ends: list[LaneDraft],
+    turn: Turn,
+    driving_side: DrivingSide,
+    cluster: Cluster,
+) -> list[tuple[LaneDraft, LaneDraft]]:
+    """Pair lanes from the side to which the movement turns; surplus lanes merge into the last."""
+    ends = [lane for lane in ends if lane.kind == "driving"] or ends
+    from_right = turn == "right" or (turn == "straight" and driving_side == "left")
+    a = starts[::-1] if from_right else starts
+    b = ends[::-1] if from_right else ends
+    if turn == "straight" and len(a) != len(b):
+        return _pairs_by_position(starts, ends, cluster)
+    return [(lane, b[min(i, len(b) - 1)]) for i, lane in enumerate(a)]
+
+
+def _pairs_by_position(
+    starts: list[LaneDraft], ends: list[LaneDraft], cluster: Cluster
+) -> list[tuple[LaneDraft, LaneDraft]]:
+    """Pair each lane with the one ahead of it; where a road widens every new lane is reached."""
+    ahead = unit(ends[0].centerline[1] - ends[0].centerline[0])
+    side = np.array([-ahead[1], ahead[0]])
+    at_start = np.array([lane.centerline[-1] @ side for lane in starts])
+    at_end = np.array([lane.centerline[0] @ side for lane in ends])
+    gaps = np.abs(at_start[:, None] - at_end[None, :])
+    best = np.maximum.accumulate(gaps.argmin(axis=1))
+    pairs = {(i, int(j)) for i, j in enumerate(best)}
+    if cluster.plain or len(starts) > len(ends):
+        pairs |= {(int(i), j) for j, i in enumerate(gaps.argmin(axis=0)) if j not in best}
+    return [(starts[i], ends[j]) for i, j in sorted(pairs)]
+
+
+def _connection(
+    start: LaneDraft, end: LaneDraft, movement: Movement, cluster: Cluster, around: Surroundings
+) -> ConnectionDraft:
+    begin, heading = start.centerline[-1], unit(start.centerline[-1] - start.centerline[-2])
+    finish, end_heading = end.centerline[0], unit(end.centerline[1] - end.centerline[0])
+    curve = turn_curve(begin, heading, finish, end_heading)
+    if sum(part.edge.length_m for part in movement.inside) > _LONG_PATH_M:
+        guided = _along_path(begin, heading, finish, end_heading, movement, around)
+        if (
+            shapely.hausdorff_distance(shapely.LineString(curve), shapely.LineString(guided))
+            > _MAX_DETOUR_M
+        ):
+            curve = guided
+    curve = np.round(curve, 3)
+    curve[0], curve[-1] = begin, finish
+    width = min(start.width_m.value, end.width_m.value)
+    return ConnectionDraft(
+        id=f"{start.id}>{end.id}",
+        start=start,
+        end=end,
+        turn=movement.turn,
+        centerline=curve,
+        width_m=Quantity(width, "inferred"),
+        cluster=cluster,
+        movement=movement,
+    )
+
+
+def _along_path(
+    begin: Array,
+    heading: Array,
+    finish: Array,
+    end_heading: Array,
+    movement: Movement,
+    around: Surroundings,
+) -> Array:
+    """Return a path that follows the inner edges on the driver's side of them."""
+    points = [begin, begin + 2.0 * heading]
+    for part in movement.inside:
+        lanes = around.section(part).driven(reverse=part.reverse)
+        middle = lanes[len(lanes) // 2].left_m if lanes else 0.0
+        line = offset(without_repeats(part.xy_m), -middle if part.reverse else middle)
+        keep = line[1:-1] if len(line) > 3 else (line[:1] + line[-1:]) / 2.0
+        points.extend(
+            p
+            for p in keep
+            if (p - points[-1]) @ (p - begin) > 0.0 and np.hypot(*(p - points[-1])) > 3.0
+        )
+    points.extend([finish - 2.0 * end_heading, finish])
+    return rounded(without_repeats(np.array(points)), deviation_m=3.0)

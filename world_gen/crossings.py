@@ -1,0 +1,56 @@
+"""Pedestrian crossings, from kerb to kerb at their nodes on the road."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from contracts.world import Choice, Crossing, Quantity
+from world_gen.clusters import Surroundings
+from world_gen.polyline import arc_lengths, direction_at, left_of
+
+CROSSING_WIDTH_M = 4.0
+_MARKED = ("zebra", "marked", "uncontrolled", "traffic_signals")
+
+
+def crossings(
+    around: Surroundings, node_tags: Mapping[int, Mapping[str, str]]
+) -> tuple[Crossing, ...]:
+    """Return each crossing node on a car road within the World's radius, once."""
+    found: dict[int, Crossing] = {}
+    for index, edge in sorted(around.edges.items()):
+        section = around.sections[index]
+        along = arc_lengths(edge.xy_m)
+        for i, node in enumerate(edge.node_ids):
+            tags = node_tags.get(node, {})
+            crosses = tags.get("highway") == "crossing" or "crossing" in tags
+            at = edge.xy_m[i] if i < len(edge.xy_m) else None
+            if not crosses or tags.get("crossing") == "no" or at is None or node in found:
+                continue
+            if np.hypot(*at) > around.radius_m:
+                continue
+            left = left_of(direction_at(edge.xy_m, float(along[i])))
+            line = np.stack([at + left * section.left_m, at + left * section.right_m])
+            found[node] = Crossing(
+                id=f"n{node}",
+                line=np.round(line, 3),
+                width_m=Quantity(CROSSING_WIDTH_M, "default"),
+                kind=_kind(tags),
+                osm_node=node,
+            )
+    return tuple(found[node] for node in sorted(found))
+
+
+def _kind(tags: Mapping[str, str]) -> Choice:
+    marks = tags.get("crossing:markings") or tags.get("crossing_ref")
+    word = tags.get("crossing")
+    if word == "traffic_signals" or tags.get("crossing:signals") == "yes":
+        return Choice("traffic_signals", "tagged")
+    if marks == "zebra" or word == "zebra":
+        return Choice("zebra", "tagged")
+    if word in ("unmarked", "informal") or marks == "no":
+        return Choice("unmarked", "tagged")
+    if word in _MARKED or (marks and marks != "no"):
+        return Choice("marked", "tagged")
+    return Choice("unmarked", "default")

@@ -1,0 +1,66 @@
+"""What many Worlds of one map share: spatial trees over roads and buildings, turn restrictions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
+from world_gen.buildings import Footprint, footprints
+from world_gen.intersections import Junction
+from world_gen.osm_map import OsmMap
+from world_gen.road_graph import RoadGraph
+from world_gen.turn_restrictions import TurnRestrictions, read_turn_restrictions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapIndex:
+    """A map prepared for building Worlds; make it once per map with `index_map`."""
+
+    osm: OsmMap
+    graph: RoadGraph
+    car_edges: tuple[int, ...]
+    car_edge_tree: shapely.STRtree
+    buildings: tuple[Footprint, ...]
+    building_tree: shapely.STRtree
+    restrictions: TurnRestrictions
+    junction_of_node: Mapping[int, Junction]
+    notes: tuple[str, ...]
+
+    def car_edges_within(self, centre_xy_m: Array, radius_m: float) -> tuple[int, ...]:
+        """Return indices of car roads within `radius_m` of a point (2,) in the map's frame."""
+        disc = shapely.Point(centre_xy_m).buffer(radius_m)
+        found = self.car_edge_tree.query(disc, predicate="intersects")
+        return tuple(sorted(self.car_edges[i] for i in found))
+
+    def buildings_within(self, centre_xy_m: Array, radius_m: float) -> tuple[Footprint, ...]:
+        """Return buildings that reach within `radius_m` of a point (2,) in the map's frame."""
+        disc = shapely.Point(centre_xy_m).buffer(radius_m)
+        found = self.building_tree.query(disc, predicate="intersects")
+        return tuple(self.buildings[i] for i in sorted(found.tolist()))
+
+
+def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ()) -> MapIndex:
+    """Prepare a map; `junctions` are all known ones, so that neighbours are built as such."""
+    notes: list[str] = []
+    car = tuple(
+        edge.index
+        for edge in graph.edges
+        if edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
+    )
+    lines = [shapely.LineString(graph.edges[i].xy_m) for i in car]
+    buildings = footprints(osm, notes)
+    return MapIndex(
+        osm=osm,
+        graph=graph,
+        car_edges=car,
+        car_edge_tree=shapely.STRtree(lines),
+        buildings=buildings,
+        building_tree=shapely.STRtree(np.array([b.polygon for b in buildings], dtype=object)),
+        restrictions=read_turn_restrictions(osm),
+        junction_of_node={node: j for j in junctions for node in sorted(j.nodes)},
+        notes=tuple(notes),
+    )

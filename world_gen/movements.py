@@ -1,0 +1,128 @@
+"""Legal movements: from which leg of a cluster to which other, along which inner edges."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from contracts.world import DrivingSide, Turn
+from world_gen.clusters import Cluster, Surroundings, heading_out, is_ring_edge
+from world_gen.road_graph import DirectedEdge
+from world_gen.turn_restrictions import TurnRestrictions
+
+STRAIGHT_RAD = math.radians(45.0)
+FORK_RAD = math.radians(18.0)
+U_TURN_RAD = math.radians(150.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Movement:
+    """One legal way through a cluster; `toward` ends at it, `away` begins there."""
+
+    toward: DirectedEdge
+    away: DirectedEdge
+    inside: tuple[DirectedEdge, ...]
+    turn: Turn
+    angle_rad: float
+
+
+def movements(
+    cluster: Cluster, around: Surroundings, restrictions: TurnRestrictions
+) -> tuple[Movement, ...]:
+    """Return every movement that one-ways and turn restrictions allow, u-turns on a street not."""
+    inner: dict[int, list[DirectedEdge]] = {}
+    for index in sorted(cluster.inner):
+        edge = around.edges.get(index)
+        if edge is None:
+            continue
+        for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
+            if directed.allowed:
+                inner.setdefault(directed.start_node, []).append(directed)
+    found: list[Movement] = []
+    for leg in cluster.legs:
+        toward = DirectedEdge(leg.edge, not leg.reverse)
+        if not toward.allowed:
+            continue
+        ways = _ways_through(cluster, toward, inner, restrictions)
+        found.extend(_with_turns(toward, ways, around.driving_side))
+    return tuple(found)
+
+
+def _ways_through(
+    cluster: Cluster,
+    toward: DirectedEdge,
+    inner: dict[int, list[DirectedEdge]],
+    restrictions: TurnRestrictions,
+) -> list[tuple[DirectedEdge, tuple[DirectedEdge, ...]]]:
+    """Return (leg, inner edges) by the shortest legal path to every leg, over pairs of edges."""
+    exits: dict[int, list[DirectedEdge]] = {}
+    for leg in cluster.legs:
+        if leg.allowed:
+            exits.setdefault(leg.start_node, []).append(leg)
+    best: dict[tuple[int, bool], tuple[DirectedEdge, tuple[DirectedEdge, ...]]] = {}
+    done: set[tuple[int, bool]] = set()
+    queue: list[tuple[float, int, DirectedEdge, tuple[DirectedEdge, ...]]] = [(0.0, 0, toward, ())]
+    count = 0
+    while queue:
+        cost, _, last, path = heapq.heappop(queue)
+        state = (last.edge.index, last.reverse)
+        if state in done:
+            continue
+        done.add(state)
+        for leg in exits.get(last.end_node, ()):
+            back = leg.edge.index == last.edge.index
+            key = (leg.edge.index, leg.reverse)
+            if key in best or back or not restrictions.step_allowed(last, leg):
+                continue
+            if restrictions.path_allowed((toward, *path, leg)):
+                best[key] = (leg, path)
+        for step in inner.get(last.end_node, ()):
+            if step.edge.index == last.edge.index or not restrictions.step_allowed(last, step):
+                continue
+            count += 1
+            heapq.heappush(queue, (cost + step.edge.length_m, count, step, (*path, step)))
+    return [best[key] for key in sorted(best)]
+
+
+def _with_turns(
+    toward: DirectedEdge,
+    ways: list[tuple[DirectedEdge, tuple[DirectedEdge, ...]]],
+    driving_side: DrivingSide,
+) -> list[Movement]:
+    heading = -heading_out(DirectedEdge(toward.edge, not toward.reverse))
+    angles = []
+    for leg, _ in ways:
+        out = heading_out(leg)
+        cross = float(heading[0] * out[1] - heading[1] * out[0])
+        angles.append(math.atan2(cross, float(heading @ out)))
+    straightest = min((abs(a) for a in angles), default=0.0)
+    found = []
+    for (leg, path), angle in zip(ways, angles, strict=True):
+        turn = _turn(angle, straightest, angles)
+        if is_ring_edge(toward.edge) or is_ring_edge(leg.edge):
+            turn = _ring_turn(toward, leg, driving_side)
+        elif abs(angle) > U_TURN_RAD and (path or toward.end_node != leg.start_node):
+            turn = "u_turn"
+        found.append(Movement(toward=toward, away=leg, inside=path, turn=turn, angle_rad=angle))
+    return found
+
+
+def _turn(angle: float, straightest: float, angles: list[float]) -> Turn:
+    if abs(angle) < STRAIGHT_RAD:
+        fork = abs(angle) > straightest + 1e-9 and (
+            abs(angle) > FORK_RAD or np.sign(angle) == 0 or straightest < abs(angle)
+        )
+        if not fork:
+            return "straight"
+        best = min(angles, key=abs)
+        return "left" if angle > best else "right"
+    return "left" if angle > 0 else "right"
+
+
+def _ring_turn(toward: DirectedEdge, away: DirectedEdge, driving_side: DrivingSide) -> Turn:
+    if is_ring_edge(toward.edge) and is_ring_edge(away.edge):
+        return "straight"
+    return "right" if driving_side == "right" else "left"

@@ -1,0 +1,94 @@
+"""Turn restrictions of the map: which way after which way may not, or must, be taken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from world_gen.osm_map import OsmMap
+from world_gen.road_graph import DirectedEdge
+
+
+class NodeRule(NamedTuple):
+    """A restriction at one node; `only` means: from there nowhere but to `to_way`."""
+
+    relation: int
+    from_way: int
+    to_way: int
+    only: bool
+    u_turn: bool
+
+
+class WayRule(NamedTuple):
+    """A restriction over one or more ways between."""
+
+    relation: int
+    from_way: int
+    via_ways: tuple[int, ...]
+    to_way: int
+    only: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TurnRestrictions:
+    """All restrictions for cars, by via node, and those with via ways."""
+
+    at_node: Mapping[int, tuple[NodeRule, ...]]
+    over_ways: tuple[WayRule, ...]
+
+    def step_allowed(self, before: DirectedEdge, after: DirectedEdge) -> bool:
+        """Return whether a car may go from one edge onto the next at their common node."""
+        turns_back = before.edge.index == after.edge.index and before.reverse != after.reverse
+        for rule in self.at_node.get(before.end_node, ()):
+            if rule.from_way != before.edge.way_id:
+                continue
+            meant = after.edge.way_id == rule.to_way
+            if rule.from_way == rule.to_way:
+                # A way that goes on beyond the node: only the word tells straight on from back.
+                meant = meant and turns_back == rule.u_turn
+            if meant != rule.only:
+                return False
+        return True
+
+    def path_allowed(self, path: Sequence[DirectedEdge]) -> bool:
+        """Return whether no restriction over via ways forbids this sequence of edges."""
+        ways = [path[0].edge.way_id]
+        for part in path[1:]:
+            if part.edge.way_id != ways[-1]:
+                ways.append(part.edge.way_id)
+        for rule in self.over_ways:
+            start = (rule.from_way, *rule.via_ways)
+            n = len(start)
+            for i in range(len(ways) - n):
+                if tuple(ways[i : i + n]) == start and (ways[i + n] == rule.to_way) != rule.only:
+                    return False
+        return True
+
+
+def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
+    """Return the map's restrictions that hold for cars at all times."""
+    at_node: dict[int, list[NodeRule]] = {}
+    over_ways: list[WayRule] = []
+    for relation in sorted(osm.relations.values(), key=lambda r: r.id):
+        tags = relation.tags
+        if tags.get("type") != "restriction":
+            continue
+        word = tags.get("restriction") or tags.get("restriction:motorcar") or ""
+        exempt = {part.strip() for part in tags.get("except", "").split(";")}
+        if not word.startswith(("no_", "only_")) or exempt & {"motorcar", "motor_vehicle"}:
+            continue
+        role = {
+            name: [m for m in relation.members if m.role == name] for name in ("from", "to", "via")
+        }
+        only = word.startswith("only_")
+        via_ways = tuple(m.ref for m in role["via"] if m.kind == "w")
+        via_nodes = [m.ref for m in role["via"] if m.kind == "n"]
+        for start in (m.ref for m in role["from"] if m.kind == "w"):
+            for end in (m.ref for m in role["to"] if m.kind == "w"):
+                if via_ways:
+                    over_ways.append(WayRule(relation.id, start, via_ways, end, only))
+                for node in via_nodes:
+                    rule = NodeRule(relation.id, start, end, only, word.endswith("u_turn"))
+                    at_node.setdefault(node, []).append(rule)
+    return TurnRestrictions({k: tuple(v) for k, v in at_node.items()}, tuple(over_ways))
