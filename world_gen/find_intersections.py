@@ -1,0 +1,170 @@
+"""Find every junction of a map, each one as a driver sees it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+import numpy as np
+
+from contracts.frames import geo_from_local
+from contracts.world import IntersectionSummary, JunctionKind
+from world_gen.chains import CarRoads, car_roads
+from world_gen.intersections import Junction
+from world_gen.junction_arms import Approach, ClusterRoads, approaches, roads_of
+from world_gen.junction_clusters import Cluster, cluster_branchings
+from world_gen.junction_control import control_of
+from world_gen.osm_map import OsmMap
+from world_gen.road_graph import RoadGraph
+
+STAGGER_M = 8.0
+"""Opposite arms whose axes lie farther apart make a junction staggered."""
+MERGE_RAD = math.radians(50.0)
+"""A one-way road joins or leaves at no larger angle, else drivers turn."""
+
+
+def find_intersections(
+    osm: OsmMap, graph: RoadGraph, *, edges: Collection[int] | None = None
+) -> tuple[Junction, ...]:
+    """Return the junctions of a map, by id; with `edges`, those that touch one of these edges.
+
+    One roundabout is one junction with the nodes where its arms part; so are the crossings of
+    dual carriageways, offset branchings close to each other, and corners with slip roads. Where
+    fewer than three roads meet is none: a street that parts into its carriageways, a turning
+    place in the median, a change of name or lanes, a driveway. Roads at different levels share
+    no node and do not meet. The result for one place does not depend on the rest of the map.
+    """
+    roads = car_roads(osm, graph)
+    signalled = frozenset(
+        node for node, tags in osm.node_tags.items() if tags.get("highway") == "traffic_signals"
+    )
+    wanted = None
+    if edges is not None:
+        wanted = {
+            node
+            for index in edges
+            for node in (graph.edges[index].start_node, graph.edges[index].end_node)
+        }
+    found = []
+    for cluster in cluster_branchings(roads, graph, signalled):
+        junction = _junction(cluster, roads, osm, graph)
+        if junction is not None and (wanted is None or wanted & junction.nodes):
+            found.append(junction)
+    return tuple(sorted(found, key=lambda junction: junction.summary.id))
+
+
+def _junction(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) -> Junction | None:
+    around = roads_of(cluster, roads, graph)
+    arms = approaches(around.leaving)
+    mini = any(
+        osm.node_tags.get(node, {}).get("highway") == "mini_roundabout" for node in cluster.core
+    )
+    if len(arms) < 3 and cluster.ring is None and not (mini and len(arms) == 2):
+        return None
+    inner = [item.edge for chain in around.inside for item in chain.edges]
+    if cluster.ring is not None:
+        inner += cluster.ring.edges
+    nodes = frozenset(
+        [*cluster.nodes, *(node for chain in around.inside for node in chain.inner_nodes)]
+    )
+    centre = _centre_xy_m(cluster, graph)
+    kind = _kind(cluster, arms, mini)
+    lat_deg, lon_deg = geo_from_local(graph.frame, centre).tolist()
+    control = control_of(
+        frozenset(cluster.core),
+        around.inside,
+        arms,
+        osm.node_tags,
+        ring=kind in ("roundabout", "mini_roundabout"),
+    )
+    return Junction(
+        summary=IntersectionSummary(
+            id=f"n{min(cluster.core)}",
+            kind=kind,
+            lat=round(lat_deg, 7),
+            lon=round(lon_deg, 7),
+            arms=len(arms),
+            control=control,
+            driving_side=graph.driving_side,
+            osm_nodes=tuple(sorted(nodes)),
+            name=_name(cluster, arms, around),
+        ),
+        centre_xy_m=centre,
+        nodes=nodes,
+        inner=tuple(sorted({edge.index for edge in inner})),
+        arms=tuple(item.arm for item in arms),
+        radius_m=max(math.dist(centre, graph.node_xy_m[node]) for node in nodes),
+    )
+
+
+def _centre_xy_m(
+    cluster: Cluster, graph: RoadGraph
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Return the mean of the core nodes, of a ring the middle of its line."""
+    if cluster.ring is None:
+        points = np.array([graph.node_xy_m[node] for node in sorted(cluster.core)])
+        return np.asarray(points.mean(axis=0))
+    middles, lengths = [], []
+    for edge in cluster.ring.edges:
+        middles.append((edge.xy_m[1:] + edge.xy_m[:-1]) / 2.0)
+        lengths.append(np.linalg.norm(np.diff(edge.xy_m, axis=0), axis=1))
+    return np.asarray(np.average(np.vstack(middles), axis=0, weights=np.concatenate(lengths)))
+
+
+def _kind(cluster: Cluster, arms: tuple[Approach, ...], mini: bool) -> JunctionKind:
+    if cluster.ring is not None:
+        return "roundabout" if cluster.ring.kind == "roundabout" else "circular"
+    if mini:
+        return "mini_roundabout"
+    if _is_merge(arms):
+        return "merge"
+    if len(arms) == 3:
+        return "t_junction"
+    if len(arms) == 4:
+        return "staggered" if _is_staggered(arms) else "crossing"
+    return "crossing" if len(arms) > 4 else "other"
+
+
+def _is_merge(arms: tuple[Approach, ...]) -> bool:
+    """Tell whether one-way roads join to one, or one parts, without a turn."""
+    if len(arms) != 3 or any(len(item.chains) != 1 for item in arms):
+        return False
+    chains = [item.chains[0] for item in arms]
+    if not all(chain.one_way for chain in chains):
+        return False
+    outward = [item for item in arms if item.chains[0].outward]
+    inward = [item for item in arms if item.chains[0].inward]
+    pair = outward if len(outward) == 2 else inward
+    if len(pair) != 2:
+        return False
+    a, b = (item.arm.bearing_rad for item in pair)
+    return abs(math.remainder(a - b, math.tau)) <= MERGE_RAD
+
+
+def _is_staggered(arms: tuple[Approach, ...]) -> bool:
+    """Tell whether a road of four does not go straight on, but meets the other with an offset."""
+    pairings = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
+
+    def opposition(pairing: tuple[tuple[int, int], tuple[int, int]]) -> float:
+        return sum(math.cos(arms[i].arm.bearing_rad - arms[j].arm.bearing_rad) for i, j in pairing)
+
+    for i, j in min(pairings, key=opposition):
+        a, b = arms[i], arms[j]
+        axis = math.atan2(
+            math.sin(a.arm.bearing_rad) - math.sin(b.arm.bearing_rad),
+            math.cos(a.arm.bearing_rad) - math.cos(b.arm.bearing_rad),
+        )
+        dx, dy = (p - q for p, q in zip(a.start_xy_m, b.start_xy_m, strict=True))
+        if abs(dy * math.cos(axis) - dx * math.sin(axis)) > STAGGER_M:
+            return True
+    return False
+
+
+def _name(cluster: Cluster, arms: tuple[Approach, ...], around: ClusterRoads) -> str:
+    """Return the ring's own name, else the names of the roads that meet."""
+    names = dict.fromkeys(item.arm.name for item in arms if item.arm.name)
+    if cluster.ring is not None:
+        own = [edge.tags["name"] for edge in cluster.ring.edges if "name" in edge.tags]
+        if own and own[0] not in names:
+            return own[0]
+    return " \u00d7 ".join(sorted(names))
