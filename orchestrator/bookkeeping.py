@@ -39,7 +39,7 @@ class TelemetryCount:
         self.ages_ms.append(age_ms)
 
     def settle(self, published: dict[str, int]) -> None:
-        """Count what the vehicle says it published and that never came, before a first sample too."""
+        """Count what the vehicle says it published and that never came, first samples included."""
         missing = sum(max(0, sent - self.by_channel[name]) for name, sent in published.items())
         self.lost = max(self.lost, missing)
 
@@ -102,7 +102,7 @@ class FuturesCount:
 
 @dataclass(slots=True)
 class ComparisonCount:
-    """Mean displacement errors by horizon: the nominal future and two baselines on the same data."""
+    """Mean displacement errors by horizon: nominal future and two baselines on the same data."""
 
     errors: dict[float, list[tuple[float, float, float]]] = field(
         default_factory=lambda: defaultdict(list)

@@ -94,7 +94,7 @@ def _clock() -> Finding:
     from sim_worker.vehicle.clock import silence_step_clock
 
     if silence_step_clock():
-        return Finding("MuJoCo's step clock", "ok", "switched off (steps take about a third less)")
+        return Finding("MuJoCo's step clock", "ok", "switched off")
     return Finding("MuJoCo's step clock", "note", "cannot be switched off here; steps are slower")
 
 

@@ -172,7 +172,6 @@ class _Drive:
             reply = answers.take(3.0)
             if isinstance(reply, Reply) and reply.message is not None:
                 conductor.take_info(reply.message)
-                self._mission.start_stamp_ns = reply.message.start_stamp_ns
                 return True
             # A live car may start its telemetry when it likes; a process of ours may not.
             if self._plan.config.resolved_source != "live" and time.monotonic() > deadline:
@@ -203,8 +202,8 @@ class _Drive:
         started_s: float,
     ) -> None:
         plan = self._plan
-        stamp = conductor.state.stamp_ns if conductor.state else 0
-        bus.publish("run_end", RunEnd(stamp_ns=stamp), run=plan.run_id)
+        end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
+        bus.publish("run_end", end, run=plan.run_id)
         quick = exit_word != "completed"
         killed = self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else END_GRACE_S)
         if killed:

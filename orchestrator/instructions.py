@@ -1,4 +1,4 @@
-"""What the mission tells the shell to do: the vocabulary between the pure core and the processes."""
+"""What the mission tells the shell to do: the words between pure core and processes."""
 
 from __future__ import annotations
 

@@ -46,29 +46,31 @@ class LiveLoop:
             if now_s >= next_housekeeping_s:
                 self._housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
-            seen = conductor.state_count
+            seen = conductor.intake.states
             item = conductor.mailbox.take(
                 max(0.0, min(next_housekeeping_s, next_due_s + 0.5 * self._period_s) - now_s)
             )
             if item is not None:
                 conductor.handle(item)
             now_s = time.monotonic()
-            fresh = conductor.state_count > seen
+            fresh = conductor.intake.states > seen
             if now_s >= next_due_s and (fresh or now_s >= next_due_s + 0.5 * self._period_s):
-                conductor.desk.expire()
+                conductor.rounds.desk.expire()
                 self._start_round(now_s)
                 # A machine that was asleep does not catch up on rounds; the grid stays.
                 periods = max(1, int((now_s - next_due_s) / self._period_s))
                 next_due_s += periods * self._period_s
-            if conductor.end is not None and not self._telemetry_waits():
+            if conductor.intake.end is not None and not self._telemetry_waits():
                 self._let_finish()
                 return True
         return False
 
     def _start_round(self, now_s: float) -> None:
         conductor = self._conductor
-        age_s = (now_s - conductor.state_receipt_ns / 1e9) * self._speed
-        if conductor.state is not None and age_s <= STALE_AFTER_S:
+        latest = conductor.intake.latest
+        if latest is None:
+            return
+        if (now_s - latest.receipt_mono_ns / 1e9) * self._speed <= STALE_AFTER_S:
             conductor.start_round()
 
     def _telemetry_waits(self) -> bool:
@@ -78,7 +80,7 @@ class LiveLoop:
         """Give the last round its time and take what the mirror still has to say."""
         conductor = self._conductor
         deadline = time.monotonic() + LAST_ROUND_GRACE_S
-        while time.monotonic() < deadline and conductor.desk.open_rounds:
+        while time.monotonic() < deadline and conductor.rounds.desk.open_rounds:
             item = conductor.mailbox.take(0.05)
             if item is not None:
                 conductor.handle(item)

@@ -44,10 +44,10 @@ class LockStepLoop:
     def run(self) -> bool:
         """Return True where the drive ended by itself, False where it was stopped."""
         conductor = self._conductor
-        assert conductor.info is not None
+        assert conductor.intake.info is not None
         config = conductor.plan.config
         period_ns = round(1e9 / config.rate_hz)
-        until_ns = conductor.info.start_stamp_ns + round(config.start_s * 1e9)
+        until_ns = conductor.intake.start_stamp_ns + round(config.start_s * 1e9)
         while True:
             self._advance(until_ns)
             if self._stop():
@@ -58,7 +58,7 @@ class LockStepLoop:
                 conductor.take_telemetry(sample)
             self._wait("worlds", lambda: not conductor.worlds.building)
             if not advanced.ended and conductor.start_round():
-                self._wait("the round", lambda: not conductor.desk.open_rounds)
+                self._wait("the round", lambda: not conductor.rounds.desk.open_rounds)
             if self._stop():
                 return False
             if advanced.ended:
@@ -89,14 +89,14 @@ class LockStepLoop:
     def _wait_for_end(self) -> None:
         """Take the vehicle's last word and what the mirror still has to say."""
         conductor = self._conductor
-        last = conductor.state.stamp_ns if conductor.state else 0
+        last = conductor.intake.now_stamp_ns
         deadline = time.monotonic() + 5.0
 
         def said() -> bool:
             for sample in self._in_order():
                 conductor.take_telemetry(sample)
             mirrored = conductor.mirror_stamp_ns >= last - 200_000_000
-            return (conductor.end is not None and mirrored) or time.monotonic() > deadline
+            return (conductor.intake.end is not None and mirrored) or time.monotonic() > deadline
 
         self._wait("the end", said)
 

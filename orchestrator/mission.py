@@ -1,4 +1,4 @@
-"""The mission: follows the car along its route, says which Worlds to build, and which rounds to run.
+"""The mission: follows the car on its route, says which Worlds to build and rounds to run.
 
 A state machine without bus and clock: states and worlds in, instructions out. Wall times come in
 as arguments and are only remembered, never decided upon.
@@ -19,11 +19,12 @@ from orchestrator.arrival import ArrivalPredictor
 from orchestrator.cruise import CruiseSpeed
 from orchestrator.driving_path import driving_path
 from orchestrator.instructions import BuildWorld, Instruction, NotReady, RoundIntent, Tell, UseWorld
-from orchestrator.junctions_ahead import UpcomingJunction
+from orchestrator.junctions_ahead import PassedJunction, UpcomingJunction
 from orchestrator.map_matching import MapMatcher, Match
 from orchestrator.road_index import RoadIndex
 from orchestrator.route import Route
 from orchestrator.route_follower import Progress, RouteFollower
+from orchestrator.visits import VisitBook
 from world_gen.intersections import Junction
 from world_gen.road_graph import RoadGraph
 
@@ -34,6 +35,7 @@ KEEP_PAST_CENTRE_M = 20.0
 """A junction stays the current one until the car is this far past its centre."""
 PATH_BEHIND_M = 10.0
 PATH_SPARE_M = 60.0
+MIN_PATH_M = 20.0
 ALTERNATIVES_M = 300.0
 """On a predicted route, Worlds of junctions that other turns lead to are built this far ahead."""
 FAR_AHEAD_M = 3000.0
@@ -46,22 +48,6 @@ class MissionSettings:
     radius_m: float = 150.0
     look_ahead_s: float = 60.0
     horizon_s: float = 8.0
-
-
-@dataclass(slots=True)
-class Visit:
-    """One junction on the way: when its World was asked for, ready, entered and passed."""
-
-    junction: Junction
-    seen_mono_s: float
-    world: World | None = None
-    ready_mono_s: float | None = None
-    built_at_s: float | None = None
-    entered_mono_s: float | None = None
-    arrived_at_s: float | None = None
-    failed: bool = False
-    rounds: int = 0
-    futures: int = 0
 
 
 class Mission:
@@ -87,8 +73,7 @@ class Mission:
         self._arrival = ArrivalPredictor()
         self._cruise = CruiseSpeed()
         self._given = bool(routes)
-        self._visits: dict[str, Visit] = {}
-        self._arrived: list[Visit] = []
+        self._visits = VisitBook()
         self._upcoming: tuple[UpcomingJunction, ...] = ()
         self._arrival_in_s: dict[str, float] = {}
         self._progress: Progress | None = None
@@ -122,7 +107,7 @@ class Mission:
             told.append(Tell("info", f"{text}: {self._match_text()}"))
             self.state = "following"
         for passed in self._progress.passed:
-            told += self._arrive(passed.junction.summary.id, passed.centre_s_m, state, mono_s)
+            told += self._arrive(passed, mono_s)
         self._look_ahead(mono_s)
         told += self._wanted_worlds(mono_s)
         told += self._choose_current()
@@ -131,21 +116,22 @@ class Mission:
 
     def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:
         """A junction's World is built and loaded by the workers."""
-        visit = self._visits[junction_id]
-        visit.world = world
-        visit.ready_mono_s = mono_s
-        visit.built_at_s = self.drive_time_s
+        visit = self._visits.get(junction_id)
+        assert visit is not None
+        visit.take_world(world, mono_s=mono_s, drive_time_s=self.drive_time_s)
         return self._choose_current()
 
-    def on_world_failed(self, junction_id: str, *, mono_s: float) -> list[Instruction]:
+    def on_world_failed(self, junction_id: str) -> list[Instruction]:
         """A junction's World cannot be built; the drive goes on without it."""
-        self._visits[junction_id].failed = True
-        self._visits[junction_id].ready_mono_s = None
+        visit = self._visits.get(junction_id)
+        assert visit is not None
+        visit.failed = True
         return []
 
     def on_round(self, junction_id: str, *, futures: int) -> None:
         """A round for a junction is complete."""
-        visit = self._visits[junction_id]
+        visit = self._visits.get(junction_id)
+        assert visit is not None
         visit.rounds += 1
         visit.futures += futures
 
@@ -170,8 +156,8 @@ class Mission:
         """Ids of the Worlds that the coming rounds need, the current one first."""
         ids = [self._current] if self._current else []
         ids += [ahead.junction.summary.id for ahead in self._upcoming]
-        worlds = [self._visits[i].world for i in dict.fromkeys(ids) if i in self._visits]
-        return [world.id for world in worlds if world is not None]
+        visits = [self._visits.get(junction_id) for junction_id in dict.fromkeys(ids)]
+        return [visit.world.id for visit in visits if visit is not None and visit.world is not None]
 
     def plan_round(self) -> RoundIntent | NotReady | None:
         """Return the round to run now; None where no junction is within the look-ahead."""
@@ -190,16 +176,22 @@ class Mission:
             return NotReady("the world is not ready")
         if not car.yaw_valid:
             return NotReady("the heading is not known")
+        path = self._path_ahead(visit.world.frame, car.speed_mps)
+        if path is None:
+            return NotReady("the road ends here")
         return RoundIntent(
             junction_id=visit.junction.summary.id,
             world_id=visit.world.id,
-            path=self._path_ahead(visit.world.frame, car.speed_mps),
+            path=path,
             cruise_speed_mps=self._cruise.speed_mps,
         )
 
-    def _path_ahead(self, frame: LocalFrame, speed_mps: float) -> PathAhead:
+    def _path_ahead(self, frame: LocalFrame, speed_mps: float) -> PathAhead | None:
+        """Return the path in a World's frame; None where the road ends within a few metres."""
         assert self._progress is not None
         s_m = self._progress.s_m
+        if self._follower.route.end_m - s_m < MIN_PATH_M:
+            return None
         reach_m = self._settings.horizon_s * max(speed_mps + 8.0, 15.0) + PATH_SPARE_M
         geometry = driving_path(
             self._graph, self._follower.route, s_from_m=s_m - PATH_BEHIND_M, s_to_m=s_m + reach_m
@@ -211,7 +203,7 @@ class Mission:
 
     def records(self, *, mono_s: float) -> list[dict[str, Any]]:
         """Return the `intersections` of run.json: those that the car reached, in order."""
-        return [_record(visit, mono_s) for visit in self._arrived]
+        return [visit.record(mono_s=mono_s) for visit in self._visits.arrived]
 
     @property
     def off_road(self) -> list[dict[str, Any]]:
@@ -252,41 +244,16 @@ class Mission:
             told.append(UseWorld(None))
         return told
 
-    def _arrive(
-        self, junction_id: str, centre_s_m: float, state: VehicleState, mono_s: float
-    ) -> list[Instruction]:
-        visit = self._visits.get(junction_id)
+    def _arrive(self, passed: PassedJunction, mono_s: float) -> list[Instruction]:
+        summary = passed.junction.summary
         told: list[Instruction] = []
-        if visit is None or visit.arrived_at_s is not None:
-            # Seen for the first time when it is passed already, or passed once more.
-            junction = next(
-                p.junction for p in self._progress_passed() if p.junction.summary.id == junction_id
-            )
-            world = visit.world if visit else None
-            visit = self._see(junction, mono_s)
-            visit.world = world
-            if world is not None:
-                visit.ready_mono_s, visit.built_at_s = mono_s, self.drive_time_s
-            else:
-                told.append(BuildWorld(junction_id))
-        visit.arrived_at_s = (state.stamp_ns - self.start_stamp_ns) / 1e9
-        if visit.entered_mono_s is None:
-            visit.entered_mono_s = mono_s
-        self._arrived.append(visit)
-        self._passed_s_m = centre_s_m
-        summary = visit.junction.summary
-        told.append(
-            Tell("info", f"passed {summary.kind} {summary.name or summary.id} ({summary.control})")
-        )
-        return told
-
-    def _progress_passed(self) -> Any:
-        return self._progress.passed if self._progress else ()
-
-    def _see(self, junction: Junction, mono_s: float) -> Visit:
-        visit = Visit(junction, mono_s)
-        self._visits[junction.summary.id] = visit
-        return visit
+        at_s = self.drive_time_s
+        if self._visits.see(passed.junction, mono_s=mono_s, drive_time_s=at_s):
+            told.append(BuildWorld(summary.id))
+        self._visits.arrive(summary.id, mono_s=mono_s, drive_time_s=at_s)
+        self._passed_s_m = passed.centre_s_m
+        text = f"passed {summary.kind} {summary.name or summary.id} ({summary.control})"
+        return [*told, Tell("info", text)]
 
     def _look_ahead(self, mono_s: float) -> None:
         assert self._progress is not None
@@ -315,18 +282,11 @@ class Mission:
         ]
         if not self._given or (self._progress is not None and self._progress.off_route):
             wanted += [a.junction for a in self._follower.alternatives(ALTERNATIVES_M)]
-        told: list[Instruction] = []
-        for junction in wanted:
-            visit = self._visits.get(junction.summary.id)
-            if visit is None:
-                self._see(junction, mono_s)
-                told.append(BuildWorld(junction.summary.id))
-            elif visit.arrived_at_s is not None and visit.world is not None:
-                # A second passage: the World is there already.
-                again = self._see(junction, mono_s)
-                again.world, again.ready_mono_s = visit.world, mono_s
-                again.built_at_s = self.drive_time_s
-        return told
+        return [
+            BuildWorld(junction.summary.id)
+            for junction in wanted
+            if self._visits.see(junction, mono_s=mono_s, drive_time_s=self.drive_time_s)
+        ]
 
     def _choose_current(self) -> list[Instruction]:
         """The junction just passed stays current for a while; then the next one within reach."""
@@ -341,7 +301,7 @@ class Mission:
         for ahead in self._upcoming:
             junction_id = ahead.junction.summary.id
             visit = self._visits.get(junction_id)
-            if visit is not None and visit.world is not None and not visit.failed:
+            if visit is not None and visit.usable:
                 if self._arrival_in_s[junction_id] <= self._settings.look_ahead_s:
                     chosen = junction_id
                 break
@@ -350,8 +310,8 @@ class Mission:
         if chosen == self._current:
             return []
         self._current = chosen
-        visit = self._visits[chosen] if chosen else None
-        return [UseWorld(visit.world.id if visit and visit.world else None)]
+        visit = self._visits.get(chosen) if chosen else None
+        return [UseWorld(visit.world.id if visit is not None and visit.world else None)]
 
     def _tell_deviations(self) -> list[Instruction]:
         told: list[Instruction] = []
@@ -373,23 +333,3 @@ class Mission:
             ways = ", ".join(str(way) for way in last.way_ids)
             told.append(Tell("warning", f"drives on {last.name or 'a way'} {why} (way {ways})"))
         return told
-
-
-def _record(visit: Visit, mono_s: float) -> dict[str, Any]:
-    summary = visit.junction.summary
-    entered = visit.entered_mono_s if visit.entered_mono_s is not None else mono_s
-    # A World that never came is late by all the time since it was needed.
-    ready = visit.ready_mono_s if visit.ready_mono_s is not None else max(mono_s, entered)
-    return {
-        "id": summary.id,
-        "kind": summary.kind,
-        "name": summary.name,
-        "control": summary.control,
-        "lat": summary.lat,
-        "lon": summary.lon,
-        "arrived_at_s": None if visit.arrived_at_s is None else round(visit.arrived_at_s, 3),
-        "built_at_s": None if visit.built_at_s is None else round(visit.built_at_s, 3),
-        "world_ready_before_s": round(entered - ready, 3),
-        "rounds": visit.rounds,
-        "futures": visit.futures,
-    }

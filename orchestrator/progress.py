@@ -62,13 +62,17 @@ class ProgressLine:
 
     def _progress(self, now_s: float) -> Progress:
         conductor, mission = self._conductor, self._mission
-        self._counts.append((now_s, conductor.futures.count))
+        self._counts.append((now_s, conductor.rounds.futures.count))
         self._counts = [c for c in self._counts if now_s - c[0] <= RATE_WINDOW_S]
         since_s, before = self._counts[0]
-        rate = (conductor.futures.count - before) / (now_s - since_s) if now_s > since_s else 0.0
+        rate = (
+            (conductor.rounds.futures.count - before) / (now_s - since_s)
+            if now_s > since_s
+            else 0.0
+        )
         ahead = mission.next_junction
         return Progress(
-            stamp_ns=conductor.state.stamp_ns if conductor.state else mission.start_stamp_ns,
+            stamp_ns=conductor.intake.now_stamp_ns,
             drive_time_s=mission.drive_time_s,
             mission_state=mission.state,
             next_intersection=ahead[0] if ahead else None,
@@ -78,7 +82,7 @@ class ProgressLine:
         )
 
     def _workers(self, stamp_ns: int) -> list[WorkerStatus]:
-        desk = self._conductor.desk
+        desk = self._conductor.rounds.desk
         busy = desk.busy
         count = self._conductor.plan.config.workers
         up = set(desk.workers)
@@ -90,7 +94,7 @@ class ProgressLine:
                     stamp_ns=stamp_ns,
                     worker_id=worker_id,
                     state=state,
-                    rtf=self._conductor.rtf.get(worker_id),
+                    rtf=self._conductor.rounds.rtf.get(worker_id),
                 )
             )
         return statuses
@@ -103,7 +107,7 @@ class ProgressLine:
         return (
             f"{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}  "
             f"{progress.futures_per_s:.0f} futures/s  "
-            f"workers {len(conductor.desk.workers)}/{conductor.plan.config.workers}  "
-            f"missed {conductor.desk.missed + conductor.not_ready_rounds}  "
+            f"workers {len(conductor.rounds.desk.workers)}/{conductor.plan.config.workers}  "
+            f"missed {conductor.rounds.desk.missed + conductor.not_ready_rounds}  "
             f"dropped {progress.dropped}"
         )

@@ -1,4 +1,4 @@
-"""The run's tables: Parquet files written by a thread of their own, so that no disk blocks a drive."""
+"""The run's tables: Parquet files written by a thread of their own: no disk blocks a drive."""
 
 from __future__ import annotations
 

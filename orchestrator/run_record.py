@@ -42,7 +42,7 @@ def run_record(
     mono_s: float,
 ) -> dict[str, Any]:
     """Return everything that run.json says."""
-    futures = conductor.futures
+    futures = conductor.rounds.futures
     # Without a word of the mirror, whether commands were recorded decides.
     independent = conductor.mirror_independent
     if independent is None:
@@ -56,21 +56,21 @@ def run_record(
         "route_source": plan.route_source,
         "config": msgspec.to_builtins(plan.config),
         "intersections": mission.records(mono_s=mono_s),
-        "telemetry": conductor.telemetry.record(conductor.skipped_invalid),
-        "futures": futures.record(missed=conductor.desk.missed + conductor.not_ready_rounds),
+        "telemetry": conductor.intake.counts.record(conductor.intake.skipped_invalid),
+        "futures": futures.record(missed=conductor.rounds.desk.missed + conductor.not_ready_rounds),
         "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
         "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),
-        "comparison": conductor.comparisons.record(independent=independent),
+        "comparison": conductor.rounds.comparisons.record(independent=independent),
         "workers": {
             "started": plan.config.workers,
             "restarted": supervisor.restarted,
-            "requeued_jobs": conductor.desk.requeued_jobs,
-            "late_results": conductor.desk.late_results,
+            "requeued_jobs": conductor.rounds.desk.requeued_jobs,
+            "late_results": conductor.rounds.desk.late_results,
         },
         "dropped": {
             "orchestrator_mailbox": conductor.mailbox.dropped,
             "result_rows": conductor.tables.dropped,
-            **{f"refused_{name}": count for name, count in sorted(conductor.refused.items())},
+            "failed_jobs": conductor.rounds.failed_jobs,
         },
         "off_road": mission.off_road,
         "drive_time_s": round(mission.drive_time_s, 3),

@@ -43,7 +43,7 @@ class StandinPath:
 def standin_path(
     graph: RoadGraph, route: Route, junctions: Sequence[Junction], *, end_s: float | None = None
 ) -> StandinPath:
-    """Return the path along a route: speed limits, slow in bends, a halt at stop-controlled junctions."""
+    """Return the path along a route: limits, slow in bends, a halt where junctions ask for it."""
     start_m, end_m = float(route.start_m[0]) + LEAD_M, route.end_m - LEAD_M
     geometry = driving_path(graph, route, s_from_m=start_m, s_to_m=end_m)
     stops = [

@@ -1,0 +1,194 @@
+"""Runs rounds: cuts an intent into jobs, sends them to workers, and takes complete rounds apart."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import NamedTuple
+
+from sim_worker.metrics.comparison import compare_plan
+
+from contracts.bus import Bus, Mailbox, Reply
+from contracts.drive import PlannedTrajectory, VehicleState
+from contracts.simulation import Comparison, FuturesJob
+from contracts.world import World
+from orchestrator.bookkeeping import ComparisonCount, FuturesCount
+from orchestrator.comparisons import ComparisonDesk
+from orchestrator.instructions import RoundIntent
+from orchestrator.intake import LatestState
+from orchestrator.plan import DrivePlan
+from orchestrator.result_rows import (
+    comparison_row,
+    future_rows,
+    plan_row,
+    round_row,
+    round_view,
+)
+from orchestrator.results import ResultTables
+from orchestrator.rounds import RoundDesk, RoundDone, RoundOrder
+from sim_worker.variants import plan_variants
+
+log = logging.getLogger("orchestrator")
+
+JOB_TIMEOUT_S = 20.0
+STEP_S = 0.1
+PLAN_FRESH_NS = 1_000_000_000
+"""An older plan of the car is not compared with a new future."""
+
+
+class _Seed(NamedTuple):
+    """What a round was started from."""
+
+    state: VehicleState
+    plan: PlannedTrajectory | None
+    intent: RoundIntent
+
+
+class RoundRunner:
+    """Everything between an intent and the rows of a round."""
+
+    def __init__(
+        self,
+        plan: DrivePlan,
+        bus: Bus,
+        mailbox: Mailbox,
+        tables: ResultTables,
+        *,
+        world_of: Callable[[str], World],
+        on_round: Callable[[str, int], None],
+        on_error: Callable[[str], None],
+    ) -> None:
+        self.desk = RoundDesk()
+        self.futures = FuturesCount()
+        self.comparisons = ComparisonCount()
+        self.rtf: dict[str, float] = {}
+        self.failed_jobs = 0
+        self.start_stamp_ns = 0
+        self._plan = plan
+        self._bus = bus
+        self._mailbox = mailbox
+        self._tables = tables
+        self._world_of = world_of
+        self._on_round = on_round
+        self._on_error = on_error
+        self._comparison_desk = ComparisonDesk(plan.drive_frame, plan.config.horizon_s)
+        config = plan.config
+        self._variants = plan_variants(
+            count=config.futures, seed=config.seed, planners=[config.planner]
+        )
+        self._next_round_id = 0
+        self._seeds: dict[int, _Seed] = {}
+
+    def start(
+        self, intent: RoundIntent, latest: LatestState, car_plan: PlannedTrajectory | None
+    ) -> None:
+        """Open a round and give its jobs out."""
+        config = self._plan.config
+        round_id, self._next_round_id = self._next_round_id, self._next_round_id + 1
+        size = config.futures_per_job
+        jobs = tuple(
+            FuturesJob(
+                round_id=round_id,
+                job_index=index,
+                world_id=intent.world_id,
+                state=latest.state,
+                path=intent.path,
+                variants=self._variants[first : first + size],
+                horizon_s=config.horizon_s,
+                step_s=STEP_S,
+                seed=config.seed,
+                cruise_speed_mps=intent.cruise_speed_mps,
+            )
+            for index, first in enumerate(range(0, config.futures, size))
+        )
+        self._seeds[round_id] = _Seed(latest.state, car_plan, intent)
+        self.desk.open(
+            RoundOrder(
+                round_id=round_id,
+                stamp_ns=latest.state.stamp_ns,
+                junction_id=intent.junction_id,
+                world_id=intent.world_id,
+                receipt_mono_ns=latest.receipt_mono_ns,
+                jobs=jobs,
+            )
+        )
+        self.give_out()
+
+    def give_out(self) -> None:
+        """Send waiting jobs to idle workers."""
+        for worker_id, job in self.desk.assignments():
+            self._bus.request(
+                "job",
+                job,
+                self._mailbox,
+                tag=(worker_id, job),
+                timeout_s=JOB_TIMEOUT_S,
+                run=self._plan.run_id,
+                process=worker_id,
+            )
+
+    def reply(self, reply: Reply) -> None:
+        """Take a worker's answer."""
+        worker_id, job = reply.tag
+        if reply.message is None:
+            self.failed_jobs += 1
+            if reply.error != "no answer":
+                self._on_error(f"{worker_id}: {reply.error}")
+        elif reply.message.cpu_seconds > 0.0:
+            self.rtf[worker_id] = reply.message.sim_seconds / reply.message.cpu_seconds
+        done = self.desk.result(worker_id, job, reply.message, reply.received_mono_ns)
+        if done is not None:
+            self._take_apart(done)
+        self.give_out()
+
+    def take_state(self, state: VehicleState) -> None:
+        """Add where the car is: comparisons fall due."""
+        for comparison in self._comparison_desk.take_state(state):
+            self._keep(comparison)
+
+    def finish(self) -> None:
+        """Compare what can still be compared at the drive's end."""
+        for comparison in self._comparison_desk.flush():
+            self._keep(comparison)
+
+    def _take_apart(self, done: RoundDone) -> None:
+        order = done.order
+        seed = self._seeds.pop(order.round_id)
+        for expired in [r for r in self._seeds if r < order.round_id]:
+            del self._seeds[expired]
+        world = self._world_of(order.world_id)
+        futures, rows, distinct = future_rows(done, self._variants)
+        sha = self.futures.take(done, distinct=distinct)
+        self._on_round(order.junction_id, len(rows))
+        self._tables.add("futures", rows)
+        row = round_row(
+            done,
+            start_stamp_ns=self.start_stamp_ns,
+            distinct=distinct,
+            sha256=sha,
+            cruise_speed_mps=seed.intent.cruise_speed_mps,
+        )
+        self._tables.add("rounds", [row])
+        view = round_view(done, futures, world.frame, self._plan.drive_frame, self._variants)
+        self._bus.publish("round", view, run=self._plan.run_id)
+        self._comparison_desk.take_round(done, world.frame, seed.state)
+        self._compare_plans(done, seed, world)
+
+    def _compare_plans(self, done: RoundDone, seed: _Seed, world: World) -> None:
+        if seed.plan is None or seed.state.stamp_ns - seed.plan.stamp_ns > PLAN_FRESH_NS:
+            return
+        compared = compare_plan(
+            seed.plan,
+            done.results[0].trajectory,
+            seed.intent.path,
+            world_frame=world.frame,
+            round_id=done.order.round_id,
+        )
+        if compared is not None:
+            self._tables.add("plan_comparisons", [plan_row(compared)])
+            self._bus.publish("plan_comparison", compared, run=self._plan.run_id)
+
+    def _keep(self, comparison: Comparison) -> None:
+        self.comparisons.take(comparison)
+        self._tables.add("comparisons", [comparison_row(comparison)])
+        self._bus.publish("comparison", comparison, run=self._plan.run_id)
