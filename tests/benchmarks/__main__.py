@@ -1,0 +1,58 @@
+"""`python -m tests.benchmarks [NAME ...]` measures and writes `build/bench.json`.
+
+The file is `{name: {value, unit, baseline, ratio}}`. Exit code 1 where something could not be
+measured, 2 for an unknown name.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+import time
+from pathlib import Path
+
+from tests.benchmarks.measuring import Measurement, UnavailableError
+
+OUT = Path(__file__).parents[2] / "build" / "bench.json"
+
+BENCHMARKS = (
+    "futures_closed_loop_20hz",
+    "futures_full_scene",
+    "world_from_open_map",
+    "state_to_result",
+    "help_startup",
+)
+"""Each is a module of this package with a function `measure() -> Measurement`."""
+
+
+def main(names: list[str]) -> int:
+    """Run the named benchmarks, all by default, and write those that could be measured."""
+    unknown = [name for name in names if name not in BENCHMARKS]
+    if unknown:
+        print(f"unknown benchmark {', '.join(unknown)}; known: {', '.join(BENCHMARKS)}")
+        return 2
+    chosen = names or list(BENCHMARKS)
+    rows: dict[str, dict[str, float | str]] = {}
+    for name in chosen:
+        start = time.perf_counter()
+        try:
+            measured: Measurement = importlib.import_module(f"tests.benchmarks.{name}").measure()
+        except UnavailableError as missing:
+            print(f"{name:28} not measured: {missing}")
+            continue
+        rows[name] = measured.as_row()
+        print(
+            f"{name:28} {measured.value:12.4g} against {measured.baseline:10.4g} {measured.unit}:"
+            f" ratio {measured.value / measured.baseline:.3f}"
+            f" ({time.perf_counter() - start:.0f} s to measure)",
+            flush=True,
+        )
+    OUT.parent.mkdir(exist_ok=True)
+    OUT.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+    print(f"written: {OUT}")
+    return 0 if len(rows) == len(chosen) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
