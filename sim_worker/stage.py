@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
 from contracts.arrays import Array
@@ -14,8 +15,6 @@ from contracts.world import World
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.planar import (
-    ROAD_USER_CONAFFINITY,
-    ROAD_USER_CONTYPE,
     TIMESTEP_S,
     base_from_cog,
     check_steering_delay,
@@ -23,6 +22,8 @@ from sim_worker.vehicle.planar import (
     set_physics_options,
     vehicle_spec,
 )
+from world_gen.export.mjcf import ROAD_USER, VEHICLE
+from world_gen.export.mjcf import world_spec as spec_of_world
 
 ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M, ROAD_USER_HEIGHT_M = 4.5, 1.8, 1.5
 PREFIX = "ego_"
@@ -45,8 +46,6 @@ def world_spec(world: World | None) -> mujoco.MjSpec:
         spec = mujoco.MjSpec()
         spec.modelname = "open ground"
     else:
-        from world_gen.export.mjcf import world_spec as spec_of_world
-
         spec = spec_of_world(world, visual=False)
     set_physics_options(spec)
     for geom in spec.geoms:
@@ -234,12 +233,12 @@ class Stage:
         return self._states[: self._count]
 
     @property
-    def static_contact(self) -> Array:
+    def static_contact(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether the vehicle touched a building or island during the last tick."""
         found = self._record["sensordata"][:, :, self._static_contact]
         return np.asarray((found > 0.0).any(axis=1))
 
-    def diverged(self) -> Array:
+    def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""
         states = self.states
         return np.asarray(
@@ -276,7 +275,7 @@ def add_road_user(spec: mujoco.MjSpec, *, name: str, collides: bool = True) -> N
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[ROAD_USER_LENGTH_M / 2, ROAD_USER_WIDTH_M / 2, ROAD_USER_HEIGHT_M / 2],
         pos=[0.0, 0.0, ROAD_USER_HEIGHT_M / 2],
-        contype=ROAD_USER_CONTYPE if collides else 0,
-        conaffinity=ROAD_USER_CONAFFINITY if collides else 0,
+        contype=ROAD_USER if collides else 0,
+        conaffinity=VEHICLE if collides else 0,
         rgba=[0.9, 0.4, 0.2, 1.0],
     )

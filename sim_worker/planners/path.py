@@ -15,7 +15,6 @@ import numpy.typing as npt
 from contracts.arrays import Array
 
 SPACING_M = 1.0
-_BEFORE_M = 20.0
 _AFTER_M = 200.0
 _WINDOW = 12
 """Nodes searched on either side of the last known place."""
@@ -40,11 +39,13 @@ class PathPose(NamedTuple):
 class FrenetPath:
     """A polyline with arc length 0 at its first given point.
 
-    `xy_m` (N, 2), `speed_limit_mps` (N,) or None. Raises ValueError for less than two distinct
-    points or numbers that are not finite.
+    `xy_m` (N, 2), `speed_limit_mps` (N,) or None; `before_m` of straight are put in front. Raises
+    ValueError for less than two distinct points or numbers that are not finite.
     """
 
-    def __init__(self, xy_m: Array, speed_limit_mps: Array | None = None) -> None:
+    def __init__(
+        self, xy_m: Array, speed_limit_mps: Array | None = None, *, before_m: float = 20.0
+    ) -> None:
         points = np.asarray(xy_m, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise ValueError(f"a path needs finite points (N, 2), not shape {points.shape}")
@@ -56,7 +57,7 @@ class FrenetPath:
         arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         self.length_m = float(arc[-1])
 
-        before, after = int(_BEFORE_M / SPACING_M), int((self.length_m + _AFTER_M) / SPACING_M)
+        before, after = int(before_m / SPACING_M), int((self.length_m + _AFTER_M) / SPACING_M)
         self._first_arc = -before * SPACING_M
         self.arc_m: Array = np.arange(-before, after + 1, dtype=np.float64) * SPACING_M
         """(M,) arc length of the nodes."""
@@ -126,21 +127,26 @@ class FrenetPath:
         """Return positions and headings at arc lengths (…) and offsets to the left."""
         return PathPose(self.point_at(arc_m, offset_m), self.at_nodes(self._heading, arc_m))
 
-    def locate(self, xy_m: Array, *, near_arc_m: Array | None = None) -> FrenetPoint:
-        """Project positions (S, 2) onto the path.
+    def locate(
+        self, xy_m: Array, *, near_arc_m: Array | None = None, upto_arc_m: float = np.inf
+    ) -> FrenetPoint:
+        """Project positions (S, 2) onto the path, as far as `upto_arc_m`.
 
         With `near_arc_m` (S,) only its surroundings (±12 m) are searched, so that a path that
         crosses itself is followed rather than jumped along.
         """
         x, y = xy_m[:, 0], xy_m[:, 1]
         if near_arc_m is None:
-            square = np.square(self._x - x[:, None]) + np.square(self._y - y[:, None])
+            end = max(2, int(np.searchsorted(self.arc_m, upto_arc_m, side="right")))
+            dx, dy = self._x[:end] - x[:, None], self._y[:end] - y[:, None]
+            square = dx * dx + dy * dy
             index = square.argmin(axis=1)
         else:
             centre, _ = self._place(near_arc_m)
             start = np.clip(centre - _WINDOW, 0, self._last - 2 * _WINDOW)
             nodes = start[:, None] + _OFFSETS
-            square = np.square(self._x[nodes] - x[:, None]) + np.square(self._y[nodes] - y[:, None])
+            dx, dy = self._x[nodes] - x[:, None], self._y[nodes] - y[:, None]
+            square = dx * dx + dy * dy
             index = start + square.argmin(axis=1)
         # The node's own tangent decides between the segment before and the one after.
         along = (x - self._x[index]) * self._cos[index] + (y - self._y[index]) * self._sin[index]

@@ -16,6 +16,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from sim_worker.vehicle.parameters import GRAVITY_MPS2
+from world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
 
 TIMESTEP_S = 0.01
 MAX_STEERING_DELAY_S = 0.6
@@ -24,9 +25,6 @@ MAX_STEERING_DELAY_S = 0.6
 CHASSIS = "chassis"
 TYRE_FRONT, TYRE_REAR, DRIVE, BRAKE, STEER = "tyre_front", "tyre_rear", "drive", "brake", "steer"
 JOINTS = ("x", "y", "yaw", "steer")
-
-VEHICLE_CONTYPE, VEHICLE_CONAFFINITY = 2, 1 | 4
-ROAD_USER_CONTYPE, ROAD_USER_CONAFFINITY = 4, 2
 
 _GROUND_CLEARANCE_M = 0.15
 _STEER_MASS_KG = 0.1
@@ -94,8 +92,8 @@ def vehicle_spec(
         ],
         pos=[box_centre_from_base_m(vehicle) - rear, 0.0, (height + _GROUND_CLEARANCE_M) / 2.0],
         mass=0.0,
-        contype=VEHICLE_CONTYPE if collides else 0,
-        conaffinity=VEHICLE_CONAFFINITY if collides else 0,
+        contype=VEHICLE if collides else 0,
+        conaffinity=STATIC | ROAD_USER if collides else 0,
         rgba=[0.2, 0.5, 0.9, 1.0],
     )
     chassis.add_site(name="cog")

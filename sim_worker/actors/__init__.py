@@ -1,0 +1,1 @@
+"""Other road users of a future: where they drive and when."""

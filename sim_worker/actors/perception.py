@@ -1,0 +1,41 @@
+"""Other road users as a driver sees them: places on the ego's path."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from sim_worker.planners.path import FrenetPath
+from sim_worker.stage import ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
+
+
+class Leads(NamedTuple):
+    """Road users as seen from the path, each (T, S); `rear_arc_m` infinite where there is none."""
+
+    rear_arc_m: Array
+    offset_m: Array
+    half_width_m: Array
+    speed_mps: Array
+
+
+def see_road_users(path: FrenetPath, poses: Array, speed_mps: Array) -> Leads:
+    """Place road users, (S, T, 3) poses with NaN where none and (S,) speeds, on the ego's path."""
+    count, ticks = poses.shape[:2]
+    arc, offset = np.full((count, ticks), np.inf), np.zeros((count, ticks))
+    half_width, speed = np.zeros((count, ticks)), np.zeros((count, ticks))
+    there = np.flatnonzero(np.isfinite(poses[:, 0, 0]))
+    if len(there):
+        found = poses[there].reshape(-1, 3)
+        place = path.locate(found[:, :2])
+        heading = path.pose_at(place.arc_m).yaw_rad
+        cos, sin = np.cos(found[:, 2] - heading), np.sin(found[:, 2] - heading)
+        along = (ROAD_USER_LENGTH_M * np.abs(cos) + ROAD_USER_WIDTH_M * np.abs(sin)) / 2.0
+        across = (ROAD_USER_LENGTH_M * np.abs(sin) + ROAD_USER_WIDTH_M * np.abs(cos)) / 2.0
+        shape = (len(there), ticks)
+        arc[there] = (place.arc_m - along).reshape(shape)
+        offset[there] = place.offset_m.reshape(shape)
+        half_width[there] = across.reshape(shape)
+        speed[there] = speed_mps[there, None] * cos.reshape(shape)
+    return Leads(arc.T.copy(), offset.T.copy(), half_width.T.copy(), speed.T.copy())
