@@ -99,6 +99,7 @@ class _Drive:
             tables = ResultTables(
                 plan.folder / "results",
                 {"run_id": plan.run_id, "attribution": ATTRIBUTION, "map": plan.osm.sha256},
+                lossless=plan.config.lock_step,
             )
             conductor = Conductor(plan, bus, self._mission, tables)
             exit_word, code = "failed", EXIT_FAILED

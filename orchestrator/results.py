@@ -66,15 +66,18 @@ QUEUE_DEPTH = 4096
 
 
 class ResultTables:
-    """Collects rows and writes them; `add` never blocks and never raises."""
+    """Collects rows and writes them; `add` never raises, and blocks in lock step alone."""
 
-    def __init__(self, folder: Path, metadata: Mapping[str, str]) -> None:
+    def __init__(
+        self, folder: Path, metadata: Mapping[str, str], *, lossless: bool = False
+    ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
         self._metadata = {key.encode(): value.encode() for key, value in metadata.items()}
         self._queue: queue.Queue[tuple[str, Sequence[Mapping[str, Any]]] | None] = queue.Queue(
             QUEUE_DEPTH
         )
+        self._lossless = lossless
         self.dropped = 0
         self.failed: str | None = None
         self._thread = threading.Thread(target=self._run, name="results", daemon=True)
@@ -83,7 +86,7 @@ class ResultTables:
     def add(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
         """Hand over rows for one table of TABLES; what does not fit the queue is counted."""
         try:
-            self._queue.put_nowait((table, rows))
+            self._queue.put((table, rows), block=self._lossless and self._thread.is_alive())
         except queue.Full:
             self.dropped += len(rows)
 

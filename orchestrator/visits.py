@@ -11,7 +11,7 @@ from world_gen.intersections import Junction
 
 @dataclass(slots=True)
 class Visit:
-    """One passage of one junction; `entered` is when the way to its centre fell below the radius."""
+    """One passage of a junction; `entered` is when the way to its centre fell below the radius."""
 
     junction: Junction
     world: World | None = None

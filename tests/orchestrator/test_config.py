@@ -1,0 +1,61 @@
+"""The configuration: what is read, what flags override, what is refused and how."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.config import ConfigError, DriveConfig, load_config, parse_speed
+
+
+def test_flags_lie_over_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "drive.toml"
+    file.write_text('map = "town.osm"\nlog = "drive.gpx"\nfutures = 32\nspeed = "max"\n')
+    config = load_config(file, {"futures": 16, "rate_hz": None})
+    assert (config.futures, config.map, config.rate_hz) == (16, "town.osm", 2.0)
+    assert config.lock_step
+
+
+def test_no_file_and_no_flags_is_the_embedded_drive() -> None:
+    config = load_config(None, {})
+    assert config == DriveConfig()
+    assert config.resolved_source == "standin"
+
+
+@pytest.mark.parametrize(
+    ("flags", "named"),
+    [
+        ({"workers": 0}, "--workers 0"),
+        ({"rate_hz": 0.0}, "--rate 0.0"),
+        ({"speed": "fast"}, "--speed fast"),
+        ({"speed": -1.0}, "--speed -1.0"),
+        ({"start_s": 5.0, "end_s": 4.0}, "--end 4.0"),
+        ({"route": "from-log"}, "--log FILE"),
+        ({"log": "a.gpx"}, "--map FILE"),
+        ({"map": "a.osm"}, "--log FILE"),
+        ({"view": "hologram"}, "view"),
+    ],
+)
+def test_what_cannot_be_used_is_named_in_one_line(flags: dict[str, object], named: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_config(None, flags)
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_setting_lists_the_known_ones(tmp_path: Path) -> None:
+    file = tmp_path / "drive.toml"
+    file.write_text("futurs = 3\n")
+    with pytest.raises(ConfigError, match=r"futurs.*known settings:.*futures"):
+        load_config(file, {})
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"nowhere\.toml"):
+        load_config(tmp_path / "nowhere.toml", {})
+
+
+def test_speed_is_a_number_or_max() -> None:
+    assert parse_speed("max") is None
+    assert parse_speed("2.5") == 2.5
