@@ -15,7 +15,7 @@ from contracts.drive import VehicleState
 from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, target_from_source
 from contracts.simulation import PathAhead
 from contracts.world import World
-from orchestrator.arrival import ArrivalPredictor
+from orchestrator.arrival import DrivingPace, predict_arrivals
 from orchestrator.cruise import CruiseSpeed
 from orchestrator.driving_path import driving_path
 from orchestrator.instructions import BuildWorld, Instruction, NotReady, RoundIntent, Tell, UseWorld
@@ -70,7 +70,7 @@ class Mission:
         index = index or RoadIndex(graph)
         self._matcher = MapMatcher(graph, index=index)
         self._follower = RouteFollower(graph, junctions, routes, index=index)
-        self._arrival = ArrivalPredictor()
+        self._pace = DrivingPace()
         self._cruise = CruiseSpeed()
         self._given = bool(routes)
         self._visits = VisitBook()
@@ -90,8 +90,7 @@ class Mission:
     def on_state(self, state: VehicleState, *, mono_s: float) -> list[Instruction]:
         """Take where the car is."""
         self._car = state
-        self._cruise.update(state)
-        self._arrival.update(state)
+        self._cruise.update(state.stamp_ns, state.speed_mps)
         if not self._time_to_match(state):
             return []
         lat, lon = state.position.lat_deg, state.position.lon_deg
@@ -108,6 +107,8 @@ class Mission:
             self.state = "following"
         for passed in self._progress.passed:
             told += self._arrive(passed, mono_s)
+        limit_mps = self._speed_limit_mps()
+        self._pace.update(state.stamp_ns, state.speed_mps, limit_mps)
         self._look_ahead(mono_s)
         told += self._wanted_worlds(mono_s)
         told += self._choose_current()
@@ -183,7 +184,7 @@ class Mission:
             junction_id=visit.junction.summary.id,
             world_id=visit.world.id,
             path=path,
-            cruise_speed_mps=self._cruise.speed_mps,
+            cruise_speed_mps=self._cruise.aim_mps(self._speed_limit_mps()),
         )
 
     def _path_ahead(self, frame: LocalFrame, speed_mps: float) -> PathAhead | None:
@@ -227,6 +228,10 @@ class Mission:
         self._last_match_ns = state.stamp_ns
         return True
 
+    def _speed_limit_mps(self) -> float:
+        assert self._match is not None
+        return self._match.directed_edge.edge.speed_limit_mps.value
+
     def _match_text(self) -> str:
         assert self._match is not None
         edge = self._match.directed_edge.edge
@@ -258,12 +263,11 @@ class Mission:
     def _look_ahead(self, mono_s: float) -> None:
         assert self._progress is not None
         self._upcoming = self._follower.upcoming(FAR_AHEAD_M)
-        self._arrival_in_s = {
-            ahead.junction.summary.id: self._arrival.seconds_until(
-                self._follower.route, self._progress.s_m, ahead.distance_m
-            )
-            for ahead in self._upcoming
-        }
+        arrivals = predict_arrivals(
+            self._follower.route, self._progress.s_m, self._upcoming, self._pace
+        )
+        # A junction that is passed twice within sight counts with its nearer passage.
+        self._arrival_in_s = {a.junction.summary.id: a.in_s for a in reversed(arrivals)}
         for ahead in self._upcoming:
             visit = self._visits.get(ahead.junction.summary.id)
             if (
