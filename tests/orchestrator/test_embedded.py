@@ -13,7 +13,10 @@ from shapely.geometry import LineString, Polygon
 
 from contracts.frames import local_from_geo
 from orchestrator.embedded import MAP_FILE, ROUTE_FILE
-from orchestrator.embedded.draw_town import NOTE, ORIGIN, write
+from orchestrator.embedded.draw_town import NOTE, ORIGIN, RING_CENTRE, write
+from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
+from world_gen.read_osm import read_map
 
 
 class Town:
@@ -110,3 +113,21 @@ def test_route_follows_the_streets_through_all_four_junctions(
     for name in ("Mill Lane", "Abbey Road", "Lime Street East", "Orchard Lane"):
         arms = [line for tags, line in town.streets if tags.get("name") == name]
         assert min(arm.distance(route) for arm in arms) < 16.0, name
+
+
+def test_junctions_come_out_as_drawn() -> None:
+    osm = read_map(MAP_FILE)
+
+    found = find_intersections(osm, build_road_graph(osm))
+
+    assert {(j.summary.kind, j.summary.control, j.summary.arms) for j in found} == {
+        ("roundabout", "roundabout", 4),
+        ("t_junction", "stop", 3),
+        ("crossing", "signals", 4),
+        ("crossing", "give_way", 4),
+    }
+    assert len(found) == 4
+    assert {j.summary.driving_side for j in found} == {"right"}
+    (ring,) = (j.summary for j in found if j.summary.kind == "roundabout")
+    centre = local_from_geo(ORIGIN, ring.lat, ring.lon)
+    assert centre == pytest.approx(RING_CENTRE, abs=0.1)
