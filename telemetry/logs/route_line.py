@@ -46,9 +46,19 @@ def read_line(path: Path) -> RouteLine:
     return _line(lines[index], where=f"{file}: line {index}")
 
 
-def line_of_log(log: Log) -> RouteLine:
-    """Return the valid positions of a log; raises LogError for fewer than two."""
-    fixes = [message for _, message in log.samples() if isinstance(message, GnssFix)]
+def line_of_log(log: Log, *, start_s: float = 0.0, end_s: float | None = None) -> RouteLine:
+    """Return the valid positions of a log from `start_s` to `end_s`, seconds from its start.
+
+    Raises LogError for fewer than two.
+    """
+    start_ns = log.info.start_stamp_ns + round(start_s * 1e9)
+    end_ns = None if end_s is None else log.info.start_stamp_ns + round(end_s * 1e9)
+    fixes = []
+    for _, message in log.samples():
+        if isinstance(message, GnssFix) and message.stamp_ns >= start_ns:
+            if end_ns is not None and message.stamp_ns > end_ns:
+                break
+            fixes.append(message)
     return _line(
         ([fix.position.lat_deg for fix in fixes], [fix.position.lon_deg for fix in fixes]),
         where=log.info.source,
