@@ -155,8 +155,8 @@ class Conductor:
         """Carry out what the mission says."""
         for instruction in instructions:
             match instruction:
-                case BuildWorld(junction_id):
-                    self.worlds.build(junction_id)
+                case BuildWorld(junction_id, load):
+                    self.worlds.want(junction_id, load=load, workers=self.rounds.desk.workers)
                 case UseWorld(world_id):
                     self._active_world = world_id
                     self._publish_active_world()

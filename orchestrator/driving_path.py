@@ -17,9 +17,12 @@ from orchestrator.route import Route, turn_angle
 from world_gen.road_graph import DirectedEdge, RoadGraph
 
 LANE_WIDTH_M = 3.0
-RIGHT_TURN_RADIUS_M = 12.0
-LEFT_TURN_RADIUS_M = 8.0
-"""Of the road's own line where right is the driving side; the lane's differs by its offset."""
+KERB_TURN_RADIUS_M = 10.5
+FAR_TURN_RADIUS_M = 9.5
+"""Of the driven lane, in turns towards the near kerb and across the other side of the road.
+
+Town driving on the Berlin drive (two turns, and one); smaller where the roads leave less room.
+"""
 BEND_RADIUS_M = 60.0
 """Of bends below `TURN_RAD`, where the road itself turns."""
 TURN_RAD = math.radians(35.0)
@@ -29,15 +32,16 @@ SMOOTHING_M = 3.0
 LANE_CHANGE_M = 8.0
 """Standard deviation of the same for the change from one lane offset to the next."""
 PREPARE_TURN_M = 60.0
+INSIDE_SHARE = 0.4
 SPACING_M = 1.0
 _FINE_M = 0.5
 _MARGIN_M = 60.0
 
 
 class PathGeometry(NamedTuple):
-    """A path in the graph's frame: points (N, 2) about 1 m apart, with limit and place in the route.
+    """A path in the graph's frame: points (N, 2) about 1 m apart.
 
-    `speed_limit_mps` (N,); `s_m` (N,) is the route's position beside each point.
+    `speed_limit_mps` (N,) at each point; `s_m` (N,) is the route's position beside it.
     """
 
     xy_m: Array
@@ -63,10 +67,14 @@ def driving_path(graph: RoadGraph, route: Route, *, s_from_m: float, s_to_m: flo
     s = float(route.start_m[first]) + _cumulative(line)
     # Lengths of edges and of this line differ by rounding alone; stretch so that places agree.
     s = np.interp(s, [s[0], s[-1]], [float(route.start_m[first]), float(route.start_m[last + 1])])
-    window = (begin - _MARGIN_M, end + _MARGIN_M)
-    smooth, place = _smooth_line(*_clip(line, s, window), left_hand=graph.driving_side == "left")
-    offset = _lane_offsets(graph, route, place, first, last)
-    xy = smooth + offset[:, None] * _normals(smooth)
+    line, s = _clip(line, s, (begin - _MARGIN_M, end + _MARGIN_M))
+    keep = _simplified(line)
+    line, s = line[keep], s[keep]
+    lanes = _LaneOffsets(graph, route, first, last)
+    centre, place = _even(*_fillet(line, s, _turn_radii(graph, line, lanes.at(s))))
+    centre = _smoothed(centre, SMOOTHING_M)
+    offset = _held_in_curves(lanes.smooth_at(place), centre)
+    xy = _smoothed(centre + offset[:, None] * _normals(centre), 0.5 * SMOOTHING_M)
     return _resampled(route, xy, place, begin, end)
 
 
@@ -86,24 +94,25 @@ def _clip(line: Array, s: Array, window: tuple[float, float]) -> tuple[Array, Ar
     )
 
 
-def _smooth_line(line: Array, s: Array, *, left_hand: bool) -> tuple[Array, Array]:
-    """Round the corners of a polyline and smooth it; return points and their s, evenly spaced."""
-    keep = _simplified(line)
-    rounded, place = _fillet(line[keep], s[keep], left_hand=left_hand)
-    arc = _cumulative(rounded)
+def _even(line: Array, s: Array) -> tuple[Array, Array]:
+    """Return a polyline and its s resampled at even spacing."""
+    arc = _cumulative(line)
     even = np.linspace(0.0, arc[-1], max(3, round(arc[-1] / _FINE_M) + 1))
-    points = np.stack([np.interp(even, arc, rounded[:, k]) for k in (0, 1)], axis=-1)
-    place = np.interp(even, arc, place)
-    # Smoothing with the ends mirrored through themselves keeps them where they are.
-    pad = min(len(points) - 1, math.ceil(4.0 * SMOOTHING_M / _FINE_M))
+    points = np.stack([np.interp(even, arc, line[:, k]) for k in (0, 1)], axis=-1)
+    return points, np.interp(even, arc, s)
+
+
+def _smoothed(points: Array, deviation_m: float) -> Array:
+    """Smooth evenly spaced points; mirrored through themselves, the ends stay where they are."""
+    pad = min(len(points) - 1, math.ceil(4.0 * deviation_m / _FINE_M))
     before = 2.0 * points[0] - points[pad:0:-1]
     after = 2.0 * points[-1] - points[-2 : -pad - 2 : -1]
     padded = np.concatenate([before, points, after])
-    smooth = gaussian_filter1d(padded, SMOOTHING_M / _FINE_M, axis=0)
-    return smooth[pad : pad + len(points)], place
+    smooth = gaussian_filter1d(padded, deviation_m / _FINE_M, axis=0)
+    return np.asarray(smooth[pad : pad + len(points)])
 
 
-def _simplified(line: Array) -> Array:
+def _simplified(line: Array) -> list[int]:
     """Return the indices that Douglas and Peucker (1973) keep within `SIMPLIFY_M`."""
     keep = np.zeros(len(line), dtype=bool)
     keep[[0, -1]] = True
@@ -126,18 +135,31 @@ def _simplified(line: Array) -> Array:
             middle = low + 1 + worst
             keep[middle] = True
             stack += [(low, middle), (middle, high)]
-    return np.flatnonzero(keep)
+    return [int(index) for index in np.flatnonzero(keep)]
 
 
-def _fillet(line: Array, s: Array, *, left_hand: bool) -> tuple[Array, Array]:
-    """Replace corners by arcs, as wide as the turn's radius and the neighbouring legs allow."""
+def _turns(line: Array) -> Array:
+    """Return the turn in radians at each inner vertex, positive to the left."""
+    legs = np.diff(line, axis=0)
+    turn = np.diff(np.arctan2(legs[:, 1], legs[:, 0]))
+    return np.asarray((turn + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def _turn_radii(graph: RoadGraph, line: Array, offset: Array) -> Array:
+    """Return the radius of the road's line at each inner vertex, from that of the driven lane."""
+    turn = _turns(line)
+    to_kerb = turn > 0.0 if graph.driving_side == "left" else turn < 0.0
+    lane_radius = np.where(to_kerb, KERB_TURN_RADIUS_M, FAR_TURN_RADIUS_M)
+    radius = np.maximum(lane_radius + np.sign(turn) * offset[1:-1], 5.0)
+    return np.asarray(np.where(np.abs(turn) < TURN_RAD, BEND_RADIUS_M, radius))
+
+
+def _fillet(line: Array, s: Array, radius: Array) -> tuple[Array, Array]:
+    """Replace corners by arcs of `radius` (N - 2,), or less where the legs are too short for it."""
     legs = np.diff(line, axis=0)
     length = np.hypot(legs[:, 0], legs[:, 1])
     heading = np.arctan2(legs[:, 1], legs[:, 0])
-    turn = (np.diff(heading) + np.pi) % (2.0 * np.pi) - np.pi
-    near_side = turn > 0.0 if left_hand else turn < 0.0
-    radius = np.where(near_side, RIGHT_TURN_RADIUS_M, LEFT_TURN_RADIUS_M)
-    radius = np.where(np.abs(turn) < TURN_RAD, BEND_RADIUS_M, radius)
+    turn = _turns(line)
     tangent_share = np.tan(np.minimum(np.abs(turn), 3.0) / 2.0)
     wanted = radius * tangent_share
     # Two corners share the leg between them in proportion to what they want.
@@ -164,13 +186,30 @@ def _fillet(line: Array, s: Array, *, left_hand: bool) -> tuple[Array, Array]:
     return np.concatenate([*points, line[-1:]]), np.concatenate([*places, s[-1:]])
 
 
-def _lane_offsets(graph: RoadGraph, route: Route, place: Array, first: int, last: int) -> Array:
-    """Return how far left of the road's line the driven lane lies, at each s of `place`."""
-    offsets = np.array([_lane_offset(graph, route, number) for number in range(first, last + 1)])
-    edge = np.clip(
-        np.searchsorted(route.start_m[first : last + 1], place, side="right") - 1, 0, last - first
-    )
-    return np.asarray(gaussian_filter1d(offsets[edge], LANE_CHANGE_M / _FINE_M, mode="nearest"))
+class _LaneOffsets:
+    """How far left of the road's line the driven lane lies along a stretch of route."""
+
+    def __init__(self, graph: RoadGraph, route: Route, first: int, last: int) -> None:
+        self._offset = np.array([_lane_offset(graph, route, n) for n in range(first, last + 1)])
+        self._start_m = route.start_m[first : last + 1]
+
+    def at(self, s: Array) -> Array:
+        """Return offsets (N,) at positions (N,), with steps where one edge follows another."""
+        edge = np.searchsorted(self._start_m, s, side="right") - 1
+        return np.asarray(self._offset[np.clip(edge, 0, len(self._offset) - 1)])
+
+    def smooth_at(self, s: Array) -> Array:
+        """Return the same at evenly spaced positions, changing gradually."""
+        return np.asarray(gaussian_filter1d(self.at(s), LANE_CHANGE_M / _FINE_M, mode="nearest"))
+
+
+def _held_in_curves(offset: Array, centre: Array) -> Array:
+    """Keep the lane from lying further inside a curve than a share of the curve's radius."""
+    heading = np.unwrap(np.arctan2(*np.gradient(centre, axis=0).T[::-1]))
+    curvature = np.gradient(heading) / _FINE_M
+    room = INSIDE_SHARE / np.maximum(np.abs(curvature), 1e-6)
+    inside = np.sign(curvature) * offset
+    return np.asarray(np.where(inside > room, np.sign(curvature) * room, offset))
 
 
 def _lane_offset(graph: RoadGraph, route: Route, number: int) -> float:

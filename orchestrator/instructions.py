@@ -10,9 +10,14 @@ from contracts.simulation import PathAhead
 
 @dataclass(frozen=True, slots=True)
 class BuildWorld:
-    """Have the World of a junction built."""
+    """Have the World of a junction built, and loaded by the workers where it will be needed.
+
+    A World that may be needed, since another turn leads to it, is built alone: the workers hold
+    few at a time.
+    """
 
     junction_id: str
+    load: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -253,8 +253,8 @@ class Mission:
         summary = passed.junction.summary
         told: list[Instruction] = []
         at_s = self.drive_time_s
-        if self._visits.see(passed.junction, mono_s=mono_s, drive_time_s=at_s):
-            told.append(BuildWorld(summary.id))
+        if self._visits.see(passed.junction, load=True, mono_s=mono_s, drive_time_s=at_s):
+            told.append(BuildWorld(summary.id, load=True))
         self._visits.arrive(summary.id, mono_s=mono_s, drive_time_s=at_s)
         self._passed_s_m = passed.centre_s_m
         text = f"passed {summary.kind} {summary.name or summary.id} ({summary.control})"
@@ -280,16 +280,18 @@ class Mission:
 
     def _wanted_worlds(self, mono_s: float) -> list[Instruction]:
         wanted = [
-            ahead.junction
+            (ahead.junction, True)
             for ahead in self._upcoming
             if self._arrival_in_s[ahead.junction.summary.id] <= self._settings.look_ahead_s
         ]
         if not self._given or (self._progress is not None and self._progress.off_route):
-            wanted += [a.junction for a in self._follower.alternatives(ALTERNATIVES_M)]
+            others = self._follower.alternatives(ALTERNATIVES_M)
+            wanted += [(ahead.junction, False) for ahead in others]
+        at_s = self.drive_time_s
         return [
-            BuildWorld(junction.summary.id)
-            for junction in wanted
-            if self._visits.see(junction, mono_s=mono_s, drive_time_s=self.drive_time_s)
+            BuildWorld(junction.summary.id, load)
+            for junction, load in wanted
+            if self._visits.see(junction, load=load, mono_s=mono_s, drive_time_s=at_s)
         ]
 
     def _choose_current(self) -> list[Instruction]:

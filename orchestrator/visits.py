@@ -14,6 +14,8 @@ class Visit:
     """One passage of a junction; `entered` is when the way to its centre fell below the radius."""
 
     junction: Junction
+    load: bool
+    """Whether the workers load its World, rather than its being built for a turn not expected."""
     world: World | None = None
     failed: bool = False
     ready_mono_s: float | None = None
@@ -63,23 +65,23 @@ class VisitBook:
         """Return the latest visit of a junction, None where it was never seen."""
         return self._latest.get(junction_id)
 
-    def see(self, junction: Junction, *, mono_s: float, drive_time_s: float) -> bool:
-        """Note a junction ahead; returns whether its World must be built.
+    def see(self, junction: Junction, *, load: bool, mono_s: float, drive_time_s: float) -> bool:
+        """Note a junction ahead; returns whether its World must be built or loaded.
 
         After a passage the next one begins with the World that is there already.
         """
         before = self._latest.get(junction.summary.id)
         if before is not None and before.arrived_at_s is None:
-            return False
+            more = load and not before.load
+            before.load = before.load or load
+            return more
         if before is not None and before.world is None and not before.failed:
             return False
-        visit = Visit(junction)
+        visit = Visit(junction, load)
         self._latest[junction.summary.id] = visit
-        if before is None or before.failed:
-            return True
-        assert before.world is not None
-        visit.take_world(before.world, mono_s=mono_s, drive_time_s=drive_time_s)
-        return False
+        if before is not None and before.world is not None:
+            visit.take_world(before.world, mono_s=mono_s, drive_time_s=drive_time_s)
+        return load or before is None
 
     def arrive(self, junction_id: str, *, mono_s: float, drive_time_s: float) -> Visit:
         """The car is at the junction's centre."""

@@ -19,13 +19,15 @@ log = logging.getLogger("orchestrator")
 BUILD_TIMEOUT_S = 60.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Loading:
-    """A built World and the workers that have not loaded it yet."""
+@dataclass(slots=True)
+class _Order:
+    """One junction's World: whether workers load it, and those that have not done so yet."""
 
-    junction_id: str
-    world: World
-    pending: set[str]
+    load: bool
+    world: World | None = None
+    pending: set[str] | None = None
+    """None until loading begins."""
+    ready: bool = False
 
 
 class WorldDesk:
@@ -50,17 +52,32 @@ class WorldDesk:
         self._on_ready = on_ready
         self._on_failed = on_failed
         self._on_warning = on_warning
-        self._loading: dict[str, _Loading] = {}
-        self.building: set[str] = set()
+        self._orders: dict[str, _Order] = {}
+        self._junction_of: dict[str, str] = {}
+
+    @property
+    def building(self) -> list[str]:
         """Junctions whose World is not ready yet."""
+        return [junction_id for junction_id, order in self._orders.items() if not order.ready]
 
     def world(self, world_id: str) -> World:
         """Return a World that has been built in this run."""
-        return self._loading[world_id].world
+        world = self._orders[self._junction_of[world_id]].world
+        assert world is not None
+        return world
 
-    def build(self, junction_id: str) -> None:
-        """Ask the builder for the World of a junction."""
-        self.building.add(junction_id)
+    def want(self, junction_id: str, *, load: bool, workers: tuple[str, ...]) -> None:
+        """Have a World built, and loaded by `workers` where `load` says so."""
+        order = self._orders.get(junction_id)
+        if order is None:
+            self._orders[junction_id] = _Order(load)
+            self._ask_build(junction_id)
+            return
+        order.load = order.load or load
+        if order.world is not None and load:
+            self._load(order, order.world, workers)
+
+    def _ask_build(self, junction_id: str) -> None:
         self._bus.request(
             "build",
             BuildRequest(intersection_id=junction_id, radius_m=self._plan.config.radius_m),
@@ -73,32 +90,45 @@ class WorldDesk:
 
     def builder_up(self) -> None:
         """The builder is back: ask again for what it owes."""
-        loading = {entry.junction_id for entry in self._loading.values()}
-        for junction_id in sorted(self.building - loading):
-            self.build(junction_id)
+        for junction_id, order in self._orders.items():
+            if order.world is None and not order.ready:
+                self._ask_build(junction_id)
 
     def build_reply(self, reply: Reply, *, workers: tuple[str, ...], builder_up: bool) -> None:
         """Take the builder's answer and let the workers load the World."""
         junction_id = reply.tag
+        order = self._orders[junction_id]
         if reply.message is None:
             if builder_up and reply.error != "no answer":
-                self.building.discard(junction_id)
+                order.ready = True  # nothing more will come of it
                 self._on_failed(junction_id, reply.error or "no reason given")
             return
-        answer = reply.message
-        if answer.world_id in self._loading:
+        if order.world is not None:
             return
+        answer = reply.message
         file = self._plan.worlds_dir / f"{answer.world_id}.world"
         world = read_message(file, World)
-        loading = _Loading(junction_id, world, set(workers))
-        self._loading[answer.world_id] = loading
+        order.world = world
+        self._junction_of[world.id] = junction_id
         how = "from the cache" if answer.cached else "built"
         log.info("world %s of %s %s in %.2f s", world.id, junction_id, how, answer.seconds)
-        notice = WorldNotice(world_id=world.id, intersection_id=junction_id, file=file.name)
-        self._bus.publish("world", notice, run=self._plan.run_id)
-        for worker_id in sorted(loading.pending):
+        if order.load:
+            self._load(order, world, workers)
+        else:
+            self._settle(junction_id, order)
+
+    def _load(self, order: _Order, world: World, workers: tuple[str, ...]) -> None:
+        if order.pending is None:
+            notice = WorldNotice(
+                world_id=world.id,
+                intersection_id=self._junction_of[world.id],
+                file=f"{world.id}.world",
+            )
+            self._bus.publish("world", notice, run=self._plan.run_id)
+        order.pending = set(workers)
+        for worker_id in sorted(order.pending):
             self.prepare(worker_id, world.id)
-        self._settle(loading)
+        self._settle(self._junction_of[world.id], order)
 
     def prepare(self, worker_id: str, world_id: str) -> None:
         """Let one worker load a World."""
@@ -115,26 +145,25 @@ class WorldDesk:
     def prepare_reply(self, reply: Reply) -> None:
         """Take a worker's answer."""
         worker_id, world_id, asked_s = reply.tag
-        loading = self._loading[world_id]
         if reply.message is None:
             self._on_warning(f"{worker_id} could not load world {world_id}: {reply.error}")
         else:
-            log.info(
-                "world %s loaded by %s in %.2f s", world_id, worker_id,
-                time.perf_counter() - asked_s,
-            )  # fmt: skip
-        if worker_id in loading.pending:
-            loading.pending.discard(worker_id)
-            self._settle(loading)
+            taken_s = time.perf_counter() - asked_s
+            log.info("world %s loaded by %s in %.2f s", world_id, worker_id, taken_s)
+        self._loaded(self._junction_of[world_id], worker_id)
 
     def worker_down(self, worker_id: str) -> None:
         """A worker is gone: nothing waits for it."""
-        for loading in self._loading.values():
-            if worker_id in loading.pending:
-                loading.pending.discard(worker_id)
-                self._settle(loading)
+        for junction_id in list(self._orders):
+            self._loaded(junction_id, worker_id)
 
-    def _settle(self, loading: _Loading) -> None:
-        if not loading.pending and loading.junction_id in self.building:
-            self.building.discard(loading.junction_id)
-            self._on_ready(loading.junction_id, loading.world)
+    def _loaded(self, junction_id: str, worker_id: str) -> None:
+        order = self._orders[junction_id]
+        if order.pending is not None and worker_id in order.pending:
+            order.pending.discard(worker_id)
+            self._settle(junction_id, order)
+
+    def _settle(self, junction_id: str, order: _Order) -> None:
+        if order.world is not None and not order.pending and not order.ready:
+            order.ready = True
+            self._on_ready(junction_id, order.world)
