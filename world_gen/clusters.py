@@ -161,7 +161,11 @@ def _groups_of(
         node for node in junction.nodes if any(is_ring_edge(d.edge) for d in leaving.get(node, ()))
     }
     if junction.summary.kind in RING_KINDS and on_ring:
-        return [(frozenset([n]), frozenset(), main, n in on_ring) for n in sorted(junction.nodes)]
+        # Where a street parts into entry and exit before the ring, nobody has to stop.
+        return [
+            (frozenset([n]), frozenset(), main and n in on_ring, n in on_ring)
+            for n in sorted(junction.nodes)
+        ]
     nodes = frozenset(node for node in junction.nodes if node in leaving)
     return [(nodes, frozenset(junction.inner), main, False)] if nodes else []
 

@@ -14,7 +14,7 @@ from contracts.world import Area
 from world_gen.clusters import Surroundings, is_ring_edge
 from world_gen.connections import ConnectionDraft
 from world_gen.lanes import LaneSet
-from world_gen.polyline import offset, without_repeats
+from world_gen.polyline import offset, rounded, without_repeats
 
 CORNER_FILLET_M = 3.0
 MIN_ISLAND_M2 = 2.5
@@ -44,11 +44,7 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
         _lines([xy for xy, _ in paths]), [w / 2 for _, w in paths], cap_style="flat", quad_segs=4
     )
     lanes_free = shapely.union_all(swept) if len(swept) else Polygon()
-    roads = [
-        shapely.buffer(shapely.LineString(line), around.sections[i].width_m / 2, quad_segs=4)
-        for i, edge in sorted(around.edges.items())
-        if len(line := _middle(around, i)) >= 2
-    ]
+    roads = _carriageways(around)
     paved = shapely.union_all([lanes_free, *roads])
     hull = _junction_hull(around, lanes)
     if hull is not None:
@@ -80,9 +76,33 @@ def _lines(curves: list[Array]) -> shapely.Geometry:
     )
 
 
+def _carriageways(around: Surroundings) -> list[shapely.Geometry]:
+    """Return each road's carriageway, and a round piece where roads meet at an angle."""
+    found = list(
+        shapely.buffer(
+            _lines([_middle(around, i) for i in around.edges]),
+            [around.sections[i].width_m / 2 for i in around.edges],
+            cap_style="flat",
+            quad_segs=4,
+        )
+    )
+    halves: dict[int, list[float]] = {}
+    places: dict[int, Array] = {}
+    for index, edge in around.edges.items():
+        line = _middle(around, index)
+        for node, at in ((edge.start_node, line[0]), (edge.end_node, line[-1])):
+            halves.setdefault(node, []).append(around.sections[index].width_m / 2)
+            places[node] = at
+    for node, widths in sorted(halves.items()):
+        if len(widths) >= 2:
+            found.append(shapely.Point(places[node]).buffer(sorted(widths)[-2], quad_segs=6))
+    return found
+
+
 def _middle(around: Surroundings, index: int) -> Array:
     section = around.sections[index]
-    return offset(without_repeats(around.edges[index].xy_m), (section.left_m + section.right_m) / 2)
+    way = rounded(without_repeats(around.edges[index].xy_m))
+    return offset(way, (section.left_m + section.right_m) / 2)
 
 
 def _junction_hull(around: Surroundings, lanes: LaneSet) -> Polygon | None:

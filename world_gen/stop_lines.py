@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from contracts.arrays import Array
 from contracts.world import LineControl, Signal, StopLine
 from world_gen.approaches import Approach
 from world_gen.clusters import Surroundings, heading_out
@@ -17,6 +16,8 @@ from world_gen.road_graph import DirectedEdge
 LINE_SETBACK_M = 0.3
 SIGNAL_HEIGHT_M = 3.0
 SIGNAL_BESIDE_M = 0.6
+GROUP_AXIS_RAD = math.radians(30.0)
+"""Approaches whose axes differ by less are taken to be green together."""
 
 
 def stop_lines(
@@ -86,7 +87,7 @@ def signals(
         outward = DirectedEdge(approach.toward.edge, not approach.toward.reverse)
         out = heading_out(outward)
         axis = math.atan2(out[1], out[0]) % math.pi
-        group = next((i for i, a in enumerate(groups) if _axis_gap(a, axis) < math.pi / 4), None)
+        group = next((i for i, a in enumerate(groups) if _axis_gap(a, axis) < GROUP_AXIS_RAD), None)
         if group is None:
             groups.append(axis)
             group = len(groups) - 1
