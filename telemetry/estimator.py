@@ -48,6 +48,8 @@ _UNKNOWN_STD_M = 0.01
 """Of positions that state none, until they turn out worse."""
 _ROUGH_INNOVATION_M = 0.5
 _STANDING_MPS = 0.05
+_FRAME_REACH_M = 20_000.0
+_FAR_M = 1e8
 
 
 class StateEstimator:
@@ -147,7 +149,11 @@ class StateEstimator:
         if self._frame is None:
             self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
             self._start_ns = fix.stamp_ns
-        xy = local_from_geo(self._frame, fix.position.lat_deg, fix.position.lon_deg)
+        # Beyond the frame's reach the projection says infinity: just somewhere far away.
+        xy = np.nan_to_num(
+            local_from_geo(self._frame, fix.position.lat_deg, fix.position.lon_deg),
+            nan=_FAR_M, posinf=_FAR_M, neginf=-_FAR_M,
+        )  # fmt: skip
         time_s = (fix.stamp_ns - self._start_ns) * 1e-9
         recent = self._gate.recent
         held = bool(recent) and bool(np.array_equal(recent[-1].xy_m, xy))
@@ -169,6 +175,11 @@ class StateEstimator:
         verdict = self._gate.judge(time_s, xy, expected)
         if verdict == "skip":
             return None
+        if verdict == "relocate" and math.hypot(xy[0], xy[1]) > _FRAME_REACH_M:
+            # What went before was wrong, or another place: begin anew, with a frame of this one.
+            self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
+            self._gate.restart(time_s, np.zeros(2))
+            filter_ = self._filter = None
         self._altitude_m = fix.position.alt_m - self._lever[2]
         self._convergence_rad = float(
             grid_convergence(self._frame, fix.position.lat_deg, fix.position.lon_deg)
@@ -182,7 +193,7 @@ class StateEstimator:
 
     def _std_m(self, fix: GnssFix) -> float:
         if fix.std_m is not None and math.isfinite(fix.std_m):
-            return max(fix.std_m, 1e-3)
+            return min(max(fix.std_m, 1e-3), 1e4)
         rough = self._innovation_m > _ROUGH_INNOVATION_M
         return 0.7 * self._innovation_m if rough else _UNKNOWN_STD_M
 

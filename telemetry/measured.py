@@ -18,6 +18,16 @@ _CHANNEL_FIELDS = {
     "heading": ("yaw_rad",),
     "steering": ("tire_angle_rad",),
 }
+_LIMITS = {
+    "speed_mps": 100.0,
+    "accel_mps2": 100.0,
+    "rate_radps": 20.0,
+    "yaw_rad": 100.0,
+    "yaw_rate_radps": 20.0,
+    "tire_angle_rad": 1.5,
+    "steering_wheel_rad": 50.0,
+}
+"""Beyond these a number is no motion of a road vehicle."""
 
 
 class Measured:
@@ -44,8 +54,9 @@ class Measured:
         if stamp_ns < self._sample_ns.get(channel, stamp_ns):
             self._skipped[f"{channel}_time_backwards"] += 1
             return False
-        if not _finite(message):
-            self._skipped[f"{channel}_not_finite"] += 1
+        fault = _fault(message)
+        if fault is not None:
+            self._skipped[f"{channel}_{fault}"] += 1
             return False
         self._sample_ns[channel] = stamp_ns
         for name in fields:
@@ -88,10 +99,16 @@ class Measured:
         return None if wheel is None else wheel / self._steering_ratio + self._steering_offset_rad
 
 
-def _finite(message: Any) -> bool:
+def _fault(message: Any) -> str | None:
+    """Return why a sample cannot be a road vehicle's, or None."""
     for name in message.__struct_fields__:
         value = getattr(message, name)
         numbers = value if isinstance(value, tuple) else (value,)
-        if not all(math.isfinite(number) for number in numbers if isinstance(number, float)):
-            return False
-    return True
+        for number in numbers:
+            if not isinstance(number, float):
+                continue
+            if not math.isfinite(number):
+                return "not_finite"
+            if abs(number) > _LIMITS.get(name, math.inf):
+                return "implausible"
+    return None

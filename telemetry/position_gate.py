@@ -97,6 +97,12 @@ class PositionGate:
         self._elsewhere.clear()
         return "relocate"
 
+    def restart(self, time_s: float, xy_m: Array) -> None:
+        """Forget all fixes but this one: the local frame is another."""
+        self.recent.clear()
+        self._elsewhere.clear()
+        self._remember(Placed(time_s, xy_m))
+
     def _remember(self, fix: Placed) -> None:
         self.recent.append(fix)
         while fix.time_s - self.recent[0].time_s > _HISTORY_S:
