@@ -10,9 +10,10 @@ import numpy as np
 from contracts.frames import geo_from_local
 from contracts.world import IntersectionSummary, JunctionKind
 from world_gen.chains import CarRoads, car_roads
+from world_gen.grouping import Cluster
 from world_gen.intersections import Junction
 from world_gen.junction_arms import Approach, ClusterRoads, approaches, roads_of
-from world_gen.junction_clusters import Cluster, cluster_branchings
+from world_gen.junction_clusters import cluster_branchings
 from world_gen.junction_control import control_of
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from world_gen.chains import CarRoads, Chain
+from world_gen.grouping import Cluster
 from world_gen.intersections import JunctionArm
-from world_gen.junction_clusters import Cluster
 from world_gen.road_graph import RoadGraph
 
 LOOK_M = 30.0
@@ -75,7 +75,7 @@ def approaches(leaving: tuple[Chain, ...]) -> tuple[Approach, ...]:
 
 
 def _one_road(a: Chain, b: Chain) -> bool:
-    if a.key == b.key or not (a.one_way and b.one_way):
+    if not (a.one_way and b.one_way):
         return False
     angle = abs(math.remainder(a.bearing_rad(LOOK_M) - b.bearing_rad(LOOK_M), math.tau))
     if a.outward != b.outward:

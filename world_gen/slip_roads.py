@@ -1,0 +1,120 @@
+"""Slip roads around the corners of junctions."""
+
+from __future__ import annotations
+
+import math
+
+from world_gen.chains import CarRoads, Chain
+from world_gen.grouping import Cluster, Grouping
+
+SLIP_M, RAMP_SLIP_M = 50.0, 120.0
+"""Length of a slip road around a corner, by any class and by a link class."""
+WIDEST_M, WIDEST_WITH_BARE_ENDS_M = 100.0, 170.0
+"""Width of a junction with its slip roads, where they end at branchings of their own or not."""
+FLARE_WIDTH_M = 70.0
+THINNEST_CORNER_RAD = math.radians(18.0)
+SMOOTH_RAD, STRAIGHT_RAD = math.radians(60.0), math.radians(12.0)
+
+
+def add_slips(grouping: Grouping, roads: CarRoads) -> None:
+    """Give junctions the ends of the slip roads that cut their corners.
+
+    A slip road leaves a road before the junction and joins another one behind it, both without
+    a turn, so that its driver could as well have driven through the junction.
+    """
+    slips = [
+        chain
+        for chains in roads.chains_from.values()
+        for chain in chains
+        if chain.one_way
+        and chain.outward
+        and chain.length_m <= (RAMP_SLIP_M if chain.link else SLIP_M)
+    ]
+    for slip in sorted(slips, key=lambda chain: (chain.length_m, chain.key)):
+        before, behind = grouping.of.get(slip.start), grouping.of.get(slip.end)
+        if before is None or behind is None or before is behind:
+            continue
+        leaving, joining = _angle_leaving(slip, roads), _angle_joining(slip, roads)
+        if max(leaving, joining) > SMOOTH_RAD:
+            continue
+        straight_on = max(leaving, joining) < STRAIGHT_RAD
+        limit_m = RAMP_SLIP_M if slip.link else SLIP_M
+        to_corner = _next_clusters(slip.start, slip, limit_m, True, grouping, roads)
+        from_corner = _next_clusters(slip.end, slip, limit_m, False, grouping, roads)
+        for key, (onward, corner) in to_corner.items():
+            if key not in from_corner or corner is before or corner is behind:
+                continue
+            back, _ = from_corner[key]
+            xy_m = grouping.xy_m
+            if _is_corner(xy_m[slip.start], xy_m[slip.end], xy_m[onward.end]):
+                if straight_on:
+                    # The through road itself: the other two sides are a side road's flare.
+                    for side in (slip, onward, back):
+                        grouping.join(side, FLARE_WIDTH_M)
+                    break
+                for end, side in ((before, onward), (behind, back)):
+                    bare = _is_bare(end, roads)
+                    widest_m = WIDEST_WITH_BARE_ENDS_M if bare else WIDEST_M
+                    keys = (slip.key, side.key)
+                    grouping.attach(corner, end, keys, widest_m=widest_m, core=not bare)
+                break
+
+
+def _is_bare(cluster: Cluster, roads: CarRoads) -> bool:
+    """Tell whether a cluster is but the end of slip roads on a road or its two carriageways."""
+    ends = sum(len(roads.chains_from[node]) for node in cluster.nodes)
+    return len(cluster.nodes) <= 2 and ends <= 3 + len(cluster.nodes)
+
+
+def _angle_leaving(slip: Chain, roads: CarRoads) -> float:
+    """Return the angle by which the straightest way into a slip road turns."""
+    ahead = slip.bearing_rad(15.0)
+    return min(
+        (
+            abs(math.remainder(chain.bearing_rad(15.0) + math.pi - ahead, math.tau))
+            for chain in roads.chains_from[slip.start]
+            if chain.inward and chain.key != slip.key
+        ),
+        default=math.pi,
+    )
+
+
+def _angle_joining(slip: Chain, roads: CarRoads) -> float:
+    """Return the angle by which the straightest way out of a slip road turns."""
+    x_m, y_m = slip.point_at(max(0.0, slip.length_m - 15.0))
+    end_x_m, end_y_m = slip.point_at(slip.length_m)
+    ahead = math.atan2(end_y_m - y_m, end_x_m - x_m)
+    return min(
+        (
+            abs(math.remainder(chain.bearing_rad(15.0) - ahead, math.tau))
+            for chain in roads.chains_from[slip.end]
+            if chain.outward and chain.key != slip.key
+        ),
+        default=math.pi,
+    )
+
+
+def _next_clusters(
+    node: int, slip: Chain, limit_m: float, onward: bool, grouping: Grouping, roads: CarRoads
+) -> dict[int, tuple[Chain, Cluster]]:
+    """Return the clusters that can be driven to (or come from) by one short road from a node."""
+    found: dict[int, tuple[Chain, Cluster]] = {}
+    for chain in roads.chains_from[node]:
+        other = grouping.of.get(chain.end)
+        drivable = chain.outward if onward else chain.inward
+        if chain.key == slip.key or other is None or not drivable or chain.length_m > limit_m:
+            continue
+        known = found.get(id(other))
+        if known is None or chain.length_m < known[0].length_m:
+            found[id(other)] = (chain, other)
+    return found
+
+
+def _is_corner(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
+    """Tell whether three points make a triangle without a very sharp corner."""
+    for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
+        first = math.atan2(q[1] - p[1], q[0] - p[0])
+        second = math.atan2(r[1] - p[1], r[0] - p[0])
+        if abs(math.remainder(first - second, math.tau)) < THINNEST_CORNER_RAD:
+            return False
+    return True
