@@ -6,7 +6,6 @@ import argparse
 import logging
 import os
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from contracts.setup import ViewerSetup
 from viewer.blueprint import drive_blueprint
 from viewer.live_viewer import HOST, NoViewerError, live_viewer, rerun_program
 from viewer.monitor import RUN_CHANNELS, VEHICLE_CHANNELS, Monitor, read_world
-from viewer.rows import APPLICATION_ID, Row
+from viewer.rows import Row
 from viewer.sinks import FileStream, LiveStream
 
 MAILBOX_DEPTH = 4096
@@ -119,7 +118,7 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
 
 
 def show(recording: Path) -> None:
-    """Become the native viewer of `recording`, with today's layout."""
+    """Become the native viewer of `recording`, which holds its layout."""
     if not recording.is_file():
         raise FileNotFoundError(f"no recording {recording}")
     has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
@@ -129,9 +128,7 @@ def show(recording: Path) -> None:
             f"`python -m viewer.picture {recording} OUT.png` renders a picture without one"
         )
     program = str(rerun_program())
-    layout = Path(tempfile.mkdtemp(prefix="foretwin-")) / "layout.rbl"
-    drive_blueprint().save(APPLICATION_ID, str(layout))
-    os.execv(program, [program, "--bind", HOST, "--port", "auto", str(recording), str(layout)])
+    os.execv(program, [program, "--bind", HOST, "--port", "auto", str(recording)])
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -70,7 +70,7 @@ def drive_blueprint(
     short = rrb.Horizontal(
         _plot("/comparison/ade_m/1", "ADE at 1 s, m", last_30_s, legend=True),
         _plot("/comparison/ade_m/2", "ADE at 2 s, m", last_30_s, legend=False),
-        name="1 s and 2 s",
+        name="Short horizons",
     )
     return rrb.Blueprint(
         rrb.Horizontal(

@@ -18,6 +18,7 @@ REAL: Colour = (245, 246, 250)
 TWIN: Colour = (0, 200, 255)
 SHADOW: Colour = (178, 132, 255)
 GHOST: Colour = (255, 120, 200)
+TRAIL: Colour = (126, 132, 144)
 PLAN: Colour = (88, 150, 255)
 LIMIT: Colour = (229, 72, 66)
 
@@ -140,7 +141,7 @@ class DriveLog:
                     drive_ns,
                     rr.LineStrips3D(
                         [np.column_stack([path, np.full(len(path), 0.1)])],
-                        colors=[REAL],
+                        colors=[TRAIL],
                         radii=0.12,
                     ),
                 )

@@ -55,14 +55,14 @@ def criticality_colours(criticality: Array | Array32) -> npt.NDArray[np.uint8]:
 
 
 def rows_of_round(view: RoundView, drive_ns: int) -> list[Row]:
-    """Return the futures as one entity, and the table of the worst."""
+    """Return the futures as one entity, their ends, and the table of the worst."""
     table = rr.TextDocument(scenario_table(view), media_type=rr.MediaType.MARKDOWN)
     return [*_futures(view, drive_ns), Row("scenarios/table", drive_ns, table)]
 
 
 def no_futures(drive_ns: int) -> list[Row]:
     """Return the row that takes the last round's futures away."""
-    return [Row("world/futures", drive_ns, rr.Clear(recursive=False))]
+    return [Row("world/futures", drive_ns, rr.Clear(recursive=True))]
 
 
 def _futures(view: RoundView, drive_ns: int) -> list[Row]:
@@ -91,7 +91,17 @@ def _futures(view: RoundView, drive_ns: int) -> list[Row]:
             rr.LineStrips3D(
                 list(strips.astype(np.float32)), colors=colours[usable], radii=radii[usable]
             ),
-        )
+        ),
+        # Many futures share one path and differ in speed alone: their ends tell them apart.
+        Row(
+            "world/futures/ends",
+            drive_ns,
+            rr.Points3D(
+                strips[:, -1].astype(np.float32),
+                colors=colours[usable],
+                radii=np.float32(2.2) * radii[usable],
+            ),
+        ),
     ]
 
 

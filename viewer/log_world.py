@@ -13,6 +13,7 @@ from contracts.world import Provenance, World
 from viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
 from viewer.rows import Row, path_part
 
+GROUND: Colour = (25, 28, 35)
 ROAD: Colour = (58, 61, 68)
 JUNCTION: Colour = (70, 74, 84)
 ISLAND: Colour = (66, 92, 66)
@@ -28,6 +29,7 @@ BUILDING: dict[Provenance, Colour] = {
 }
 """The lighter, the better its height is known."""
 
+GROUND_HEIGHT_M = -0.06
 ROAD_HEIGHT_M = 0.0
 JUNCTION_HEIGHT_M = 0.02
 ISLAND_HEIGHT_M = 0.12
@@ -46,7 +48,10 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
     def row(name: str, components: rr.AsComponents) -> Row:
         return Row(f"{base}/{name}", drive_ns, components, lasting=True)
 
-    rows: list[Row] = []
+    round_about = np.linspace(0.0, 2.0 * np.pi, 73)[:-1]
+    disc = world.radius_m * np.column_stack([np.cos(round_about), np.sin(round_about)])
+    ground = flat_mesh(move.polygons([Polygon(disc)]), height_m=GROUND_HEIGHT_M, colour=GROUND)
+    rows = [row("ground", _archetype(ground))]
     surface = [Polygon(area.outline, area.holes) for area in world.road_surface]
     junction = [] if world.junction_area is None else [world.junction_area]
     if surface:

@@ -21,7 +21,8 @@ from viewer.live_viewer import (
     start_program,
     wait_until_it_answers,
 )
-from viewer.rows import APPLICATION_ID, TIMELINE
+from viewer.rows import TIMELINE
+from viewer.sinks import copy_with_blueprint
 
 SETTLE_S = 60.0
 POLL_S = 0.25
@@ -58,8 +59,9 @@ def take_picture(
     if sys.platform.startswith("linux") and not has_vulkan():
         raise NoViewerError("no Vulkan driver to render with; on Debian: mesa-vulkan-drivers")
     with tempfile.TemporaryDirectory(prefix="foretwin-") as folder:
-        layout = Path(folder) / "layout.rbl"
-        drive_blueprint(main=main, detail=detail).save(APPLICATION_ID, str(layout))
+        # The viewer renames what it opens, so a layout sent apart would never meet it.
+        copy = Path(folder) / "recording.rrd"
+        copy_with_blueprint(recording, copy, drive_blueprint(main=main, detail=detail))
         port = free_port()
         program = start_program(
             "--headless", "--hide-welcome-screen", "--window-size", f"{size[0]}x{size[1]}",
@@ -68,7 +70,7 @@ def take_picture(
         try:
             wait_until_it_answers(program, port)
             client = ViewerClient.connect(address(port))
-            client.open([str(recording.resolve()), str(layout)])
+            client.open(str(copy))
             return _settled(client, at_s)
         finally:
             _end(program)
@@ -106,15 +108,22 @@ def _settled(client: ViewerClient, at_s: float | None) -> Picture:
             continue
         window = client.take_screenshot()
         if window == last:
-            views = {
-                view.name: client.take_screenshot(view.view_id)
-                for view in state.views
-                if view.visible
-            }
-            return Picture(window, views)
+            return Picture(window, _views(client))
         last = window
         time.sleep(POLL_S)
     raise NoViewerError(f"the picture did not settle within {SETTLE_S:.0f} s")
+
+
+def _views(client: ViewerClient) -> dict[str, bytes]:
+    """Return a picture of each view that is on screen; those behind a tab have none."""
+    views: dict[str, bytes] = {}
+    for view in client.get_state().views:
+        try:
+            views[view.name] = client.take_screenshot(view.view_id)
+        except ConnectionError as problem:
+            if "not found" not in str(problem):
+                raise
+    return views
 
 
 def _end(program: subprocess.Popen[bytes]) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import collections
 import logging
 import threading
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.chunk import RrdReader
 
-from viewer.rows import APPLICATION_ID, TIMELINE, Row
+from viewer.rows import APPLICATION_ID, TIMELINE, Row, plain_text
 
 LIVE_ROWS = 256
 LASTING_ROWS = 4096
@@ -46,7 +48,7 @@ class FileStream:
     ) -> None:
         self._stream = _stream(recording_id, send_properties=True)
         self._stream.save(path, default_blueprint=blueprint)
-        self._stream.send_recording_name(title)
+        self._stream.send_recording_name(plain_text(title))
 
     def write(self, rows: Iterable[Row]) -> None:
         """Append rows."""
@@ -93,6 +95,11 @@ class LiveStream:
         self.failed: str | None = None
         threading.Thread(target=self._pump, name="live", daemon=True).start()
 
+    @property
+    def waiting(self) -> int:
+        """How many rows have not been sent yet."""
+        return len(self._lasting) + len(self._rows)
+
     def write(self, rows: Iterable[Row]) -> None:
         """Queue rows; never waits."""
         with self._changed:
@@ -135,3 +142,24 @@ class LiveStream:
             _log.warning("no live view: %s", problem)
             self.failed = str(problem)
         self._done.set()
+
+
+def copy_with_blueprint(recording: Path, copy: Path, blueprint: rrb.Blueprint) -> None:
+    """Write `recording`, complete or cut off by a kill, to `copy` with another layout.
+
+    Raises ValueError for a file that is no recording.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="RRD file has no footer")
+            reader = RrdReader(recording)
+            stores = reader.recordings()
+    except Exception as problem:
+        raise ValueError(f"{recording} is no Rerun recording: {problem}") from problem
+    if not stores:
+        raise ValueError(f"{recording} holds no recording")
+    stream = _stream(stores[0].recording_id, send_properties=False)
+    stream.save(copy, default_blueprint=blueprint)
+    stream.send_chunks(reader.stream())
+    stream.flush()
+    stream.disconnect()

@@ -180,7 +180,7 @@ def _in_drive(xy_m: Array, yaw_rad: float) -> tuple[Array, float]:
 
 def _plane(time_s: float, behind_m: float, left_m: float) -> PlaneState:
     here, yaw = real_at(time_s)
-    xy, drive_yaw = _in_drive(here + [-behind_m, left_m], yaw)
+    xy, drive_yaw = _in_drive(here + np.array([-behind_m, left_m]), yaw)
     return PlaneState(float(xy[0]), float(xy[1]), drive_yaw, SPEED_MPS - 0.3 * behind_m)
 
 

@@ -1,0 +1,174 @@
+"""Messages become rows: places, times, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contracts.codec import SchemaMismatch
+from contracts.simulation import ActiveWorld, WorldNotice
+from contracts.world import World
+from tests.viewer import scene
+from viewer.live_viewer import NoViewerError, live_viewer
+from viewer.log_scenarios import CRITICAL, SAFE, criticality_colours, scenario_table
+from viewer.monitor import Monitor, read_world
+from viewer.rows import Row, plain_text
+
+
+def _monitor(load_world: Any = lambda _id: scene.junction()) -> Monitor:
+    return Monitor(
+        drive_frame=scene.DRIVE_FRAME,
+        start_stamp_ns=scene.START_NS,
+        title="t",
+        load_world=load_world,
+    )
+
+
+@dataclass
+class Shown:
+    """Rows by path, the last of each."""
+
+    rows: list[Row]
+
+    def __getitem__(self, path: str) -> Any:
+        return next(row for row in reversed(self.rows) if row.path == path).components
+
+    @property
+    def paths(self) -> list[str]:
+        return [row.path for row in self.rows]
+
+
+def _translation(transform: Any) -> np.ndarray:
+    return np.array(transform.translation.as_arrow_array().to_pylist()[0])
+
+
+def test_the_car_stands_where_the_mirror_says_it_is() -> None:
+    monitor = _monitor()
+    shown = Shown(monitor.handle("state", scene.state_at(7.0)))
+    real = scene.mirror_at(7.0).real
+    np.testing.assert_allclose(
+        _translation(shown["world/ego/real"]), [real.x_m, real.y_m, 0.0], atol=1e-3
+    )
+    quaternion = shown["world/ego/real"].quaternion.as_arrow_array().to_pylist()[0]
+    assert 2.0 * np.arctan2(quaternion[2], quaternion[3]) == pytest.approx(real.yaw_rad, abs=1e-6)
+    assert all(row.drive_ns == 7_000_000_000 for row in shown.rows)
+
+
+def test_states_at_50_hz_are_shown_at_10_hz() -> None:
+    monitor = _monitor()
+    shown = [monitor.handle("state", scene.state_at(tick / 50.0)) for tick in range(100)]
+    assert sum(bool(rows) for rows in shown) == 20
+
+
+def test_an_unknown_heading_keeps_the_last() -> None:
+    monitor = _monitor()
+    monitor.handle("state", scene.state_at(1.0))
+    lost = msgspec.structs.replace(scene.state_at(2.0), yaw_rad=2.0, yaw_valid=False)
+    shown = Shown(monitor.handle("state", lost))
+    quaternion = shown["world/ego/real"].quaternion.as_arrow_array().to_pylist()[0]
+    assert abs(quaternion[2]) < 0.01
+
+
+def test_the_eye_leans_from_the_car_towards_the_active_junction() -> None:
+    monitor = _monitor()
+    active = ActiveWorld(stamp_ns=scene.START_NS, world_id=scene.WORLD_ID)
+    monitor.handle("active_world", active)
+    shown = Shown(monitor.handle("state", scene.state_at(0.0)))
+    car, focus = _translation(shown["world/ego/real"]), _translation(shown["world/focus"])
+    assert np.hypot(*(focus - car)[:2]) == pytest.approx(32.0, abs=0.01)
+    for tick in range(1, 200):
+        shown.rows += monitor.handle("state", scene.state_at(tick / 10.0))
+    jumps = [_translation(row.components)[:2] for row in shown.rows if row.path == "world/focus"]
+    assert np.hypot(*np.diff(jumps, axis=0).T).max() < 1.5
+
+
+def test_open_ground_takes_the_futures_away() -> None:
+    rows = _monitor().handle("active_world", ActiveWorld(stamp_ns=scene.START_NS, world_id=None))
+    assert [row.path for row in rows] == ["world/futures"]
+    assert rows[0].components.is_recursive.as_arrow_array().to_pylist() == [True]  # type: ignore[attr-defined]
+
+
+def test_a_world_is_read_once() -> None:
+    read: list[str] = []
+
+    def load(world_id: str) -> World:
+        read.append(world_id)
+        return scene.junction()
+
+    monitor = _monitor(load)
+    notice = WorldNotice(world_id=scene.WORLD_ID, intersection_id="x1", file="f")
+    assert len(monitor.handle("world", notice)) > 5
+    assert monitor.handle("world", notice) == []
+    monitor.handle("active_world", ActiveWorld(stamp_ns=0, world_id=scene.WORLD_ID))
+    assert read == [scene.WORLD_ID]
+
+
+def test_a_message_that_cannot_be_shown_is_told_as_an_event() -> None:
+    broken = msgspec.structs.replace(scene.round_at(1.0), xy_m=np.zeros(3, dtype=np.float32))
+    shown = Shown(_monitor().handle("round", broken))
+    assert shown.paths == ["events"]
+    assert "round at 1.00 s" in str(shown["events"].text.as_arrow_array())
+
+
+def test_futures_are_one_entity_with_the_nominal_thickest() -> None:
+    shown = Shown(_monitor().handle("round", scene.round_at(3.0)))
+    futures = shown["world/futures"]
+    assert len(futures.strips.as_arrow_array()) == 64
+    radii = np.array(futures.radii.as_arrow_array().to_pylist())
+    assert int(np.argmax(radii)) == scene.round_at(3.0).nominal_index
+
+
+def test_a_diverged_future_is_left_out() -> None:
+    view = scene.round_at(3.0)
+    xy_m = view.xy_m.copy()
+    xy_m[5, 10:] = np.nan
+    shown = Shown(_monitor().handle("round", msgspec.structs.replace(view, xy_m=xy_m)))
+    assert len(shown["world/futures"].strips.as_arrow_array()) == 63
+
+
+def test_the_table_lists_the_worst_first() -> None:
+    view = scene.round_at(3.0)
+    rows = [line for line in scenario_table(view).splitlines() if line.startswith("| ")][1:]
+    criticality = [float(row.split("|")[3]) for row in rows]
+    assert criticality == sorted(criticality, reverse=True)
+    assert criticality[0] == pytest.approx(float(view.criticality.max()), abs=0.01)
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8))
+def test_criticality_runs_from_green_to_red(values: list[float]) -> None:
+    colours = criticality_colours(np.array([0.0, *values, 1.0]))
+    assert tuple(colours[0]) == SAFE
+    assert tuple(colours[-1]) == CRITICAL
+    assert tuple(criticality_colours(np.array([np.nan]))[0]) == CRITICAL
+
+
+@given(st.text())
+def test_labels_keep_to_glyphs_that_the_viewer_has(text: str) -> None:
+    told = plain_text(text)
+    assert all(ord(letter) < 0x250 or letter in "–—‘’“”„•…→←↑↓≤≥≈−" for letter in told)  # noqa: RUF001
+    assert plain_text(told) == told
+
+
+def test_street_names_stay_readable() -> None:
+    assert plain_text("Kronenstraße · Łódź · © Žižka") == "Kronenstraße · Łódź · © Žižka"
+    assert plain_text("東京 🚗") == "?? ?"
+
+
+def test_a_world_id_is_no_path(tmp_path: Any) -> None:
+    with pytest.raises(FileNotFoundError, match="no name of a World"):
+        read_world(tmp_path, "../secret")
+    (tmp_path / "x.world").write_bytes(b"nonsense")
+    with pytest.raises(SchemaMismatch, match=r"x\.world"):
+        read_world(tmp_path, "x")
+
+
+def test_an_unknown_live_view_names_the_choices() -> None:
+    assert live_viewer("none") is None
+    with pytest.raises(NoViewerError, match="native, web, none"):
+        live_viewer("hologram")

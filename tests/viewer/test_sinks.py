@@ -1,0 +1,67 @@
+"""The live stream never holds up its writer, whatever the window does."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+
+from tests.viewer.conftest import wait_until
+from tests.viewer.readback import Recorded
+from viewer.blueprint import drive_blueprint
+from viewer.live_viewer import address, free_port, start_program, wait_until_it_answers
+from viewer.rows import Row
+from viewer.sinks import LIVE_ROWS, FileStream, LiveStream
+
+HEAVY = rr.Points3D(np.zeros((150_000, 3), dtype=np.float32))
+"""1.8 MB: a frozen window takes about 200 MB before `log` blocks."""
+
+
+def test_a_frozen_window_costs_rows_and_no_time(tmp_path: Path) -> None:
+    port = free_port()
+    window = start_program("--serve-grpc", "--server-memory-limit", "64MB", port=port)
+    try:
+        wait_until_it_answers(window, port)
+        live = LiveStream(lambda: address(port), recording_id="frozen", blueprint=drive_blueprint())
+        live.write([Row("world/futures", 0, HEAVY)])
+        os.kill(window.pid, signal.SIGSTOP)
+        written, slowest_s, deadline_s = 1, 0.0, time.monotonic() + 30.0
+        while live.dropped < 20:
+            assert time.monotonic() < deadline_s, f"{written} rows went into a frozen window"
+            before_s = time.monotonic()
+            live.write([Row("world/futures", written, HEAVY)])
+            slowest_s = max(slowest_s, time.monotonic() - before_s)
+            written += 1
+            if live.waiting > LIVE_ROWS // 2:
+                time.sleep(0.001)  # let the live thread run into the wall
+        assert slowest_s < 0.5
+        before_s = time.monotonic()
+        assert not live.close(0.5)
+        assert time.monotonic() - before_s < 2.0
+    finally:
+        os.kill(window.pid, signal.SIGCONT)
+        window.kill()
+        window.wait()
+
+
+def test_an_absent_window_is_told_and_the_file_goes_on(tmp_path: Path) -> None:
+    def no_window() -> str:
+        raise OSError("no display")
+
+    live = LiveStream(no_window, recording_id="absent", blueprint=drive_blueprint())
+    wait_until(lambda: live.failed is not None)
+    assert live.failed == "no display"
+    file = FileStream(
+        tmp_path / "a.rrd", recording_id="absent", title="東京", blueprint=drive_blueprint()
+    )
+    rows = [Row("gap/pos_m/twin", n * 100_000_000, rr.Scalars(float(n))) for n in range(1000)]
+    live.write(rows)
+    file.write(rows)
+    file.close()
+    assert live.close(1.0)
+    assert len(Recorded(tmp_path / "a.rrd").times_s("/gap/pos_m/twin")) == 1000
+    assert live.dropped == 1000 - LIVE_ROWS
