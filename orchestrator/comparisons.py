@@ -6,7 +6,6 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
-from sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 
 from contracts.arrays import Array
 from contracts.drive import VehicleState
@@ -14,6 +13,7 @@ from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, tar
 from contracts.simulation import Comparison
 from orchestrator.config import HORIZONS_S
 from orchestrator.rounds import RoundDone
+from sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 
 KEEP_S = 5.0
 """How long the real track is kept beyond the longest horizon."""

@@ -33,6 +33,9 @@ LANE_CHANGE_M = 8.0
 """Standard deviation of the same for the change from one lane offset to the next."""
 PREPARE_TURN_M = 60.0
 INSIDE_SHARE = 0.4
+WIDENING_STEPS = 8
+MAX_CURVATURE_PM = 0.18
+"""A turning circle of 11 m, as of an ordinary car."""
 SPACING_M = 1.0
 _FINE_M = 0.5
 _MARGIN_M = 60.0
@@ -74,7 +77,7 @@ def driving_path(graph: RoadGraph, route: Route, *, s_from_m: float, s_to_m: flo
     centre, place = _even(*_fillet(line, s, _turn_radii(graph, line, lanes.at(s))))
     centre = _smoothed(centre, SMOOTHING_M)
     offset = _held_in_curves(lanes.smooth_at(place), centre)
-    xy = _smoothed(centre + offset[:, None] * _normals(centre), 0.5 * SMOOTHING_M)
+    xy = _drivable(_smoothed(centre + offset[:, None] * _normals(centre), 0.5 * SMOOTHING_M))
     return _resampled(route, xy, place, begin, end)
 
 
@@ -203,10 +206,38 @@ class _LaneOffsets:
         return np.asarray(gaussian_filter1d(self.at(s), LANE_CHANGE_M / _FINE_M, mode="nearest"))
 
 
+def _drivable(points: Array) -> Array:
+    """Widen turns that no car could steer, as far as that helps.
+
+    It does where short edges left no room for an arc; in the hairpin of an island drawn as a V
+    it does not, and the line stays as it was drawn.
+    """
+    best, least = points, float(np.abs(_curvature(points)).max())
+    for _ in range(WIDENING_STEPS):
+        tight = np.abs(_curvature(points)) > MAX_CURVATURE_PM
+        if not tight.any():
+            break
+        near = gaussian_filter1d(tight.astype(np.float64), 8.0 / _FINE_M, mode="nearest")
+        share = np.minimum(1.0, 2.0 * near / float(near.max()))[:, None]
+        # Many small steps rather than one wide one, so that the rest stays where it is.
+        points = points + share * (_smoothed(points, SMOOTHING_M) - points)
+        tightest = float(np.abs(_curvature(points)).max())
+        if tightest >= least:
+            break
+        best, least = points, tightest
+    return best
+
+
+def _curvature(points: Array) -> Array:
+    """Return the curvature (N,) in 1/m of a path of evenly spaced points, positive to the left."""
+    tangent = np.gradient(points, axis=0)
+    heading = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
+    return np.asarray(np.gradient(heading) / np.maximum(np.hypot(*tangent.T), 1e-3))
+
+
 def _held_in_curves(offset: Array, centre: Array) -> Array:
     """Keep the lane from lying further inside a curve than a share of the curve's radius."""
-    heading = np.unwrap(np.arctan2(*np.gradient(centre, axis=0).T[::-1]))
-    curvature = np.gradient(heading) / _FINE_M
+    curvature = _curvature(centre)
     room = INSIDE_SHARE / np.maximum(np.abs(curvature), 1e-6)
     inside = np.sign(curvature) * offset
     return np.asarray(np.where(inside > room, np.sign(curvature) * room, offset))

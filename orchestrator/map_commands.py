@@ -6,11 +6,11 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from world_gen.find_intersections import find_intersections
 
 from contracts.errors import UserError
 from contracts.frames import local_from_geo
 from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.read_osm import read_map
@@ -45,10 +45,9 @@ def list_intersections(map_file: Path, *, route: Path | None, as_json: bool) -> 
 
 
 def _along(graph: RoadGraph, junctions: tuple[Junction, ...], route: Path) -> tuple[Junction, ...]:
-    from world_gen.find_intersections import junctions_on_route
-
     from orchestrator.map_matching import match_line
     from telemetry.logs import read_line
+    from world_gen.find_intersections import junctions_on_route
 
     line = read_line(route)
     matched = match_line(graph, line.lat_deg, line.lon_deg, name=str(route))

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from world_gen.find_intersections import find_intersections
 
 from contracts.arrays import Array
 from contracts.drive import VehicleInfo
@@ -28,6 +27,7 @@ from sim_worker.planners.registry import load_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import line_of_log, open_log, read_line
 from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.read_osm import read_map
@@ -114,7 +114,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     routes, route_source = _routes(config, graph, index, positions)
     standin = None
     if source == "standin":
-        standin = standin_path(graph, routes[0], junctions, end_s=config.end_s)
+        standin = standin_path(osm, graph, routes[0])
     if positions is not None:
         origin = positions[0]
     elif standin is not None:

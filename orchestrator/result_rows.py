@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from sim_worker.metrics.displacement import distinct_count
 
 from contracts.arrays import Array
 from contracts.frames import LocalFrame, target_from_source
@@ -19,6 +18,7 @@ from contracts.simulation import (
     Variant,
 )
 from orchestrator.rounds import RoundDone
+from sim_worker.metrics.displacement import distinct_count
 
 DISTINCT_M = 0.1
 VIEW_POINTS = 25

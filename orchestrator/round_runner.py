@@ -6,8 +6,6 @@ import logging
 from collections.abc import Callable
 from typing import NamedTuple
 
-from sim_worker.metrics.comparison import compare_plan
-
 from contracts.bus import Bus, Mailbox, Reply
 from contracts.drive import PlannedTrajectory, VehicleState
 from contracts.simulation import Comparison, FuturesJob
@@ -26,12 +24,14 @@ from orchestrator.result_rows import (
 )
 from orchestrator.results import ResultTables
 from orchestrator.rounds import RoundDesk, RoundDone, RoundOrder
+from sim_worker.metrics.comparison import compare_plan
 from sim_worker.variants import plan_variants
 
 log = logging.getLogger("orchestrator")
 
 JOB_TIMEOUT_S = 20.0
 STEP_S = 0.1
+HEEDLESS_PLANNER = "constant_speed"
 PLAN_FRESH_NS = 1_000_000_000
 """An older plan of the car is not compared with a new future."""
 
@@ -42,6 +42,11 @@ class _Seed(NamedTuple):
     state: VehicleState
     plan: PlannedTrajectory | None
     intent: RoundIntent
+
+
+def planners_of(planner: str) -> list[str]:
+    """Return who drives the futures in turn: the planner under test, and one that heeds nobody."""
+    return [planner] * 7 + ([HEEDLESS_PLANNER] if planner != HEEDLESS_PLANNER else [])
 
 
 class RoundRunner:
@@ -74,7 +79,7 @@ class RoundRunner:
         self._comparison_desk = ComparisonDesk(plan.drive_frame, plan.config.horizon_s)
         config = plan.config
         self._variants = plan_variants(
-            count=config.futures, seed=config.seed, planners=[config.planner]
+            count=config.futures, seed=config.seed, planners=planners_of(config.planner)
         )
         self._next_round_id = 0
         self._seeds: dict[int, _Seed] = {}

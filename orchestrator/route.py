@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from contracts.arrays import Array
+from contracts.errors import UserError
 from contracts.frames import wrap_angle
 from orchestrator.road_index import key_of, legality
 from world_gen.road_graph import DirectedEdge, RoadGraph
@@ -22,7 +23,7 @@ _CLASS_RANK = {
 }  # fmt: skip
 
 
-class RouteError(ValueError):
+class RouteError(UserError):
     """A route that cannot be driven on this map; the message is one line."""
 
 

@@ -12,13 +12,12 @@ from contracts.arrays import Array
 from contracts.frames import geo_from_local
 from orchestrator.driving_path import driving_path
 from orchestrator.route import Route
-from world_gen.intersections import Junction
+from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
 
 LATERAL_MPS2 = 2.0
 ACCEL_MPS2 = 1.3
 BRAKE_MPS2 = 1.8
-STOP_BEFORE_CENTRE_M = 9.0
 LEAD_M = 12.0
 """Left out at both ends, so that the car neither begins nor ends on a map's last node."""
 
@@ -40,35 +39,33 @@ class StandinPath:
         }
 
 
-def standin_path(
-    graph: RoadGraph, route: Route, junctions: Sequence[Junction], *, end_s: float | None = None
-) -> StandinPath:
-    """Return the path along a route: limits, slow in bends, a halt where junctions ask for it."""
+def standin_path(osm: OsmMap, graph: RoadGraph, route: Route) -> StandinPath:
+    """Return the path along a route: limits, slow in bends, a halt at the stop signs on its way."""
     start_m, end_m = float(route.start_m[0]) + LEAD_M, route.end_m - LEAD_M
     geometry = driving_path(graph, route, s_from_m=start_m, s_to_m=end_m)
-    stops = [
-        _nearest_index(geometry.xy_m, junction.centre_xy_m, STOP_BEFORE_CENTRE_M)
-        for junction in junctions
-        if junction.summary.control in ("stop", "all_way_stop")
-    ]
+    stops = [int(np.searchsorted(geometry.s_m, s_m)) for s_m in stop_signs(osm, route)]
     speed = speed_profile(
         geometry.xy_m,
         geometry.speed_limit_mps,
-        stop_indices=[index for index in stops if index is not None],
+        stop_indices=[index for index in stops if 0 < index < len(geometry.s_m)],
     )
     geo = geo_from_local(graph.frame, geometry.xy_m)
     return StandinPath(lat_deg=geo[:, 0], lon_deg=geo[:, 1], speed_mps=speed)
 
 
-def _nearest_index(xy_m: Array, centre_xy_m: Array, before_m: float) -> int | None:
-    """Return the point `before_m` ahead of where the path passes a centre, None if it does not."""
-    away = np.hypot(*(xy_m - centre_xy_m).T)
-    nearest = int(np.argmin(away))
-    if away[nearest] > 10.0:
-        return None
-    steps = np.hypot(*np.diff(xy_m[: nearest + 1], axis=0).T)[::-1]
-    ahead = int(np.searchsorted(np.cumsum(steps), before_m))
-    return nearest - ahead if nearest > ahead else None
+def stop_signs(osm: OsmMap, route: Route) -> list[float]:
+    """Return the positions along a route of the stop signs that face its driver."""
+    found = []
+    for place, directed in enumerate(route.edges):
+        xy = directed.xy_m
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+        nodes = directed.edge.node_ids[::-1] if directed.reverse else directed.edge.node_ids
+        for node, s_m in zip(nodes[1:], along[1:], strict=True):
+            tags = osm.node_tags.get(node, {})
+            facing = "backward" if directed.reverse else "forward"
+            if tags.get("highway") == "stop" and tags.get("direction", facing) in (facing, "both"):
+                found.append(float(route.start_m[place] + s_m))
+    return found
 
 
 def speed_profile(xy_m: Array, limit_mps: Array, *, stop_indices: Sequence[int] = ()) -> Array:

@@ -6,15 +6,14 @@ import logging
 import time
 from pathlib import Path
 
-from world_gen.find_intersections import find_intersections
-from world_gen.world_store import WorldStore
-
 from contracts.bus import Bus, Mailbox, Request
 from contracts.process import ProcessLife, run_process
 from contracts.setup import BuilderSetup
 from contracts.simulation import BuildReply
 from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
 from world_gen.read_osm import read_map
+from world_gen.world_store import WorldStore
 
 log = logging.getLogger("builder")
 

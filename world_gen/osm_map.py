@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from contracts.errors import UserError
 from contracts.frames import LocalFrame
 
 
-class MapError(ValueError):
+class MapError(UserError):
     """A map that cannot be used; the message names the file and what is wrong."""
 
 

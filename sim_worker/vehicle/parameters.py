@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 
+from contracts.errors import UserError
 from contracts.vehicle import Parameter, VehicleParameters
 
 DEFAULT_FILE = Path(__file__).with_name("bmw_320i.toml")
@@ -29,17 +30,17 @@ def load_vehicle(path: Path | None = None) -> VehicleParameters:
     except (FileNotFoundError, IsADirectoryError) as error:
         raise FileNotFoundError(f"no vehicle file {source}") from error
     except UnicodeDecodeError as error:
-        raise ValueError(f"vehicle file {source} is no UTF-8 text") from error
+        raise UserError(f"vehicle file {source} is no UTF-8 text") from error
     try:
         vehicle = msgspec.convert(tomllib.loads(text), VehicleParameters)
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"vehicle file {source} is no TOML: {error}") from error
+        raise UserError(f"vehicle file {source} is no TOML: {error}") from error
     except msgspec.ValidationError as error:
-        raise ValueError(f"vehicle file {source}: {error}") from error
+        raise UserError(f"vehicle file {source}: {error}") from error
     try:
         return check_vehicle(vehicle)
     except ValueError as error:
-        raise ValueError(f"vehicle file {source}: {error}") from error
+        raise UserError(f"vehicle file {source}: {error}") from error
 
 
 def check_vehicle(vehicle: VehicleParameters) -> VehicleParameters:

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from contracts import drive
+from contracts.errors import UserError
 
 Sample = tuple[str, msgspec.Struct]
 """Channel name of contracts.keys and its message."""
@@ -26,7 +27,7 @@ UNREADABLE_ROW = "unreadable row"
 FILE_CUT_SHORT = "file cut short"
 
 
-class LogError(ValueError):
+class LogError(UserError):
     """A log that cannot be read: one line with the file, the line or field, and what would do."""
 
 
