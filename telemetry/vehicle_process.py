@@ -90,6 +90,7 @@ class VehicleProcess:
         self._given_until_ns = source.first_stamp_ns
         self._started_s: float | None = None
         self._lost_s: float | None = None
+        self._behind = False
         self._end_sent = False
         self._stop = False
         bus.serve("info", self._mailbox, vehicle=vehicle_id)
@@ -127,11 +128,14 @@ class VehicleProcess:
             due_ns = self._source.first_stamp_ns + elapsed_ns
             # Questions are answered between portions, also by a source that cannot keep up.
             self._publish_until(min(due_ns, self._given_until_ns + _MOST_AT_ONCE_NS))
+            self._behind = self._given_until_ns < due_ns
         return True
 
     def _wait_s(self) -> float:
         pacing = self._speed is not None and self._started_s is not None and not self._end_sent
-        return _TICK_S if pacing else _IDLE_S
+        if not pacing:
+            return _IDLE_S
+        return 0.0 if self._behind else _TICK_S
 
     def _take(self, item: Any) -> None:
         match item:

@@ -1,0 +1,166 @@
+"""Replay and stand-in as processes of their own, over a real router."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from contracts.bus import Mailbox, Received, ZenohBus, ask
+from contracts.drive import AdvanceRequest, DriveEnd, InfoRequest
+from contracts.keys import TELEMETRY_CHANNELS, alive_key
+from contracts.setup import BusSetup, ProcessSetup, ReplaySetup, StandinSetup, write_setup
+from contracts.simulation import RunEnd
+from tests.telemetry.standin_drive import wished_path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Ground(NamedTuple):
+    """A router, what arrives there, and where files go."""
+
+    bus: ZenohBus
+    setup: BusSetup
+    inbox: Mailbox
+    folder: Path
+
+    def base(self, **fields: object) -> dict[str, object]:
+        return {
+            "run_id": "r",
+            "process_id": "vehicle",
+            "vehicle_id": "car",
+            "bus": self.setup,
+            "log_file": str(self.folder / "vehicle.log"),
+        } | fields
+
+    def until_end(self) -> tuple[list[Received], DriveEnd]:
+        samples = []
+        deadline = time.monotonic() + 30.0
+        while time.monotonic() < deadline:
+            item = self.inbox.take(1.0)
+            if item is not None and item.channel == "end":
+                return samples, item.message()
+            if item is not None:
+                samples.append(item)
+        raise TimeoutError(f"no end after {len(samples)} samples")
+
+    def wait_alive(self) -> None:
+        seen = Mailbox(4)
+        self.bus.watch_alive(alive_key(run="r", process="vehicle"), seen)
+        assert seen.take(20.0) is not None, "the vehicle's process does not appear"
+
+    def ready(self) -> None:
+        self.bus.declare_alive(alive_key(run="r", process="orchestrator"))
+
+
+@pytest.fixture
+def ground(tmp_path: Path) -> Iterator[Ground]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    setup = BusSetup(endpoint=f"tcp/127.0.0.1:{port}", lossless=True)
+    with ZenohBus(setup, router=True) as bus:
+        inbox = Mailbox(100_000)
+        for channel in TELEMETRY_CHANNELS:
+            bus.subscribe(channel, inbox, vehicle="car")
+        yield Ground(bus, setup, inbox, tmp_path)
+
+
+@contextlib.contextmanager
+def running(module: str, setup: ProcessSetup, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    file = folder / "setup.json"
+    write_setup(setup, file)
+    command = [sys.executable, "-m", module, "--setup", str(file)]
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def gpx(folder: Path, *, seconds: int) -> Path:
+    """Write 5 positions a second of a straight drive."""
+    start = datetime.datetime(2026, 1, 1, tzinfo=datetime.UTC)
+    points = "".join(
+        f'<trkpt lat="{52.5 + k * 1e-5:.7f}" lon="13.4"><time>'
+        f"{(start + datetime.timedelta(seconds=k / 5)).isoformat()}</time></trkpt>"
+        for k in range(5 * seconds + 1)
+    )
+    file = folder / "drive.gpx"
+    file.write_text(
+        '<gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1"><trk><trkseg>'
+        f"{points}</trkseg></trk></gpx>"
+    )
+    return file
+
+
+def test_a_recorded_drive_runs_at_its_speed_and_leaves_at_the_end_of_the_run(
+    ground: Ground,
+) -> None:
+    log = gpx(ground.folder, seconds=20)
+    setup = ReplaySetup(**ground.base(log=str(log), start_s=2.0, speed=20.0))
+    with running("telemetry.replay", setup, ground.folder) as process:
+        ground.wait_alive()
+        process.send_signal(signal.SIGINT)
+        assert ground.inbox.take(0.3) is None
+        ground.ready()
+        samples, end = ground.until_end()
+        assert end.published == {"gnss": len(samples)} == {"gnss": 91}
+        took_s = (samples[-1].received_mono_ns - samples[0].received_mono_ns) * 1e-9
+        assert took_s == pytest.approx(18.0 / 20.0, abs=0.4)
+        assert [sample.envelope().seq for sample in samples] == list(range(91))
+        info = ask(ground.bus, "info", InfoRequest(), vehicle="car")
+        assert samples[0].message().stamp_ns - info.start_stamp_ns == 2_000_000_000
+        ground.bus.publish("run_end", RunEnd(stamp_ns=0), run="r")
+        assert process.wait(5.0) == 0
+
+
+def test_the_stand_in_in_lock_step_tells_what_it_has_published(ground: Ground) -> None:
+    wish = wished_path()
+    path_file = ground.folder / "path.json"
+    path_file.write_text(
+        json.dumps({name: values.tolist() for name, values in wish._asdict().items()})
+    )
+    setup = StandinSetup(**ground.base(path_file=str(path_file), end_s=1.0, speed=None))
+    with running("telemetry.standin", setup, ground.folder) as process:
+        ground.wait_alive()
+        ground.ready()
+        info = ask(ground.bus, "info", InfoRequest(), vehicle="car")
+        ended = False
+        for tenth in range(1, 12):
+            question = AdvanceRequest(until_stamp_ns=info.start_stamp_ns + tenth * 100_000_000)
+            reply = ask(ground.bus, "advance", question, vehicle="car")
+            ended = reply.ended
+        assert ended
+        samples, end = ground.until_end()
+        assert end.published == reply.published
+        assert sum(end.published.values()) == len(samples)
+        assert end.published["imu"] == 101
+        assert set(end.published) == set(info.sends)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(5.0) == 0
+
+
+@pytest.mark.parametrize(
+    ("module", "fields"),
+    [("telemetry.replay", {"log": "nowhere.gpx"}), ("telemetry.standin", {"path_file": "no.json"})],
+)
+def test_a_missing_file_is_one_line_and_exit_2(
+    ground: Ground, module: str, fields: dict[str, str]
+) -> None:
+    kind = ReplaySetup if module == "telemetry.replay" else StandinSetup
+    with running(module, kind(**ground.base(**fields)), ground.folder) as process:
+        _, errors = process.communicate(timeout=20.0)
+        assert process.returncode == 2
+        assert next(iter(fields.values())) in errors
+        assert errors.count("\n") == 1
