@@ -20,6 +20,8 @@ from world_gen.polyline import without_repeats
 LEVEL_HEIGHT_M = 3.0
 DEFAULT_HEIGHT_M = 6.0
 MAX_HEIGHT_M = 900.0
+GRID_M = 0.001
+"""Outlines are written in millimetres."""
 SILHOUETTE_TOLERANCE_M = 0.25
 _FEET = re.compile(r"^\s*(\d+)\s*'\s*(?:(\d+)\s*\")?\s*$")
 _METRES = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*(?:m|metres?|meters?)?\s*$")
@@ -197,20 +199,24 @@ def buildings_in_frame(
     shapes = np.array([f.polygon for f in near], dtype=object)
     moved = shapely.transform(shapes, lambda xy: target_from_source(frame, map_frame, xy, 0.0).xy_m)
     moved = shapely.simplify(moved, 0.05, preserve_topology=True)
+    moved = shapely.set_precision(moved, GRID_M)
     shapely.prepare(keep_free)
     hit = shapely.intersects(keep_free, moved)
     buildings: list[Building] = []
-    notes: list[str] = []
+    cut: list[str] = []
     for footprint, shape, blocked in zip(near, moved, hit, strict=True):
         polygons = _valid(shape)
         if blocked and footprint.min_height_m < 2.5:
-            polygons = [p for whole in polygons for p in _valid(whole.difference(keep_free))]
-            notes.append(f"building {footprint.id}: cut back where a lane passes")
+            free = [shapely.difference(p, keep_free, grid_size=GRID_M) for p in polygons]
+            polygons = [p for shape in free for p in _valid(shape)]
+            cut.append(footprint.id)
         for i, polygon in enumerate(polygons):
             buildings.append(
                 _building(footprint, polygon, footprint.id if i == 0 else f"{footprint.id}-{i}")
             )
-    return tuple(buildings), tuple(notes)
+    if not cut:
+        return tuple(buildings), ()
+    return tuple(buildings), (f"buildings cut back where a lane passes: {', '.join(cut)}",)
 
 
 def _building(footprint: Footprint, polygon: Polygon, name: str) -> Building:

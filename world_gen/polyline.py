@@ -143,7 +143,7 @@ def _arc(corner: Array, before: Array, after: Array, tangent_m: float, angle: fl
     """Return a Bézier arc that rounds `corner` with tangents of `tangent_m`."""
     k = (4.0 / 3.0) * math.tan(angle / 4) / math.tan(angle / 2)
     p0, p3 = corner - before * tangent_m, corner + after * tangent_m
-    steps = int(np.clip(math.ceil(angle / math.radians(8.0)), 2, 24))
+    steps = int(np.clip(math.ceil(angle / math.radians(7.0)), 2, 24))
     return bezier(p0, p0 + before * tangent_m * k, p3 - after * tangent_m * k, p3, steps)
 
 
@@ -166,7 +166,7 @@ def turn_curve(start: Array, heading: Array, end: Array, end_heading: Array) -> 
         return np.stack([start, end])
     cross = heading[0] * end_heading[1] - heading[1] * end_heading[0]
     angle = abs(math.atan2(cross, float(heading @ end_heading)))
-    steps = int(np.clip(math.ceil(span), 4, 40))
+    steps = int(np.clip(math.ceil(max(span, angle / math.radians(7.0))), 8, 40))
     if math.radians(8.0) < angle < math.radians(155.0):
         # start + a heading = end - b end_heading, by Cramer's rule.
         a = (chord[0] * end_heading[1] - chord[1] * end_heading[0]) / cross

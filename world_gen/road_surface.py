@@ -17,6 +17,7 @@ from world_gen.lanes import LaneSet
 from world_gen.polyline import offset, rounded, without_repeats
 
 CORNER_FILLET_M = 3.0
+GRID_M = 0.001
 MIN_ISLAND_M2 = 2.5
 MAX_ISLAND_M2 = 2500.0
 ISLANDS_WITHIN_M = 25.0
@@ -56,7 +57,9 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
     rings = _ring_islands(around, lanes_free)
     for island in rings:
         paved = paved.difference(island)
-    paved = shapely.simplify(paved.intersection(disc), 0.04)
+    # On the millimetre grid on which the World is written, so that rounding breaks nothing.
+    paved = shapely.set_precision(shapely.simplify(paved.intersection(disc), 0.04), GRID_M)
+    rings = [p for r in rings for p in _sorted(shapely.set_precision(r, GRID_M))]
     islands = [_area(f"{RING_ISLAND}:{i}", island) for i, island in enumerate(rings)]
     islands += _traffic_islands(around, paved, rings)
     return Areas(
@@ -143,7 +146,7 @@ def _junction_hull(around: Surroundings, lanes: LaneSet) -> Polygon | None:
 def _junction_area(hull: Polygon | None, paved: shapely.Geometry) -> Area | None:
     if hull is None:
         return None
-    parts = _sorted(hull.intersection(paved))
+    parts = _sorted(shapely.set_precision(hull.intersection(paved), GRID_M))
     return _area("junction", parts[0]) if parts else None
 
 

@@ -101,8 +101,8 @@ def _set_options(spec: mujoco.MjSpec) -> None:
 
 
 def _near_road(world: World) -> shapely.Geometry:
-    roads = [Polygon(area.outline, area.holes) for area in world.road_surface]
-    reach = shapely.union_all(roads).simplify(1.0).buffer(WORKER_REACH_M, quad_segs=2)
+    roads = [Polygon(area.outline).simplify(1.0) for area in world.road_surface]
+    reach = shapely.union_all(shapely.buffer(roads, WORKER_REACH_M, quad_segs=2))
     shapely.prepare(reach)
     return reach
 
