@@ -107,6 +107,21 @@ def test_a_refusal_carries_its_reason(sides: Sides) -> None:
     assert replies.take(0.2) is None
 
 
+def test_a_question_that_its_server_forgets_ends_too(sides: Sides) -> None:
+    questions, replies = Mailbox(1), Mailbox(10)
+    sides.far.serve("prepare", questions, **W0)
+    ask_until_served(sides, questions, replies, tag=0).refuse("met")
+    assert take(replies).error == "met"
+
+    sides.near.request("prepare", PREPARE, replies, tag="first", **W0)
+    sides.near.request("prepare", PREPARE, replies, tag="second", **W0)
+
+    assert (reply := take(replies)).tag == "first"
+    assert reply.error == "no answer"
+    take(questions).refuse("too busy")
+    assert take(replies)[:4] == ("prepare", "second", None, "too busy")
+
+
 def test_nobody_there_is_an_answer_too(sides: Sides) -> None:
     replies = Mailbox(10)
 

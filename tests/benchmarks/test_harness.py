@@ -1,0 +1,44 @@
+"""The harness of the benchmarks, without measuring anything for long."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.benchmarks import __main__ as harness
+from tests.benchmarks.measuring import Measurement, UnavailableError
+
+
+def test_every_benchmark_is_a_module() -> None:
+    specs = [importlib.util.find_spec(f"tests.benchmarks.{name}") for name in harness.BENCHMARKS]
+
+    assert None not in specs
+
+
+def test_rows_hold_value_unit_baseline_and_ratio(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def unavailable() -> Measurement:
+        raise UnavailableError("no C compiler")
+
+    monkeypatch.setattr(harness, "OUT", tmp_path / "build" / "bench.json")
+    monkeypatch.setattr("tests.benchmarks.help_startup.measure", lambda: Measurement(0.3, "s", 0.1))
+    monkeypatch.setattr("tests.benchmarks.world_from_open_map.measure", unavailable)
+
+    code = harness.main(["help_startup", "world_from_open_map"])
+
+    assert code == 1
+    assert "not measured: no C compiler" in capsys.readouterr().out
+    assert json.loads(harness.OUT.read_text()) == {
+        "help_startup": {
+            "value": 0.3, "unit": "s", "baseline": 0.1, "ratio": pytest.approx(3.0),
+        }
+    }  # fmt: skip
+
+
+def test_an_unknown_name_lists_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    assert harness.main(["speed"]) == 2
+    assert "unknown benchmark speed; known: futures_closed_loop_20hz" in capsys.readouterr().out
