@@ -42,22 +42,44 @@ def add_slips(grouping: Grouping, roads: CarRoads) -> None:
         to_corner = _next_clusters(slip.start, slip, limit_m, True, grouping, roads)
         from_corner = _next_clusters(slip.end, slip, limit_m, False, grouping, roads)
         for key, (onward, corner) in to_corner.items():
-            if key not in from_corner or corner is before or corner is behind:
-                continue
-            back, _ = from_corner[key]
             xy_m = grouping.xy_m
-            if _is_corner(xy_m[slip.start], xy_m[slip.end], xy_m[onward.end]):
-                if straight_on:
-                    # The through road itself: the other two sides are a side road's flare.
-                    for side in (slip, onward, back):
-                        grouping.join(side, FLARE_WIDTH_M)
-                    break
-                for end, side in ((before, onward), (behind, back)):
-                    bare = _is_bare(end, roads)
-                    widest_m = WIDEST_WITH_BARE_ENDS_M if bare else WIDEST_M
-                    keys = (slip.key, side.key)
-                    grouping.attach(corner, end, keys, widest_m=widest_m, core=not bare)
+            if not _is_corner(xy_m[slip.start], xy_m[slip.end], xy_m[onward.end]):
+                continue
+            if corner is behind and _is_bare(before, roads):
+                keys = (slip.key, onward.key)
+                grouping.attach(corner, before, keys, widest_m=WIDEST_WITH_BARE_ENDS_M)
                 break
+            if key in from_corner and corner is not before and corner is not behind:
+                _attach_both(slip, onward, from_corner[key][0], straight_on, grouping, roads)
+                break
+        else:
+            back, _ = from_corner.get(id(before), (None, None))
+            if back is not None and _is_bare(behind, roads):
+                xy_m = grouping.xy_m
+                if _is_corner(xy_m[slip.start], xy_m[slip.end], xy_m[back.end]):
+                    keys = (slip.key, back.key)
+                    grouping.attach(before, behind, keys, widest_m=WIDEST_WITH_BARE_ENDS_M)
+
+
+def _attach_both(
+    slip: Chain,
+    onward: Chain,
+    back: Chain,
+    straight_on: bool,
+    grouping: Grouping,
+    roads: CarRoads,
+) -> None:
+    """Give the corner between two roads both ends of a slip road."""
+    if straight_on:
+        # The through road itself: the other two sides are a side road's flare.
+        for side in (slip, onward, back):
+            grouping.join(side, FLARE_WIDTH_M)
+        return
+    corner = grouping.of[onward.end]
+    for end, side in ((grouping.of[slip.start], onward), (grouping.of[slip.end], back)):
+        bare = _is_bare(end, roads)
+        widest_m = WIDEST_WITH_BARE_ENDS_M if bare else WIDEST_M
+        grouping.attach(corner, end, (slip.key, side.key), widest_m=widest_m, core=not bare)
 
 
 def _is_bare(cluster: Cluster, roads: CarRoads) -> bool:
