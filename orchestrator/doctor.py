@@ -62,7 +62,7 @@ def _packages() -> Finding:
 def _bus() -> Finding:
     import threading
 
-    from contracts.bus import Mailbox, ZenohBus, ask
+    from contracts.bus import Mailbox, Request, ZenohBus, ask
     from contracts.drive import InfoRequest, VehicleInfo
     from contracts.setup import BusSetup
     from orchestrator.endpoints import free_endpoint
@@ -74,7 +74,7 @@ def _bus() -> Finding:
 
         def answer() -> None:
             request = mailbox.take(5.0)
-            if request is not None:
+            if isinstance(request, Request):
                 request.reply(VehicleInfo(vehicle_id="doctor", time_base="log", start_stamp_ns=0))
 
         threading.Thread(target=answer, daemon=True).start()

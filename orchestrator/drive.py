@@ -78,6 +78,7 @@ class _Drive:
         self._interrupt = _Interrupt()
         self._supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
         self._vehicle_lost = False
+        self._given_up: set[str] = set()
         self._mission = Mission(
             plan.graph,
             plan.junctions,
@@ -156,8 +157,11 @@ class _Drive:
             if self._stop():
                 return False
             self._look_after(conductor, time.monotonic())
+            missing = ", ".join(sorted(expected - conductor.alive))
+            if self._given_up & expected:
+                dead = ", ".join(sorted(self._given_up & expected))
+                raise DriveError(f"cannot be started: {dead}; see log.jsonl")
             if time.monotonic() > deadline:
-                missing = ", ".join(sorted(expected - conductor.alive))
                 raise DriveError(f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl")
             item = conductor.mailbox.take(0.1)
             if item is not None:
@@ -182,6 +186,8 @@ class _Drive:
     def _look_after(self, conductor: Conductor, now_s: float) -> None:
         for death in self._supervisor.poll(now_s):
             text = f"{death.process_id} ended with code {death.exit_code}"
+            if not death.restarted:
+                self._given_up.add(death.process_id)
             if death.restarted:
                 conductor.tell(Tell("warning", f"{text}; started again"))
             elif death.row.when_dead == "end_drive":

@@ -45,13 +45,18 @@ def list_intersections(map_file: Path, *, route: Path | None, as_json: bool) -> 
 
 
 def _along(graph: RoadGraph, junctions: tuple[Junction, ...], route: Path) -> tuple[Junction, ...]:
-    from orchestrator.map_matching import match_line
+    from orchestrator.line_matching import match_line
     from telemetry.logs import read_line
-    from world_gen.find_intersections import junctions_on_route
+    from world_gen.route_junctions import junctions_on_route
 
     line = read_line(route)
-    matched = match_line(graph, line.lat_deg, line.lon_deg, name=str(route))
-    return tuple(passage.junction for passage in junctions_on_route(junctions, matched.edges))
+    lat_lon_deg = np.stack([line.lat_deg, line.lon_deg], axis=-1)
+    matched = match_line(graph, lat_lon_deg, name=f"--route {route}")
+    return tuple(
+        passage.junction
+        for stretch in matched.routes
+        for passage in junctions_on_route(junctions, stretch.edges)
+    )
 
 
 def write_world(
@@ -75,8 +80,10 @@ def write_world(
     else:
         junction = _nearest(osm, junctions, at or "", map_file)
     from world_gen.build import build_world
+    from world_gen.map_index import index_map
 
-    world = build_world(osm, graph, junction, radius_m=radius_m)
+    index = index_map(osm, graph, junctions)
+    world = build_world(osm, graph, junction, radius_m=radius_m, index=index)
     if file_format == "png":
         from world_gen.export.picture import write_picture
 

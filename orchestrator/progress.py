@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from typing import Literal
 
 from rich.console import Console
 from rich.status import Status
@@ -88,7 +89,9 @@ class ProgressLine:
         up = set(desk.workers)
         statuses = []
         for worker_id in (f"w{index}" for index in range(count)):
-            state = "busy" if worker_id in busy else "idle" if worker_id in up else "dead"
+            state: Literal["idle", "busy", "dead"] = "dead"
+            if worker_id in up:
+                state = "busy" if worker_id in busy else "idle"
             statuses.append(
                 WorkerStatus(
                     stamp_ns=stamp_ns,

@@ -12,8 +12,9 @@ from contracts.setup import BuilderSetup
 from contracts.simulation import BuildReply
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
+from world_gen.map_index import index_map
 from world_gen.read_osm import read_map
-from world_gen.world_store import WorldStore
+from world_gen.world_store import WorldStore, cached_build
 
 log = logging.getLogger("builder")
 
@@ -23,7 +24,8 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     osm = read_map(Path(setup.map))
     graph = build_road_graph(osm)
     junctions = {j.summary.id: j for j in find_intersections(osm, graph)}
-    store = WorldStore(Path(setup.worlds_dir))
+    index = index_map(osm, graph, junctions.values())
+    cache, run_worlds = WorldStore(Path(setup.cache_dir)), WorldStore(Path(setup.worlds_dir))
     mailbox = Mailbox(256)
     bus.serve("build", mailbox, run=setup.run_id, process=setup.process_id)
     life.ready()
@@ -38,9 +40,8 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
             continue
         started = time.perf_counter()
         try:
-            world, cached = store.cached_build(
-                osm, graph, junction, radius_m=wanted.radius_m, cache=Path(setup.cache_dir)
-            )
+            world, cached = cached_build(cache, index, junction, radius_m=wanted.radius_m)
+            run_worlds.save(world)
         except Exception as error:
             log.exception("world of %s", wanted.intersection_id)
             request.refuse(f"world of {wanted.intersection_id}: {type(error).__name__}: {error}")
