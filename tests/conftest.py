@@ -6,6 +6,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# A busy machine is no fault of the code: pytest-timeout alone says what takes too long.
+settings.register_profile("foretwin", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("foretwin")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
