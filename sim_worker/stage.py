@@ -88,6 +88,8 @@ class Stage:
         self.control_dt_s = 1.0 / control_hz
         self.steps_per_tick = round(steps)
         self.timestep_s = TIMESTEP_S
+        rate = vehicle.max_tire_rate_radps.value * TIMESTEP_S
+        self._reach = rate * np.arange(1, self.steps_per_tick + 1)
         self.model = _compile(world_spec(world) if spec is None else spec, vehicle)
         self._batch = mujoco_batch.Batch(self.model, nsim, nthread=threads, persistent=True)
         self._bind()
@@ -191,20 +193,18 @@ class Stage:
             accel_mps2=controls.accel_mps2,
             friction=self._friction,
         )
-        steps, nu = self.steps_per_tick, self.model.nu
-        per_step = self._controls
+        nu, per_step = self.model.nu, self._controls
         per_step[:, :, :nu] = self._ctrl[rows, None, :]
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
-        rate = self.vehicle.max_tire_rate_radps.value * self.timestep_s
-        change = controls.tire_angle_rad - self._tire_command
-        per_step[:, :, self._actuators.steer] = self._tire_command[:, None] + np.clip(
-            change[:, None], -rate * _STEP_NUMBERS[:steps], rate * _STEP_NUMBERS[:steps]
+        change = (controls.tire_angle_rad - self._tire_command)[:, None]
+        per_step[:, :, self._actuators.steer] = self._tire_command[:, None] + np.minimum(
+            np.maximum(change, -self._reach), self._reach
         )
         self._tire_command = per_step[:, -1, self._actuators.steer].copy()
         if road_users is not None:
             self._place_road_users(road_users)
         self._batch.rollout(
-            steps,
+            self.steps_per_tick,
             control=per_step,
             control_spec=self._control_spec,
             record=("sensordata",),
@@ -219,11 +219,10 @@ class Stage:
         states[:, 7] = (states[:, 3] - before) / self.control_dt_s
 
     def _place_road_users(self, poses: Array) -> None:
-        there = np.isfinite(poses[:, :, 0])
+        there = np.isfinite(poses[:, :, :1])
         users = self._road_users
-        users[:, :, 0] = np.where(there, poses[:, :, 0], _FAR_M)
-        users[:, :, 1] = np.where(there, poses[:, :, 1], _FAR_M)
-        half = np.where(there, 0.5 * poses[:, :, 2], 0.0)
+        users[:, :, :2] = np.where(there, poses[:, :, :2], _FAR_M)
+        half = np.where(there[:, :, 0], 0.5 * poses[:, :, 2], 0.0)
         users[:, :, 3] = np.cos(half)
         users[:, :, 6] = np.sin(half)
 
@@ -246,9 +245,6 @@ class Stage:
             | (np.abs(states[:, 3]) > 200.0)
             | (np.abs(states[:, 5]) > 50.0)
         )
-
-
-_STEP_NUMBERS = np.arange(1, 1001)
 
 
 def _compile(spec: mujoco.MjSpec, vehicle: VehicleParameters) -> mujoco.MjModel:

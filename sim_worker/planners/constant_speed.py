@@ -19,7 +19,8 @@ class ConstantSpeed:
         """Answer one control tick."""
         speed = view.states[:, 3]
         accel = (view.target_speed_mps - speed) / _TIME_CONSTANT_S
-        accel = np.clip(accel, -_LIMIT_MPS2, _LIMIT_MPS2 * np.clip(view.speed_factor, 0.3, 2.0))
+        most = _LIMIT_MPS2 * np.minimum(np.maximum(view.speed_factor, 0.3), 2.0)
+        accel = np.maximum(np.minimum(accel, most), -_LIMIT_MPS2)
         stands = (np.abs(speed) < 0.05) & (view.target_speed_mps < 0.05)
         command = accel + resistance_mps2(view.vehicle, speed)
         return PlannerOutput(np.where(stands, -_LIMIT_MPS2, command), pure_pursuit(view))

@@ -66,6 +66,7 @@ class FrenetPath:
         heading = np.unwrap(np.arctan2(np.gradient(self._y), np.gradient(self._x)))
         self._heading = heading
         self._cos, self._sin = np.cos(heading), np.sin(heading)
+        self._nodes = np.stack([self._x, self._y, self._cos, self._sin], axis=-1)
         self._last = len(self.arc_m) - 1
         if speed_limit_mps is None:
             self.speed_limit_mps = np.full(len(self.arc_m), np.inf)
@@ -103,7 +104,9 @@ class FrenetPath:
 
     def _place(self, arc_m: Array) -> tuple[npt.NDArray[np.intp], Array]:
         """Return node index and fraction towards the next, clipped to the path."""
-        place = np.clip((arc_m - self._first_arc) / SPACING_M, 0.0, self._last - 1e-9)
+        place = np.minimum(
+            np.maximum((arc_m - self._first_arc) / SPACING_M, 0.0), self._last - 1e-9
+        )
         index = place.astype(np.intp)
         return index, place - index
 
@@ -117,11 +120,12 @@ class FrenetPath:
         """Return positions (…, 2) at arc lengths (…) and offsets to the left."""
         index, share = self._place(arc_m)
         after = index + 1
-        x = self._x[index] + share * (self._x[after] - self._x[index])
-        y = self._y[index] + share * (self._y[after] - self._y[index])
-        sin = self._sin[index] + share * (self._sin[after] - self._sin[index])
-        cos = self._cos[index] + share * (self._cos[after] - self._cos[index])
-        return np.stack([x - sin * offset_m, y + cos * offset_m], axis=-1)
+        low, high = self._nodes[index], self._nodes[after]
+        x, y, cos, sin = np.moveaxis(low + share[..., None] * (high - low), -1, 0)
+        point = np.empty((*np.shape(arc_m), 2))
+        point[..., 0] = x - sin * offset_m
+        point[..., 1] = y + cos * offset_m
+        return point
 
     def pose_at(self, arc_m: Array, offset_m: Array | float = 0.0) -> PathPose:
         """Return positions and headings at arc lengths (…) and offsets to the left."""
@@ -143,19 +147,21 @@ class FrenetPath:
             index = square.argmin(axis=1)
         else:
             centre, _ = self._place(near_arc_m)
-            start = np.clip(centre - _WINDOW, 0, self._last - 2 * _WINDOW)
+            start = np.minimum(np.maximum(centre - _WINDOW, 0), self._last - 2 * _WINDOW)
             nodes = start[:, None] + _OFFSETS
             dx, dy = self._x[nodes] - x[:, None], self._y[nodes] - y[:, None]
             square = dx * dx + dy * dy
             index = start + square.argmin(axis=1)
         # The node's own tangent decides between the segment before and the one after.
-        along = (x - self._x[index]) * self._cos[index] + (y - self._y[index]) * self._sin[index]
-        index = np.clip(np.where(along < 0.0, index - 1, index), 0, self._last - 1)
-        x0, y0 = self._x[index], self._y[index]
-        dx, dy = self._x[index + 1] - x0, self._y[index + 1] - y0
-        length = dx * dx + dy * dy
-        share = np.clip(((x - x0) * dx + (y - y0) * dy) / length, 0.0, 1.0)
-        offset = (dx * (y - y0) - dy * (x - x0)) / np.sqrt(length)
+        x0, y0, cos, sin = self._nodes[index].T
+        index = index - ((x - x0) * cos + (y - y0) * sin < 0.0)
+        index = np.minimum(np.maximum(index, 0), self._last - 1)
+        x0, y0, _, _ = self._nodes[index].T
+        x1, y1, _, _ = self._nodes[index + 1].T
+        dx, dy, x, y = x1 - x0, y1 - y0, x - x0, y - y0
+        square = dx * dx + dy * dy
+        share = np.minimum(np.maximum((x * dx + y * dy) / square, 0.0), 1.0)
+        offset = (dx * y - dy * x) / np.sqrt(square)
         return FrenetPoint(self._first_arc + (index + share) * SPACING_M, offset)
 
 

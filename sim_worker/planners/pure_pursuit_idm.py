@@ -29,7 +29,7 @@ class PurePursuitIdm:
         speed = np.maximum(view.states[:, 3], 0.0)
         accel = np.minimum(self._free(view, speed), self._curves(view, speed))
         accel = accel - self._interaction(view, speed)
-        accel = np.clip(accel, -MAX_DECEL_MPS2, None)
+        accel = np.maximum(accel, -MAX_DECEL_MPS2)
         command = accel + resistance_mps2(view.vehicle, speed)
         hold = (speed < _HOLD_SPEED_MPS) & (accel <= 0.0)
         return PlannerOutput(np.where(hold, _HOLD_MPS2, command), pure_pursuit(view))
@@ -40,7 +40,7 @@ class PurePursuitIdm:
         Treiber, Hennecke, Helbing (2000), Phys. Rev. E 62, eq. 2; above the target speed the
         improved form of Treiber and Kesting (2013), Traffic Flow Dynamics, eq. 11.22.
         """
-        start = MAX_ACCEL_MPS2 * np.clip(view.speed_factor, 0.3, 2.0)
+        start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(view.speed_factor, 0.3), 2.0)
         target = np.maximum(view.target_speed_mps, 0.0)
         allowed = np.maximum(target, 0.1)
         ratio = speed / allowed

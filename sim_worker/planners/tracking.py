@@ -25,4 +25,4 @@ def pure_pursuit(view: PlannerView) -> Array:
     left = cos * dy - sin * dx
     angle = np.arctan(2.0 * view.vehicle.wheelbase_m.value * left / (dx * dx + dy * dy + 1e-9))
     limit = view.vehicle.max_tire_angle_rad.value
-    return np.asarray(np.clip(angle, -limit, limit))
+    return np.asarray(np.minimum(np.maximum(angle, -limit), limit))

@@ -80,10 +80,10 @@ class Actuation:
         inertia to the chassis, which would add it sideways too.
         """
         ids, mass = self._ids, self._mass
-        command = np.clip(accel_mps2, -self._max_brake, self._max_drive)
+        command = np.minimum(np.maximum(accel_mps2, -self._max_brake), self._max_drive)
         grip = friction * GRAVITY_MPS2
         accel = command * np.where(command > 0.0, self._drive_gain, self._brake_gain)
-        accel = np.clip(accel, -grip, grip)
+        accel = np.minimum(np.maximum(accel, -grip), grip)
         share = np.sqrt(np.maximum(1.0 - np.square(accel / grip), _MIN_LATERAL_SHARE**2))
         shift = self._transfer * accel
         front_load = np.maximum(self._front_load - shift, 0.0) + _TINY_N
@@ -106,8 +106,7 @@ class Actuation:
 
 def resistance_mps2(vehicle: VehicleParameters, speed_mps: Array) -> Array:
     """Return the deceleration by drag and rolling at `speed_mps`, for a command to undo."""
-    moving = np.abs(speed_mps) > 0.1
-    force = vehicle.drag_npv2.value * speed_mps * np.abs(speed_mps) + np.where(
-        moving, np.sign(speed_mps) * vehicle.rolling_resistance_n.value, 0.0
-    )
+    speed = np.abs(speed_mps)
+    force = vehicle.drag_npv2.value * speed * speed_mps
+    force += (speed > 0.1) * np.sign(speed_mps) * vehicle.rolling_resistance_n.value
     return np.asarray(force / vehicle.mass_kg.value)

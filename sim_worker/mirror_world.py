@@ -1,0 +1,174 @@
+"""One MuJoCo world: the twin, which physics moves; shadow and ghost, which measurement does.
+
+The shadow is a kinematic body that other bodies run into; the ghost is the same without collisions.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+from sim_worker.stage import world_spec
+from sim_worker.vehicle.actuation import Actuation, actuator_ids
+from sim_worker.vehicle.clock import silence_step_clock
+from sim_worker.vehicle.planar import (
+    JOINTS,
+    TIMESTEP_S,
+    base_from_cog,
+    box_centre_from_base_m,
+    check_steering_delay,
+    cog_from_base,
+    vehicle_spec,
+)
+from world_gen.export.mjcf import ROAD_USER, VEHICLE
+
+TWIN, SHADOW, GHOST = "twin_", "shadow", "ghost"
+_REFRESH_STEPS = 2
+"""Physics steps between two updates of tyre forces."""
+
+
+class MirrorWorld:
+    """Twin, shadow and ghost of one car in one World; poses are those of base_link in its frame.
+
+    By default the twin passes through the shadow, since both are the same car in nearly the same
+    place; with `twin_meets_shadow` it runs into it as into any other car.
+    """
+
+    def __init__(
+        self,
+        world: World | None,
+        vehicle: VehicleParameters,
+        *,
+        twin_meets_shadow: bool = False,
+        steering_delay_s: float | None = None,
+    ) -> None:
+        """Compile; `steering_delay_s` replaces the vehicle's."""
+        silence_step_clock()
+        self.vehicle = vehicle
+        spec = world_spec(world)
+        spec.attach(vehicle_spec(vehicle), prefix=TWIN, frame=spec.worldbody.add_frame())
+        _add_measured(spec, SHADOW, vehicle, collides=True)
+        _add_measured(spec, GHOST, vehicle, collides=False)
+        if not twin_meets_shadow:
+            spec.add_exclude(name="own_shadow", bodyname1=TWIN + "chassis", bodyname2=SHADOW)
+        self.model = model = spec.compile()
+        self.data = mujoco.MjData(model)
+        ids = actuator_ids(model, TWIN)
+        if steering_delay_s is not None:
+            check_steering_delay(steering_delay_s)
+            model.actuator_delay[ids.steer] = steering_delay_s
+        self._steer = ids.steer
+        self._actuation = Actuation(
+            vehicle,
+            ids,
+            ctrl=self.data.ctrl[None],
+            biasprm=model.actuator_biasprm[None],
+            forcerange=model.actuator_forcerange[None],
+        )
+        self._joints = np.array([model.joint(TWIN + name).qposadr[0] for name in JOINTS])
+        self._dofs = np.array([model.joint(TWIN + name).dofadr[0] for name in JOINTS])
+        self._mocap = {name: int(model.body(name).mocapid[0]) for name in (SHADOW, GHOST)}
+        self._friction = np.array([vehicle.friction.value])
+        self._state = np.zeros((1, 8))
+        self._tire_command = 0.0
+        self._steps = 0
+
+    @property
+    def history_samples(self) -> int:
+        """Return how many past steering commands `seed_twin` takes, one physics step apart."""
+        return int(self.model.actuator_history[self._steer][0])
+
+    def seed_twin(self, state: Array, *, steering_history_rad: Array | None = None) -> None:
+        """Put the twin at base_link `state` (8,), the only way it ever teleports.
+
+        `steering_history_rad` (H,) are the tyre angles commanded before, latest last; without it
+        the present angle counts as having been commanded all along.
+        """
+        data = self.data
+        mocap_pos, mocap_quat = data.mocap_pos.copy(), data.mocap_quat.copy()
+        mujoco.mj_resetData(self.model, data)
+        data.mocap_pos[:], data.mocap_quat[:] = mocap_pos, mocap_quat
+        limit = self.vehicle.max_tire_angle_rad.value
+        self._state[0] = state
+        self._state[0, 6] = np.clip(state[6], -limit, limit)
+        positions, velocities = cog_from_base(self.vehicle, self._state)
+        data.qpos[self._joints], data.qvel[self._dofs] = positions[0], velocities[0]
+        history = np.full(self.history_samples, self._state[0, 6])
+        if steering_history_rad is not None:
+            history = np.clip(steering_history_rad, -limit, limit)
+        first = int(self.model.actuator_historyadr[self._steer]) + 2 + len(history)
+        data.history[first : first + len(history)] = history
+        self._tire_command = float(history[-1])
+        self._steps = 0
+
+    def place(self, name: str, pose: Array) -> None:
+        """Put the shadow or the ghost at x, y, yaw (3,)."""
+        index = self._mocap[name]
+        self.data.mocap_pos[index] = (pose[0], pose[1], 0.0)
+        self.data.mocap_quat[index] = (np.cos(0.5 * pose[2]), 0.0, 0.0, np.sin(0.5 * pose[2]))
+
+    def step(self, *, accel_mps2: float, tire_angle_rad: float) -> None:
+        """Advance 10 ms under one command."""
+        if self._steps % _REFRESH_STEPS == 0:
+            self._actuation.apply(
+                speed_mps=self._state[:, 3],
+                accel_mps2=np.array([accel_mps2]),
+                friction=self._friction,
+            )
+        self._steps += 1
+        reach = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
+        change = tire_angle_rad - self._tire_command
+        self._tire_command += min(max(change, -reach), reach)
+        self.data.ctrl[self._steer] = self._tire_command
+        before = self._state[0, 3]
+        mujoco.mj_step(self.model, self.data)
+        base_from_cog(
+            self.vehicle,
+            self.data.qpos[None, self._joints],
+            self.data.qvel[None, self._dofs],
+            self._state,
+        )
+        self._state[0, 7] = (self._state[0, 3] - before) / TIMESTEP_S
+
+    @property
+    def twin_state(self) -> Array:
+        """Base_link state (8,) of the twin."""
+        return np.array(self._state[0])
+
+    def measured_pose(self, name: str) -> Array:
+        """Return x, y, yaw (3,) of the shadow or the ghost as MuJoCo has it."""
+        mujoco.mj_kinematics(self.model, self.data)
+        body = self.data.body(name)
+        w, _, _, z = body.xquat
+        return np.array([body.xpos[0], body.xpos[1], 2.0 * np.arctan2(z, w)])
+
+    def contact_force_n(self, name: str) -> float:
+        """Return the summed size of the contact forces on the shadow or ghost in the last step."""
+        geom = self.model.geom(name).id
+        force = np.zeros(6)
+        total = 0.0
+        for index in range(self.data.ncon):
+            contact = self.data.contact[index]
+            if geom in (contact.geom[0], contact.geom[1]):
+                mujoco.mj_contactForce(self.model, self.data, index, force)
+                total += float(np.linalg.norm(force[:3]))
+        return total
+
+
+def _add_measured(
+    spec: mujoco.MjSpec, name: str, vehicle: VehicleParameters, *, collides: bool
+) -> None:
+    body = spec.worldbody.add_body(name=name, mocap=True)
+    height = vehicle.height_m.value
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[vehicle.length_m.value / 2, vehicle.width_m.value / 2, height / 2],
+        pos=[box_centre_from_base_m(vehicle), 0.0, height / 2],
+        contype=ROAD_USER if collides else 0,
+        conaffinity=VEHICLE if collides else 0,
+        rgba=[0.3, 0.3, 0.3, 1.0] if collides else [0.3, 0.3, 0.3, 0.3],
+    )

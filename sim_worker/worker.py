@@ -1,0 +1,169 @@
+"""The worker process: keeps compiled stages of the last Worlds and answers jobs on them."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from contracts.bus import Bus, Mailbox, Request
+from contracts.codec import read_message
+from contracts.frames import local_from_geo
+from contracts.process import ProcessLife
+from contracts.setup import WorkerSetup
+from contracts.simulation import FuturesJob, FuturesResult, PrepareReply, PrepareRequest
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+from sim_worker.actors.conflicts import CrossingPaths
+from sim_worker.futures import run_job
+from sim_worker.planners.registry import load_planner, planner_names
+from sim_worker.stage import Controls, Stage
+
+NSIM = 32
+"""Simulations of a stage: two workers share a round of 64."""
+KEPT_WORLDS = 4
+_IDLE_S = 0.2
+
+log = logging.getLogger("sim_worker")
+
+
+class _Prepared(NamedTuple):
+    stage: Stage
+    crossing_paths: CrossingPaths
+
+
+class StageCache:
+    """Compiled stages of the Worlds used last; loads a World's file on first use."""
+
+    def __init__(
+        self,
+        worlds_dir: Path,
+        vehicle: VehicleParameters,
+        *,
+        control_hz: float = 20.0,
+        threads: int = 1,
+        nsim: int = NSIM,
+        kept: int = KEPT_WORLDS,
+    ) -> None:
+        self._worlds_dir = worlds_dir
+        self._vehicle = vehicle
+        self._control_hz, self._threads, self._nsim, self._kept = control_hz, threads, nsim, kept
+        self._stages: OrderedDict[str, _Prepared] = OrderedDict()
+
+    def get(self, world_id: str) -> _Prepared:
+        """Return the stage of a World; raises FileNotFoundError where its file is missing."""
+        if world_id in self._stages:
+            self._stages.move_to_end(world_id)
+            return self._stages[world_id]
+        world = load_world(self._worlds_dir, world_id)
+        stage = Stage(
+            world,
+            self._vehicle,
+            nsim=self._nsim,
+            control_hz=self._control_hz,
+            threads=self._threads,
+        )
+        self._stages[world_id] = prepared = _Prepared(stage, CrossingPaths(world))
+        while len(self._stages) > self._kept:
+            self._stages.popitem(last=False)
+        return prepared
+
+    def __len__(self) -> int:
+        return len(self._stages)
+
+    def __contains__(self, world_id: str) -> bool:
+        return world_id in self._stages
+
+
+def load_world(worlds_dir: Path, world_id: str) -> World:
+    """Read a World's file; raises FileNotFoundError or SchemaMismatch naming the file."""
+    if not world_id or "/" in world_id or "\\" in world_id or world_id.startswith("."):
+        raise FileNotFoundError(f"world id {world_id!r} names no file in {worlds_dir}")
+    return read_message(worlds_dir / f"{world_id}.world", World)
+
+
+class FuturesWorker:
+    """Answers `prepare` and `job`; a question that cannot be answered is refused with one line."""
+
+    def __init__(self, setup: WorkerSetup) -> None:
+        self._id = setup.process_id
+        self._stages = StageCache(
+            Path(setup.worlds_dir),
+            setup.vehicle,
+            control_hz=setup.control_hz,
+            threads=setup.threads,
+        )
+        self._answers: dict[str, Callable[[msgspec.Struct], msgspec.Struct]] = {
+            "prepare": self._prepare,
+            "job": self._job,
+        }
+
+    def handle(self, request: Request) -> None:
+        """Answer one question; never raises."""
+        try:
+            answer = self._answers[request.channel](request.message())
+        except Exception as error:
+            # The drive goes on without this answer; the traceback is for the log's reader.
+            log.exception("%s refused", request.channel)
+            request.refuse(one_line(error))
+            return
+        request.reply(answer)
+
+    def _prepare(self, question: msgspec.Struct) -> PrepareReply:
+        assert isinstance(question, PrepareRequest)
+        start = time.perf_counter()
+        warm_up(self._stages.get(question.world_id).stage)
+        return PrepareReply(
+            world_id=question.world_id,
+            worker_id=self._id,
+            seconds=time.perf_counter() - start,
+        )
+
+    def _job(self, question: msgspec.Struct) -> FuturesResult:
+        assert isinstance(question, FuturesJob)
+        prepared = self._stages.get(question.world_id)
+        return run_job(
+            question,
+            prepared.stage,
+            worker_id=self._id,
+            crossing_paths=prepared.crossing_paths,
+        )
+
+
+def warm_up(stage: Stage) -> None:
+    """Do once, before it counts, what a first job does first: project, step, load planners."""
+    assert stage.world is not None
+    origin = stage.world.frame.origin
+    local_from_geo(stage.world.frame, origin.lat_deg, origin.lon_deg)
+    stage.seed(np.zeros((1, 8)), steering_delay_s=np.zeros(1), friction_factor=np.ones(1))
+    stage.step(Controls(np.zeros(1), np.zeros(1)))
+    for name in planner_names():
+        try:
+            load_planner(name)
+        except ValueError as error:
+            log.warning("%s", error)
+
+
+def one_line(error: Exception) -> str:
+    """Return an error as one line of text."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
+    """Answer until the run is over; alive only once it can take work."""
+    worker = FuturesWorker(setup)
+    mailbox = Mailbox(64)
+    ids = {"run": setup.run_id, "process": setup.process_id}
+    bus.serve("prepare", mailbox, **ids)
+    bus.serve("job", mailbox, **ids)
+    life.ready()
+    while not life.over:
+        request = mailbox.take(_IDLE_S)
+        if isinstance(request, Request):
+            worker.handle(request)
