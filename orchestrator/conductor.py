@@ -60,7 +60,7 @@ class Conductor:
             on_error=lambda text: self.tell(Tell("error", text)),
         )
         self.alive: set[str] = set()
-        self.not_ready_rounds = 0
+        self.missed_rounds = 0
         self.mirror_stamp_ns = 0
         self.mirror_independent: bool | None = None
         self._active_world: str | None = None
@@ -138,7 +138,7 @@ class Conductor:
         if intent is None or latest is None:
             return False
         if isinstance(intent, NotReady):
-            self.not_ready_rounds += 1
+            self.missed_rounds += 1
             return False
         self.rounds.start(intent, latest, self.intake.plan)
         return True

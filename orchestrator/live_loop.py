@@ -11,6 +11,7 @@ from orchestrator.conductor import Conductor
 
 HOUSEKEEPING_S = 0.1
 LAST_ROUND_GRACE_S = 1.0
+GIVE_UP_ROUND_S = 10.0
 STALE_AFTER_S = 1.0
 """No round starts from a state older than this, in seconds of the drive's clock."""
 
@@ -20,7 +21,9 @@ class LiveLoop:
 
     A round falls due `rate_hz` times a wall second. It starts with the first state received from
     then on, so that a slow GNSS does not make results older than need be, and at the latest half
-    a period later. The start of a round closes the one before: what is not complete is missed.
+    a period later. A round that is not complete when the next one should start has missed its
+    deadline: it counts as missed, is let finish, and the next one is left out. So a machine that
+    is too slow gives fewer results, not none.
     """
 
     def __init__(
@@ -35,6 +38,7 @@ class LiveLoop:
         self._stop = stop
         self._period_s = 1.0 / conductor.plan.config.rate_hz
         self._speed = conductor.plan.config.speed or 1.0
+        self._started_s = 0.0
 
     def run(self) -> bool:
         """Return True where the drive ended by itself, False where it was stopped."""
@@ -55,7 +59,6 @@ class LiveLoop:
             now_s = time.monotonic()
             fresh = conductor.intake.states > seen
             if now_s >= next_due_s and (fresh or now_s >= next_due_s + 0.5 * self._period_s):
-                conductor.rounds.desk.expire()
                 self._start_round(now_s)
                 # A machine that was asleep does not catch up on rounds; the grid stays.
                 periods = max(1, int((now_s - next_due_s) / self._period_s))
@@ -70,8 +73,14 @@ class LiveLoop:
         latest = conductor.intake.latest
         if latest is None:
             return
-        if (now_s - latest.receipt_mono_ns / 1e9) * self._speed <= STALE_AFTER_S:
-            conductor.start_round()
+        if (now_s - latest.receipt_mono_ns / 1e9) * self._speed > STALE_AFTER_S:
+            return
+        if conductor.rounds.desk.open_rounds:
+            conductor.missed_rounds += 1
+            if now_s - self._started_s > GIVE_UP_ROUND_S:
+                conductor.rounds.desk.drop()
+        elif conductor.start_round():
+            self._started_s = now_s
 
     def _telemetry_waits(self) -> bool:
         return len(self._conductor.mailbox) > 0

@@ -111,6 +111,6 @@ class ProgressLine:
             f"{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}  "
             f"{progress.futures_per_s:.0f} futures/s  "
             f"workers {len(conductor.rounds.desk.workers)}/{conductor.plan.config.workers}  "
-            f"missed {conductor.rounds.desk.missed + conductor.not_ready_rounds}  "
+            f"missed {conductor.missed_rounds}  "
             f"dropped {progress.dropped}"
         )

@@ -49,11 +49,10 @@ class _Open:
 
 @dataclass(slots=True)
 class RoundDesk:
-    """Holds the open rounds; live there is one at most, since the next one's start ends it."""
+    """Holds the open rounds; live there is one at most."""
 
     late_results: int = 0
     requeued_jobs: int = 0
-    missed: int = 0
     _open: dict[int, _Open] = field(default_factory=dict)
     _idle: dict[str, None] = field(default_factory=dict)
     _busy: dict[str, FuturesJob] = field(default_factory=dict)
@@ -90,12 +89,9 @@ class RoundDesk:
         """Begin a round."""
         self._open[order.round_id] = _Open(order, deque(order.jobs))
 
-    def expire(self) -> int:
-        """Close every open round as missed; returns how many."""
-        count = len(self._open)
-        self.missed += count
+    def drop(self) -> None:
+        """Give up every open round; what its workers still send is late."""
         self._open.clear()
-        return count
 
     def assignments(self) -> list[Assignment]:
         """Give waiting jobs to idle workers, oldest round first."""
