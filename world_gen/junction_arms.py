@@ -13,7 +13,7 @@ from world_gen.road_graph import RoadGraph
 
 LOOK_M = 30.0
 """How far along a road its direction and its distance from another are judged."""
-CARRIAGEWAY_GAP_M = 50.0
+CARRIAGEWAY_GAP_M = 62.0
 OPPOSED_RAD, ALONGSIDE_RAD = math.radians(50.0), math.radians(25.0)
 REJOIN_M = 90.0
 """Carriageways that part and meet again within this length are one road whatever their names."""

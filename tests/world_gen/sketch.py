@@ -1,0 +1,70 @@
+"""Small maps drawn in metres around a place, written as OSM XML."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
+from world_gen.intersections import Junction
+from world_gen.osm_map import OsmMap
+from world_gen.read_osm import read_map
+from world_gen.road_graph import RoadGraph
+
+NORTH_SEA_COAST = GeoPoint(53.5, 8.1)
+MANCHESTER = GeoPoint(53.45, -2.3)
+
+
+class Sketch:
+    """Nodes at metres east and north of a place, and ways of their ids."""
+
+    def __init__(self, place: GeoPoint = NORTH_SEA_COAST, bounds: str = "") -> None:
+        self.frame = LocalFrame(place)
+        self.bounds = bounds
+        self.nodes: list[str] = []
+        self.ways: list[str] = []
+        self.relations: list[str] = []
+
+    def node(self, node: int, x_m: float, y_m: float, **tags: str) -> int:
+        lat, lon = geo_from_local(self.frame, [x_m, y_m]).tolist()  # type: ignore[arg-type]
+        self.nodes.append(f'<node id="{node}" lat="{lat:.9f}" lon="{lon:.9f}">{_xml(tags)}</node>')
+        return node
+
+    def way(self, way: int, nodes: list[int], **tags: str) -> None:
+        refs = "".join(f'<nd ref="{node}"/>' for node in nodes)
+        self.ways.append(f'<way id="{way}">{refs}{_xml(tags)}</way>')
+
+    def road(self, way: int, nodes: list[int], name: str = "", **tags: str) -> None:
+        self.way(way, nodes, **{"highway": "residential", "name": name, **tags})
+
+    def relation(self, relation: int, ways: dict[int, str], **tags: str) -> None:
+        members = "".join(
+            f'<member type="way" ref="{way}" role="{role}"/>' for way, role in ways.items()
+        )
+        self.relations.append(f'<relation id="{relation}">{members}{_xml(tags)}</relation>')
+
+    def xml(self) -> str:
+        parts = [self.bounds, *self.nodes, *self.ways, *self.relations]
+        return f'<?xml version="1.0"?>\n<osm version="0.6">{"".join(parts)}</osm>\n'
+
+    def read(self, folder: Path) -> OsmMap:
+        path = folder / "sketch.osm"
+        path.write_text(self.xml(), encoding="utf-8")
+        return read_map(path)
+
+    def graph(self, folder: Path) -> RoadGraph:
+        return build_road_graph(self.read(folder))
+
+    def junctions(self, folder: Path) -> tuple[Junction, ...]:
+        osm = self.read(folder)
+        return find_intersections(osm, build_road_graph(osm))
+
+
+def _xml(tags: dict[str, str]) -> str:
+    return "".join(
+        f"<tag k={quoteattr(key.replace('__', ':'))} v={quoteattr(value)}/>"
+        for key, value in tags.items()
+        if value
+    )

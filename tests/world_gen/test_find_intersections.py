@@ -1,0 +1,331 @@
+"""A junction is what a driver takes for one."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contracts.frames import local_from_geo
+from tests.world_gen.sketch import MANCHESTER, Sketch
+from world_gen.find_intersections import find_intersections
+from world_gen.intersections import Junction
+
+
+def star(bearings_deg: list[float], length_m: float = 150.0) -> Sketch:
+    """Roads that meet in node 1."""
+    sketch = Sketch()
+    sketch.node(1, 0.0, 0.0)
+    for arm, bearing in enumerate(bearings_deg, start=2):
+        angle = math.radians(bearing)
+        sketch.node(arm, length_m * math.cos(angle), length_m * math.sin(angle))
+        sketch.road(100 + arm, [1, arm], f"Arm {arm}")
+    return sketch
+
+
+def dual_carriageway(sketch: Sketch, gap_m: float = 14.0) -> None:
+    """An east-west street of two carriageways; nodes 11..13 eastward, 21..23 westward."""
+    for node, x_m in ((11, -150.0), (12, 0.0), (13, 150.0)):
+        sketch.node(node, x_m, -gap_m / 2)
+        sketch.node(node + 10, -x_m, gap_m / 2)
+    sketch.road(110, [11, 12, 13], "Allee", highway="secondary", oneway="yes")
+    sketch.road(120, [21, 22, 23], "Allee", highway="secondary", oneway="yes")
+
+
+def only(junctions: tuple[Junction, ...]) -> Junction:
+    assert len(junctions) == 1, [j.summary for j in junctions]
+    return junctions[0]
+
+
+def off_centre_m(sketch: Sketch, junction: Junction) -> float:
+    """Return how far a junction's centre lies from the place the sketch is drawn around."""
+    return math.hypot(*local_from_geo(sketch.frame, junction.summary.lat, junction.summary.lon))
+
+
+@pytest.mark.parametrize(
+    ("bearings_deg", "kind"),
+    [
+        ([0, 90, 180], "t_junction"),
+        ([0, 120, 240], "t_junction"),
+        ([0, 90, 180, 270], "crossing"),
+        ([0, 60, 130, 200, 290], "crossing"),
+    ],
+)
+def test_roads_that_meet_in_one_node(bearings_deg: list[float], kind: str, tmp_path: Path) -> None:
+    found = only(star(bearings_deg).junctions(tmp_path))
+    assert found.summary.kind == kind
+    assert found.summary.arms == len(bearings_deg)
+    assert found.summary.id == "n1"
+    assert found.summary.osm_nodes == (1,)
+    assert found.summary.control == "uncontrolled"
+    assert found.summary.driving_side == "right"
+    assert found.radius_m == 0.0
+    bearings = np.degrees([arm.bearing_rad for arm in found.arms]) % 360
+    assert sorted(bearings) == pytest.approx(sorted(bearings_deg), abs=0.5)
+
+
+def test_a_bend_with_another_name_is_none(tmp_path: Path) -> None:
+    assert star([0, 110]).junctions(tmp_path) == ()
+
+
+def test_driveways_and_footways_make_none(tmp_path: Path) -> None:
+    sketch = star([0, 180])
+    for node, highway in ((50, "service"), (51, "pedestrian"), (52, "footway"), (53, "track")):
+        sketch.node(node, 0.0, 10.0 * node)
+        sketch.way(node, [1, node], highway=highway)
+    sketch.node(60, 0.0, -80.0)
+    sketch.road(60, [1, 60], "Private road", access="private")
+    assert sketch.junctions(tmp_path) == ()
+
+
+def test_a_bridge_makes_none(tmp_path: Path) -> None:
+    sketch = star([0, 180])
+    sketch.node(50, 0.0, 80.0)
+    sketch.node(51, 0.0, -80.0)
+    sketch.road(50, [50, 51], "Brücke", bridge="yes", layer="1")
+    assert sketch.junctions(tmp_path) == ()
+
+
+def test_two_dual_carriageways_cross_in_one_junction(tmp_path: Path) -> None:
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -7, -7), (2, 7, -7), (3, 7, 7), (4, -7, 7),
+        (5, -150, -7), (6, 150, -7), (7, 150, 7), (8, -150, 7),
+        (9, 7, -150), (10, 7, 150), (11, -7, 150), (12, -7, -150),
+    ):  # fmt: skip
+        sketch.node(node, x_m, y_m)
+    sketch.road(100, [5, 1, 2, 6], "Ost", oneway="yes")
+    sketch.road(101, [7, 3, 4, 8], "Ost", oneway="yes")
+    sketch.road(102, [9, 2, 3, 10], "Nord", oneway="yes")
+    sketch.road(103, [11, 4, 1, 12], "Nord", oneway="yes")
+    found = only(sketch.junctions(tmp_path))
+    assert found.summary.kind == "crossing"
+    assert found.summary.arms == 4
+    assert found.nodes == {1, 2, 3, 4}
+    assert len(found.inner) == 4
+    assert all(len(arm.outward) == 2 for arm in found.arms)
+    assert abs(found.centre_xy_m).max() < 0.1
+    assert found.summary.name == "Nord \u00d7 Ost"
+
+
+@pytest.mark.parametrize("gap_m", [10.0, 35.0, 55.0])
+def test_a_street_across_a_dual_carriageway_is_one_junction(gap_m: float, tmp_path: Path) -> None:
+    sketch = Sketch()
+    dual_carriageway(sketch, gap_m)
+    sketch.node(30, 0.0, 150.0)
+    sketch.node(31, 0.0, -150.0)
+    sketch.road(130, [30, 22, 12, 31], "Gasse")
+    found = only(sketch.junctions(tmp_path))
+    assert (found.summary.kind, found.summary.arms) == ("crossing", 4)
+    assert found.nodes == {12, 22}
+
+
+def test_a_turning_place_in_the_median_is_none(tmp_path: Path) -> None:
+    sketch = Sketch()
+    dual_carriageway(sketch)
+    sketch.road(130, [12, 22])
+    assert sketch.junctions(tmp_path) == ()
+
+
+def test_a_street_that_parts_into_its_carriageways_is_none(tmp_path: Path) -> None:
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -200, 0), (2, -60, 0), (3, -45, -8), (4, 45, -8), (5, 60, 0), (6, 200, 0),
+        (7, 45, 8), (8, -45, 8),
+    ):  # fmt: skip
+        sketch.node(node, x_m, y_m)
+    sketch.road(100, [1, 2], "Mohrenstraße")
+    sketch.road(101, [2, 3, 4, 5], "Mohrenstraße", oneway="yes")
+    sketch.road(102, [5, 7, 8, 2], "Mohrenstraße", oneway="yes")
+    sketch.road(103, [5, 6], "Mohrenstraße")
+    assert sketch.junctions(tmp_path) == ()
+
+
+def test_a_side_street_with_a_traffic_island_is_one_junction(tmp_path: Path) -> None:
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -150, 0),
+        (2, -10, 0),
+        (3, 10, 0),
+        (4, 150, 0),
+        (5, 0, 25),
+        (6, 0, 150),
+    ):
+        sketch.node(node, x_m, y_m)
+    sketch.road(100, [1, 2, 3, 4], "Haupt", highway="primary")
+    sketch.road(101, [6, 5], "Neben")
+    sketch.road(102, [5, 2], "Neben", oneway="yes")
+    sketch.road(103, [3, 5], "Neben", oneway="yes")
+    found = only(sketch.junctions(tmp_path))
+    assert (found.summary.kind, found.summary.arms) == ("t_junction", 3)
+    assert found.nodes == {2, 3, 5}
+
+
+@pytest.mark.parametrize(("offset_m", "kinds"), [(14, ["staggered"]), (60, ["t_junction"] * 2)])
+def test_offset_side_streets(offset_m: float, kinds: list[str], tmp_path: Path) -> None:
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -200, 0), (2, 0, 0), (3, offset_m, 0), (4, 200, 0), (5, 0, 150), (6, offset_m, -150),
+    ):  # fmt: skip
+        sketch.node(node, x_m, y_m)
+    sketch.road(100, [1, 2, 3, 4], "Haupt")
+    sketch.road(101, [5, 2], "Links")
+    sketch.road(102, [6, 3], "Rechts")
+    assert [j.summary.kind for j in sketch.junctions(tmp_path)] == kinds
+
+
+def test_a_slip_road_belongs_to_the_corner_that_it_cuts(tmp_path: Path) -> None:
+    sketch = star([0, 90, 180, 270], 200.0)
+    sketch.node(40, -50.0, 0.0)
+    sketch.node(41, -25.0, -12.0)
+    sketch.node(42, -10.0, -28.0)
+    sketch.node(43, 0.0, -50.0)
+    sketch.ways.clear()
+    sketch.road(100, [4, 40, 1, 2], "Ost", highway="primary")
+    sketch.road(101, [3, 1, 43, 5], "Nord", highway="primary")
+    sketch.way(102, [40, 41, 42, 43], highway="primary_link", oneway="yes")
+    found = only(sketch.junctions(tmp_path))
+    assert (found.summary.kind, found.summary.arms) == ("crossing", 4)
+    assert found.nodes == {1, 40, 43}
+    assert off_centre_m(sketch, found) < 0.1
+    assert found.summary.id == "n1"
+
+
+def test_a_ramp_that_joins_a_motorway_is_a_merge(tmp_path: Path) -> None:
+    sketch = Sketch()
+    for node, x_m, y_m in ((1, -300, 0), (2, 0, 0), (3, 300, 0), (4, -200, -60), (5, -60, -8)):
+        sketch.node(node, x_m, y_m)
+    sketch.way(100, [1, 2, 3], highway="motorway", ref="A 7")
+    sketch.way(101, [4, 5, 2], highway="motorway_link", oneway="yes")
+    found = only(sketch.junctions(tmp_path))
+    assert (found.summary.kind, found.summary.arms) == ("merge", 3)
+
+
+def roundabout(kind: str = "roundabout") -> Sketch:
+    """A ring of two ways and 15 m radius; the eastern arm parts 25 m before it."""
+    sketch = Sketch()
+    for step in range(8):
+        angle = math.radians(45.0 * step)
+        sketch.node(1 + step, 15.0 * math.cos(angle), 15.0 * math.sin(angle))
+    sketch.road(100, [1, 2, 3, 4, 5], junction=kind)
+    sketch.road(101, [5, 6, 7, 8, 1], junction=kind)
+    for node, x_m, y_m in ((20, 40, 0), (21, 150, 0), (22, 0, 150), (23, -150, 0)):
+        sketch.node(node, x_m, y_m)
+    sketch.road(110, [20, 2], "Ost", oneway="yes")
+    sketch.road(111, [8, 20], "Ost", oneway="yes")
+    sketch.road(112, [20, 21], "Ost")
+    sketch.road(113, [22, 3], "Nord")
+    sketch.road(114, [23, 5], "West")
+    return sketch
+
+
+def test_a_roundabout_is_one_junction_with_the_parting_of_its_arms(tmp_path: Path) -> None:
+    sketch = roundabout()
+    found = only(sketch.junctions(tmp_path))
+    assert (found.summary.kind, found.summary.arms) == ("roundabout", 3)
+    assert found.summary.control == "roundabout"
+    assert found.nodes == {1, 2, 3, 5, 8, 20}
+    assert found.summary.id == "n1"
+    assert off_centre_m(sketch, found) < 0.1
+    assert [arm.name for arm in found.arms] == ["Ost", "Nord", "West"]
+
+
+def test_a_circular_place_has_no_roundabout_rules(tmp_path: Path) -> None:
+    summary = only(roundabout("circular").junctions(tmp_path)).summary
+    assert (summary.kind, summary.control) == ("circular", "uncontrolled")
+
+
+def test_a_ring_without_the_tag_is_no_roundabout(tmp_path: Path) -> None:
+    kinds = {junction.summary.kind for junction in roundabout("").junctions(tmp_path)}
+    assert not kinds & {"roundabout", "circular"}
+
+
+def test_a_painted_roundabout(tmp_path: Path) -> None:
+    sketch = star([0, 120, 240])
+    sketch.nodes[0] = sketch.nodes[0].replace(
+        "</node>", '<tag k="highway" v="mini_roundabout"/></node>'
+    )
+    summary = only(sketch.junctions(tmp_path)).summary
+    assert (summary.kind, summary.control) == ("mini_roundabout", "roundabout")
+
+
+def signed(word: str, distances_m: dict[float, float], **tags: str) -> Sketch:
+    """A crossing with a sign or light on some arms: bearing in degrees → distance."""
+    sketch = Sketch()
+    sketch.node(1, 0.0, 0.0)
+    for arm, bearing in enumerate((0.0, 90.0, 180.0, 270.0), start=2):
+        angle = math.radians(bearing)
+        cos, sin = math.cos(angle), math.sin(angle)
+        sketch.node(arm, 200.0 * cos, 200.0 * sin)
+        nodes = [arm, 1]
+        if bearing in distances_m:
+            distance_m = distances_m[bearing]
+            sketch.node(arm + 10, distance_m * cos, distance_m * sin, highway=word, **tags)
+            nodes = [arm, arm + 10, 1]
+        sketch.road(100 + arm, nodes, f"Arm {arm}")
+    return sketch
+
+
+@pytest.mark.parametrize(
+    ("sketch", "control"),
+    [
+        (signed("traffic_signals", {0.0: 12.0}), "signals"),
+        (signed("traffic_signals", {0.0: 35.0}), "signals"),
+        (signed("traffic_signals", {0.0: 90.0}), "uncontrolled"),
+        (signed("traffic_signals", {0.0: 30.0}, crossing="traffic_signals"), "uncontrolled"),
+        (signed("traffic_signals", {0.0: 12.0}, direction="backward"), "uncontrolled"),
+        (signed("traffic_signals", {0.0: 12.0}, direction="forward"), "signals"),
+        (signed("stop", {0.0: 8.0}), "stop"),
+        (signed("stop", {0.0: 8.0}, stop="all"), "all_way_stop"),
+        (signed("stop", {0.0: 8.0, 90.0: 8.0, 180.0: 8.0, 270.0: 8.0}), "all_way_stop"),
+        (signed("give_way", {90.0: 8.0, 270.0: 8.0}), "give_way"),
+    ],
+)
+def test_control(sketch: Sketch, control: str, tmp_path: Path) -> None:
+    assert only(sketch.junctions(tmp_path)).summary.control == control
+
+
+def test_left_hand_traffic_is_said(tmp_path: Path) -> None:
+    sketch = Sketch(MANCHESTER)
+    for node, x_m, y_m in ((1, 0, 0), (2, 100, 0), (3, -100, 0), (4, 0, 100)):
+        sketch.node(node, x_m, y_m)
+        if node > 1:
+            sketch.road(100 + node, [1, node])
+    assert only(sketch.junctions(tmp_path)).summary.driving_side == "left"
+
+
+def test_an_edit_elsewhere_changes_no_id(tmp_path: Path) -> None:
+    sketch = star([0, 90, 180, 270])
+    before = only(sketch.junctions(tmp_path)).summary.id
+    for node, x_m, y_m in ((900, 500, 500), (901, 600, 500), (902, 500, 600), (903, 400, 500)):
+        sketch.node(node, x_m, y_m)
+        if node > 900:
+            sketch.road(node, [900, node])
+    after = [junction.summary.id for junction in sketch.junctions(tmp_path)]
+    assert before in after
+    assert len(after) == 2
+
+
+def test_the_order_in_the_file_does_not_matter(tmp_path: Path) -> None:
+    there, back = roundabout(), roundabout()
+    back.nodes.reverse()
+    back.ways.reverse()
+    a, b = only(there.junctions(tmp_path)), only(back.junctions(tmp_path))
+    assert a.summary == b.summary
+    assert a.inner == b.inner
+
+
+def test_only_those_that_touch_given_edges(tmp_path: Path) -> None:
+    sketch = star([0, 90, 180, 270])
+    for node, x_m, y_m in ((50, 400, 0), (51, 400, 100), (52, 500, 0)):
+        sketch.node(node, x_m, y_m)
+    sketch.road(50, [2, 50], "Arm 2")
+    sketch.road(51, [51, 50, 52], "Fern")
+    osm = sketch.read(tmp_path)
+    graph = sketch.graph(tmp_path)
+    every = find_intersections(osm, graph)
+    assert len(every) == 2
+    near = [edge.index for edge in graph.edges if edge.name == "Arm 4"]
+    assert [j.summary.id for j in find_intersections(osm, graph, edges=near)] == ["n1"]
