@@ -21,7 +21,8 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from contracts import drive
 from contracts.frames import GeoPoint, LocalFrame
-from telemetry.ros_messages import messages_from, schema_text
+from telemetry.ros_messages import messages_from
+from telemetry.ros_parts import schema_text
 
 FORMAT_METADATA = "foretwin.format"
 INFO_METADATA = "foretwin.vehicle_info"

@@ -23,7 +23,7 @@ from contracts.setup import RecorderSetup
 from contracts.simulation import Event
 from telemetry.mcap_file import create
 from telemetry.recording import SOURCE, Recording
-from telemetry.ros_messages import typestore
+from telemetry.ros_parts import typestore
 from telemetry.vehicle_process import ORCHESTRATOR
 from telemetry.vehicle_process import main as process_main
 
@@ -65,8 +65,10 @@ class RecorderProcess:
         self._control = Mailbox(64)
         self._stop = False
         self._lost_s: float | None = None
-        self._told_dropped = 0
+        self._told_lost = 0
         self._unreadable = 0
+        self._lost = 0
+        self._next_seq: dict[str, int] = {}
         self._asked_s: float | None = None
         self._informed = False
         self._flushed_s = mono_s()
@@ -99,26 +101,27 @@ class RecorderProcess:
         if now_s - self._flushed_s >= _FLUSH_EVERY_S:
             self._flushed_s = now_s
             self._publish(self._recording.flush())
-            self._tell_of_drops()
+            self._tell_of_losses()
         gone = self._lost_s is not None and now_s - self._lost_s > _GRACE_S
         if gone:
             log.warning("the orchestrator is gone")
         return not (self._stop or gone)
 
     def finish(self) -> None:
-        """Write what still waits, for half a second at most, and end the file."""
+        """Write what still waits or is on its way, for half a second at most, and end the file."""
         until_s = self._mono_s() + _LAST_WORDS_S
-        while len(self._messages) and self._mono_s() < until_s:
-            self._take_messages(self._messages.take())
+        while self._mono_s() < until_s and (item := self._messages.take(_WAIT_S)) is not None:
+            self._take_messages(item)
         left = len(self._messages)
         self._messages.close()
-        self._tell_of_drops()
+        self._tell_of_losses()
         self._publish(self._recording.finish())
         log.info(
-            "recorded %s; unwritten %d, refused %s, dropped %d, unreadable %d, left over %d",
+            "recorded %s; unwritten %d, refused %s, missing %d, dropped %d, unreadable %d, left %d",
             dict(self._recording.counts),
             self._recording.unwritten,
             dict(self._recording.refused),
+            self._lost,
             self._messages.dropped,
             self._unreadable,
             left,
@@ -136,11 +139,13 @@ class RecorderProcess:
 
     def _write(self, item: Received) -> None:
         try:
-            message = item.message()
+            seq, _, message = item.envelope()
         except SchemaMismatch as problem:
             self._unreadable += 1
             log.warning("%s", problem)
             return
+        self._lost += max(0, seq - self._next_seq.get(item.key, seq))
+        self._next_seq[item.key] = seq + 1
         self._stamp_ns = message.stamp_ns
         self._publish(self._recording.add(item.channel, message))
 
@@ -166,11 +171,14 @@ class RecorderProcess:
             "info", InfoRequest(), self._control, timeout_s=_ASK_EVERY_S, vehicle=self._vehicle_id
         )
 
-    def _tell_of_drops(self) -> None:
-        dropped = self._messages.dropped
-        if dropped > self._told_dropped:
-            self._told_dropped = dropped
-            text = f"{dropped} messages dropped so far: the disk is slower than the vehicle"
+    def _tell_of_losses(self) -> None:
+        # Gaps in the sequence count what the mailbox dropped, and what the bus lost before it.
+        if self._lost > self._told_lost:
+            self._told_lost = self._lost
+            text = (
+                f"{self._lost} messages are missing in the recording so far"
+                f" ({self._messages.dropped} dropped since the disk is slow, the rest by the bus)"
+            )
             log.warning(text)
             event = Event(stamp_ns=self._stamp_ns, level="warning", source=SOURCE, text=text)
             self._publish([event])

@@ -18,14 +18,12 @@ Views for other programs, not read back since they hold less (32-bit numbers, fe
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from contracts import drive
 from contracts.frames import (
@@ -37,21 +35,34 @@ from contracts.frames import (
     local_from_geo_yaw,
 )
 from contracts.keys import CHANNELS
-from telemetry.ros_definitions import DEFINITIONS
+from telemetry.ros_parts import (
+    ACKERMANN,
+    ANTENNA_FRAME,
+    BASE_FRAME,
+    IMU,
+    JOINT_STATE,
+    MAP_FRAME,
+    NAV_SAT_FIX,
+    ODOMETRY,
+    STEERING_REPORT,
+    STRING,
+    TRAJECTORY,
+    TWIST_STAMPED,
+    covariance,
+    header_from,
+    point_from,
+    ros_type,
+    stamp_ns_of,
+    time_from,
+    turn_from,
+    twist_from,
+    typestore,
+    vector_from,
+    within_float32,
+    yaw_of,
+)
 
 TOPIC_PREFIX = "/foretwin/"
-MAP_FRAME, BASE_FRAME, ANTENNA_FRAME = "map", "base_link", "antenna"
-
-NAV_SAT_FIX = "sensor_msgs/msg/NavSatFix"
-IMU = "sensor_msgs/msg/Imu"
-TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"
-JOINT_STATE = "sensor_msgs/msg/JointState"
-ODOMETRY = "nav_msgs/msg/Odometry"
-STRING = "std_msgs/msg/String"
-ACKERMANN = "ackermann_msgs/msg/AckermannDriveStamped"
-STEERING_REPORT = "autoware_vehicle_msgs/msg/SteeringReport"
-TRAJECTORY = "autoware_planning_msgs/msg/Trajectory"
-
 WHEEL_JOINT, TIRE_JOINT = "steering_wheel", "tire"
 _JSON_ALONE = ("status", "objects", "signals", "end")
 _JSON_BESIDE_A_VIEW = ("control", "state")
@@ -67,23 +78,6 @@ class RosMessage(NamedTuple):
     topic: str
     kind: str
     data: bytes
-
-
-@functools.cache
-def typestore() -> Any:
-    """Return the types of ROS 2 Jazzy with Ackermann's and Autoware's; about 0.15 s at first."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    types: dict[str, Any] = {}
-    for name, text in DEFINITIONS.items():
-        types.update(get_types_from_msg(text, name))
-    store.register(types)
-    return store
-
-
-@functools.cache
-def schema_text(kind: str) -> str:
-    """Return the `ros2msg` definition of a type with all it builds on."""
-    return str(typestore().generate_msgdef(kind, ros_version=2)[0])
 
 
 def messages_from(
@@ -135,65 +129,8 @@ def message_from(
     return name, read(typestore().deserialize_cdr(data, kind), frame)
 
 
-def stamp_ns_of(time: Any) -> int:
-    """Return the nanoseconds of a ROS time."""
-    return int(time.sec) * 1_000_000_000 + int(time.nanosec)
-
-
-def yaw_of(quaternion: Any) -> float:
-    """Return the yaw of a ROS quaternion."""
-    q = quaternion
-    return math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
-
-
-def _type(kind: str) -> Any:
-    return typestore().types[kind]
-
-
-def _time(stamp_ns: int) -> Any:
-    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
-    return _type("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
-
-
-def _header(stamp_ns: int, frame_id: str) -> Any:
-    return _type("std_msgs/msg/Header")(stamp=_time(stamp_ns), frame_id=frame_id)
-
-
-def _vector(x: float, y: float, z: float) -> Any:
-    return _type("geometry_msgs/msg/Vector3")(x=x, y=y, z=z)
-
-
-def _point(x: float, y: float, z: float) -> Any:
-    return _type("geometry_msgs/msg/Point")(x=x, y=y, z=z)
-
-
-def _turn(yaw_rad: float) -> Any:
-    return _type("geometry_msgs/msg/Quaternion")(
-        x=0.0, y=0.0, z=math.sin(0.5 * yaw_rad), w=math.cos(0.5 * yaw_rad)
-    )
-
-
-def _twist(forward_mps: float, yaw_rate_radps: float) -> Any:
-    return _type("geometry_msgs/msg/Twist")(
-        linear=_vector(forward_mps, 0.0, 0.0), angular=_vector(0.0, 0.0, yaw_rate_radps)
-    )
-
-
-def _covariance(size: int, **diagonal: float) -> Any:
-    """Return a flat square covariance; keys are `dN` for the element (N, N)."""
-    flat = np.zeros(size * size)
-    for name, value in diagonal.items():
-        flat[int(name[1:]) * (size + 1)] = value
-    return flat
-
-
-def _float32(value: float) -> float:
-    """Keep a number within what 32 bits hold; NaN stays."""
-    return min(max(value, -3.4e38), 3.4e38) if math.isfinite(value) else value
-
-
 def _json(message: msgspec.Struct) -> Any:
-    return _type(STRING)(data=msgspec.json.encode(message).decode())
+    return ros_type(STRING)(data=msgspec.json.encode(message).decode())
 
 
 Parts = list[tuple[str, str, Any]]
@@ -201,14 +138,14 @@ Parts = list[tuple[str, str, Any]]
 
 def _gnss(message: drive.GnssFix, _frame: LocalFrame | None) -> Parts:
     variance = 0.0 if message.std_m is None else message.std_m**2
-    status = _type("sensor_msgs/msg/NavSatStatus")(status=0, service=0)
-    fix = _type(NAV_SAT_FIX)(
-        header=_header(message.stamp_ns, ANTENNA_FRAME),
+    status = ros_type("sensor_msgs/msg/NavSatStatus")(status=0, service=0)
+    fix = ros_type(NAV_SAT_FIX)(
+        header=header_from(message.stamp_ns, ANTENNA_FRAME),
         status=status,
         latitude=message.position.lat_deg,
         longitude=message.position.lon_deg,
         altitude=message.position.alt_m,
-        position_covariance=_covariance(3, d0=variance, d1=variance),
+        position_covariance=covariance(3, d0=variance, d1=variance),
         position_covariance_type=_UNKNOWN if message.std_m is None else _DIAGONAL_KNOWN,
     )
     return [("gnss", NAV_SAT_FIX, fix)]
@@ -224,14 +161,14 @@ def _gnss_read(ros: Any, _frame: LocalFrame | None) -> drive.GnssFix:
 
 
 def _imu(message: drive.ImuSample, _frame: LocalFrame | None) -> Parts:
-    imu = _type(IMU)(
-        header=_header(message.stamp_ns, BASE_FRAME),
-        orientation=_turn(0.0),
-        orientation_covariance=_covariance(3, d0=_ABSENT),
-        angular_velocity=_vector(*message.rate_radps),
-        angular_velocity_covariance=_covariance(3),
-        linear_acceleration=_vector(*message.accel_mps2),
-        linear_acceleration_covariance=_covariance(3),
+    imu = ros_type(IMU)(
+        header=header_from(message.stamp_ns, BASE_FRAME),
+        orientation=turn_from(0.0),
+        orientation_covariance=covariance(3, d0=_ABSENT),
+        angular_velocity=vector_from(*message.rate_radps),
+        angular_velocity_covariance=covariance(3),
+        linear_acceleration=vector_from(*message.accel_mps2),
+        linear_acceleration_covariance=covariance(3),
     )
     return [("imu", IMU, imu)]
 
@@ -246,8 +183,8 @@ def _imu_read(ros: Any, _frame: LocalFrame | None) -> drive.ImuSample:
 
 
 def _speed(message: drive.SpeedSample, _frame: LocalFrame | None) -> Parts:
-    header = _header(message.stamp_ns, BASE_FRAME)
-    twist = _type(TWIST_STAMPED)(header=header, twist=_twist(message.speed_mps, 0.0))
+    header = header_from(message.stamp_ns, BASE_FRAME)
+    twist = ros_type(TWIST_STAMPED)(header=header, twist=twist_from(message.speed_mps, 0.0))
     return [("speed", TWIST_STAMPED, twist)]
 
 
@@ -257,14 +194,14 @@ def _speed_read(ros: Any, _frame: LocalFrame | None) -> drive.SpeedSample:
 
 def _heading(message: drive.HeadingSample, _frame: LocalFrame | None) -> Parts:
     rate = message.yaw_rate_radps
-    imu = _type(IMU)(
-        header=_header(message.stamp_ns, BASE_FRAME),
-        orientation=_turn(message.yaw_rad),
-        orientation_covariance=_covariance(3),
-        angular_velocity=_vector(0.0, 0.0, rate or 0.0),
-        angular_velocity_covariance=_covariance(3, d0=_ABSENT if rate is None else 0.0),
-        linear_acceleration=_vector(0.0, 0.0, 0.0),
-        linear_acceleration_covariance=_covariance(3, d0=_ABSENT),
+    imu = ros_type(IMU)(
+        header=header_from(message.stamp_ns, BASE_FRAME),
+        orientation=turn_from(message.yaw_rad),
+        orientation_covariance=covariance(3),
+        angular_velocity=vector_from(0.0, 0.0, rate or 0.0),
+        angular_velocity_covariance=covariance(3, d0=_ABSENT if rate is None else 0.0),
+        linear_acceleration=vector_from(0.0, 0.0, 0.0),
+        linear_acceleration_covariance=covariance(3, d0=_ABSENT),
     )
     return [("heading", IMU, imu)]
 
@@ -281,8 +218,8 @@ def _heading_read(ros: Any, _frame: LocalFrame | None) -> drive.HeadingSample:
 def _steering(message: drive.SteeringSample, _frame: LocalFrame | None) -> Parts:
     angles = {WHEEL_JOINT: message.steering_wheel_rad, TIRE_JOINT: message.tire_angle_rad}
     known = {name: angle for name, angle in angles.items() if angle is not None}
-    joints = _type(JOINT_STATE)(
-        header=_header(message.stamp_ns, BASE_FRAME),
+    joints = ros_type(JOINT_STATE)(
+        header=header_from(message.stamp_ns, BASE_FRAME),
         name=list(known),
         position=np.array(list(known.values()), dtype=np.float64),
         velocity=np.zeros(0),
@@ -290,8 +227,9 @@ def _steering(message: drive.SteeringSample, _frame: LocalFrame | None) -> Parts
     )
     parts: Parts = [("steering", JOINT_STATE, joints)]
     if message.tire_angle_rad is not None:
-        report = _type(STEERING_REPORT)(
-            stamp=_time(message.stamp_ns), steering_tire_angle=_float32(message.tire_angle_rad)
+        report = ros_type(STEERING_REPORT)(
+            stamp=time_from(message.stamp_ns),
+            steering_tire_angle=within_float32(message.tire_angle_rad),
         )
         parts.append(("steering_report", STEERING_REPORT, report))
     return parts
@@ -308,14 +246,14 @@ def _steering_read(ros: Any, _frame: LocalFrame | None) -> drive.SteeringSample:
 
 def _control(message: drive.ControlCommand, _frame: LocalFrame | None) -> Parts:
     tire = math.nan if message.tire_angle_rad is None else message.tire_angle_rad
-    command = _type("ackermann_msgs/msg/AckermannDrive")(
-        steering_angle=_float32(tire),
+    command = ros_type("ackermann_msgs/msg/AckermannDrive")(
+        steering_angle=within_float32(tire),
         steering_angle_velocity=0.0,
         speed=0.0,
-        acceleration=_float32(message.accel_mps2),
+        acceleration=within_float32(message.accel_mps2),
         jerk=0.0,
     )
-    stamped = _type(ACKERMANN)(header=_header(message.stamp_ns, BASE_FRAME), drive=command)
+    stamped = ros_type(ACKERMANN)(header=header_from(message.stamp_ns, BASE_FRAME), drive=command)
     return [("control", ACKERMANN, stamped), ("control_json", STRING, _json(message))]
 
 
@@ -326,15 +264,15 @@ def _plan(message: drive.PlannedTrajectory, frame: LocalFrame | None) -> Parts:
     yaw = local_from_geo_yaw(frame, message.yaw_rad, lat, lon).tolist()
     offsets_ns = np.round(message.time_from_stamp_s * 1e9).astype(np.int64).tolist()
     point, pose = (
-        _type("autoware_planning_msgs/msg/TrajectoryPoint"),
-        _type("geometry_msgs/msg/Pose"),
+        ros_type("autoware_planning_msgs/msg/TrajectoryPoint"),
+        ros_type("geometry_msgs/msg/Pose"),
     )
-    duration = _type("builtin_interfaces/msg/Duration")
+    duration = ros_type("builtin_interfaces/msg/Duration")
     points = [
         point(
             time_from_start=duration(sec=offset // 10**9, nanosec=offset % 10**9),
-            pose=pose(position=_point(x, y, 0.0), orientation=_turn(heading)),
-            longitudinal_velocity_mps=_float32(speed),
+            pose=pose(position=point_from(x, y, 0.0), orientation=turn_from(heading)),
+            longitudinal_velocity_mps=within_float32(speed),
             lateral_velocity_mps=0.0,
             acceleration_mps2=0.0,
             heading_rate_rps=0.0,
@@ -345,8 +283,8 @@ def _plan(message: drive.PlannedTrajectory, frame: LocalFrame | None) -> Parts:
             offsets_ns, xy_m, yaw, message.speed_mps.tolist(), strict=True
         )
     ]
-    header = _header(message.stamp_ns, MAP_FRAME)
-    return [("plan", TRAJECTORY, _type(TRAJECTORY)(header=header, points=points))]
+    header = header_from(message.stamp_ns, MAP_FRAME)
+    return [("plan", TRAJECTORY, ros_type(TRAJECTORY)(header=header, points=points))]
 
 
 def plan_from_trajectory(ros: Any, frame: LocalFrame | None) -> drive.PlannedTrajectory:
@@ -374,17 +312,19 @@ def _state(message: drive.VehicleState, frame: LocalFrame | None) -> Parts:
     z_m = message.position.alt_m - frame.origin.alt_m
     yaw = float(local_from_geo_yaw(frame, message.yaw_rad, lat, lon))
     position, heading = message.position_std_m or 0.0, message.yaw_std_rad or 0.0
-    pose = _type("geometry_msgs/msg/Pose")(position=_point(x_m, y_m, z_m), orientation=_turn(yaw))
-    odometry = _type(ODOMETRY)(
-        header=_header(message.stamp_ns, MAP_FRAME),
+    pose = ros_type("geometry_msgs/msg/Pose")(
+        position=point_from(x_m, y_m, z_m), orientation=turn_from(yaw)
+    )
+    odometry = ros_type(ODOMETRY)(
+        header=header_from(message.stamp_ns, MAP_FRAME),
         child_frame_id=BASE_FRAME,
-        pose=_type("geometry_msgs/msg/PoseWithCovariance")(
+        pose=ros_type("geometry_msgs/msg/PoseWithCovariance")(
             pose=pose,
-            covariance=_covariance(6, d0=position**2, d1=position**2, d5=heading**2),
+            covariance=covariance(6, d0=position**2, d1=position**2, d5=heading**2),
         ),
-        twist=_type("geometry_msgs/msg/TwistWithCovariance")(
-            twist=_twist(message.speed_mps, message.yaw_rate_radps),
-            covariance=_covariance(6, d0=(message.speed_std_mps or 0.0) ** 2),
+        twist=ros_type("geometry_msgs/msg/TwistWithCovariance")(
+            twist=twist_from(message.speed_mps, message.yaw_rate_radps),
+            covariance=covariance(6, d0=(message.speed_std_mps or 0.0) ** 2),
         ),
     )
     return [("state", ODOMETRY, odometry), ("state_json", STRING, _json(message))]
