@@ -1,0 +1,131 @@
+"""CSV drives: every column declared, every unit named."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from contracts.frames import LocalFrame, local_from_geo
+from telemetry.logs import LogError, open_log
+
+DECLARATION = """
+reference_point = "antenna on the roof"
+body_from_antenna_m = [1.2, 0.0, 1.5]
+[time]
+column = "t"
+unit = "s"
+base = "log"
+[position]
+frame = "wgs84"
+latitude = { column = "lat", unit = "deg" }
+longitude = { column = "lon", unit = "deg" }
+[speed]
+forward = { column = "v", unit = "mph" }
+[steering]
+wheel = { column = "wheel", unit = "deg", negate = true }
+"""
+ROWS = "t,lat,lon,v,wheel\n0.0,52.5,13.4,10,90\n0.1,52.6,13.5,20,-45\n"
+
+
+def drive(folder: Path, rows: str = ROWS, declaration: str | None = DECLARATION) -> Path:
+    path = folder / "drive.csv"
+    path.write_text(rows)
+    if declaration is not None:
+        (folder / "drive.csv.toml").write_text(declaration)
+    return path
+
+
+def channels(path: Path) -> dict[str, list[Any]]:
+    found: dict[str, list[Any]] = {}
+    for channel, message in open_log(path).samples():
+        found.setdefault(channel, []).append(message)
+    return found
+
+
+def test_units_and_signs_are_converted(tmp_path: Path) -> None:
+    found = channels(drive(tmp_path))
+    assert [m.stamp_ns for m in found["gnss"]] == [0, 100_000_000]
+    assert [m.speed_mps for m in found["speed"]] == pytest.approx([4.4704, 8.9408])
+    assert found["steering"][0].steering_wheel_rad == pytest.approx(-math.pi / 2)
+    info = open_log(tmp_path / "drive.csv").info
+    assert info.body_from_antenna_m == (1.2, 0.0, 1.5)
+    assert info.sends == ("gnss", "speed", "steering")
+
+
+def test_nineteen_digits_of_time_survive(tmp_path: Path) -> None:
+    rows = (
+        "t,lat,lon,v,wheel\n1772359200123456789,52.5,13.4,1,1\n1772359200123456790,52.5,13.4,1,1\n"
+    )
+    path = drive(tmp_path, rows, DECLARATION.replace('unit = "s"', 'unit = "ns"'))
+    assert [m.stamp_ns % 1000 for m in channels(path)["gnss"]] == [789, 790]
+
+
+def test_empty_cells_hold_no_sample_and_bad_ones_are_counted(tmp_path: Path) -> None:
+    rows = (
+        "t,lat,lon,v,wheel\n0.0,52.5,13.4,10,1\n0.1,,,11,1\n0.2,52.5,,12,1\n0.3,52.5,13.4,fast,1\n"
+        "soon,52.5,13.4,13,1\n0.5,52.5\n0.6,nan,13.4,14,1\n"
+    )
+    log = open_log(drive(tmp_path, rows))
+    stamps = [(channel, message.stamp_ns // 10**8) for channel, message in log.samples()]  # type: ignore[attr-defined]
+    assert [at for channel, at in stamps if channel == "gnss"] == [0, 3]
+    assert [at for channel, at in stamps if channel == "speed"] == [0, 1, 2, 6]
+    assert log.skipped == {"unreadable row": 4, "position not finite": 1}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (', unit = "mph"', "", r"column 'v': no unit; valid: m/s, km/h, mph, kn"),
+        ('"mph"', '"knots"', r"column 'v': unknown unit 'knots'; valid: m/s"),
+        ('unit = "s"', "", r"column 't': no unit; valid: s, ms, us, ns, iso8601"),
+        ('column = "v"', 'column = "speed"', r"drive\.csv: line 1: no column 'speed'"),
+        ('frame = "wgs84"', 'frame = "utm"', r"Invalid enum value 'utm'"),
+        ('frame = "wgs84"', 'frame = "ecef"', r"in frame 'ecef' needs exactly x, y, z"),
+        ('frame = "wgs84"', 'frame = "wgs84"\nepsg = 32633', r"epsg belongs to frame 'projected'"),
+        ("forward", "backward", r"unknown field `backward`"),
+        ("[time]", "[time", r"drive\.csv\.toml"),
+    ],
+)
+def test_a_wrong_declaration_is_told_in_one_line(
+    tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    assert old in DECLARATION
+    with pytest.raises(LogError, match=told) as caught:
+        open_log(drive(tmp_path, declaration=DECLARATION.replace(old, new, 1)))
+    assert "\n" not in str(caught.value)
+
+
+def test_without_a_declaration_nothing_is_guessed(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"units not declared; write drive\.csv\.toml beside it"):
+        open_log(drive(tmp_path, declaration=None))
+
+
+def test_grid_headings_become_true_ones(tmp_path: Path) -> None:
+    # Away from the central meridian of zone 33 (15° E), grid north points east of true north.
+    declaration = """
+reference_point = "antenna"
+[time]
+column = "t"
+unit = "s"
+base = "log"
+[position]
+frame = "projected"
+epsg = 32633
+easting = { column = "e", unit = "m" }
+northing = { column = "n", unit = "m" }
+[heading]
+yaw = { column = "h", unit = "deg" }
+zero = "north"
+direction = "clockwise"
+north = "grid"
+"""
+    path = drive(tmp_path, "t,e,n,h\n0,700000,5800000,0\n1,700000,5800100,0\n", declaration)
+    found = channels(path)
+    first, second = (fix.position for fix in found["gnss"])
+    east_m, north_m = local_from_geo(LocalFrame(first), second.lat_deg, second.lon_deg)
+    course = math.atan2(north_m, east_m)
+    assert found["heading"][0].yaw_rad == pytest.approx(course, abs=1e-6)
+    assert math.degrees(course) < 88.0

@@ -1,0 +1,138 @@
+"""Small logs written by hand: GPX, GeoJSON, smartLoc, and what is wrong with bad ones."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from telemetry.logs import LogError, line_of_log, open_log, read_line
+
+GPX = """<?xml version="1.0"?>
+<gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1">
+<rte><rtept lat="52.0" lon="13.0"/><rtept lat="52.1" lon="13.1"/></rte>
+{track}
+</gpx>"""
+TRACK = """<trk><trkseg>
+<trkpt lat="52.5" lon="13.4"><ele>34.5</ele><time>2026-03-01T10:00:00Z</time></trkpt>
+<trkpt lat="52.6" lon="13.5"><time>2026-03-01T11:00:00.250+01:00</time></trkpt>
+<trkpt lat="0" lon="0"><time>2026-03-01T10:00:01Z</time></trkpt>
+<trkpt lat="52.7" lon="13.5"><time>2026-03-01T10:00:00.100Z</time></trkpt>
+<trkpt lat="52.8" lon="13.5"><time>2026-03-01T10:00:02Z</time></trkpt>
+<trkpt lat="52.9" lon="13.5"/>
+</trkseg></trk>"""
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_gpx_track_is_a_log_in_utc(tmp_path: Path) -> None:
+    log = open_log(write(tmp_path, "ride.gpx", GPX.format(track=TRACK)))
+    samples = list(log.samples())
+    assert [m.stamp_ns - log.info.start_stamp_ns for _, m in samples] == [  # type: ignore[attr-defined]
+        0, 250_000_000, 2_000_000_000,
+    ]  # fmt: skip
+    assert log.info.start_stamp_ns == 1_772_359_200_000_000_000
+    assert log.info.time_base == "utc"
+    assert log.skipped == {"position (0, 0)": 1, "time backwards": 1, "unreadable row": 1}
+    list(log.samples())
+    assert log.skipped.total() == 3, "counted anew at each reading"
+
+
+def test_gpx_route_is_a_line_and_no_log(tmp_path: Path) -> None:
+    path = write(tmp_path, "plan.gpx", GPX.format(track=""))
+    np.testing.assert_array_equal(read_line(path).lat_deg, [52.0, 52.1])
+    with pytest.raises(LogError, match=r"plan\.gpx: track without time"):
+        open_log(path)
+
+
+def test_gpx_prefers_the_track_as_line(tmp_path: Path) -> None:
+    path = write(tmp_path, "both.gpx", GPX.format(track=TRACK))
+    assert read_line(path).lat_deg.tolist() == [52.5, 52.6, 52.7, 52.8, 52.9]
+
+
+def feature(**properties: object) -> str:
+    line = {"type": "LineString", "coordinates": [[13.4, 52.5, 30.0], [13.5, 52.6]]}
+    return json.dumps({"type": "Feature", "geometry": line, "properties": properties})
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        ["2026-03-01T10:00:00Z", "2026-03-01T10:00:01Z"],
+        [1_772_359_200, 1_772_359_201],
+        [1_772_359_200_000, 1_772_359_201_000],
+    ],
+)
+@pytest.mark.parametrize("name", ["coordTimes", "times"])
+def test_geojson_line_with_times_is_a_log(tmp_path: Path, name: str, times: list[object]) -> None:
+    log = open_log(write(tmp_path, "drive.geojson", feature(**{name: times})))
+    fixes = [message for _, message in log.samples()]
+    assert [fix.stamp_ns for fix in fixes] == [  # type: ignore[attr-defined]
+        1_772_359_200_000_000_000, 1_772_359_201_000_000_000,
+    ]  # fmt: skip
+    assert line_of_log(log).lon_deg.tolist() == [13.4, 13.5]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('{"type": "FeatureCollection", "features": []}', "holds no LineString but nothing"),
+        ('{"type": "Point", "coordinates": [1, 2]}', "holds no LineString but Point"),
+        ('{"type": "LineString", "coordinates": []}', "an empty LineString"),
+        ('{"type": "LineString", "coordinates": [[13.4, 52.5]]}', "a line needs two"),
+        ("{", "no valid JSON"),
+    ],
+)
+def test_geojson_without_a_line(tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(LogError, match=told) as caught:
+        read_line(write(tmp_path, "bad.geojson", text))
+    assert "bad.geojson" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_geojson_times_must_fit_the_line(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="3 times for a line of 2 positions"):
+        open_log(write(tmp_path, "drive.geojson", feature(times=[1, 2, 3])))
+
+
+def test_smartloc_counts_what_it_cannot_use(tmp_path: Path) -> None:
+    good = "point3 {} 3784144.3 901246.3 5037714.1 0 0 0 0 0 0 0 0 0\n"
+    text = (
+        good.format("0")
+        + "point3 0.2 x y z\n"
+        + "point3 0.4 0 0 0\n"
+        + "point3 0.6 nan 901246.3 5037714.1\n"
+        + good.format("0.8") * 2
+        + good.format("0.5")
+        + good.format("1.0")
+        + "point3 1.2\n"
+    )
+    log = open_log(write(tmp_path, "dirty.txt", text))
+    stamps = [message.stamp_ns for _, message in log.samples()]  # type: ignore[attr-defined]
+    assert stamps == [0, 800_000_000, 1_000_000_000]
+    assert log.skipped == {
+        "unreadable row": 2, "position not finite": 2, "time doubled": 1, "time backwards": 1,
+    }  # fmt: skip
+
+
+def test_files_that_are_no_log(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"missing\.gpx: no such file"):
+        open_log(tmp_path / "missing.gpx")
+    with pytest.raises(LogError, match="no comma2k19 segment"):
+        open_log(tmp_path)
+    with pytest.raises(LogError, match="is empty"):
+        open_log(write(tmp_path, "empty.gpx", ""))
+    with pytest.raises(LogError, match="no valid XML"):
+        open_log(write(tmp_path, "torn.gpx", GPX.format(track=TRACK)[:200]))
+    with pytest.raises(LogError, match=r"no known log; known are MCAP.*CSV.*GPX"):
+        open_log(write(tmp_path, "notes.txt", "hello"))
+    with pytest.raises(LogError, match="no MCAP file"):
+        open_log(write(tmp_path, "fake.mcap", "hello"))
+    with pytest.raises(LogError, match=r"a route is a \.gpx"):
+        read_line(write(tmp_path, "route.txt", "hello"))
