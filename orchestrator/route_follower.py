@@ -66,6 +66,9 @@ class RouteFollower:
         self._doubt: Match | None = None
         self._encounters: tuple[PassedJunction, ...] = ()
         self._passed_at: dict[str, float] = {}
+        self._reach_memory: tuple[tuple[int, bool, float], list[tuple[Junction, float]]] | None = (
+            None
+        )
 
     @property
     def route(self) -> Route:
@@ -123,20 +126,34 @@ class RouteFollower:
         known = {ahead.junction.summary.id for ahead in self.upcoming(horizon_m)}
         nearest: dict[str, UpcomingJunction] = {}
         for start, offset_m in starts:
-            nodes = [(start.end_node, offset_m)]
-            for reached in reach(self._graph, start, limit_m=horizon_m, legal_only=True).values():
-                end_m = offset_m + reached.gap_m + reached.directed_edge.edge.length_m
-                nodes.append((reached.directed_edge.end_node, end_m))
-            for node, distance_m in nodes:
-                junction = self._junction_at.get(node)
-                if junction is None or not 0.0 < distance_m <= horizon_m:
-                    continue
+            for junction, gap_m in self._junctions_from(start, horizon_m):
+                distance_m = offset_m + gap_m
                 name = junction.summary.id
-                if name in known or self._near_passed(name, self._s_m, junction.radius_m):
+                if name in known or not 0.0 < distance_m <= horizon_m:
+                    continue
+                if self._near_passed(name, self._s_m, junction.radius_m):
                     continue
                 if name not in nearest or distance_m < nearest[name].distance_m:
                     nearest[name] = UpcomingJunction(junction, distance_m, self._s_m + distance_m)
         return tuple(sorted(nearest.values(), key=lambda a: (a.distance_m, a.junction.summary.id)))
+
+    def _junctions_from(
+        self, start: DirectedEdge, horizon_m: float
+    ) -> list[tuple[Junction, float]]:
+        """Return the junctions' nodes reached from the end of `start`, with their distances."""
+        memory = (*key_of(start), horizon_m)
+        if self._reach_memory is None or self._reach_memory[0] != memory:
+            nodes = [(start.end_node, 0.0)]
+            for found in reach(self._graph, start, limit_m=horizon_m, legal_only=True).values():
+                end_m = found.gap_m + found.directed_edge.edge.length_m
+                nodes.append((found.directed_edge.end_node, end_m))
+            junctions = [
+                (self._junction_at[node], distance_m)
+                for node, distance_m in nodes
+                if node in self._junction_at
+            ]
+            self._reach_memory = (memory, junctions)
+        return self._reach_memory[1]
 
     # --- where the car is -------------------------------------------------------------------
 
