@@ -40,13 +40,13 @@ from telemetry.kinematic_filter import (
     X,
     Y,
 )
-from telemetry.measured import Measured
+from telemetry.measured import Doubt, Measured
 from telemetry.position_gate import PositionGate
 
 _STATE_PERIOD_NS = 20_000_000
 _UNKNOWN_STD_M = 0.01
 """Of positions that state none, until they turn out worse."""
-_ROUGH_INNOVATION_M = 0.5
+_ROUGH_M = 0.3
 _STANDING_MPS = 0.05
 _FRAME_REACH_M = 20_000.0
 _FAR_M = 1e8
@@ -85,7 +85,8 @@ class StateEstimator:
         self._state_stamp_ns: int | None = None
         self._convergence_rad = 0.0
         self._altitude_m = 0.0
-        self._innovation_m = 0.0
+        self._speed_doubt = Doubt(0.05)
+        self._yaw_doubt = Doubt(0.02)
         self._shifts = 0
         self._standing = False
 
@@ -122,7 +123,9 @@ class StateEstimator:
                 if self._standing:
                     filter_.stand()
                 else:
-                    filter_.correct_speed(speed, 0.05 + 0.005 * abs(speed))
+                    surprise = abs(speed - filter_.mean[SPEED])
+                    std = self._speed_doubt.std(surprise)
+                    filter_.correct_speed(speed, std + 0.005 * abs(speed))
             case ImuSample(accel_mps2=accel, rate_radps=rate):
                 if filter_ is not None:
                     filter_.correct_yaw_rate(rate[2], 0.01, biased=True)
@@ -132,7 +135,8 @@ class StateEstimator:
                 if filter_ is None:
                     self._start(stamp_ns, local_yaw, yaw_std_rad=0.02)
                     return
-                filter_.correct_yaw(local_yaw, 0.01)
+                surprise = abs(math.remainder(local_yaw - filter_.mean[YAW], math.tau))
+                filter_.correct_yaw(local_yaw, self._yaw_doubt.std(surprise))
                 if yaw_rate is not None:
                     filter_.correct_yaw_rate(yaw_rate, 0.01, biased=False)
             case SteeringSample():
@@ -194,8 +198,8 @@ class StateEstimator:
     def _std_m(self, fix: GnssFix) -> float:
         if fix.std_m is not None and math.isfinite(fix.std_m):
             return min(max(fix.std_m, 1e-3), 1e4)
-        rough = self._innovation_m > _ROUGH_INNOVATION_M
-        return 0.7 * self._innovation_m if rough else _UNKNOWN_STD_M
+        rough = self._gate.roughness_m
+        return rough if rough > _ROUGH_M else _UNKNOWN_STD_M
 
     def _correct(self, filter_: KinematicFilter, xy: Array, std: float, *, relocate: bool) -> None:
         lever = self._lever[:2]
@@ -203,7 +207,6 @@ class StateEstimator:
         if relocate:
             filter_.move_position(xy, std, lever)
             return
-        self._innovation_m += 0.05 * (min(innovation, 20.0) - self._innovation_m)
         if innovation > max(1.0, 8.0 * filter_.position_spread_m(std)):
             self._shifts += 1
             filter_.move_position(xy, std, lever)
@@ -271,7 +274,7 @@ class StateEstimator:
 
     def _passes_through(self, fix: GnssFix) -> bool:
         if fix.std_m is None:
-            return self._innovation_m <= _ROUGH_INNOVATION_M
+            return self._gate.roughness_m <= _ROUGH_M
         return fix.std_m <= 0.05 and not self._measured.anything
 
     def _place(self, fix: GnssFix | None) -> GeoPoint:

@@ -99,6 +99,23 @@ class Measured:
         return None if wheel is None else wheel / self._steering_ratio + self._steering_offset_rad
 
 
+class Doubt:
+    """The standard deviation to give a sensor that states none: its recent surprises, at least.
+
+    Speeds and courses of a satellite receiver lag behind its positions by up to a second; taken at
+    their word they would lead the track away.
+    """
+
+    def __init__(self, least: float) -> None:
+        self._least = least
+        self._mean_square = 0.0
+
+    def std(self, surprise: float) -> float:
+        """Take the latest surprise and return the standard deviation to use for it."""
+        self._mean_square += 0.02 * (surprise * surprise - self._mean_square)
+        return max(self._least, 2.0 * math.sqrt(self._mean_square))
+
+
 def _fault(message: Any) -> str | None:
     """Return why a sample cannot be a road vehicle's, or None."""
     for name in message.__struct_fields__:

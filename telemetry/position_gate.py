@@ -17,6 +17,7 @@ _JUMP_CONFIRM_S = 1.0
 _CLOCK_LEAP_S = 10.0
 _HISTORY_S = 6.0
 _STANDING_FIXES = 4
+_MOST_ACCEL_MPS2 = 4.0
 _STANDING_MPS = 0.06
 
 Verdict = Literal["use", "relocate", "skip"]
@@ -41,6 +42,8 @@ class PositionGate:
         self._last_stamp_ns: int | None = None
         self._leap_stamp_ns: int | None = None
         self._elsewhere: list[Placed] = []
+        self.roughness_m = 0.0
+        """How far fixes lie, on average, off any motion with up to 4 m/s² through the last two."""
 
     def plausible(self, fix: GnssFix) -> bool:
         """Return whether the fix is a position on Earth with a stamp after the last one's."""
@@ -74,8 +77,11 @@ class PositionGate:
         is relocated there.
         """
         if expected_xy_m is not None and self.recent:
-            elapsed = max(time_s - self.recent[-1].time_s, 0.02)
-            if _distance(xy_m, expected_xy_m) > MAX_SPEED_MPS * elapsed:
+            last = self.recent[-1]
+            elapsed = max(time_s - last.time_s, 0.02)
+            # Where the filter is astray, a fix that follows from the last one is still no jump.
+            away = min(_distance(xy_m, expected_xy_m), _distance(xy_m, last.xy_m))
+            if away > MAX_SPEED_MPS * elapsed:
                 return self._judge_jump(Placed(time_s, xy_m))
         self._elsewhere.clear()
         self._remember(Placed(time_s, xy_m))
@@ -104,6 +110,14 @@ class PositionGate:
         self._remember(Placed(time_s, xy_m))
 
     def _remember(self, fix: Placed) -> None:
+        if len(self.recent) >= 2:
+            last, before = self.recent[-1], self.recent[-2]
+            step_s, step_before_s = fix.time_s - last.time_s, last.time_s - before.time_s
+            if step_before_s > 0.0:
+                straight = last.xy_m + (last.xy_m - before.xy_m) * (step_s / step_before_s)
+                allowed = 0.5 * _MOST_ACCEL_MPS2 * step_s * (step_s + step_before_s)
+                excess = min(max(0.0, _distance(fix.xy_m, straight) - allowed), 20.0)
+                self.roughness_m += 0.05 * (excess - self.roughness_m)
         self.recent.append(fix)
         while fix.time_s - self.recent[0].time_s > _HISTORY_S:
             self.recent.popleft()

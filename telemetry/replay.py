@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import msgspec
 
 from contracts.drive import GnssFix, VehicleInfo
+from contracts.errors import UserError
 from contracts.setup import ReplaySetup
 from telemetry.vehicle_process import main, run_vehicle
 
@@ -45,9 +46,9 @@ class ReplaySource:
         start_s: float = 0.0,
         end_s: float | None = None,
     ) -> None:
-        """Raises ValueError for times out of order or a start after the log's last sample."""
+        """Raises UserError for times out of order or a start after the log's last sample."""
         if start_s < 0.0 or (end_s is not None and end_s <= start_s):
-            raise ValueError(f"replay from {start_s} s to {end_s} s: start must be before the end")
+            raise UserError(f"replay from {start_s} s to {end_s} s: start must be before the end")
         self._drive = drive
         log_start_ns = drive.info.start_stamp_ns
         self.first_stamp_ns = log_start_ns + round(start_s * 1e9)
@@ -62,7 +63,7 @@ class ReplaySource:
         self._samples = self._believable()
         self._next_sample = next(self._samples, None)
         if self._next_sample is None:
-            raise ValueError(
+            raise UserError(
                 f"{drive.info.source or 'the log'} holds no sample from {start_s} s to "
                 f"{'its end' if end_s is None else f'{end_s} s'}"
             )

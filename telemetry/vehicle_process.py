@@ -21,7 +21,9 @@ import msgspec
 from contracts.bus import Alive, Bus, Mailbox, Received, Request, ZenohBus
 from contracts.codec import SchemaMismatch
 from contracts.drive import AdvanceReply, DriveEnd, VehicleInfo
+from contracts.errors import UserError
 from contracts.keys import alive_key
+from contracts.process import log_to_file
 from contracts.setup import ProcessSetup, read_setup
 
 ORCHESTRATOR = "orchestrator"
@@ -213,11 +215,9 @@ def main(
         return 2
     try:
         setup = read_setup(Path(arguments[1]), kind)
-        logging.basicConfig(
-            filename=setup.log_file, level=logging.INFO, format="%(asctime)s %(name)s %(message)s"
-        )
+        log_to_file(setup)
         run(setup)
-    except (ValueError, OSError) as problem:
+    except (UserError, msgspec.DecodeError, OSError) as problem:
         print(f"{program}: {problem}", file=sys.stderr)
         log.error("%s", problem)
         return 2

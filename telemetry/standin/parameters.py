@@ -6,6 +6,8 @@ from pathlib import Path
 
 import msgspec
 
+from contracts.errors import UserError
+
 DEFAULT_FILE = Path(__file__).with_name("standin.toml")
 
 
@@ -59,10 +61,10 @@ class StandinParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
 def read_parameters(path: Path | None = None) -> StandinParameters:
     """Read a parameter file, by default the bundled one.
 
-    Raises ValueError naming the file and the field at fault, FileNotFoundError without a file.
+    Raises UserError naming the file and the field at fault, FileNotFoundError without a file.
     """
     file = path or DEFAULT_FILE
     try:
         return msgspec.toml.decode(file.read_bytes(), type=StandinParameters)
     except (msgspec.DecodeError, UnicodeDecodeError) as problem:
-        raise ValueError(f"{file}: {problem}") from problem
+        raise UserError(f"{file}: {problem}") from problem

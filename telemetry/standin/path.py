@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
+from contracts.errors import UserError
 from contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from telemetry.standin.parameters import DriverParameters
 
@@ -40,22 +41,22 @@ class DrivenPath:
     ) -> None:
         """Take positions (N,) in degrees with wished speeds (N,); 0 asks for a stop there.
 
-        Raises ValueError for arrays of other sizes, numbers that are not finite, or less than 5 m.
+        Raises UserError for arrays of other sizes, numbers that are not finite, or less than 5 m.
         """
         if not (len(lat_deg) == len(lon_deg) == len(speed_mps) >= 2):
-            raise ValueError(
+            raise UserError(
                 f"path of {len(lat_deg)} latitudes, {len(lon_deg)} longitudes and "
                 f"{len(speed_mps)} speeds; three lists of one length, at least 2, are needed"
             )
         if not np.isfinite(np.concatenate([lat_deg, lon_deg, speed_mps])).all():
-            raise ValueError("path holds a number that is not finite")
+            raise UserError("path holds a number that is not finite")
         if np.any(speed_mps < 0.0):
-            raise ValueError("path holds a negative speed; the stand-in drives forwards")
+            raise UserError("path holds a negative speed; the stand-in drives forwards")
         self.frame = LocalFrame(GeoPoint(float(lat_deg[0]), float(lon_deg[0])))
         xy = local_from_geo(self.frame, lat_deg, lon_deg)
         given_s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
         if given_s[-1] < 5.0:
-            raise ValueError(f"path is {given_s[-1]:.1f} m long; at least 5 m are needed")
+            raise UserError(f"path is {given_s[-1]:.1f} m long; at least 5 m are needed")
         fresh = np.concatenate([[True], np.diff(given_s) > 1e-6])
         count = max(11, int(given_s[-1] / _SPACING_M) + 1)
         even_s = np.linspace(0.0, given_s[-1], count)
@@ -72,7 +73,7 @@ class DrivenPath:
         self.length_m = float(self.s_m[-1])
         moving = fresh & (speed_mps > 0.0)
         if not moving.any():
-            raise ValueError("path holds no speed above 0")
+            raise UserError("path holds no speed above 0")
         # The smoothing shortens the path a little: stretch the given distances to it.
         along = given_s * self.length_m / given_s[-1]
         wished = np.interp(self.s_m, along[moving], speed_mps[moving])
@@ -126,7 +127,7 @@ def _braked(speed_mps: Array, step_m: Array, decel_mps2: float) -> Array:
 def read_path(file: Path, *, driver: DriverParameters) -> DrivenPath:
     """Read a JSON object with lists lat_deg, lon_deg, speed_mps.
 
-    Raises ValueError naming the file and what is wrong, FileNotFoundError without a file.
+    Raises UserError naming the file and what is wrong, FileNotFoundError without a file.
     """
     try:
         given = json.loads(file.read_text(encoding="utf-8"))
@@ -136,6 +137,6 @@ def read_path(file: Path, *, driver: DriverParameters) -> DrivenPath:
         )
         return DrivenPath(lat, lon, speed, driver=driver)
     except KeyError as missing:
-        raise ValueError(f"{file}: no list {missing}; lat_deg, lon_deg, speed_mps needed") from None
+        raise UserError(f"{file}: no list {missing}; lat_deg, lon_deg, speed_mps needed") from None
     except (ValueError, TypeError) as problem:
-        raise ValueError(f"{file}: {problem}") from problem
+        raise UserError(f"{file}: {problem}") from problem

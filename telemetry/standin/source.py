@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from contracts.drive import ControlCommand, VehicleInfo, VehicleState
+from contracts.errors import UserError
 from contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
 from telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
 from telemetry.standin.driver import Driver, DriverCommand
@@ -35,9 +36,9 @@ class StandinSource:
         end_s: float | None = None,
         plan_shift_m: float = 0.0,
     ) -> None:
-        """Place the car at rest at the path's beginning; raises ValueError for an end before it."""
+        """Place the car at rest at the path's beginning; raises UserError for an end before it."""
         if end_s is not None and not end_s > 0.0:
-            raise ValueError(f"end {end_s} s must be after the start")
+            raise UserError(f"end {end_s} s must be after the start")
         start = path.at(0.0)
         self._path = path
         self._parameters = parameters
