@@ -45,7 +45,7 @@ class Cluster:
     @property
     def plain(self) -> bool:
         """Whether one road merely goes on here."""
-        return len(self.legs) == 2 and len(self.nodes) == 1
+        return len(self.legs) == 2 and len(self.nodes) == 1 and not self.main
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

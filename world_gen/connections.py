@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from world_gen.polyline import offset, rounded, turn_curve, unit, without_repeat
 
 _LONG_PATH_M = 25.0
 _MAX_DETOUR_M = 9.0
+_FROM_LEFT: tuple[Turn, ...] = ("left", "straight", "right")
 
 
 @dataclass(slots=True)
@@ -67,13 +69,16 @@ def connect(
         if not mine:
             continue
         toward = mine[0].toward
-        starts = lanes.incoming(toward, around.section(toward).driven(reverse=toward.reverse))
+        plans = around.section(toward).driven(reverse=toward.reverse)
+        starts = lanes.incoming(toward, plans)
         for movement in _by_tags(mine, starts):
             away = movement.away
             ends = lanes.outgoing(away, around.section(away).driven(reverse=away.reverse))
             if not starts or not ends:
                 continue
             chosen = _starting_lanes(movement, starts, mine, len(ends))
+            if not chosen and len(starts) < len(plans):
+                continue  # the lanes for it are beyond the World's edge
             if not chosen:
                 notes.append(
                     f"way {toward.edge.way_id}: its turn lanes leave no lane for "
@@ -91,30 +96,30 @@ def connect(
 
 
 def _by_tags(ways: list[Movement], starts: list[LaneDraft]) -> list[Movement]:
-    """Let turn lanes correct a turn's name: a tagged `left` that no other movement takes up."""
-    tagged = {t for lane in starts for t in lane.plan.turns if lane.plan.turns_source == "tagged"}
-    if not tagged or any(lane.plan.turns_source != "tagged" for lane in starts):
+    """Let turn lanes correct the names of turns, which angles alone cannot tell at forks.
+
+    As many movements as there are tagged turns take them in order from the left; else a turn
+    that no lane names takes the name of a tagged one that no other movement took up.
+    """
+    if any(lane.plan.turns_source != "tagged" for lane in starts):
         return ways
-    have = {m.turn for m in ways}
-    corrected = []
-    for movement in ways:
-        turn = movement.turn
-        if turn not in tagged and turn != "u_turn":
-            side: Turn = "left" if movement.angle_rad > 0 else "right"
-            for candidate in (side, "straight"):
-                if candidate in tagged and candidate not in have:
-                    turn = candidate
-                    break
-        corrected.append(
-            Movement(
-                toward=movement.toward,
-                away=movement.away,
-                inside=movement.inside,
-                turn=turn,
-                angle_rad=movement.angle_rad,
-            )
-        )
-    return corrected
+    tagged = {turn for lane in starts for turn in lane.plan.turns} - {"u_turn"}
+    forward = sorted((m for m in ways if m.turn != "u_turn"), key=lambda m: -m.angle_rad)
+    have = {m.turn for m in forward}
+    if not tagged or have <= tagged:
+        return ways
+    if len(forward) == len(tagged):
+        named = zip(forward, sorted(tagged, key=_FROM_LEFT.index), strict=True)
+        turn_of = {id(m): turn for m, turn in named}
+    else:
+        turn_of = {id(m): _free_name(m, tagged, have) for m in forward if m.turn not in tagged}
+    return [dataclasses.replace(m, turn=turn_of.get(id(m), m.turn)) for m in ways]
+
+
+def _free_name(movement: Movement, tagged: set[Turn], have: set[Turn]) -> Turn:
+    side: Turn = "left" if movement.angle_rad > 0 else "right"
+    names: tuple[Turn, ...] = (side, "straight")
+    return next((name for name in names if name in tagged and name not in have), movement.turn)
 
 
 def _starting_lanes(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,10 +34,12 @@ class WorldStore:
         return self.folder / f"{world_id}.world"
 
     def save(self, world: World) -> Path:
-        """Write a World, unless it is there already, and return its path."""
+        """Write a World, complete or not at all, and return its path."""
         path = self.path_of(world.id)
-        if not path.exists():
-            write_message(world, path)
+        # Another process may be writing the same World: each has a name of its own for it.
+        mine = path.with_name(f"{world.id}.{os.getpid()}.part")
+        write_message(world, mine)
+        mine.replace(path)
         return path
 
     def load(self, world_id: str) -> World:
@@ -58,7 +61,7 @@ class WorldStore:
         """Save a World and enter it under what it was built from."""
         self.save(world)
         entry = self._entry(world.map_sha256, world.intersection.id, world.radius_m)
-        partial = entry.with_name(f"{entry.name}.{world.id}.partial")
+        partial = entry.with_name(f"{entry.stem}.{os.getpid()}.part")
         partial.write_text(world.id, encoding="ascii")
         partial.replace(entry)
 

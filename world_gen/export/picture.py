@@ -75,7 +75,7 @@ def write_picture(world: World, path: Path) -> None:
     figure.text(0.985, 0.012, world.attribution, fontsize=13, ha="right", weight="bold")
     _legend(figure, world)
     _notes(figure, world)
-    canvas.print_figure(str(path), format="png")
+    canvas.print_figure(str(path), format="png", metadata={"Copyright": world.attribution})
 
 
 def _close_reach(world: World) -> float:
