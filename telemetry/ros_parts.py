@@ -6,6 +6,7 @@ import functools
 import math
 from typing import Any
 
+import msgspec
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -23,6 +24,9 @@ STRING = "std_msgs/msg/String"
 ACKERMANN = "ackermann_msgs/msg/AckermannDriveStamped"
 STEERING_REPORT = "autoware_vehicle_msgs/msg/SteeringReport"
 TRAJECTORY = "autoware_planning_msgs/msg/Trajectory"
+
+Parts = list[tuple[str, str, Any]]
+"""Topic below our prefix, type name and message, of each ROS 2 message of one of ours."""
 
 
 @functools.cache
@@ -104,3 +108,8 @@ def covariance(size: int, **diagonal: float) -> Array:
 def within_float32(value: float) -> float:
     """Keep a number within what 32 bits hold; NaN stays."""
     return min(max(value, -3.4e38), 3.4e38) if math.isfinite(value) else value
+
+
+def json_string(message: msgspec.Struct) -> Any:
+    """Return a message as a String that holds its JSON."""
+    return ros_type(STRING)(data=msgspec.json.encode(message).decode())

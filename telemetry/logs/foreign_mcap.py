@@ -24,7 +24,7 @@ from contracts.frames import GeoPoint, LocalFrame
 from telemetry.logs.log import FILE_CUT_SHORT, UNREADABLE_ROW, Declared, Log, LogError, Sample
 from telemetry.logs.mcap_records import Contents, Record, records
 from telemetry.logs.merge import reordered
-from telemetry.ros_messages import plan_from_trajectory
+from telemetry.ros_motion import plan_from_trajectory
 from telemetry.ros_parts import stamp_ns_of
 
 NO_FIX = "receiver without fix"
