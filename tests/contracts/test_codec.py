@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -72,6 +73,13 @@ def test_arrays_of_any_layout_arrive_contiguous_and_little_endian(array: np.ndar
 
     assert arrived.dtype == np.dtype("<f8")
     assert np.array_equal(arrived, array)
+
+
+def test_arrays_of_anything_but_plain_numbers_are_refused() -> None:
+    plan = msgspec.structs.replace(PLAN, yaw_rad=np.array([1j]))
+
+    with pytest.raises(SchemaMismatch, match="array of type '<c16' is refused"):
+        decode(encode(plan), PlannedTrajectory)
 
 
 def test_another_schema_version_is_refused_with_both_versions_named() -> None:
