@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -13,8 +14,16 @@ from contracts.bus import Bus, Mailbox, Received
 from contracts.process import ProcessLife, run_process
 from contracts.setup import ViewerSetup
 from viewer.blueprint import drive_blueprint
-from viewer.live_viewer import HOST, NoViewerError, live_viewer, rerun_program
+from viewer.live_viewer import (
+    HOST,
+    NoViewerError,
+    has_display,
+    live_viewer,
+    offline_environment,
+    rerun_program,
+)
 from viewer.monitor import RUN_CHANNELS, VEHICLE_CHANNELS, Monitor, read_world
+from viewer.recordings import copy_with_blueprint, is_complete
 from viewer.rows import Row
 from viewer.sinks import FileStream, LiveStream
 
@@ -22,7 +31,8 @@ MAILBOX_DEPTH = 4096
 FLUSH_PERIOD_S = 0.5
 QUIET_S = 0.25
 """At the end the mailbox must stay empty for this long: messages of other keys may lag behind."""
-DRAIN_S = 3.0
+DRAIN_S, HURRIED_DRAIN_S = 10.0, 1.0
+"""How long emptying the mailbox may take: after `run_end`, and when told to leave at once."""
 LIVE_CLOSE_S = 1.0
 
 _log = logging.getLogger("viewer")
@@ -34,6 +44,7 @@ class Recorder:
     def __init__(self, setup: ViewerSetup, messages: Mailbox) -> None:
         self._messages = messages
         self._dropped_told = 0
+        self._window_told = False
         self._flushed_s = time.monotonic()
         self._monitor = Monitor(
             drive_frame=setup.drive_frame,
@@ -64,20 +75,20 @@ class Recorder:
                 rows = self._monitor.note("error", str(problem))
             self._write(rows)
         if time.monotonic() - self._flushed_s > FLUSH_PERIOD_S:
-            self._tell_dropped()
+            self._tell_troubles()
             self._file.flush()
             self._flushed_s = time.monotonic()
         return item is not None
 
-    def drain(self) -> None:
+    def drain(self, *, at_most_s: float) -> None:
         """Write what still lies in the mailbox, in bounded time."""
-        deadline_s = time.monotonic() + DRAIN_S
+        deadline_s = time.monotonic() + at_most_s
         while self.take_one(QUIET_S) and time.monotonic() < deadline_s:
             pass
 
     def close(self, *, keep_window: bool) -> None:
         """Complete the file, then give the live view a moment; bounded even if it is frozen."""
-        self._tell_dropped()
+        self._tell_troubles()
         self._file.close()
         if self._live is not None and self._live_viewer is not None:
             self._live.close(LIVE_CLOSE_S)
@@ -90,7 +101,10 @@ class Recorder:
         if self._live is not None:
             self._live.write(rows)
 
-    def _tell_dropped(self) -> None:
+    def _tell_troubles(self) -> None:
+        if self._live is not None and self._live.failed and not self._window_told:
+            self._window_told = True
+            self._write(self._monitor.note("warning", f"no live view: {self._live.failed}"))
         dropped = self._messages.dropped
         if dropped > self._dropped_told:
             text = f"{dropped - self._dropped_told} messages dropped, {dropped} in all"
@@ -112,23 +126,28 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
     life.ready()
     while not life.over:
         recorder.take_one(0.1)
-    recorder.drain()
+    ended_well = len(run_end) > 0
+    recorder.drain(at_most_s=DRAIN_S if ended_well else HURRIED_DRAIN_S)
     messages.close()
-    recorder.close(keep_window=len(run_end) > 0)
+    recorder.close(keep_window=ended_well)
 
 
 def show(recording: Path) -> None:
     """Become the native viewer of `recording`, which holds its layout."""
     if not recording.is_file():
         raise FileNotFoundError(f"no recording {recording}")
-    has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if sys.platform.startswith("linux") and not has_display:
+    if not has_display():
         raise NoViewerError(
             f"no display to show {recording} on; "
             f"`python -m viewer.picture {recording} OUT.png` renders a picture without one"
         )
     program = str(rerun_program())
-    os.execv(program, [program, "--bind", HOST, "--port", "auto", str(recording)])
+    if not is_complete(recording):
+        copy = Path(tempfile.mkdtemp(prefix="foretwin-")) / recording.name
+        copy_with_blueprint(recording, copy, drive_blueprint())
+        recording = copy
+    arguments = [program, "--bind", HOST, "--port", "auto", str(recording)]
+    os.execve(program, arguments, offline_environment())
 
 
 def main(arguments: list[str] | None = None) -> int:

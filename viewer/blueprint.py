@@ -38,7 +38,7 @@ def drive_blueprint(
         name="Intersection",
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
-            position=(-34.0, -46.0, 74.0),
+            position=(-19.0, -26.0, 88.0),
             look_target=(0.0, 0.0, 0.0),
             eye_up=(0.0, 0.0, 1.0),
         ),
@@ -54,6 +54,21 @@ def drive_blueprint(
             position=(-17.0, 0.0, 9.0),
             look_target=(7.0, 0.0, 0.0),
             eye_up=(0.0, 0.0, 1.0),
+        ),
+        background=BACKGROUND,
+        line_grid=False,
+    )
+    # Rerun's own map view fetches tiles from the internet, which tells where the car is: seen from
+    # straight above, the World needs none. /geo is recorded for those who add a map view.
+    overview = rrb.Spatial3DView(
+        origin="/world/focus",
+        contents=["/world/**", "/map/**"],
+        name="Map",
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital,
+            position=(0.0, 0.0, 330.0),
+            look_target=(0.0, 0.0, 0.0),
+            eye_up=(0.0, 1.0, 0.0),
         ),
         background=BACKGROUND,
         line_grid=False,
@@ -77,7 +92,7 @@ def drive_blueprint(
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/status", name="Status", titlebar=False),
                 rrb.Tabs(
-                    intersection, chase, rrb.MapView(origin="/geo", name="Map", zoom=16.5),
+                    intersection, chase, overview,
                     active_tab=main,
                 ),
                 rrb.Tabs(

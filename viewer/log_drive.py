@@ -40,6 +40,7 @@ TRAIL_S = 10.0
 PERIOD_NS = 95_000_000
 """Cars and gaps are logged at most at about 10 Hz of drive time."""
 FOCUS_REACH_M = 32.0
+MARK_HEIGHT_M = 60.0
 FOCUS_TIME_CONSTANT_S = 1.5
 
 
@@ -80,7 +81,7 @@ def static_rows() -> list[Row]:
                 rr.SeriesLines(
                     colors=[LIMIT] * count,
                     names=["limit"] if count == 1 else ["limit", "-limit"],
-                    widths=[1.0] * count,
+                    widths=[2.5] * count,
                 ),
             )
         )
@@ -127,6 +128,16 @@ class DriveLog:
         rows = [
             Row("world/ego/real", drive_ns, _pose(here, self._yaw_rad)),
             Row("world/focus", drive_ns, rr.Transform3D(translation=self._look(here, drive_ns))),
+            # From straight above, the car itself is a few pixels.
+            Row(
+                "map/ego",
+                drive_ns,
+                rr.Points3D(
+                    [[float(here[0]), float(here[1]), MARK_HEIGHT_M]],
+                    radii=rr.Radius.ui_points(6),
+                    colors=[TWIN],
+                ),
+            ),
             Row(
                 "geo/ego/real",
                 drive_ns,

@@ -99,7 +99,7 @@ def _futures(view: RoundView, drive_ns: int) -> list[Row]:
             rr.Points3D(
                 strips[:, -1].astype(np.float32),
                 colors=colours[usable],
-                radii=np.float32(2.2) * radii[usable],
+                radii=np.where(radii[usable] > 0.2, 0.7, 0.45),
             ),
         ),
     ]

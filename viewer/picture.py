@@ -21,8 +21,8 @@ from viewer.live_viewer import (
     start_program,
     wait_until_it_answers,
 )
+from viewer.recordings import copy_with_blueprint
 from viewer.rows import TIMELINE
-from viewer.sinks import copy_with_blueprint
 
 SETTLE_S = 60.0
 POLL_S = 0.25

@@ -5,14 +5,12 @@ from __future__ import annotations
 import collections
 import logging
 import threading
-import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from rerun.chunk import RrdReader
 
 from viewer.rows import APPLICATION_ID, TIMELINE, Row, plain_text
 
@@ -23,7 +21,8 @@ FLUSH_S = 3.0
 _log = logging.getLogger(__name__)
 
 
-def _stream(recording_id: str, *, send_properties: bool) -> rr.RecordingStream:
+def recording_stream(recording_id: str, *, send_properties: bool) -> rr.RecordingStream:
+    """Return a stream of our application, without the wall clock as a timeline."""
     stream = rr.RecordingStream(
         APPLICATION_ID, recording_id=recording_id, send_properties=send_properties
     )
@@ -46,7 +45,7 @@ class FileStream:
     def __init__(
         self, path: Path, *, recording_id: str, title: str, blueprint: rrb.Blueprint
     ) -> None:
-        self._stream = _stream(recording_id, send_properties=True)
+        self._stream = recording_stream(recording_id, send_properties=True)
         self._stream.save(path, default_blueprint=blueprint)
         self._stream.send_recording_name(plain_text(title))
 
@@ -133,7 +132,7 @@ class LiveStream:
 
     def _pump(self) -> None:
         try:
-            stream = _stream(self._recording_id, send_properties=False)
+            stream = recording_stream(self._recording_id, send_properties=False)
             stream.connect_grpc(self._open_viewer(), default_blueprint=self._blueprint)
             while (row := self._next()) is not None:
                 _emit(stream, row)
@@ -142,24 +141,3 @@ class LiveStream:
             _log.warning("no live view: %s", problem)
             self.failed = str(problem)
         self._done.set()
-
-
-def copy_with_blueprint(recording: Path, copy: Path, blueprint: rrb.Blueprint) -> None:
-    """Write `recording`, complete or cut off by a kill, to `copy` with another layout.
-
-    Raises ValueError for a file that is no recording.
-    """
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="RRD file has no footer")
-            reader = RrdReader(recording)
-            stores = reader.recordings()
-    except Exception as problem:
-        raise ValueError(f"{recording} is no Rerun recording: {problem}") from problem
-    if not stores:
-        raise ValueError(f"{recording} holds no recording")
-    stream = _stream(stores[0].recording_id, send_properties=False)
-    stream.save(copy, default_blueprint=blueprint)
-    stream.send_chunks(reader.stream())
-    stream.flush()
-    stream.disconnect()

@@ -117,6 +117,21 @@ def test_a_missing_world_and_foreign_bytes_become_events(start_viewer: StartView
     assert len(recorded.times_s("/world/ego/real")) == 10
 
 
+def test_without_a_display_the_drive_goes_on_and_says_so(
+    start_viewer: StartViewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    run = start_viewer(live="native")
+    run.send(scene.drive(duration_s=1.0))
+    wait_until(lambda: run.logged("no live view"))
+    _end_run(run)
+    assert run.process.wait(20.0) == 0
+    recorded = Recorded(run.recording)
+    assert any("no live view" in str(text) for text in recorded.values("/events", ":text"))
+    assert len(recorded.times_s("/world/ego/real")) == 10
+
+
 def test_a_frozen_window_holds_up_nothing(start_viewer: StartViewer) -> None:
     port = free_port()
     window: subprocess.Popen[bytes] = start_program("--serve-grpc", port=port)

@@ -1,0 +1,37 @@
+"""`python -m viewer --open` and its errors: one line each, exit code 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from viewer.__main__ import main
+from viewer.live_viewer import offline_environment
+
+
+def test_a_missing_recording_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--open", str(tmp_path / "monitor.rrd")]) == 2
+    assert capsys.readouterr().err == f"viewer: no recording {tmp_path / 'monitor.rrd'}\n"
+
+
+@pytest.mark.skipif("sys.platform != 'linux'", reason="displays are named in the environment")
+def test_without_a_display_a_picture_is_offered(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    recording = tmp_path / "monitor.rrd"
+    recording.write_bytes(b"RRF2")
+    assert main(["--open", str(recording)]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "viewer.picture" in told
+
+
+def test_the_viewer_is_kept_from_the_internet(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("https_proxy", "http://proxy.example:3128")
+    environment = offline_environment()
+    for name in ("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "https_proxy"):
+        assert environment[name] == "http://127.0.0.1:9"
+    assert "127.0.0.1" in environment["NO_PROXY"]

@@ -1,0 +1,121 @@
+"""What a person sees: the recording rendered without a display, and proof that emptiness shows."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from tests.viewer import scene
+from viewer.blueprint import GAP_VIEWS, drive_blueprint
+from viewer.log_drive import LIMIT, TWIN
+from viewer.log_scenarios import CRITICAL
+from viewer.log_world import ROAD
+from viewer.monitor import Monitor
+from viewer.picture import Picture, has_vulkan, main, take_picture
+from viewer.sinks import FileStream
+
+pytestmark = pytest.mark.picture
+SIZE = (1200, 800)
+AT_S = 7.0
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _needs_vulkan() -> None:
+    if has_vulkan():
+        return
+    if os.environ.get("FORETWIN_REQUIRE_PICTURE") == "1":
+        pytest.fail("FORETWIN_REQUIRE_PICTURE=1, but no Vulkan driver is installed")
+    pytest.skip("no Vulkan driver to render with (Debian: mesa-vulkan-drivers)")
+
+
+def _record(path: Path, *, without: tuple[str, ...] = ()) -> Path:
+    monitor = Monitor(
+        drive_frame=scene.DRIVE_FRAME,
+        start_stamp_ns=scene.START_NS,
+        title="hand-made drive",
+        load_world=lambda _id: scene.junction(),
+    )
+    file = FileStream(path, recording_id=path.stem, title="t", blueprint=drive_blueprint())
+    file.write(monitor.opening())
+    for channel, message in scene.drive(duration_s=AT_S + 1.0):
+        if channel not in without:
+            file.write(monitor.handle(channel, message))
+    file.close()
+    return path
+
+
+def _pixels(png: bytes) -> np.ndarray[Any, Any]:
+    return matplotlib.image.imread(io.BytesIO(png), format="png")[..., :3] * 255.0
+
+
+def _count(png: bytes, colour: tuple[int, int, int], *, within: float = 24.0) -> int:
+    """Return how many pixels have about this colour."""
+    return int((np.abs(_pixels(png) - np.array(colour)).max(axis=2) < within).sum())
+
+
+def _contrast(png: bytes) -> float:
+    """Return the standard deviation of the pixels' brightness, 0..255."""
+    return float(_pixels(png).mean(axis=2).std())
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Picture:
+    folder = tmp_path_factory.mktemp("whole")
+    return take_picture(_record(folder / "whole.rrd"), at_s=AT_S, size=SIZE)
+
+
+@pytest.fixture(scope="module")
+def empty(tmp_path_factory: pytest.TempPathFactory) -> Picture:
+    folder = tmp_path_factory.mktemp("empty")
+    missing = ("world", "active_world", "mirror", "round", "plan", "state")
+    recording = _record(folder / "empty.rrd", without=missing)
+    return take_picture(recording, at_s=AT_S, size=SIZE)
+
+
+def test_the_3d_view_shows_roads_buildings_and_futures(whole: Picture, empty: Picture) -> None:
+    full, bare = whole.views["Intersection"], empty.views["Intersection"]
+    assert _contrast(full) > 25.0
+    assert _count(full, ROAD) > 5000
+    assert _count(full, CRITICAL, within=40.0) > 200
+    assert _contrast(bare) < 10.0
+    assert _count(bare, ROAD) == 0
+    assert _count(bare, CRITICAL, within=40.0) == 0
+
+
+@pytest.mark.parametrize("name", GAP_VIEWS.values())
+def test_each_gap_plot_shows_its_curve_and_limit(whole: Picture, empty: Picture, name: str) -> None:
+    assert _count(whole.views[name], TWIN) > 150
+    assert _count(whole.views[name], LIMIT, within=40.0) > 150
+    assert _count(empty.views[name], TWIN) == 0
+    assert _count(empty.views[name], LIMIT, within=40.0) == 0
+
+
+def test_views_behind_tabs_are_not_on_the_picture(whole: Picture) -> None:
+    assert set(whole.views) >= {"Intersection", *GAP_VIEWS.values(), "ADE at 8 s, m", "Status"}
+    assert "Chase" not in whole.views
+    assert _pixels(whole.window).shape == (SIZE[1], SIZE[0], 3)
+
+
+def test_the_command_writes_a_picture(tmp_path: Path) -> None:
+    out = tmp_path / "out.png"
+    options = ["--at", "3", "--main", "Chase", "--detail", "Scenarios", "--size", "800x600"]
+    assert main([str(_record(tmp_path / "drive.rrd")), str(out), *options]) == 0
+    assert _contrast(out.read_bytes()) > 25.0
+
+
+def test_what_is_no_recording_is_told_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(tmp_path / "none.rrd"), str(tmp_path / "out.png")]) == 2
+    (tmp_path / "text.rrd").write_text("no recording")
+    assert main([str(tmp_path / "text.rrd"), str(tmp_path / "out.png")]) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 2
+    assert "none.rrd" in told[0]
+    assert "text.rrd" in told[1]
