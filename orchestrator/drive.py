@@ -8,9 +8,9 @@ import signal
 import time
 from types import FrameType
 
-from contracts.bus import Alive, Mailbox, Reply, ZenohBus
+from contracts.bus import Mailbox, Reply, ZenohBus
 from contracts.drive import InfoRequest
-from contracts.keys import alive_key, process_of_alive_key
+from contracts.keys import alive_key
 from contracts.process import log_to_file
 from contracts.setup import ProcessSetup
 from contracts.simulation import RunEnd
@@ -31,9 +31,11 @@ from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
 log = logging.getLogger(ORCHESTRATOR)
 
 START_TIMEOUT_S = 60.0
-END_GRACE_S = 20.0
+END_GRACE_S = 10.0
 """What recorder and viewer get to write at the end of a drive."""
 INTERRUPT_GRACE_S = 1.2
+HUNG_AFTER_S = 1.0
+"""A process whose token is gone for so long while it runs (a stopped one, say) is killed."""
 
 EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -79,6 +81,8 @@ class _Drive:
         self._supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
         self._vehicle_lost = False
         self._given_up: set[str] = set()
+        self._seen_alive: set[str] = set()
+        self._silent_since_s: dict[str, float] = {}
         self._mission = Mission(
             plan.graph,
             plan.junctions,
@@ -195,10 +199,21 @@ class _Drive:
                 self._vehicle_lost = True
             else:
                 conductor.tell(Tell("error", f"{text}; the drive goes on without it"))
-            # The token of a killed process vanishes by itself; a hung link would take longer.
-            gone = alive_key(run=self._plan.run_id, process=death.process_id)
-            if process_of_alive_key(gone) in conductor.alive:
-                conductor.handle(Alive(gone, False, time.monotonic_ns()))
+        self._end_the_hung(conductor, now_s)
+
+    def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:
+        """Kill processes that were alive, run still, and have not answered for a while."""
+        for process_id in self._supervisor.running():
+            if process_id in conductor.alive:
+                self._silent_since_s.pop(process_id, None)
+                self._seen_alive.add(process_id)
+            elif process_id in self._seen_alive:
+                since_s = self._silent_since_s.setdefault(process_id, now_s)
+                row = self._supervisor.row(process_id)
+                if row.when_dead == "restart" and now_s - since_s > HUNG_AFTER_S:
+                    log.warning("%s hangs: killed", process_id)
+                    self._supervisor.kill(process_id)
+                    self._seen_alive.discard(process_id)
 
     def _end(
         self,

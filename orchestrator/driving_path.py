@@ -24,6 +24,7 @@ from orchestrator.rounding import (
     simplified,
     smoothed,
     turns,
+    without_straight,
 )
 from orchestrator.route import Route, turn_angle
 from world_gen.polyline import arc_lengths
@@ -101,7 +102,9 @@ def _centre_line(route: Route, first: int, last: int) -> tuple[Array, Array]:
         places.append(float(route.start_m[number]) + arc[keep])
     line, s = np.concatenate(points), np.concatenate(places)
     apart = np.concatenate([[True], np.hypot(*np.diff(line, axis=0).T) > 0.05])
-    return line[apart], s[apart]
+    line, s = line[apart], s[apart]
+    bends = without_straight(line, s)
+    return line[bends], s[bends]
 
 
 class _LaneOffsets:

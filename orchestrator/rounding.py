@@ -13,6 +13,7 @@ from world_gen.polyline import arc_lengths
 FINE_M = 0.5
 """Spacing of lines while they are worked on."""
 SIMPLIFY_M = 0.5
+ARC_ROOM_M = 15.0
 WIDENING_M = 3.0
 WIDENING_STEPS = 8
 MAX_CURVATURE_PM = 0.18
@@ -44,6 +45,18 @@ def turns(line: Array) -> Array:
     legs = np.diff(line, axis=0)
     turn = np.diff(np.arctan2(legs[:, 1], legs[:, 0]))
     return np.asarray((turn + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def without_straight(line: Array, s: Array) -> list[int]:
+    """Return the indices without vertices near a corner where the line goes all but straight on.
+
+    A side road that joins there must not shorten the leg that the corner's arc may use.
+    """
+    turn = np.abs(turns(line))
+    corners = s[1:-1][turn > math.radians(35.0)]
+    near = (np.abs(s[1:-1, None] - corners[None, :]) < ARC_ROOM_M).any(axis=1)
+    keep = np.concatenate([[True], ~(near & (turn < math.radians(3.0))), [True]])
+    return [int(index) for index in np.flatnonzero(keep)]
 
 
 def fillet(line: Array, s: Array, radius: Array) -> tuple[Array, Array]:

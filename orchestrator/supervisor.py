@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -20,6 +21,8 @@ from typing import Protocol
 
 from contracts.setup import ProcessSetup, write_setup
 from orchestrator.processes import ProcessRow
+
+log = logging.getLogger("orchestrator")
 
 RESTARTS_WITHIN_S = 30.0
 MAX_RESTARTS = 5
@@ -105,6 +108,7 @@ class Supervisor:
     def start(self, row: ProcessRow, setup: ProcessSetup) -> None:
         """Start one process."""
         child = self.launch(module=row.module, setup=setup)
+        log.info("started %s (%s) as process %d", setup.process_id, row.module, child.pid)
         self._managed[setup.process_id] = _Managed(row, setup, child)
         self.started += 1
 
@@ -120,6 +124,7 @@ class Supervisor:
             again = managed.row.when_dead == "restart" and self._may_restart(process_id, now_s)
             if again:
                 managed.child = self.launch(module=managed.row.module, setup=managed.setup)
+                log.info("started %s again as process %d", process_id, managed.child.pid)
                 self.restarted += 1
             else:
                 managed.gone = True
@@ -136,6 +141,16 @@ class Supervisor:
     def running(self) -> list[str]:
         """Return the ids of processes that have not ended."""
         return [name for name, m in self._managed.items() if not m.gone and m.child.poll() is None]
+
+    def kill(self, process_id: str) -> None:
+        """End a process that hangs; `poll` then sees its death."""
+        managed = self._managed.get(process_id)
+        if managed is not None and not managed.gone:
+            _signal(managed.child, signal.SIGKILL)
+
+    def row(self, process_id: str) -> ProcessRow:
+        """Return the table's row of a process."""
+        return self._managed[process_id].row
 
     def pid(self, process_id: str) -> int:
         """Return the operating system's id of a process."""

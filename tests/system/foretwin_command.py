@@ -1,0 +1,121 @@
+"""Runs the command as a user does: a process of its own, its files looked at afterwards."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow.parquet as pq
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+class Finished(NamedTuple):
+    """What a command left: exit code, screen, and the folder of its run, if it made one."""
+
+    code: int
+    screen: str
+    run: Path | None
+
+    def record(self) -> dict[str, Any]:
+        assert self.run is not None
+        return json.loads((self.run / "run.json").read_text(encoding="utf-8"))
+
+    def rows(self, table: str) -> list[dict[str, Any]]:
+        assert self.run is not None
+        return pq.read_table(self.run / "results" / f"{table}.parquet").to_pylist()
+
+
+def environment(cache: Path) -> dict[str, str]:
+    return os.environ | {"XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(REPOSITORY)}
+
+
+def foretwin(out: Path, *arguments: str, timeout_s: float = 240.0) -> Finished:
+    """Run `foretwin drive` to its end."""
+    with started(out, *arguments) as process:
+        screen, _ = process.communicate(timeout=timeout_s)
+    return Finished(process.returncode, screen, run_folder(out))
+
+
+@contextmanager
+def started(out: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "orchestrator", "drive", "--view", "none", "--out", str(out),
+         *arguments],
+        cwd=out.parent, env=environment(out.parent / "cache"), text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(15.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+        folder = run_folder(out)
+        for pid in child_pids(folder).values() if folder else ():
+            if is_running(pid):
+                os.kill(pid, signal.SIGKILL)
+
+
+def run_folder(out: Path) -> Path | None:
+    """Return the folder of the only run below `out`, None where there is none."""
+    runs = sorted(path for path in out.glob("*") if path.is_dir()) if out.is_dir() else []
+    assert len(runs) <= 1
+    return runs[0] if runs else None
+
+
+def log_lines(run: Path) -> list[dict[str, Any]]:
+    """Return the lines of the run's log that are there so far."""
+    text = (run / "log.jsonl").read_text(encoding="utf-8") if (run / "log.jsonl").exists() else ""
+    return [json.loads(line) for line in text.splitlines(keepends=True) if line.endswith("\n")]
+
+
+def child_pids(run: Path) -> dict[str, int]:
+    """Return the newest process of each id that the log names."""
+    pids = {}
+    for line in log_lines(run):
+        text = line["text"]
+        if line.get("source") == "orchestrator" and text.startswith("started "):
+            pids[text.split()[1]] = int(text.rsplit(" ", 1)[1])
+    return pids
+
+
+def wait_for(condition: Callable[[], bool], what: str, *, within_s: float = 60.0) -> float:
+    """Wait until a condition holds; returns the seconds that took, fails after `within_s`."""
+    begun = time.monotonic()
+    pause = Pause()
+    while not condition():
+        assert time.monotonic() - begun < within_s, f"waited {within_s} s for {what}"
+        pause()
+    return time.monotonic() - begun
+
+
+class Pause:
+    """Lets others run between two looks at a condition."""
+
+    def __call__(self) -> None:
+        signal.sigtimedwait([], 0.02)
+
+
+def is_running(pid: int) -> bool:
+    """Whether a process exists and is no zombie."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"

@@ -1,0 +1,56 @@
+"""Lock step: the same results whatever the number of workers, and none that knows the future."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.system.foretwin_command import foretwin
+
+BERLIN_LOG = "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt"
+SMALL = ("--speed", "max", "--futures", "36", "--rate", "0.5")
+
+
+def test_one_worker_and_two_give_the_same_results(tmp_path: Path) -> None:
+    runs = [
+        foretwin(tmp_path / f"runs{workers}", *SMALL, "--end", "9", "--workers", str(workers))
+        for workers in (1, 2)
+    ]
+    assert [run.code for run in runs] == [0, 0], runs[0].screen + runs[1].screen
+    one, two = (run.record() for run in runs)
+    assert one["futures"]["count"] >= 36 * 3
+    assert one["futures"]["sha256"] == two["futures"]["sha256"]
+    assert one["futures"]["missed_rounds"] == 0
+    for table in ("comparisons", "plan_comparisons", "mirror"):
+        assert runs[0].rows(table) == runs[1].rows(table)
+
+
+@pytest.mark.real_data
+def test_cutting_the_log_changes_nothing_before_the_cut(tmp_path: Path, data_dir: Path) -> None:
+    whole = data_dir / BERLIN_LOG
+    cut = tmp_path / "cut.txt"
+    cut_s = 43.0
+    lines = whole.read_text().splitlines()
+    cut.write_text("\n".join(line for line in lines if float(line.split()[1]) <= cut_s) + "\n")
+    berlin = str(data_dir / "osm-berlin-mitte" / "berlin-mitte.osm")
+    runs = [
+        foretwin(
+            tmp_path / name, *SMALL, "--map", berlin, "--log", str(log), "--start", "20",
+            "--end", "50",
+        )
+        for name, log in (("whole", whole), ("cut", cut))
+    ]  # fmt: skip
+    assert [run.code for run in runs] == [0, 0], runs[0].screen + runs[1].screen
+    for table in ("futures", "comparisons", "mirror"):
+        full = [row for row in runs[0].rows(table) if row["stamp_ns"] < cut_s * 1e9]
+        part = [row for row in runs[1].rows(table) if row["stamp_ns"] < cut_s * 1e9]
+        if table == "comparisons":
+            # A comparison belongs to the instant at which its horizon has passed.
+            full = [r for r in full if r["stamp_ns"] / 1e9 + r["horizon_s"] < cut_s - 1.0]
+            part = [r for r in part if r["stamp_ns"] / 1e9 + r["horizon_s"] < cut_s - 1.0]
+        if table == "futures":
+            for row in [*full, *part]:
+                del row["worker_id"]
+        assert full, table
+        assert full == part, table
