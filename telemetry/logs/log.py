@@ -63,20 +63,23 @@ class Log:
 def screened(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sample]:
     """Drop samples with impossible values, and those whose clock stands still or runs backwards.
 
-    Time is judged per channel (per group for signals), since sensors overtake one another.
+    A doubled stamp is one within a channel (within a group for signals), a backwards one is before
+    anything already given, so that what is yielded is in stamp order whatever the source does.
     """
     latest: dict[object, int] = {}
+    newest_ns = 0
     for channel, message in samples:
         fault = fault_of(message)
         stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         stream = (channel, getattr(message, "group_id", None))
-        before_ns = latest.get(stream)
-        if fault is None and before_ns is not None and stamp_ns <= before_ns:
-            fault = TIME_DOUBLED if stamp_ns == before_ns else TIME_BACKWARDS
+        if fault is None and stamp_ns < newest_ns:
+            fault = TIME_BACKWARDS
+        elif fault is None and stamp_ns == latest.get(stream):
+            fault = TIME_DOUBLED
         if fault is not None:
             skipped[fault] += 1
             continue
-        latest[stream] = stamp_ns
+        latest[stream] = newest_ns = stamp_ns
         yield channel, message
 
 
