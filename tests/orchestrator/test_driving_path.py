@@ -101,6 +101,19 @@ def test_a_jog_of_a_badly_drawn_junction_does_not_kink_the_path() -> None:
     assert np.abs(curvature(whole(jog))).max() < 0.06
 
 
+def test_a_side_road_just_before_a_turn_does_not_sharpen_it() -> None:
+    plain = graph_of([road(0, 1, 2, [(0, 0), (150, 0)]), road(1, 2, 3, [(150, 0), (150, 150)])])
+    joined = graph_of(
+        [
+            road(0, 1, 2, [(0, 0), (147, 0)]),
+            road(1, 2, 3, [(147, 0), (150, 0)]),
+            road(2, 3, 4, [(150, 0), (150, 150)]),
+        ]
+    )
+
+    assert whole(joined).xy_m == pytest.approx(whole(plain).xy_m, abs=0.1)
+
+
 def test_a_roundabout_is_followed_round() -> None:
     angles = np.linspace(-math.pi / 2, math.pi / 2, 13)
     ring = [(20.0 * math.cos(a) + 80.0, 20.0 * math.sin(a)) for a in angles]
