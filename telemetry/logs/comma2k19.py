@@ -50,7 +50,8 @@ def open_comma2k19(folder: Path) -> Log:
     present = {name: stream for name, stream in streams.items() if stream is not None}
     if "gnss" not in present:
         raise LogError(f"{folder}: no global_pose/frame_positions: a drive needs positions")
-    edges_ns = [_stamps_ns(time_s) for time_s, _ in present.values()]
+    stamps_ns = np.concatenate([_stamps_ns(time_s) for time_s, _ in present.values()])
+    known_ns = stamps_ns[stamps_ns >= 0]
 
     def read(_skipped: Counter[str]) -> Iterator[Sample]:
         return merged(*(_samples(name, *stream) for name, stream in present.items()))
@@ -59,8 +60,8 @@ def open_comma2k19(folder: Path) -> Log:
         info=VehicleInfo(
             vehicle_id="car",
             time_base="boot",
-            start_stamp_ns=int(min(stamps[0] for stamps in edges_ns)),
-            end_stamp_ns=int(max(stamps[-1] for stamps in edges_ns)),
+            start_stamp_ns=int(known_ns.min()),
+            end_stamp_ns=int(known_ns.max()),
             source=folder.name,
             reference_point="camera",
             sends=tuple(present),
@@ -98,8 +99,7 @@ def _timed(
         raise LogError(
             f"{folder / value_name}: {len(value)} values for the {len(time_s)} times in {time_name}"
         )
-    known = np.isfinite(time_s[:, 0])
-    return (time_s[known, 0], value[known]) if known.any() else None
+    return (time_s[:, 0], value) if np.isfinite(time_s).any() else None
 
 
 def _column(folder: Path, name: str, columns: int) -> tuple[Array, Array] | None:
@@ -133,14 +133,15 @@ def _imu(folder: Path) -> tuple[Array, Array] | None:
     """Return times and (N, 6) specific force and rate, axes forward, left, up."""
     accel = _column(folder, "processed_log/IMU/accelerometer", 3)
     rate = _column(folder, "processed_log/IMU/gyro", 3)
-    if accel is None or rate is None or not np.array_equal(accel[0], rate[0]):
+    if accel is None or rate is None or not np.array_equal(accel[0], rate[0], equal_nan=True):
         return None
     left_up = np.array([1.0, -1.0, -1.0])
     return accel[0], np.hstack([accel[1] * left_up, rate[1] * left_up])
 
 
 def _stamps_ns(time_s: Array) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    return np.round(time_s * 1e9).astype(np.int64)
+    # An unreadable time becomes one before zero, which is refused and counted with the others.
+    return np.round(np.where(np.isfinite(time_s), time_s * 1e9, -1.0)).astype(np.int64)
 
 
 def _samples(name: str, time_s: Array, value: Array) -> Iterator[Sample]:
