@@ -3,8 +3,8 @@
 `run_job` is a pure function of World, vehicle and job: its result is the same bits whichever
 worker runs it, however often, whatever the stage did before. Collisions with road users are
 overlaps of oriented rectangles at each control tick (planar bodies that lie deep inside each
-other push no more); collisions with buildings and islands are contacts of the physics, which
-sees every 10 ms and stops the car at the wall.
+other touch no more), or a contact of the physics between two ticks, which can push the car back
+out before the next; collisions with buildings and islands are contacts of the physics alone.
 """
 
 from __future__ import annotations
@@ -175,6 +175,7 @@ def _drive(
 
     states = np.empty((count, ticks + 1, 8))
     contact = np.zeros((count, ticks + 1), dtype=bool)
+    user_contact = contact.copy()
     valid = np.ones((count, ticks + 1), dtype=bool)
     arc = np.full(count, start_arc_m)
     states[:, 0] = stage.states
@@ -209,9 +210,10 @@ def _drive(
         )
         states[:, tick + 1] = stage.states
         contact[:, tick + 1] = stage.static_contact
+        user_contact[:, tick + 1] = stage.road_user_contact
         valid[:, tick + 1] = valid[:, tick] & fine & ~stage.diverged()
     end = path.locate(stage.states[:, :2], near_arc_m=arc).arc_m
-    return DriveRecord(states, contact, valid, end - start_arc_m)
+    return DriveRecord(states, contact, user_contact, valid, end - start_arc_m)
 
 
 def _planner_groups(job: FuturesJob) -> list[tuple[str, Planner, Rows | None]]:

@@ -21,10 +21,11 @@ NOTHING, ROAD_USER, STATIC = 0, 1, 2
 
 
 class DriveRecord(NamedTuple):
-    """What a job recorded at T control ticks: states (S, T, 8), contact and validity (S, T)."""
+    """What a job recorded at T control ticks: states (S, T, 8), contacts and validity (S, T)."""
 
     states: Array
     static_contact: Flags
+    user_contact: Flags
     valid: Flags
     progress_m: Array
 
@@ -49,6 +50,7 @@ def judge(
                 poses[there, :, :2], poses[there, :, 2], ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
             ),
         )
+    distance[drive.user_contact] = 0.0
     hit_user, hit_static = distance <= 0.0, drive.static_contact
     hit = hit_user | hit_static
     collided: Any = hit.any(axis=1) & valid

@@ -29,6 +29,7 @@ ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M, ROAD_USER_HEIGHT_M = 4.5, 1.8, 1.5
 PREFIX = "ego_"
 _ROAD_USER = "road_user"
 _STATIC_CONTACT = "static_contact"
+_ROAD_USER_CONTACT = "road_user_contact"
 _FAR_M = 1.0e4
 """Where the road user of a future without one is kept."""
 
@@ -115,6 +116,7 @@ class Stage:
         self._steer_history = slice(first, first + samples)
         self._history_samples = samples
         self._static_contact = int(model.sensor(_STATIC_CONTACT).adr[0])
+        self._road_user_contact = int(model.sensor(_ROAD_USER_CONTACT).adr[0])
         state = mujoco.mjtState
         # Control, road user position and orientation, in the order of the state's bits.
         self._control_spec = int(
@@ -234,7 +236,15 @@ class Stage:
     @property
     def static_contact(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether the vehicle touched a building or island during the last tick."""
-        found = self._record["sensordata"][:, :, self._static_contact]
+        return self._touched(self._static_contact)
+
+    @property
+    def road_user_contact(self) -> npt.NDArray[np.bool_]:
+        """(S,) bool: whether the vehicle touched its road user during the last tick."""
+        return self._touched(self._road_user_contact)
+
+    def _touched(self, sensor: int) -> npt.NDArray[np.bool_]:
+        found = self._record["sensordata"][:, :, sensor]
         return np.asarray((found > 0.0).any(axis=1))
 
     def diverged(self) -> npt.NDArray[np.bool_]:
@@ -251,15 +261,16 @@ def _compile(spec: mujoco.MjSpec, vehicle: VehicleParameters) -> mujoco.MjModel:
     spec.attach(vehicle_spec(vehicle), prefix=PREFIX, frame=spec.worldbody.add_frame())
     add_road_user(spec, name=_ROAD_USER)
     body = mujoco.mjtObj.mjOBJ_BODY
-    sensor = spec.add_sensor(
-        name=_STATIC_CONTACT,
-        type=mujoco.mjtSensor.mjSENS_CONTACT,
-        objtype=body,
-        objname=PREFIX + "chassis",
-        reftype=body,
-        refname="world",
-    )
-    sensor.intprm = [1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1]
+    for name, other in ((_STATIC_CONTACT, "world"), (_ROAD_USER_CONTACT, _ROAD_USER)):
+        sensor = spec.add_sensor(
+            name=name,
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=body,
+            objname=PREFIX + "chassis",
+            reftype=body,
+            refname=other,
+        )
+        sensor.intprm = [1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1]
     return spec.compile()
 
 

@@ -16,7 +16,7 @@ from sim_worker.seeding import local_state
 from sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
 
 _STEP_NS = round(TIMESTEP_S * 1e9)
-_GRID_TOLERANCE = 0.25
+_GRID_TOLERANCE = 0.05
 """Of a sample period: how early a state may be and still count for its instant."""
 
 

@@ -13,6 +13,8 @@ from contracts.vehicle import Parameter, VehicleParameters
 
 DEFAULT_FILE = Path(__file__).with_name("bmw_320i.toml")
 GRAVITY_MPS2 = 9.81
+MAX_VEHICLE_DELAY_S = 0.6
+"""Futures add up to 0.4 s, and the sample buffer of the steering actuator holds 1 s."""
 
 _MAY_BE_ZERO = {"drag_npv2", "rolling_resistance_n", "steering_delay_s", "rear_overhang_m"}
 _ANY_SIGN = {"steering_offset_rad"}
@@ -61,6 +63,11 @@ def check_vehicle(vehicle: VehicleParameters) -> VehicleParameters:
         raise ValueError(
             f"cog_from_rear_axle_m {vehicle.cog_from_rear_axle_m.value} must be less than "
             f"wheelbase_m {vehicle.wheelbase_m.value}"
+        )
+    if vehicle.steering_delay_s.value > MAX_VEHICLE_DELAY_S:
+        raise ValueError(
+            f"steering_delay_s {vehicle.steering_delay_s.value} must be at most "
+            f"{MAX_VEHICLE_DELAY_S}: futures add to it"
         )
     if vehicle.max_tire_angle_rad.value >= math.pi / 2:
         raise ValueError(f"max_tire_angle_rad {vehicle.max_tire_angle_rad.value} must be below π/2")

@@ -19,7 +19,7 @@ from sim_worker.vehicle.parameters import GRAVITY_MPS2
 from world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
 
 TIMESTEP_S = 0.01
-MAX_STEERING_DELAY_S = 0.6
+MAX_STEERING_DELAY_S = 1.0
 """The longest delay the sample buffer of the steering actuator holds."""
 
 CHASSIS = "chassis"

@@ -10,7 +10,7 @@ from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
 from contracts.simulation import FuturesJob, PathAhead, Variant
-from contracts.world import Building, Connection, IntersectionSummary, Lane, Quantity, World
+from contracts.world import Area, Building, Connection, IntersectionSummary, Lane, Quantity, World
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 
@@ -28,6 +28,10 @@ def _lane(name: str, line: Array) -> Lane:
         id=name, osm_way=1, name="", kind="driving", centerline=line,
         width_m=Quantity(3.0, "default"), speed_limit_mps=Quantity(13.9, "default"), role="other",
     )  # fmt: skip
+
+
+def _street(name: str, half_x: float, half_y: float) -> Area:
+    return Area(id=name, outline=box(0.0, 0.0, half_x, half_y).outline)
 
 
 def crossroads(*, buildings: tuple[Building, ...] = (), connections: bool = True) -> World:
@@ -53,7 +57,8 @@ def crossroads(*, buildings: tuple[Building, ...] = (), connections: bool = True
             driving_side="right", osm_nodes=(1,),
         ),
         lanes=tuple(lanes), connections=tuple(links) if connections else (), stop_lines=(),
-        crossings=(), signals=(), islands=(), kerbs=(), road_surface=(), junction_area=None,
+        crossings=(), signals=(), islands=(), kerbs=(), junction_area=None,
+        road_surface=(_street("ew", 150.0, 4.0), _street("ns", 4.0, 150.0)),
         buildings=buildings,
     )  # fmt: skip
 

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contracts.simulation import ActorSpec, Variant
+from sim_worker.futures import run_job
+from sim_worker.planners import registry
+from sim_worker.planners.base import PlannerOutput, PlannerView
+from sim_worker.planners.registry import load_planner, planner_names
+from sim_worker.stage import Stage
+from sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.places import crossroads, job, state_at, turning_path
+
+
+@pytest.fixture(scope="module")
+def stage() -> Stage:
+    return Stage(crossroads(), load_vehicle(), nsim=8)
+
+
+def test_built_in_planners_are_known_without_installation() -> None:
+    assert planner_names()[:2] == ("pure_pursuit_idm", "constant_speed")
+    assert load_planner("constant_speed") is load_planner("constant_speed")
+
+
+def test_an_unknown_planner_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(ValueError, match=r"unknown planner 'magic'; known: pure_pursuit_idm, con"):
+        load_planner("magic")
+
+
+class _Entry:
+    name, value = "theirs", "their_package:Theirs"
+
+    def __init__(self, loaded: object) -> None:
+        self._loaded = loaded
+
+    def load(self) -> object:
+        return self._loaded
+
+
+class _Coasting:
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        return PlannerOutput(np.zeros_like(view.arc_m), np.zeros_like(view.arc_m))
+
+
+class _Scalar:
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        return PlannerOutput(np.zeros(1), np.zeros(1))
+
+
+@pytest.fixture
+def offered(monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
+    def offer(kind: object) -> None:
+        monkeypatch.setattr(registry, "entry_points", lambda group: [_Entry(kind)])
+        load_planner.cache_clear()
+
+    yield offer
+    load_planner.cache_clear()
+
+
+def test_an_entry_point_adds_a_planner(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
+    offered(_Coasting)
+    assert planner_names() == ("pure_pursuit_idm", "constant_speed", "theirs")
+    variants = (Variant(index=0, name="a"), Variant(index=1, name="b", planner="theirs"))
+    result = run_job(job(variants, cruise=12.0), stage)
+    assert result.outcome.progress_m[1] == pytest.approx(64.0, abs=0.1)
+    assert result.outcome.progress_m[0] > 70.0
+
+
+def test_a_planner_of_the_wrong_shape_is_named(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
+    offered(_Scalar)
+    variants = tuple(Variant(index=i, name="x", planner="theirs") for i in range(3))
+    with pytest.raises(ValueError, match="planner 'theirs' answers accel_mps2 of shape"):
+        run_job(job(variants), stage)
+
+
+def test_a_planner_that_is_none_is_refused(offered) -> None:  # type: ignore[no-untyped-def]
+    offered(object)
+    with pytest.raises(ValueError, match="has no method plan"):
+        load_planner("theirs")
+
+
+def test_the_driver_reaches_and_keeps_the_cruise_speed(stage: Stage) -> None:
+    result = run_job(
+        job((Variant(index=0, name="n"),), state=state_at(-50, -1.5, speed=4.0)), stage
+    )
+    speed = result.trajectory.states[0, :, 3]
+    assert speed[-1] == pytest.approx(8.0, abs=0.6)
+    assert speed.max() < 8.1
+
+
+def test_the_driver_slows_for_a_curve_and_stays_on_its_path(stage: Stage) -> None:
+    result = run_job(
+        job((Variant(index=0, name="n"),), path=turning_path(), cruise=10.0,
+            state=state_at(-30.0, -1.5, speed=10.0)),
+        stage,
+    )  # fmt: skip
+    states = result.trajectory.states[0]
+    assert states[-1, 2] == pytest.approx(np.pi / 2, abs=0.1)
+    lateral = np.abs(states[:, 3] * states[:, 5])
+    assert 1.5 < lateral.max() < 4.0
+    on_circle = (states[:, 0] > 3.0) & (states[:, 1] < 7.5)
+    radius = np.hypot(states[on_circle, 0], states[on_circle, 1] - 10.5)
+    assert radius == pytest.approx(np.full(len(radius), 12.0), abs=0.6)
+
+
+def test_the_driver_stops_behind_a_standing_lead_and_the_careless_one_does_not(
+    stage: Stage,
+) -> None:
+    lead = ActorSpec(kind="lead", speed_mps=0.0, gap_m=30.0)
+    variants = (
+        Variant(index=0, name="careful", actor=lead),
+        Variant(index=1, name="careless", planner="constant_speed", actor=lead),
+        Variant(index=2, name="alone"),
+    )
+    outcome = run_job(job(variants, horizon_s=16.0), stage).outcome
+    assert outcome.collided.tolist() == [False, True, False]
+    assert outcome.collision_with.tolist() == [0, 1, 0]
+    assert outcome.collision_time_s[1] == pytest.approx(30.0 / 8.0, abs=0.1)
+    assert 1.0 < outcome.min_clearance_m[0] < 3.5
+    assert outcome.min_clearance_m[1] == 0.0
+    assert np.isinf(outcome.min_clearance_m[2])
+
+
+@pytest.mark.parametrize("planner", ["pure_pursuit_idm", "constant_speed"])
+def test_a_car_with_nothing_to_do_stands_still(stage: Stage, planner: str) -> None:
+    variant = Variant(index=0, name="n", planner=planner)
+    result = run_job(job((variant,), state=state_at(-50, -1.5, speed=0.0), cruise=0.0), stage)
+    states = result.trajectory.states[0]
+    assert np.abs(states[:, :2] - states[0, :2]).max() < 1e-3

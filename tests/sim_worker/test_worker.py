@@ -1,0 +1,182 @@
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus, ask
+from contracts.codec import write_message
+from contracts.drive import ControlCommand
+from contracts.keys import alive_key
+from contracts.memory_bus import MemoryBus
+from contracts.process import ProcessLife
+from contracts.setup import BusSetup, WorkerSetup, write_setup
+from contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
+from sim_worker.futures import result_digest, run_job
+from sim_worker.mirror_process import serve_mirror
+from sim_worker.stage import Stage
+from sim_worker.variants import plan_variants
+from sim_worker.vehicle.parameters import load_vehicle
+from sim_worker.worker import StageCache, serve_futures
+from tests.sim_worker.places import FRAME, crossroads, job, state_at
+
+CAR = load_vehicle()
+RUN = {"run": "r1"}
+IDS = {"run": "r1", "process": "w0"}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_message(crossroads(), tmp_path / "crossroads.world")
+    return tmp_path
+
+
+def _setup(
+    folder: Path, *, role: str = "futures", endpoint: str = "tcp/127.0.0.1:1"
+) -> WorkerSetup:
+    return WorkerSetup(
+        run_id="r1", process_id="w0", vehicle_id="car", bus=BusSetup(endpoint=endpoint),
+        log_file=str(folder / "log.jsonl"), role=role, worlds_dir=str(folder), vehicle=CAR,
+        drive_frame=FRAME,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def served(folder: Path) -> Iterator[MemoryBus]:
+    """A futures worker in a thread on a bus in memory."""
+    bus = MemoryBus()
+    setup = _setup(folder)
+    life = ProcessLife(setup, bus)
+    alive = Mailbox(4)
+    bus.watch_alive(alive_key(run="r1", process="w0"), alive)
+    thread = threading.Thread(target=serve_futures, args=(setup, bus, life))
+    thread.start()
+    assert alive.take(10.0) is not None
+    yield bus
+    bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
+    thread.join(1.0)
+    assert not thread.is_alive()
+
+
+def test_a_worker_prepares_worlds_and_answers_jobs(served: MemoryBus) -> None:
+    prepared = ask(served, "prepare", PrepareRequest(world_id="crossroads"), **IDS)
+    assert (prepared.world_id, prepared.worker_id) == ("crossroads", "w0")
+    question = job(plan_variants(count=4, seed=0, planners=["pure_pursuit_idm"]), horizon_s=2.0)
+    result = ask(served, "job", question, **IDS)
+    assert result.worker_id == "w0"
+    here = run_job(question, Stage(crossroads(), CAR, nsim=32))
+    assert result_digest(result) == result_digest(here)
+
+
+def test_a_question_that_cannot_be_answered_is_refused_and_the_worker_goes_on(
+    served: MemoryBus,
+) -> None:
+    with pytest.raises(TimeoutError, match=r"FileNotFoundError.*nowhere\.world"):
+        ask(served, "prepare", PrepareRequest(world_id="nowhere"), **IDS)
+    with pytest.raises(TimeoutError, match="names no file"):
+        ask(served, "prepare", PrepareRequest(world_id="../crossroads"), **IDS)
+    question = job(plan_variants(count=2, seed=0, planners=["magic"]))
+    with pytest.raises(TimeoutError, match="unknown planner 'magic'"):
+        ask(served, "job", question, **IDS)
+    assert ask(served, "prepare", PrepareRequest(world_id="crossroads"), **IDS).seconds < 10.0
+
+
+def test_the_cache_keeps_the_worlds_used_last(folder: Path) -> None:
+    import msgspec
+
+    for name in "abc":
+        world = msgspec.structs.replace(crossroads(), id=name)
+        write_message(world, folder / f"{name}.world")
+    cache = StageCache(folder, CAR, nsim=2, kept=2)
+    first = cache.get("a")
+    cache.get("b")
+    assert cache.get("a") is first
+    cache.get("c")
+    assert ("a" in cache, "b" in cache, "c" in cache, len(cache)) == (True, False, True, 2)
+
+
+def _drive_past(bus: Bus, *, count: int = 101) -> None:
+    for k in range(count):
+        stamp_ns = k * 20_000_000
+        command = ControlCommand(stamp_ns=stamp_ns, accel_mps2=0.0, tire_angle_rad=0.0)
+        bus.publish("control", command, vehicle="car")
+        bus.publish("state", state_at(-50 + 0.16 * k, -1.5, stamp_ns=stamp_ns), vehicle="car")
+
+
+def test_a_mirror_worker_turns_states_into_samples(folder: Path) -> None:
+    bus = MemoryBus()
+    setup = _setup(folder, role="mirror")
+    life = ProcessLife(setup, bus)
+    heard, alive = Mailbox(200), Mailbox(4)
+    bus.subscribe("mirror", heard, **RUN)
+    bus.watch_alive(alive_key(run="r1", process="w0"), alive)
+    thread = threading.Thread(target=serve_mirror, args=(setup, bus, life))
+    thread.start()
+    assert alive.take(10.0) is not None
+    bus.publish("active_world", ActiveWorld(stamp_ns=1_000_000_000, world_id="nowhere"), **RUN)
+    bus.publish("active_world", ActiveWorld(stamp_ns=1_000_000_000, world_id="crossroads"), **RUN)
+    _drive_past(bus)
+    samples = [_sample(heard) for _ in range(21)]
+    bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
+    thread.join(2.0)
+    assert not thread.is_alive()
+    assert [sample.stamp_ns for sample in samples] == [k * 100_000_000 for k in range(21)]
+    assert [sample.world_id for sample in samples] == [None] * 10 + ["crossroads"] * 11
+    assert max(sample.gap_m for sample in samples) < 0.01
+
+
+def _sample(mailbox: Mailbox) -> MirrorSample:
+    item = mailbox.take(10.0)
+    assert isinstance(item, Received)
+    message = item.message()
+    assert isinstance(message, MirrorSample)
+    return message
+
+
+def _free_port() -> int:
+    import socket
+
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+def test_a_worker_process_over_zenoh_answers_logs_and_leaves(folder: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{_free_port()}"
+    write_setup(_setup(folder, endpoint=endpoint), folder / "setup.json")
+    with ZenohBus(BusSetup(endpoint=endpoint), router=True) as bus:
+        alive = Mailbox(8)
+        bus.watch_alive(alive_key(run="r1", process="w0"), alive)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "sim_worker", "--setup", str(folder / "setup.json")],
+            env={**os.environ, "PYTHONWARNINGS": "error"},
+        )
+        try:
+            up = alive.take(30.0)
+            assert isinstance(up, Alive)
+            assert up.up
+            with pytest.raises(TimeoutError, match=r"nowhere\.world"):
+                ask(bus, "prepare", PrepareRequest(world_id="nowhere"), **IDS)
+            question = job(plan_variants(count=8, seed=0, planners=["pure_pursuit_idm"]))
+            result = ask(bus, "job", question, timeout_s=30.0, **IDS)
+            here = run_job(question, Stage(crossroads(), CAR, nsim=32))
+            assert result_digest(result) == result_digest(here)
+            bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)
+            start = time.monotonic()
+            assert process.wait(10.0) == 0
+            assert time.monotonic() - start < 3.0
+        finally:
+            process.kill()
+            process.wait(10.0)
+    lines = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
+    refused = [line for line in lines if line["text"] == "prepare refused"]
+    assert len(refused) == 1
+    assert refused[0]["process"] == "w0"
+    assert "FileNotFoundError" in refused[0]["traceback"]
