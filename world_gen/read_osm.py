@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import osmium
 
 from contracts.frames import GeoPoint, LocalFrame
-from world_gen.osm_map import LatLonBounds, MapError, OsmMap, OsmMember, OsmRelation, OsmWay
+from world_gen.opl import OplObjects, add_opl
+from world_gen.osm_map import LatLonBounds, MapError, OsmMap, OsmWay
 
 WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
 NODE_KEYS = (
@@ -86,103 +88,81 @@ class _Decoded:
     """What passes the filters, in plain Python containers."""
 
     def __init__(self, source: Any) -> None:
-        store = osmium.index.create_map("flex_mem")
         self.declared_bounds = _declared_bounds(source)
-        self.node_tags: dict[int, dict[str, str]] = {}
-        ways: dict[int, OsmWay] = {}
-        relations: dict[int, OsmRelation] = {}
-        for item in _filtered(source, store):
-            if item.is_node():
-                self.node_tags[item.id] = _tags(item)
-            elif item.is_way():
-                ways[item.id] = _way(item)
-            else:
-                relation = _relation(item)
-                if relation is not None:
-                    relations[item.id] = relation
+        objects = OplObjects()
+        store = osmium.index.create_map("flex_mem")
+        osm = osmium.osm
+        filters = [
+            _of_keys(entity, keys)
+            for entity, keys in (
+                (osm.NODE, NODE_KEYS),
+                (osm.WAY, WAY_KEYS),
+                (osm.RELATION, ("type",)),
+            )
+        ]
+        _decode(source, osm.NODE | osm.WAY | osm.RELATION, store, filters, objects)
+        self.relations = dict(sorted(objects.relations.items()))
         members = {
             member.ref
-            for relation in relations.values()
+            for relation in self.relations.values()
             for member in relation.members
             if member.kind == "w"
         }
-        # Outlines of buildings with courtyards carry their tags on the relation alone.
-        for item in _by_id(source, osmium.osm.WAY, members - ways.keys()):
-            ways[item.id] = _way(item)
-        self.relations = dict(sorted(relations.items()))
-        wanted = {node for way in ways.values() for node in way.nodes}
-        wanted.update(self.node_tags)
-        self.locations = _locations(source, store, wanted)
+        missing = sorted(members - objects.ways.keys())
+        if missing:
+            # Outlines of buildings with courtyards carry their tags on the relation alone.
+            _decode(source, osm.WAY, store, [osmium.filter.IdFilter(missing)], objects)
+        self.node_tags = objects.node_tags
+        self.locations = objects.locations
+        self._add_negative(source, objects.ways.values())
         self.ways = {
             key: way
-            for key, raw in sorted(ways.items())
+            for key, raw in sorted(objects.ways.items())
             if len((way := _located(raw, self.locations)).nodes) >= 2
         }
 
+    def _add_negative(self, source: Any, ways: Iterable[OsmWay]) -> None:
+        """Look up nodes numbered below zero, as editors number what is not yet uploaded.
 
-def _filtered(source: Any, store: Any) -> Iterator[Any]:
-    osm = osmium.osm
-    processor = osmium.FileProcessor(source, osm.NODE | osm.WAY | osm.RELATION)
-    processor.with_locations(store)
-    for entity, keys in (
-        (osm.NODE, NODE_KEYS),
-        (osm.WAY, WAY_KEYS),
-        (osm.RELATION, ("type",)),
-    ):
-        wanted = osmium.filter.KeyFilter(*keys)
-        wanted.enable_for(entity)
-        processor.with_filter(wanted)
-    return iter(processor)
+        osmium's index holds no such ids.
+        """
+        wanted = {node for way in ways for node in way.nodes if node < 0}
+        if wanted - self.locations.keys():
+            items: Iterator[Any] = iter(osmium.FileProcessor(source, osmium.osm.NODE))
+            for item in items:
+                if item.id in wanted and item.location.valid():
+                    self.locations[item.id] = (item.location.lat, item.location.lon)
 
 
-def _by_id(source: Any, entity: Any, ids: set[int]) -> Iterator[Any]:
-    if not ids:
-        return iter(())
-    return iter(
-        osmium.FileProcessor(source, entity).with_filter(osmium.filter.IdFilter(sorted(ids)))
-    )
+def _of_keys(entity: Any, keys: tuple[str, ...]) -> Any:
+    wanted = osmium.filter.KeyFilter(*keys)
+    wanted.enable_for(entity)
+    return wanted
 
 
-def _tags(item: Any) -> dict[str, str]:
-    return {tag.k: tag.v for tag in item.tags}
+def _decode(
+    source: Any, entities: Any, store: Any, filters: Sequence[Any], objects: OplObjects
+) -> None:
+    """Add what passes the filters, ways with the locations of `store`, which nodes fill."""
+    with_locations = osmium.NodeLocationsForWays(store)
+    with_locations.ignore_errors()
+    with tempfile.TemporaryDirectory(prefix="foretwin-map-") as folder:
+        path = Path(folder) / "filtered.opl"
+        target = osmium.io.File(path, "opl,locations_on_ways=true,add_metadata=false")
+        with (
+            osmium.io.Reader(source, entities) as reader,
+            osmium.SimpleWriter(target) as writer,
+        ):
+            osmium.apply(reader, with_locations, *filters, writer)
+        with path.open(encoding="utf-8", newline="\n") as lines:
+            add_opl(objects, lines, _is_kept)
 
 
-def _way(item: Any) -> OsmWay:
-    return OsmWay(item.id, tuple([node.ref for node in item.nodes]), _tags(item))
-
-
-def _relation(item: Any) -> OsmRelation | None:
-    tags = _tags(item)
-    restriction = tags["type"].split(":")[0] == "restriction"
-    building = tags["type"] in ("multipolygon", "building") and (
-        "building" in tags or "building:part" in tags or tags["type"] == "building"
-    )
-    if not (restriction or building):
-        return None
-    members = tuple(OsmMember(member.type, member.ref, member.role) for member in item.members)
-    return OsmRelation(item.id, members, tags)
-
-
-def _locations(source: Any, store: Any, wanted: set[int]) -> dict[int, tuple[float, float]]:
-    found: dict[int, tuple[float, float]] = {}
-    negative: set[int] = set()
-    for node in sorted(wanted):
-        if node < 0:
-            negative.add(node)
-            continue
-        try:
-            location = store.get(node)
-        except KeyError:
-            continue
-        if location.valid():
-            found[node] = (location.lat, location.lon)
-    if negative:
-        # Editors number what is not yet uploaded below zero; osmium's index holds no such ids.
-        items: Iterator[Any] = iter(osmium.FileProcessor(source, osmium.osm.NODE))
-        for item in items:
-            if item.id in negative and item.location.valid():
-                found[item.id] = (item.location.lat, item.location.lon)
-    return found
+def _is_kept(tags: Mapping[str, str]) -> bool:
+    kind = tags["type"]
+    if kind.split(":")[0] == "restriction" or kind == "building":
+        return True
+    return kind == "multipolygon" and ("building" in tags or "building:part" in tags)
 
 
 def _located(way: OsmWay, locations: Mapping[int, tuple[float, float]]) -> OsmWay:

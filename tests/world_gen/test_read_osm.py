@@ -66,6 +66,22 @@ def test_every_packing_reads_the_same(street: Sketch, tmp_path: Path) -> None:
         assert osm.sha256 == hashlib.sha256((tmp_path / name).read_bytes()).hexdigest()
 
 
+@pytest.mark.parametrize(
+    "name", ["A, B=50% @ C", "Große Straße\u00a0\N{TRAM CAR}", "%20%", "=,=", "x y"]
+)
+def test_any_character_of_a_tag_survives(name: str, tmp_path: Path) -> None:
+    sketch = Sketch()
+    sketch.node(1, 0.0, 0.0, highway="stop", note=name)
+    sketch.node(2, 50.0, 0.0)
+    sketch.road(10, [1, 2], name)
+    sketch.relation(20, {10: name}, type="restriction", restriction=name)
+    osm = sketch.read(tmp_path)
+    assert osm.ways[10].tags["name"] == name
+    assert osm.node_tags[1]["note"] == name
+    assert osm.relations[20].tags["restriction"] == name
+    assert osm.relations[20].members[0].role == name
+
+
 def test_a_name_that_hides_the_packing_does_no_harm(street: Sketch, tmp_path: Path) -> None:
     path = tmp_path / "export.xml"
     path.write_bytes(gzip.compress(street.xml().encode()))
