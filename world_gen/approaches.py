@@ -13,11 +13,10 @@ from world_gen.road_graph import DirectedEdge
 
 LOOK_BACK_M = 40.0
 _CROSSING_NEAR_M = 16.0
-_CONTROL: Mapping[str, LineControl] = {
-    "traffic_signals": "signal",
-    "stop": "stop",
-    "give_way": "give_way",
-}
+_SIGNAL_NEAR_M = 25.0
+_OWN_LINE_M = 3.0
+"""A sign or signal farther than this from the junction's node stands at the stop line."""
+_SIGNS = ("stop", "give_way")
 _CLASS_RANK: Mapping[str, int] = {
     "motorway": 8,
     "trunk": 7,
@@ -83,7 +82,7 @@ def _top_rank(around: Surroundings) -> int:
 
 
 def class_rank(road_class: str) -> int:
-    """Return how important a highway class is; links count as their class less a half step."""
+    """Return how important a highway class is; links count as their class."""
     return _CLASS_RANK.get(road_class.removesuffix("_link"), 2)
 
 
@@ -131,37 +130,47 @@ def _faces(tags: Mapping[str, str], outward: DirectedEdge) -> bool:
 def _approach(
     cluster: Cluster, toward: DirectedEdge, met: list[Met], junction: Junction, top_rank: int
 ) -> Approach:
-    crossing_m = max(
-        (
-            m.distance_m
-            for m in met
-            if m.tags.get("highway") == "crossing" or "crossing" in m.tags
-            if 1.0 < m.distance_m <= _CROSSING_NEAR_M
-        ),
+    signals = [m for m in met if m.tags.get("highway") == "traffic_signals"]
+    signalled = junction.summary.control == "signals"
+    if not signalled:
+        # A light farther away is one for pedestrians, not for this junction.
+        signals = [m for m in signals if m.distance_m <= _SIGNAL_NEAR_M]
+    if signalled or signals:
+        signal = max(signals, key=lambda m: m.distance_m, default=None)
+        line = _before_crossing(met)
+        source: Provenance = "inferred"
+        node: int | None = None
+        if signal is not None:
+            source, node = "tagged", signal.node
+            line = signal.distance_m if signal.distance_m > _OWN_LINE_M else line
+        return Approach(cluster, toward, Choice("signal", source), line, node)
+    sign = min(
+        (m for m in met if m.tags.get("highway") in _SIGNS and _is_for(m, cluster, junction)),
+        key=lambda m: m.distance_m,
         default=None,
     )
-    before_crossing = None if crossing_m is None else crossing_m + 3.0
-    signed = [m for m in met if m.tags.get("highway") in _CONTROL]
-    if junction.summary.control == "signals":
-        signals = [m for m in signed if m.tags["highway"] == "traffic_signals"]
-        signal = max(signals, key=lambda m: m.distance_m, default=None)
-        if signal is None:
-            return Approach(cluster, toward, Choice("signal", "inferred"), before_crossing, None)
-        line = signal.distance_m if signal.distance_m > 3.0 else before_crossing
-        return Approach(cluster, toward, Choice("signal", "tagged"), line, signal.node)
-    if signed:
-        first = min(signed, key=lambda m: m.distance_m)
-        line = first.distance_m if first.distance_m > 3.0 else before_crossing
-        word = _CONTROL[first.tags["highway"]]
-        # A sign on the junction's own node cannot tell which approach it is for.
-        at_node = first.distance_m < 0.1 and len(cluster.legs) > 2
-        if not (
-            at_node and word in ("stop", "give_way") and junction.summary.control != "all_way_stop"
-        ):
-            node = first.node if word == "signal" else None
-            return Approach(cluster, toward, Choice(word, "tagged"), line, node)
-    word, source = _unsigned(cluster, toward, junction, top_rank)
-    return Approach(cluster, toward, Choice(word, source), before_crossing, None)
+    if sign is None:
+        word, guessed = _unsigned(cluster, toward, junction, top_rank)
+        return Approach(cluster, toward, Choice(word, guessed), None, None)
+    line = sign.distance_m if _OWN_LINE_M < sign.distance_m <= _SIGNAL_NEAR_M else None
+    return Approach(cluster, toward, Choice(sign.tags["highway"], "tagged"), line, None)
+
+
+def _is_for(sign: Met, cluster: Cluster, junction: Junction) -> bool:
+    """Return whether a sign is for this approach; on the junction's own node it cannot tell."""
+    at_node = sign.distance_m < 0.1 and len(cluster.legs) > 2
+    return not at_node or junction.summary.control == "all_way_stop"
+
+
+def _before_crossing(met: list[Met]) -> float | None:
+    """Return where cars wait for a light before the crossing that they would else block."""
+    at = [
+        m.distance_m
+        for m in met
+        if (m.tags.get("highway") == "crossing" or "crossing" in m.tags)
+        and 1.0 < m.distance_m <= _CROSSING_NEAR_M
+    ]
+    return max(at) + 3.0 if at else None
 
 
 def _unsigned(

@@ -55,7 +55,7 @@ def build_world(
     controls = line_controls(lines)
     for connection in connections:
         connection.control = controls.get(connection.start.id, "none")
-    add_right_of_way([c for c in connections if c.cluster.main])
+    add_right_of_way([c for c in connections if c.cluster.main], around.driving_side)
     surface = areas(around, lanes, connections)
     near = index.buildings_within(np.asarray(junction.centre_xy_m), radius_m)
     buildings, cut = buildings_in_frame(near, around.frame, graph.frame, surface.lanes_free)

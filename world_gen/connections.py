@@ -85,7 +85,7 @@ def connect(
                     f"{movement.turn} into way {away.edge.way_id}; left out"
                 )
                 continue
-            for a, b in _pairs(chosen, ends, movement.turn, around.driving_side, cluster):
+            for a, b in _pairs(chosen, ends, movement.turn, around.driving_side, len(mine) == 1):
                 found.append(_connection(a, b, movement, cluster, around))
     for connection in found:
         connection.start.successors.append(connection.id)
@@ -154,7 +154,7 @@ def _pairs(
     ends: list[LaneDraft],
     turn: Turn,
     driving_side: DrivingSide,
-    cluster: Cluster,
+    only_way: bool,
 ) -> list[tuple[LaneDraft, LaneDraft]]:
     """Pair lanes from the side to which the movement turns; surplus lanes merge into the last."""
     ends = [lane for lane in ends if lane.kind == "driving"] or ends
@@ -162,12 +162,12 @@ def _pairs(
     a = starts[::-1] if from_right else starts
     b = ends[::-1] if from_right else ends
     if turn == "straight" and len(a) != len(b):
-        return _pairs_by_position(starts, ends, cluster)
+        return _pairs_by_position(starts, ends, only_way)
     return [(lane, b[min(i, len(b) - 1)]) for i, lane in enumerate(a)]
 
 
 def _pairs_by_position(
-    starts: list[LaneDraft], ends: list[LaneDraft], cluster: Cluster
+    starts: list[LaneDraft], ends: list[LaneDraft], only_way: bool
 ) -> list[tuple[LaneDraft, LaneDraft]]:
     """Pair each lane with the one ahead of it; where a road widens every new lane is reached."""
     ahead = unit(ends[0].centerline[1] - ends[0].centerline[0])
@@ -177,7 +177,7 @@ def _pairs_by_position(
     gaps = np.abs(at_start[:, None] - at_end[None, :])
     best = np.maximum.accumulate(gaps.argmin(axis=1))
     pairs = {(i, int(j)) for i, j in enumerate(best)}
-    if cluster.plain or len(starts) > len(ends):
+    if only_way or len(starts) > len(ends):
         pairs |= {(int(i), j) for j, i in enumerate(gaps.argmin(axis=0)) if j not in best}
     return [(starts[i], ends[j]) for i, j in sorted(pairs)]
 

@@ -16,7 +16,7 @@ from world_gen.polyline import arc_lengths, cut, inside_disc, offset, rounded, u
 from world_gen.road_graph import DirectedEdge, RoadEdge
 
 Role = Literal["approach", "exit", "ring", "other"]
-MIN_LANE_M = 0.3
+MIN_LANE_M = 0.05
 
 
 class LaneKey(NamedTuple):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import shapely
 
-from contracts.world import LineControl
+from contracts.world import DrivingSide, LineControl
 from world_gen.connections import ConnectionDraft
 
 SWEPT_HALF_WIDTH_M = 1.0
@@ -15,7 +15,7 @@ SWEPT_HALF_WIDTH_M = 1.0
 _RANK: dict[LineControl, int] = {"none": 2, "signal": 2, "give_way": 1, "stop": 0}
 
 
-def add_right_of_way(connections: list[ConnectionDraft]) -> None:
+def add_right_of_way(connections: list[ConnectionDraft], driving_side: DrivingSide) -> None:
     """Fill conflicts and yields of connections that share a cluster.
 
     In each conflicting pair exactly one yields: by sign first; then who turns across oncoming
@@ -40,14 +40,14 @@ def add_right_of_way(connections: list[ConnectionDraft]) -> None:
             continue
         conflicts.setdefault(i, set()).add(j)
         conflicts.setdefault(j, set()).add(i)
-        loser, winner = (i, j) if _yields(a, b) else (j, i)
+        loser, winner = (i, j) if _yields(a, b, driving_side) else (j, i)
         yields.setdefault(loser, set()).add(winner)
     for i, connection in enumerate(connections):
         connection.conflicts_with = tuple(sorted(connections[j].id for j in conflicts.get(i, ())))
         connection.yields_to = tuple(sorted(connections[j].id for j in yields.get(i, ())))
 
 
-def _yields(a: ConnectionDraft, b: ConnectionDraft) -> bool:
+def _yields(a: ConnectionDraft, b: ConnectionDraft, driving_side: DrivingSide) -> bool:
     """Return whether `a` yields to `b`."""
     if _RANK[a.control] != _RANK[b.control]:
         return _RANK[a.control] < _RANK[b.control]
@@ -56,7 +56,8 @@ def _yields(a: ConnectionDraft, b: ConnectionDraft) -> bool:
         return ring_b
     angle = _from_right(a, b)
     if abs(angle) > math.radians(135.0):  # oncoming: who crosses the other's lane waits
-        weight = {"straight": 0, "right": 1, "left": 2, "u_turn": 3}
+        near, far = ("right", "left") if driving_side == "right" else ("left", "right")
+        weight = {"straight": 0, near: 1, far: 2, "u_turn": 3}
         if weight[a.turn] != weight[b.turn]:
             return weight[a.turn] > weight[b.turn]
     elif abs(angle) > math.radians(30.0):

@@ -82,11 +82,9 @@ def write_mjcf(world: World, path: Path) -> None:
     spec.compile()
     text = spec.to_xml()
     place = world.intersection
-    comment = f"<!-- {world.attribution}; world {world.id}, {place.kind} {place.name} -->\n"
-    path.write_text(
-        comment.replace("--", "-").replace("<!-", "<!--").replace("->", "-->") + text,
-        encoding="utf-8",
-    )
+    about = f"{world.attribution}; world {world.id}, {place.kind} {place.name}"
+    comment = f"<!-- {about.replace('--', '- ')} -->\n"
+    path.write_text(comment + text, encoding="utf-8")
 
 
 def _set_options(spec: mujoco.MjSpec) -> None:

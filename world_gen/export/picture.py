@@ -64,7 +64,9 @@ def write_picture(world: World, path: Path) -> None:
     _north(close)
     traits = f"{place.kind}, {place.control}, {place.driving_side}-hand traffic"
     title = f"{place.name or 'unnamed'}   ({traits})"
-    figure.text(0.015, 0.962, title, fontsize=19, weight="bold", va="center")
+    figure.text(
+        0.015, 0.962, title, fontsize=min(19.0, 1500.0 / len(title)), weight="bold", va="center"
+    )
     under = (
         f"intersection {place.id}   world {world.id}   {place.lat:.6f}, {place.lon:.6f}   "
         f"radius {world.radius_m:g} m   {len(world.lanes)} lanes, "
