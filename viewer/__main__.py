@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 from contracts.bus import Bus, Mailbox, Received
 from contracts.process import ProcessLife, run_process
@@ -29,11 +30,22 @@ from viewer.sinks import FileStream, LiveStream
 
 MAILBOX_DEPTH = 4096
 FLUSH_PERIOD_S = 0.5
-QUIET_S = 0.25
-"""At the end the mailbox must stay empty for this long: messages of other keys may lag behind."""
-DRAIN_S, HURRIED_DRAIN_S = 10.0, 1.0
-"""How long emptying the mailbox may take: after `run_end`, and when told to leave at once."""
-LIVE_CLOSE_S = 1.0
+
+
+class Farewell(NamedTuple):
+    """How long leaving may take: emptying the mailbox, and sending what the window lacks.
+
+    The mailbox counts as empty after `quiet_s` without a message, since keys may lag behind.
+    """
+
+    quiet_s: float
+    drain_s: float
+    live_s: float
+
+
+ENDED = Farewell(quiet_s=0.25, drain_s=6.0, live_s=1.0)
+HURRIED = Farewell(quiet_s=0.05, drain_s=0.4, live_s=0.1)
+"""When told to leave, or left alone: Ctrl-C ends a whole run within 3 s."""
 
 _log = logging.getLogger("viewer")
 
@@ -80,18 +92,18 @@ class Recorder:
             self._flushed_s = time.monotonic()
         return item is not None
 
-    def drain(self, *, at_most_s: float) -> None:
+    def drain(self, farewell: Farewell) -> None:
         """Write what still lies in the mailbox, in bounded time."""
-        deadline_s = time.monotonic() + at_most_s
-        while self.take_one(QUIET_S) and time.monotonic() < deadline_s:
+        deadline_s = time.monotonic() + farewell.drain_s
+        while self.take_one(farewell.quiet_s) and time.monotonic() < deadline_s:
             pass
 
-    def close(self, *, keep_window: bool) -> None:
+    def close(self, farewell: Farewell, *, keep_window: bool) -> None:
         """Complete the file, then give the live view a moment; bounded even if it is frozen."""
         self._tell_troubles()
         self._file.close()
         if self._live is not None and self._live_viewer is not None:
-            self._live.close(LIVE_CLOSE_S)
+            self._live.close(farewell.live_s)
             if self._live.dropped:
                 _log.info("the live view missed %d rows; the file has them", self._live.dropped)
             self._live_viewer.end(keep_window)
@@ -127,9 +139,10 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
     while not life.over:
         recorder.take_one(0.1)
     ended_well = len(run_end) > 0
-    recorder.drain(at_most_s=DRAIN_S if ended_well else HURRIED_DRAIN_S)
+    farewell = ENDED if ended_well else HURRIED
+    recorder.drain(farewell)
     messages.close()
-    recorder.close(keep_window=ended_well)
+    recorder.close(farewell, keep_window=ended_well)
 
 
 def show(recording: Path) -> None:
