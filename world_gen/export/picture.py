@@ -12,37 +12,38 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PatchCollection
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, PathPatch
+from matplotlib.patches import PathPatch
 from matplotlib.patches import Polygon as PolygonPatch
 from matplotlib.path import Path as Outline
 
 from contracts.arrays import Array
-from contracts.world import Lane, Provenance, Turn, World
+from contracts.world import Lane, Turn, World
+from world_gen.export.picture_marks import (
+    BUS,
+    GROUND,
+    HATCH,
+    HEIGHT_COLOURS,
+    HEIGHT_SCALE_M,
+    ISLAND,
+    ISLAND_EDGE,
+    JUNCTION,
+    KERB,
+    LANE,
+    LANE_EDGE,
+    LINE_COLOUR,
+    RING,
+    ROAD,
+    TURN_COLOUR,
+    draw_legend,
+    draw_notes,
+    north_arrow,
+    scale_bar,
+)
 from world_gen.polyline import direction_at, left_of, length, offset, points_at
 
 _DPI = 110
 _CLOSE_MIN_M, _CLOSE_MARGIN_M = 42.0, 28.0
-_GROUND, _ROAD, _JUNCTION, _KERB = "#e9ece4", "#c9ccd1", "#b9bdc4", "#7c828a"
-_LANE_EDGE, _LANE, _BUS, _RING = "#ffffff", "#4c5560", "#a8326e", "#2b6f9e"
-_ISLAND, _ISLAND_EDGE = "#b7cfa1", "#6f8f56"
-_TURN: Mapping[Turn, str] = {
-    "straight": "#2a7f3f",
-    "left": "#1f5fd0",
-    "right": "#d8781a",
-    "u_turn": "#8a3fb0",
-}
-_LINE: Mapping[str, str] = {
-    "signal": "#d62728",
-    "stop": "#8b0000",
-    "give_way": "#e3a100",
-    "none": "#6b7280",
-}
-_HATCH: Mapping[Provenance, str | None] = {"tagged": None, "inferred": "///", "default": "xxx"}
-_HEIGHT_M = Normalize(0.0, 40.0, clip=True)
-_HEIGHTS = "YlOrBr"
 
 
 def write_picture(world: World, path: Path) -> None:
@@ -59,9 +60,9 @@ def write_picture(world: World, path: Path) -> None:
     reach = _close_reach(world)
     _draw(close, world, reach, close_up=True)
     _draw(whole, world, world.radius_m, close_up=False)
-    _scale_bar(close, reach)
-    _scale_bar(whole, world.radius_m)
-    _north(close)
+    scale_bar(close, reach)
+    scale_bar(whole, world.radius_m)
+    north_arrow(close)
     traits = f"{place.kind}, {place.control}, {place.driving_side}-hand traffic"
     title = f"{place.name or 'unnamed'}   ({traits})"
     figure.text(
@@ -75,8 +76,8 @@ def write_picture(world: World, path: Path) -> None:
     )
     figure.text(0.015, 0.939, under, fontsize=11, va="center", color="#444444")
     figure.text(0.985, 0.012, world.attribution, fontsize=13, ha="right", weight="bold")
-    _legend(figure, world)
-    _notes(figure, world)
+    draw_legend(figure, world)
+    draw_notes(figure, world)
     canvas.print_figure(str(path), format="png", metadata={"Copyright": world.attribution})
 
 
@@ -91,23 +92,21 @@ def _draw(axes: Axes, world: World, reach: float, *, close_up: bool) -> None:
     axes.set_aspect("equal")
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-reach, reach)
-    axes.set_facecolor(_GROUND)
+    axes.set_facecolor(GROUND)
     axes.set_xticks([])
     axes.set_yticks([])
     for area in world.road_surface:
-        axes.add_patch(
-            _patch(area.outline, area.holes, facecolor=_ROAD, edgecolor="none", zorder=1)
-        )
+        axes.add_patch(_patch(area.outline, area.holes, facecolor=ROAD, edgecolor="none", zorder=1))
     if world.junction_area is not None:
         area = world.junction_area
         axes.add_patch(
-            _patch(area.outline, area.holes, facecolor=_JUNCTION, edgecolor="none", zorder=1.1)
+            _patch(area.outline, area.holes, facecolor=JUNCTION, edgecolor="none", zorder=1.1)
         )
     for area in world.islands:
         axes.add_patch(
-            _patch(area.outline, area.holes, facecolor=_ISLAND, edgecolor=_ISLAND_EDGE, zorder=2)
+            _patch(area.outline, area.holes, facecolor=ISLAND, edgecolor=ISLAND_EDGE, zorder=2)
         )
-    axes.add_collection(LineCollection(list(world.kerbs), colors=_KERB, linewidths=1.2, zorder=2.1))
+    axes.add_collection(LineCollection(list(world.kerbs), colors=KERB, linewidths=1.2, zorder=2.1))
     _draw_buildings(axes, world, close_up=close_up)
     _draw_crossings(axes, world, close_up=close_up)
     _draw_lanes(axes, world, reach, close_up=close_up)
@@ -127,7 +126,7 @@ def _patch(outline: Array, holes: Iterable[Array], **style: Any) -> PathPatch:
 
 
 def _draw_buildings(axes: Axes, world: World, *, close_up: bool) -> None:
-    colours = ScalarMappable(_HEIGHT_M, _HEIGHTS)
+    colours = ScalarMappable(HEIGHT_SCALE_M, HEIGHT_COLOURS)
     for building in sorted(world.buildings, key=lambda b: b.height_m.value):
         source = building.height_m.source
         axes.add_patch(
@@ -136,7 +135,7 @@ def _draw_buildings(axes: Axes, world: World, *, close_up: bool) -> None:
                 building.holes,
                 facecolor=colours.to_rgba(np.array([building.height_m.value]), alpha=0.85)[0],
                 edgecolor="#5b4a3a" if source == "tagged" else "#9a8a7a",
-                hatch=_HATCH[source],
+                hatch=HATCH[source],
                 linewidth=0.8 if close_up else 0.4,
                 linestyle="-" if building.min_height_m < 2.5 else ":",
                 zorder=3,
@@ -177,10 +176,10 @@ def _draw_lanes(axes: Axes, world: World, reach: float, *, close_up: bool) -> No
         half = lane.width_m.value / 2
         borders += [offset(lane.centerline, half), offset(lane.centerline, -half)]
     axes.add_collection(
-        LineCollection(borders, colors=_LANE_EDGE, linewidths=1.1 if close_up else 0.5, zorder=4.5)
+        LineCollection(borders, colors=LANE_EDGE, linewidths=1.1 if close_up else 0.5, zorder=4.5)
     )
     for lane in world.lanes:
-        colour = _BUS if lane.kind == "bus" else _RING if lane.role == "ring" else _LANE
+        colour = BUS if lane.kind == "bus" else RING if lane.role == "ring" else LANE
         tagged = lane.width_m.source == "tagged"
         axes.plot(
             *lane.centerline.T,
@@ -235,7 +234,7 @@ def _turn_arrows(axes: Axes, lane: Lane, at: Array, ahead: Array) -> None:
             xytext=tuple(at - 1.2 * ahead),
             arrowprops={
                 "arrowstyle": "-|>",
-                "color": _TURN[turn],
+                "color": TURN_COLOUR[turn],
                 "lw": 1.6,
                 "shrinkA": 0,
                 "shrinkB": 0,
@@ -256,7 +255,7 @@ def _draw_connections(axes: Axes, world: World, *, close_up: bool) -> None:
         here = connection.id in chosen
         axes.plot(
             *connection.centerline.T,
-            color=_TURN[connection.turn],
+            color=TURN_COLOUR[connection.turn],
             linewidth=(1.7 if here else 0.9) * (1.0 if close_up else 0.5),
             alpha=0.9 if here else 0.6,
             zorder=5.5,
@@ -268,7 +267,7 @@ def _draw_stop_lines(axes: Axes, world: World, *, close_up: bool) -> None:
         tagged = line.control.source == "tagged"
         axes.plot(
             *line.ends.T,
-            color=_LINE[line.control.value],
+            color=LINE_COLOUR[line.control.value],
             linewidth=4.0 if close_up else 1.6,
             linestyle="-" if tagged else (0, (1.2, 0.7)),
             solid_capstyle="butt",
@@ -290,100 +289,3 @@ def _draw_signals(axes: Axes, world: World, *, close_up: bool) -> None:
                 signal.group_id, (x, y), ha="center", va="center", fontsize=6.5, zorder=9,
                 color="white" if tagged else "#d62728", annotation_clip=True,
             )  # fmt: skip
-
-
-def _scale_bar(axes: Axes, reach: float) -> None:
-    size = next(s for s in (5, 10, 20, 50, 100, 200, 500) if s >= reach / 6 or s == 500)
-    x, y = -0.95 * reach, -0.94 * reach
-    axes.plot([x, x + size], [y, y], color="black", linewidth=4, solid_capstyle="butt", zorder=10)
-    axes.text(
-        x + size / 2, y + 0.015 * reach, f"{size} m", ha="center", va="bottom", fontsize=12,
-        zorder=10,
-        bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.5},
-    )  # fmt: skip
-
-
-def _north(axes: Axes) -> None:
-    axes.annotate(
-        "N", xy=(0.965, 0.975), xytext=(0.965, 0.905), xycoords="axes fraction",
-        ha="center", va="center", fontsize=15, weight="bold", zorder=10,
-        arrowprops={"arrowstyle": "-|>", "lw": 2.5, "color": "black"},
-        bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 2.0},
-    )  # fmt: skip
-
-
-def _legend(figure: Figure, world: World) -> None:
-    def line(colour: str, label: str, style: Any = "-", width: float = 2.0) -> Line2D:
-        return Line2D([], [], color=colour, linestyle=style, linewidth=width, label=label)
-
-    def dot(fill: str, label: str) -> Line2D:
-        return Line2D(
-            [],
-            [],
-            marker="o",
-            linestyle="",
-            color=fill,
-            markeredgecolor="#d62728",
-            markersize=9,
-            label=label,
-        )
-
-    entries: list[Any] = [
-        line(colour, f"connection: {turn.replace('_', '-')}") for turn, colour in _TURN.items()
-    ]
-    entries += [
-        line(_LANE, "lane, width tagged"),
-        line(_LANE, "lane, width inferred", (0, (5, 3))),
-        line(_RING, "ring lane", (0, (5, 3))),
-        line(_BUS, "bus lane", (0, (5, 3))),
-    ]
-    entries += [
-        line(
-            colour,
-            f"stop line: {'no control' if name == 'none' else name.replace('_', ' ')}",
-            "-",
-            4.0,
-        )
-        for name, colour in _LINE.items()
-    ]
-    entries += [
-        line("#555555", "control inferred", (0, (1.2, 0.7)), 4.0),
-        dot("#d62728", "signal tagged (with its group)"),
-        dot("white", "signal inferred"),
-        Patch(facecolor="white", edgecolor="#9097a0", hatch="|||", label="crossing"),
-        Patch(facecolor=_ISLAND, edgecolor=_ISLAND_EDGE, label="island"),
-        Patch(facecolor="#e8b96a", edgecolor="#5b4a3a", label="building, height tagged"),
-        Patch(facecolor="#e8b96a", edgecolor="#9a8a7a", hatch="///", label="height from levels"),
-        Patch(facecolor="#e8b96a", edgecolor="#9a8a7a", hatch="xxx", label="height default (6 m)"),
-    ]  # fmt: skip
-    legend = figure.legend(
-        handles=entries, loc="lower left", bbox_to_anchor=(0.012, 0.002), ncols=5, fontsize=10,
-        frameon=False, columnspacing=1.6, handlelength=2.4,
-    )  # fmt: skip
-    for text in legend.get_texts():
-        text.set_color("#222222")
-    bar = figure.add_axes((0.6, 0.295, 0.2, 0.013))
-    figure.colorbar(ScalarMappable(_HEIGHT_M, _HEIGHTS), cax=bar, orientation="horizontal")
-    bar.set_xlabel("building height in m", fontsize=10)
-
-
-def _notes(figure: Figure, world: World) -> None:
-    guessed = sum(lane.width_m.source != "tagged" for lane in world.lanes)
-    heights = [b.height_m.source for b in world.buildings]
-    lines = [
-        f"arm {arm.id}: {arm.name or 'unnamed'}, {arm.lanes_in} in, {arm.lanes_out} out"
-        for arm in world.arms[:8]
-    ]
-    lines += [
-        "",
-        f"lane widths inferred: {guessed} of {len(world.lanes)}",
-        f"building heights tagged {heights.count('tagged')}, "
-        f"from levels {heights.count('inferred')}, "
-        f"default {heights.count('default')}",
-    ]
-    lines += [f"note: {note[:88]}" for note in world.notes[:5]]
-    if len(world.notes) > 5:
-        lines.append(f"... and {len(world.notes) - 5} more notes")
-    figure.text(
-        0.6, 0.245, "\n".join(lines), fontsize=10, va="top", color="#222222", linespacing=1.35
-    )
