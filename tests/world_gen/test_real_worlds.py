@@ -39,6 +39,7 @@ SAMPLE = [
     ("badhersfeld", 1698047149),
     ("monaco", 25195725),
     ("monaco", 21918402),
+    ("liechtenstein", 2262648033),  # Hiltikreisel
 ]
 
 
