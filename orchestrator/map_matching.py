@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
+from contracts.frames import wrap_angle
 from orchestrator.road_hypotheses import (
     Hypothesis,
     MatchingWeights,
@@ -31,6 +32,8 @@ class Match(NamedTuple):
     distance_m: float
     confident: bool
     direction_known: bool = True
+    heading_off_rad: float = 0.0
+    """The car's heading against the road's there, positive to the left; 0 while it is unknown."""
 
 
 class OffRoadStretch(NamedTuple):
@@ -87,7 +90,11 @@ class MapMatcher:
             self._begin(xy, yaw)
         elif moved >= self._weights.step_m or (yaw is not None and not self._direction_known):
             self._step(xy, yaw, moved)
-        return self._match(xy)
+        match = self._match(xy)
+        if match is None or yaw is None or not self._direction_known:
+            return match
+        road_rad = project(match.directed_edge, xy).heading_rad
+        return match._replace(heading_off_rad=float(wrap_angle(yaw - road_rad)))
 
     def _begin(self, xy: Array, yaw: float | None) -> None:
         candidates = self._index.near(xy, self._weights.begin_radius_m)

@@ -9,6 +9,7 @@ from orchestrator.junctions_ahead import PassedJunction, UpcomingJunction, encou
 from orchestrator.map_matching import Match
 from orchestrator.road_index import RoadIndex, key_of, reach
 from orchestrator.route import Route, extend_most_probable
+from orchestrator.turning import TURNING_RAD, route_with_turn
 from world_gen.intersections import Junction
 from world_gen.road_graph import DirectedEdge, RoadGraph
 
@@ -62,6 +63,7 @@ class RouteFollower:
         self._version = 0
         self._on_given = False
         self._direction_known = False
+        self._turning = False
         self._given_from = 0
         self._doubt: Match | None = None
         self._encounters: tuple[PassedJunction, ...] = ()
@@ -90,6 +92,8 @@ class RouteFollower:
             self._doubt = None
             if not self._on_given:
                 self._rejoin(match)
+            if not self._on_given:
+                self._turn_with(match)
         elif self._leaving(match):
             self._leave(match)
         self._direction_known = match.direction_known
@@ -237,6 +241,18 @@ class RouteFollower:
         self._doubt = None
         self._set_route(new)
         self._rejoin(match)
+
+    def _turn_with(self, match: Match) -> None:
+        """Predict the turn that the car's heading shows, and drop it when the heading does."""
+        assert self._route is not None
+        off_rad = match.heading_off_rad
+        turned = route_with_turn(self._graph, self._route, self._place, self._s_m, off_rad)
+        if turned is not None:
+            self._turning = True
+            self._set_route(turned)
+        elif self._turning and abs(off_rad) < TURNING_RAD / 3.0:
+            self._turning = False
+            self._set_route(Route(self._route.edges[: self._place + 1], self._route.origin_m))
 
     def _find_given(
         self, match: Match, *, direction_matters: bool = True, start: int = 0

@@ -97,6 +97,20 @@ def test_dithering_at_a_junction_passes_it_once() -> None:
     assert driver.names == ["n102"]
 
 
+def test_a_heading_into_a_turn_is_believed_before_the_position_shows_it() -> None:
+    driver = Driver().go([(20, 100), (96, 100)])
+    straight_on = driver.ahead(250.0)
+    for _ in range(2):
+        driver.follower.update(driver.matcher.update(np.array([97.0, 100.5]), 0.5, True, 4.0))
+    turning = driver.ahead(250.0)
+    driver.follower.update(driver.matcher.update(np.array([98.0, 100.5]), 0.0, True, 4.0))
+    after_all_not = driver.ahead(250.0)
+
+    assert [name for name, _ in straight_on] == ["n102", "n103", "n104"]
+    assert [name for name, _ in turning] == ["n102", "n202", "n302"]
+    assert [name for name, _ in after_all_not] == ["n102", "n103", "n104"]
+
+
 ROUND = along((4, False), (20, False), (9, False), (10, False))
 
 
