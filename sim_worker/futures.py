@@ -87,7 +87,9 @@ def run_job(
     )
     if motion.invented:
         _log.info("world %s offers no path that meets the ego's: a straight one is used", world.id)
-    drive = _drive(job, stage, path, start, float(place.arc_m[0]), aims, motion, ticks)
+    with np.errstate(over="ignore", invalid="ignore"):
+        drive = _drive(job, stage, path, start, float(place.arc_m[0]), aims, motion, ticks)
+        states = drive.states[:, ::every].astype(np.float32)
     poses = motion.poses[:, :: stage.steps_per_tick]
     outcome = judge(stage.vehicle, drive, poses, tick_s=stage.control_dt_s)
     return FuturesResult(
@@ -99,7 +101,7 @@ def run_job(
         trajectory=Trajectory(
             stamp_ns=job.state.stamp_ns,
             time_s=np.arange(0, ticks + 1, every, dtype=np.float64) * stage.control_dt_s,
-            states=drive.states[:, ::every].astype(np.float32),
+            states=states,
         ),
         actors=poses[:, ::every].astype(np.float32),
         outcome=outcome,
@@ -181,7 +183,9 @@ def _drive(
     states[:, 0] = stage.states
     steps = stage.steps_per_tick
     for tick in range(ticks):
-        now = stage.states
+        alive = valid[:, tick]
+        # What has diverged is not shown to planners: one bad future must not spoil the job.
+        now = stage.states if alive.all() else np.where(alive[:, None], stage.states, start)
         place = path.locate(now[:, :2], near_arc_m=arc)
         arc = place.arc_m
         gap = leads.rear_arc_m[tick] - arc - front
@@ -211,8 +215,9 @@ def _drive(
         states[:, tick + 1] = stage.states
         contact[:, tick + 1] = stage.static_contact
         user_contact[:, tick + 1] = stage.road_user_contact
-        valid[:, tick + 1] = valid[:, tick] & fine & ~stage.diverged()
-    end = path.locate(stage.states[:, :2], near_arc_m=arc).arc_m
+        valid[:, tick + 1] = alive & fine & ~stage.diverged()
+    ends = np.where(valid[:, -1:], stage.states[:, :2], start[:2])
+    end = path.locate(ends, near_arc_m=arc).arc_m
     return DriveRecord(states, contact, user_contact, valid, end - start_arc_m)
 
 

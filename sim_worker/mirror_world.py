@@ -14,6 +14,7 @@ from contracts.world import World
 from sim_worker.stage import world_spec
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
+from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
 from sim_worker.vehicle.planar import (
     JOINTS,
     TIMESTEP_S,
@@ -47,6 +48,7 @@ class MirrorWorld:
     ) -> None:
         """Compile; `steering_delay_s` replaces the vehicle's."""
         silence_step_clock()
+        log_mujoco_warnings()
         self.vehicle = vehicle
         spec = world_spec(world)
         spec.attach(vehicle_spec(vehicle), prefix=TWIN, frame=spec.worldbody.add_frame())

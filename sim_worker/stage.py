@@ -14,6 +14,7 @@ from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
+from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
 from sim_worker.vehicle.planar import (
     TIMESTEP_S,
     base_from_cog,
@@ -78,6 +79,7 @@ class Stage:
         Raises ValueError where a control tick is no whole number of physics steps.
         """
         silence_step_clock()
+        log_mujoco_warnings()
         steps = 1.0 / (control_hz * TIMESTEP_S)
         if steps < 1.0 or abs(steps - round(steps)) > 1e-6:
             raise ValueError(

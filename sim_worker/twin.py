@@ -24,8 +24,9 @@ class Mirror:
     """Steps the twin along with the measured states of one car; no clock, no bus.
 
     The twin starts from the measured state, runs on commands alone, and starts anew after each
-    `window_s` and in each new World; it never teleports otherwise. States must come in time order;
-    a command counts from its stamp on and should come before the first state after it.
+    `window_s`, in each new World and where its physics diverged; it never teleports otherwise.
+    States must come in time order; a command counts from its stamp on and should come before the
+    first state after it.
     """
 
     def __init__(
@@ -94,8 +95,10 @@ class Mirror:
         self._measured, self._measured_stamp_ns = measured, state.stamp_ns
         self._scene.place(SHADOW, measured[:3])
         self._scene.place(GHOST, measured[:3])
+        if not self._sound():
+            self._seed(measured, state.stamp_ns)
         sample = self._sample(state, measured) if self._due(state.stamp_ns) else None
-        if state.stamp_ns - self._seed_stamp_ns >= self._window_ns or not self._sound():
+        if state.stamp_ns - self._seed_stamp_ns >= self._window_ns:
             self._seed(measured, state.stamp_ns)
         return sample
 

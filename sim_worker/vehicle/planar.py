@@ -119,6 +119,8 @@ def set_physics_options(spec: mujoco.MjSpec, *, timestep_s: float = TIMESTEP_S) 
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     option.gravity = [0.0, 0.0, -GRAVITY_MPS2]
     option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    # A diverged car must stay diverged and be reported, not be put back to the origin.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
 def _add_actuators(spec: mujoco.MjSpec, vehicle: VehicleParameters, *, timestep_s: float) -> None:

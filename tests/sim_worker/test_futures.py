@@ -163,6 +163,32 @@ def test_a_building_in_the_way_is_a_collision_with_a_building(
     assert outcome.collision_time_s[0] == pytest.approx((50.0 - 4.0 - front) / 8.0, abs=0.15)
 
 
+def test_a_diverged_future_is_marked_and_spoils_no_other(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    stage = Stage(crossroads(), CAR, nsim=2)
+    variants = tuple(Variant(index=i, name=str(i)) for i in range(2))
+    sound = run_job(job(variants, horizon_s=2.0), stage)
+    seed = stage.seed
+
+    def seed_badly(states: np.ndarray, **others: np.ndarray) -> None:  # type: ignore[type-arg]
+        states = states.copy()
+        states[1, 3] = 1e200
+        seed(states, **others)
+
+    monkeypatch.setattr(stage, "seed", seed_badly)
+    result = run_job(job(variants, horizon_s=2.0), stage)
+    assert result.outcome.valid.tolist() == [True, False]
+    assert np.isnan(result.outcome.progress_m[1])
+    assert np.isnan(result.outcome.min_clearance_m[1])
+    assert not result.outcome.collided[1]
+    assert result.trajectory.states[0] == pytest.approx(sound.trajectory.states[0], abs=1e-6)
+    # MuJoCo's warnings stand in the log and in no file of its own.
+    assert "unstable" in caplog.text
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Variant, ...]) -> None:
     from contracts.codec import decode, encode
 
