@@ -8,10 +8,12 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from contracts.bus import Bus, Mailbox, Received
+from contracts.bus import Bus, Mailbox, Received, ask
+from contracts.drive import InfoRequest
 from contracts.process import ProcessLife, run_process
 from contracts.setup import ViewerSetup
 from viewer.blueprint import drive_blueprint
@@ -29,7 +31,9 @@ from viewer.rows import Row
 from viewer.sinks import FileStream, LiveStream
 
 MAILBOX_DEPTH = 4096
-FLUSH_PERIOD_S = 0.5
+FLUSH_PERIOD_S = 0.9
+INFO_S = 2.0
+"""How long the vehicle may take to say when its drive began, where the setup does not."""
 
 
 class Farewell(NamedTuple):
@@ -53,14 +57,16 @@ _log = logging.getLogger("viewer")
 class Recorder:
     """Takes messages from a mailbox and writes their rows to the file and the live stream."""
 
-    def __init__(self, setup: ViewerSetup, messages: Mailbox) -> None:
+    def __init__(
+        self, setup: ViewerSetup, messages: Mailbox, find_start: Callable[[int], int]
+    ) -> None:
         self._messages = messages
         self._dropped_told = 0
         self._window_told = False
         self._flushed_s = time.monotonic()
         self._monitor = Monitor(
             drive_frame=setup.drive_frame,
-            start_stamp_ns=setup.start_stamp_ns,
+            find_start=find_start,
             title=setup.title,
             load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
         )
@@ -129,7 +135,18 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
     """Record until the run is over."""
     messages = Mailbox(MAILBOX_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
     run_end = Mailbox(1)
-    recorder = Recorder(setup, messages)
+
+    def find_start(first_stamp_ns: int) -> int:
+        if setup.start_stamp_ns:
+            return setup.start_stamp_ns
+        try:
+            info = ask(bus, "info", InfoRequest(), timeout_s=INFO_S, vehicle=setup.vehicle_id)
+        except TimeoutError as problem:
+            _log.warning("drive time counts from the first stamp: %s", problem)
+            return first_stamp_ns
+        return int(info.start_stamp_ns)
+
+    recorder = Recorder(setup, messages, find_start)
     for channel in VEHICLE_CHANNELS:
         bus.subscribe(channel, messages, vehicle=setup.vehicle_id)
     for channel in RUN_CHANNELS:

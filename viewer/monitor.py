@@ -41,22 +41,26 @@ def read_world(worlds_dir: Path, world_id: str) -> World:
 
 
 class Monitor:
-    """Turns each message into rows, in drive time since `start_stamp_ns`.
+    """Turns each message into rows, in drive time since the drive's start.
 
-    `load_world` returns the World of an id. A message that cannot be shown becomes an event in
-    the recording, never an exception.
+    `find_start` is called once, with the first stamp that is not 0, and returns the stamp of the
+    drive's start: it may be known only once the vehicle speaks. What is stamped earlier, such as
+    the run's preparations, is shown at drive time 0. `load_world`
+    returns the World of an id. A message that cannot be shown becomes an event in the recording,
+    never an exception.
     """
 
     def __init__(
         self,
         *,
         drive_frame: LocalFrame,
-        start_stamp_ns: int,
+        find_start: Callable[[int], int],
         title: str,
         load_world: Callable[[str], World],
     ) -> None:
         self._frame = drive_frame
-        self._start_ns = start_stamp_ns
+        self._find_start = find_start
+        self._start_ns: int | None = None
         self._load_world = load_world
         self._drive = DriveLog(drive_frame)
         self._run = RunLog(title)
@@ -91,7 +95,7 @@ class Monitor:
         """Return the rows of one message."""
         stamp_ns = getattr(message, "stamp_ns", None)
         # A WorldNotice carries no stamp: it counts from the latest instant seen.
-        drive_ns = self._now_ns if stamp_ns is None else stamp_ns - self._start_ns
+        drive_ns = self._now_ns if stamp_ns is None else self._drive_ns(stamp_ns)
         if channel in ("state", "mirror"):
             self._now_ns = max(self._now_ns, drive_ns)
         try:
@@ -99,6 +103,13 @@ class Monitor:
         except Exception as problem:  # one odd message must not end the recording
             _log.exception("message on %s cannot be shown", channel)
             return self._say("error", f"{channel} at {drive_ns / 1e9:.2f} s: {problem}", drive_ns)
+
+    def _drive_ns(self, stamp_ns: int) -> int:
+        if self._start_ns is None:
+            if stamp_ns == 0:
+                return 0
+            self._start_ns = self._find_start(stamp_ns)
+        return max(0, stamp_ns - self._start_ns)
 
     def note(self, level: str, text: str) -> list[Row]:
         """Return an event of the viewer itself at the latest drive time."""

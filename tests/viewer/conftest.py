@@ -32,19 +32,21 @@ def wait_until(condition: Callable[[], bool], *, timeout_s: float = 30.0) -> Non
 class ViewerRun:
     """A router that plays the orchestrator, and one viewer process."""
 
-    def __init__(self, folder: Path, *, live: str = "none", lossless: bool = True) -> None:
+    def __init__(
+        self, folder: Path, *, live: str = "none", start_stamp_ns: int = scene.START_NS
+    ) -> None:
         self.recording = folder / "monitor.rrd"
         self.log = folder / "log.jsonl"
         worlds = folder / "worlds"
         worlds.mkdir()
         write_message(scene.junction(), worlds / f"{scene.WORLD_ID}.world")
-        bus_setup = BusSetup(endpoint=f"tcp/127.0.0.1:{free_port()}", lossless=lossless)
+        bus_setup = BusSetup(endpoint=f"tcp/127.0.0.1:{free_port()}", lossless=True)
         self.bus = ZenohBus(bus_setup, router=True)
         setup = ViewerSetup(
             run_id=RUN, process_id="viewer", vehicle_id=VEHICLE, bus=bus_setup,
             log_file=str(self.log), file=str(self.recording), worlds_dir=str(worlds),
             drive_frame=scene.DRIVE_FRAME, live=live, title="hand-made drive",
-            start_stamp_ns=scene.START_NS,
+            start_stamp_ns=start_stamp_ns,
         )  # fmt: skip
         write_setup(setup, folder / "viewer.json")
         alive = Mailbox(8)
@@ -74,8 +76,8 @@ def start_viewer(tmp_path: Path) -> Iterator[Callable[..., ViewerRun]]:
     """Start a viewer process that ends with the test."""
     runs: list[ViewerRun] = []
 
-    def start(*, live: str = "none", lossless: bool = True) -> ViewerRun:
-        runs.append(ViewerRun(tmp_path, live=live, lossless=lossless))
+    def start(*, live: str = "none", start_stamp_ns: int = scene.START_NS) -> ViewerRun:
+        runs.append(ViewerRun(tmp_path, live=live, start_stamp_ns=start_stamp_ns))
         return runs[-1]
 
     yield start

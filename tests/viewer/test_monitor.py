@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contracts.codec import SchemaMismatch
-from contracts.simulation import ActiveWorld, WorldNotice
+from contracts.simulation import ActiveWorld, Event, WorldNotice
 from contracts.world import World
 from tests.viewer import scene
 from viewer.live_viewer import NoViewerError, live_viewer
@@ -24,7 +24,7 @@ from viewer.rows import Row, plain_text
 def _monitor(load_world: Any = lambda _id: scene.junction()) -> Monitor:
     return Monitor(
         drive_frame=scene.DRIVE_FRAME,
-        start_stamp_ns=scene.START_NS,
+        find_start=lambda _first: scene.START_NS,
         title="t",
         load_world=load_world,
     )
@@ -172,3 +172,23 @@ def test_an_unknown_live_view_names_the_choices() -> None:
     assert live_viewer("none") is None
     with pytest.raises(NoViewerError, match="native, web, none"):
         live_viewer("hologram")
+
+
+def test_the_start_is_asked_for_when_the_vehicle_first_speaks() -> None:
+    asked: list[int] = []
+
+    def find_start(first_stamp_ns: int) -> int:
+        asked.append(first_stamp_ns)
+        return scene.START_NS
+
+    monitor = Monitor(
+        drive_frame=scene.DRIVE_FRAME, find_start=find_start, title="t",
+        load_world=lambda _id: scene.junction(),
+    )  # fmt: skip
+    before = Event(stamp_ns=0, level="info", source="s", text="preparing")
+    early = msgspec.structs.replace(before, stamp_ns=scene.START_NS - 5)
+    assert monitor.handle("event", before)[0].drive_ns == 0
+    assert asked == []
+    assert monitor.handle("state", scene.state_at(3.0))[0].drive_ns == 3_000_000_000
+    assert monitor.handle("event", early)[0].drive_ns == 0
+    assert asked == [scene.START_NS + 3_000_000_000]

@@ -37,7 +37,7 @@ def _needs_vulkan() -> None:
 def _record(path: Path, *, without: tuple[str, ...] = ()) -> Path:
     monitor = Monitor(
         drive_frame=scene.DRIVE_FRAME,
-        start_stamp_ns=scene.START_NS,
+        find_start=lambda _first: scene.START_NS,
         title="hand-made drive",
         load_world=lambda _id: scene.junction(),
     )

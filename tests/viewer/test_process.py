@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from contracts.bus import Mailbox
 from contracts.codec import MAGIC
+from contracts.drive import VehicleInfo
 from contracts.keys import alive_key
 from contracts.keys import key as channel_key
 from contracts.simulation import RunEnd
@@ -115,6 +117,22 @@ def test_a_missing_world_and_foreign_bytes_become_events(start_viewer: StartView
     assert f"World {scene.WORLD_ID} is not shown" in told
     assert "schema version 9" in told
     assert len(recorded.times_s("/world/ego/real")) == 10
+
+
+def test_the_vehicle_is_asked_when_its_drive_began(start_viewer: StartViewer) -> None:
+    run = start_viewer(start_stamp_ns=0)
+    asked = Mailbox(1)
+    run.bus.serve("info", asked, vehicle="car")
+    run.send(m for m in scene.drive(duration_s=4.0) if m.channel == "state" and _late(m))
+    question = asked.take(10.0)
+    question.reply(VehicleInfo(vehicle_id="car", time_base="utc", start_stamp_ns=scene.START_NS))
+    _end_run(run)
+    assert run.process.wait(20.0) == 0
+    assert Recorded(run.recording).times_s("/world/ego/real")[0] == pytest.approx(2.0)
+
+
+def _late(message: scene.Message) -> bool:
+    return bool(message.message.stamp_ns >= scene.START_NS + 2_000_000_000)
 
 
 def test_without_a_display_the_drive_goes_on_and_says_so(

@@ -19,7 +19,7 @@ from viewer.sinks import FileStream
 def recording(tmp_path: Path) -> Path:
     monitor = Monitor(
         drive_frame=scene.DRIVE_FRAME,
-        start_stamp_ns=scene.START_NS,
+        find_start=lambda _first: scene.START_NS,
         title="t",
         load_world=lambda _id: scene.junction(),
     )
