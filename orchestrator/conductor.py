@@ -172,7 +172,7 @@ class Conductor:
 
     def _world_failed(self, junction_id: str, reason: str) -> None:
         self.tell(Tell("error", f"no world for {junction_id}: {reason}"))
-        self.obey(self.mission.on_world_failed(junction_id))
+        self.mission.on_world_failed(junction_id)
 
     # Processes.
 

@@ -27,6 +27,7 @@ from orchestrator.progress import ProgressLine
 from orchestrator.results import ResultTables
 from orchestrator.run_record import run_record, versions, write_record
 from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
+from orchestrator.way_ahead import WayAhead
 
 log = logging.getLogger(ORCHESTRATOR)
 
@@ -84,15 +85,12 @@ class _Drive:
         self._seen_alive: set[str] = set()
         self._silent_since_s: dict[str, float] = {}
         self._mission = Mission(
-            plan.graph,
-            plan.junctions,
-            plan.routes,
+            WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index),
             MissionSettings(
                 radius_m=plan.config.radius_m,
                 look_ahead_s=plan.config.look_ahead_s,
                 horizon_s=plan.config.horizon_s,
             ),
-            index=plan.index,
         )
 
     def run(self) -> int:

@@ -72,7 +72,15 @@ def run_record(
             "result_rows": conductor.tables.dropped,
             "failed_jobs": conductor.rounds.failed_jobs,
         },
-        "off_road": mission.off_road,
+        "off_road": [
+            {
+                "reason": stretch.reason,
+                "name": stretch.name,
+                "way_ids": list(stretch.way_ids),
+                "length_m": round(stretch.length_m, 1),
+            }
+            for stretch in mission.off_road_stretches
+        ],
         "drive_time_s": round(mission.drive_time_s, 3),
         "wall_s": round(wall_s, 3),
     }

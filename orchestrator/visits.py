@@ -25,11 +25,6 @@ class Visit:
     rounds: int = 0
     futures: int = 0
 
-    @property
-    def usable(self) -> bool:
-        """Whether rounds can run in its World."""
-        return self.world is not None and not self.failed
-
     def take_world(self, world: World, *, mono_s: float, drive_time_s: float) -> None:
         """The World is ready."""
         self.world, self.ready_mono_s, self.built_at_s = world, mono_s, drive_time_s
@@ -64,6 +59,16 @@ class VisitBook:
     def get(self, junction_id: str) -> Visit | None:
         """Return the latest visit of a junction, None where it was never seen."""
         return self._latest.get(junction_id)
+
+    def latest(self, junction_id: str) -> Visit:
+        """Return the latest visit of a junction; raises KeyError where it was never seen."""
+        return self._latest[junction_id]
+
+    def enter(self, junction_id: str, *, mono_s: float) -> None:
+        """The way to the junction's centre is below the radius; the first time counts."""
+        visit = self._latest.get(junction_id)
+        if visit is not None and visit.arrived_at_s is None and visit.entered_mono_s is None:
+            visit.entered_mono_s = mono_s
 
     def see(self, junction: Junction, *, load: bool, mono_s: float, drive_time_s: float) -> bool:
         """Note a junction ahead; returns whether its World must be built or loaded.
