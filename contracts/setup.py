@@ -9,6 +9,7 @@ import msgspec
 
 from contracts.frames import LocalFrame
 from contracts.vehicle import VehicleParameters
+from contracts.world import ATTRIBUTION
 
 _Setup = TypeVar("_Setup", bound="ProcessSetup")
 
@@ -87,6 +88,7 @@ class ViewerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     drive_frame: LocalFrame
     live: str = "none"
     title: str = "foretwin"
+    attribution: str = ATTRIBUTION
     start_stamp_ns: int = 0
 
 

@@ -27,6 +27,11 @@ LineControl = Literal["signal", "stop", "give_way", "none"]
 ATTRIBUTION = "© OpenStreetMap contributors"
 """Stands in every picture, report and export made from OpenStreetMap data."""
 
+DRAWN_GENERATOR = "foretwin draw_town"
+"""How the generator of a map drawn for foretwin begins."""
+DRAWN_ATTRIBUTION = "map drawn for foretwin, an invented town"
+"""Stands in OpenStreetMap's place where the map is none of theirs."""
+
 
 class Quantity(msgspec.Struct, frozen=True):
     """A number and where it came from."""

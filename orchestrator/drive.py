@@ -14,7 +14,6 @@ from contracts.keys import alive_key
 from contracts.process import log_to_file
 from contracts.setup import ProcessSetup
 from contracts.simulation import RunEnd
-from contracts.world import ATTRIBUTION
 from orchestrator.conductor import Conductor
 from orchestrator.config import DriveConfig
 from orchestrator.instructions import Tell
@@ -101,7 +100,11 @@ class _Drive:
         with ZenohBus(plan.bus, router=True) as bus:
             tables = ResultTables(
                 plan.folder / "results",
-                {"run_id": plan.run_id, "attribution": ATTRIBUTION, "map": plan.osm.sha256},
+                {
+                    "run_id": plan.run_id,
+                    "attribution": plan.osm.attribution,
+                    "map": plan.osm.sha256,
+                },
                 lossless=plan.config.lock_step,
             )
             conductor = Conductor(plan, bus, self._mission, tables)
@@ -264,4 +267,5 @@ def summary_text(record: dict[str, object]) -> str:
         f"{junction['world_ready_before_s']:.1f} s before"
         for junction in junctions
     ]
-    return "\n".join([*lines, ATTRIBUTION])
+    attribution = record["map"]["attribution"]  # type: ignore[index]
+    return "\n".join([*lines, attribution])

@@ -88,6 +88,7 @@ def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
         drive_frame=plan.drive_frame,
         live=plan.live_view,
         title=f"foretwin {plan.run_id}",
+        attribution=plan.osm.attribution,
         start_stamp_ns=plan.start_stamp_ns,
     )
 

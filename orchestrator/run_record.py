@@ -10,7 +10,6 @@ from typing import Any
 
 import msgspec
 
-from contracts.world import ATTRIBUTION
 from orchestrator.bookkeeping import percentile
 from orchestrator.conductor import Conductor
 from orchestrator.mission import Mission
@@ -51,7 +50,11 @@ def run_record(
         "run_id": plan.run_id,
         "exit": exit_word,
         "versions": versions(),
-        "map": {"file": str(plan.map_file), "sha256": plan.osm.sha256, "attribution": ATTRIBUTION},
+        "map": {
+            "file": str(plan.map_file),
+            "sha256": plan.osm.sha256,
+            "attribution": plan.osm.attribution,
+        },
         "seed": plan.config.seed,
         "route_source": plan.route_source,
         "config": msgspec.to_builtins(plan.config),

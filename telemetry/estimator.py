@@ -47,6 +47,7 @@ _STATE_PERIOD_NS = 20_000_000
 _UNKNOWN_STD_M = 0.01
 """Of positions that state none, until they turn out worse."""
 _ROUGH_M = 0.3
+_CREEPING_MPS = 1.0
 _STANDING_MPS = 0.05
 _FRAME_REACH_M = 20_000.0
 _FAR_M = 1e8
@@ -215,7 +216,10 @@ class StateEstimator:
             return
         self._shifts = 0
         yaw_before = filter_.mean[YAW]
+        if abs(filter_.mean[SPEED]) < _CREEPING_MPS:
+            filter_.drift_sideways(xy, std, lever)
         filter_.correct_position(xy, std, lever)
+        filter_.limit_turn(yaw_before, moved_m=self._gate.last_step_m)
         if not self._measured.fresh("speed_mps", self._filter_stamp_ns):
             self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
             if self._standing:

@@ -18,6 +18,10 @@ X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
 MAX_CURVATURE_PM = 0.25
 """A turning circle of 8 m across: tighter than any passenger car's."""
 _MAX_STEP_S = 0.05
+_DRIFT_M = 0.03
+_STANDING_CURVATURE_PM = 0.1
+_LEAST_TURN_RAD = 0.002
+_KNOWN_YAW_VAR = 0.15**2
 _JERK_DENSITY = 4.0**2
 """(m/s³)² s: acceleration wanders by 4 m/s² in one second."""
 _CURVATURE_RATE_PMPS = 0.25
@@ -142,6 +146,26 @@ class KinematicFilter:
         self.covariance[:, :2] = 0.0
         self.covariance[X, X] = self.covariance[Y, Y] = std_m * std_m
 
+    def drift_sideways(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
+        """Take a step across the car as the receiver's own: a car that creeps cannot go there."""
+        cos, sin = math.cos(self.mean[YAW]), math.sin(self.mean[YAW])
+        step = xy_m - self.sensor_xy(lever_m)
+        along, across = cos * step[0] + sin * step[1], -sin * step[0] + cos * step[1]
+        if abs(across) > max(abs(along), _DRIFT_M) and self.covariance[YAW, YAW] < _KNOWN_YAW_VAR:
+            sideways: Array = across * np.array([-sin, cos])
+            self.move_position(self.sensor_xy(lever_m) + sideways, std_m, lever_m)
+
+    def limit_turn(self, yaw_before_rad: float, *, moved_m: float) -> None:
+        """Undo what a correction turned beyond the tightest bend over `moved_m`.
+
+        Positions that shift under a car that hardly moves must not turn it round.
+        """
+        if self.covariance[YAW, YAW] > _KNOWN_YAW_VAR:
+            return
+        reach = MAX_CURVATURE_PM * moved_m + _LEAST_TURN_RAD
+        change = math.remainder(self.mean[YAW] - yaw_before_rad, math.tau)
+        self.mean[YAW] = yaw_before_rad + min(max(change, -reach), reach)
+
     def correct_speed(self, speed_mps: float, std_mps: float) -> None:
         """Apply a measured speed."""
         row = np.zeros(8)
@@ -185,3 +209,5 @@ class KinematicFilter:
         self.correct(row, -self.mean[SPEED], 0.01)
         row[SPEED], row[ACCEL] = 0.0, 1.0
         self.correct(row, -self.mean[ACCEL], 0.05)
+        # What positions said of the curvature in the last moments before a stop is mostly noise.
+        self.correct_curvature(0.0, _STANDING_CURVATURE_PM)

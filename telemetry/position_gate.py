@@ -145,6 +145,13 @@ class PositionGate:
                 return math.atan2(dy, dx)
         return None
 
+    @property
+    def last_step_m(self) -> float:
+        """How far the last two believed fixes lie apart."""
+        if len(self.recent) < 2:
+            return 0.0
+        return _distance(self.recent[-1].xy_m, self.recent[-2].xy_m)
+
     def speed_mps(self) -> float:
         """Return the speed between the last two believed fixes, 0 before there are two."""
         if len(self.recent) < 2:

@@ -68,6 +68,7 @@ class Recorder:
             drive_frame=setup.drive_frame,
             find_start=find_start,
             title=setup.title,
+            attribution=setup.attribution,
             load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
         )
         blueprint = drive_blueprint()

@@ -25,17 +25,18 @@ LEVELS = {
 class RunLog:
     """Turns the run's messages into rows; a worker's colours come with its first status."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, attribution: str = ATTRIBUTION) -> None:
         self._title = plain_text(title)
+        self._source = f"map: {attribution}"
         self._states: dict[str, str] = {}
 
     def static_rows(self) -> list[Row]:
         """Return the status line as it reads before the first progress."""
-        return [static("about", _document(f"{self._title} · map data {ATTRIBUTION}"))]
+        return [static("about", _document(f"{self._title} · {self._source}"))]
 
     def first_status(self) -> Row:
         """Return the status line at drive time 0."""
-        return Row("status", 0, _document(f"**{self._title}** · map data {ATTRIBUTION}"), True)
+        return Row("status", 0, _document(f"**{self._title}** · {self._source}"), True)
 
     def worker(self, status: WorkerStatus, drive_ns: int) -> list[Row]:
         """Return a change of state and the real-time factor."""
@@ -70,7 +71,7 @@ class RunLog:
         text = (
             f"**{progress.drive_time_s:.1f} s** · {plain_text(progress.mission_state)} · {ahead} · "
             f"{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped · "
-            f"map data {ATTRIBUTION}"
+            f"{self._source}"
         )
         return [Row("status", drive_ns, _document(text))]
 

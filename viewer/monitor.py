@@ -11,7 +11,7 @@ from contracts.arrays import Array
 from contracts.codec import read_message
 from contracts.frames import LocalFrame
 from contracts.simulation import ActiveWorld, Event, WorldNotice
-from contracts.world import World
+from contracts.world import ATTRIBUTION, World
 from viewer import log_drive, log_scenarios
 from viewer.log_drive import DriveLog
 from viewer.log_run import RunLog, rows_of_event
@@ -56,6 +56,7 @@ class Monitor:
         drive_frame: LocalFrame,
         find_start: Callable[[int], int],
         title: str,
+        attribution: str = ATTRIBUTION,
         load_world: Callable[[str], World],
     ) -> None:
         self._frame = drive_frame
@@ -63,7 +64,7 @@ class Monitor:
         self._start_ns: int | None = None
         self._load_world = load_world
         self._drive = DriveLog(drive_frame)
-        self._run = RunLog(title)
+        self._run = RunLog(title, attribution)
         self._centres: dict[str, Array] = {}
         self._now_ns = 0
         self._handlers: dict[str, Callable[[Any, int], list[Row]]] = {

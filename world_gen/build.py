@@ -24,7 +24,7 @@ from world_gen.road_graph import RoadGraph
 from world_gen.road_surface import areas
 from world_gen.stop_lines import line_controls, signals, stop_lines
 
-GENERATOR_VERSION = 1
+GENERATOR_VERSION = 2
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 
@@ -77,6 +77,7 @@ def build_world(
         junction_area=surface.junction_area,
         buildings=buildings,
         notes=tuple(dict.fromkeys((*lanes.notes, *notes, *cut))),
+        attribution=osm.attribution,
     )
     return with_id(world)
 

@@ -62,6 +62,7 @@ class OsmMap:
 
     file: str
     sha256: str
+    attribution: str
     bounds: LatLonBounds
     frame: LocalFrame
     locations: Mapping[int, tuple[float, float]]

@@ -11,6 +11,7 @@ from typing import Any
 import osmium
 
 from contracts.frames import GeoPoint, LocalFrame
+from contracts.world import ATTRIBUTION, DRAWN_ATTRIBUTION, DRAWN_GENERATOR
 from world_gen.opl import OplObjects, add_opl
 from world_gen.osm_map import LatLonBounds, MapError, OsmMap, OsmWay
 
@@ -49,6 +50,7 @@ def read_map(path: Path) -> OsmMap:
     return OsmMap(
         file=str(path),
         sha256=hashlib.sha256(data).hexdigest(),
+        attribution=_attribution(source),
         bounds=decoded.declared_bounds or box,
         frame=LocalFrame(centre),
         locations=decoded.locations,
@@ -180,6 +182,12 @@ def _located(way: OsmWay, locations: Mapping[int, tuple[float, float]]) -> OsmWa
 def _bounds_of(positions: Iterable[tuple[float, float]]) -> LatLonBounds:
     lats, lons = zip(*positions, strict=True)
     return LatLonBounds(min(lats), min(lons), max(lats), max(lons))
+
+
+def _attribution(source: Any) -> str:
+    with osmium.io.Reader(source, osmium.osm.NOTHING) as reader:
+        generator = reader.header().get("generator")
+    return DRAWN_ATTRIBUTION if generator.startswith(DRAWN_GENERATOR) else ATTRIBUTION
 
 
 def _declared_bounds(source: Any) -> LatLonBounds | None:

@@ -116,3 +116,14 @@ def test_nothing_of_the_real_drive_is_refused(data_dir: Path) -> None:
     for channel, message in log.samples():
         estimator.handle(channel, message)
     assert not estimator.skipped
+
+
+def test_a_receiver_that_drifts_does_not_turn_a_standing_car(data_dir: Path) -> None:
+    """From 192 s to 202 s the car stands while its positions wander by 0.3 m, mostly sideways."""
+    compared = berlin(data_dir)
+    seconds = np.array([state.stamp_ns for state in compared.states]) / 1e9
+    standing = (seconds > 192.5) & (seconds < 201.5)
+    path_m = np.hypot(*np.diff(compared.truth.xy_m[standing], axis=0).T).sum()
+    assert path_m > 0.3
+    assert np.ptp(np.unwrap(compared.values("yaw_rad")[standing])) < np.radians(3.0)
+    assert np.abs(compared.values("tire_angle_rad")[standing])[-10:].max() < 0.05

@@ -32,6 +32,7 @@ def drawn_map(
     geo = geo_from_local(frame, np.array(list(nodes.values()), dtype=np.float64))
     locations = {node: (float(p[0]), float(p[1])) for node, p in zip(nodes, geo, strict=True)}
     return OsmMap(
+        attribution="drawn for a test",
         file="drawn.osm",
         sha256=hashlib.sha256(repr((nodes, ways, relations, node_tags)).encode()).hexdigest(),
         bounds=LatLonBounds(*geo.min(axis=0), *geo.max(axis=0)),
