@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
+from orchestrator.given_routes import GivenRoutes
 from orchestrator.junctions_ahead import PassedJunction, UpcomingJunction, encounters
 from orchestrator.map_matching import Match
-from orchestrator.road_index import RoadIndex, key_of, reach
+from orchestrator.other_turns import OtherTurns
+from orchestrator.road_index import RoadIndex, key_of
 from orchestrator.route import Route, extend_most_probable
 from orchestrator.turning import TURNING_RAD, route_with_turn
 from world_gen.intersections import Junction
@@ -50,10 +52,8 @@ class RouteFollower:
         self._graph = graph
         self._index = index or RoadIndex(graph)
         self._junction_at = {node: junction for junction in junctions for node in junction.nodes}
-        self._given: list[tuple[int, int]] = [
-            (r, n) for r, route in enumerate(given) for n in range(len(route.edges))
-        ]
-        self._given_routes = tuple(given)
+        self._other_turns = OtherTurns(graph, self._junction_at)
+        self._given = GivenRoutes(given)
         self._ahead_m = ahead_m
         self._patience_m = patience_m
         self._route: Route | None = None
@@ -68,9 +68,6 @@ class RouteFollower:
         self._doubt: Match | None = None
         self._encounters: tuple[PassedJunction, ...] = ()
         self._passed_at: dict[str, float] = {}
-        self._reach_memory: tuple[tuple[int, bool, float], list[tuple[Junction, float]]] | None = (
-            None
-        )
 
     @property
     def route(self) -> Route:
@@ -129,45 +126,22 @@ class RouteFollower:
             starts.append((DirectedEdge(edge.edge, not edge.reverse), edge.edge.length_m - rest_m))
         known = {ahead.junction.summary.id for ahead in self.upcoming(horizon_m)}
         nearest: dict[str, UpcomingJunction] = {}
-        for start, offset_m in starts:
-            for junction, gap_m in self._junctions_from(start, horizon_m):
-                distance_m = offset_m + gap_m
-                name = junction.summary.id
-                if name in known or not 0.0 < distance_m <= horizon_m:
-                    continue
-                if self._near_passed(name, self._s_m, junction.radius_m):
-                    continue
-                if name not in nearest or distance_m < nearest[name].distance_m:
-                    nearest[name] = UpcomingJunction(junction, distance_m, self._s_m + distance_m)
+        for met in self._other_turns.junctions(starts, s_m=self._s_m, horizon_m=horizon_m):
+            name = met.junction.summary.id
+            if name in known or self._near_passed(name, self._s_m, met.junction.radius_m):
+                continue
+            if name not in nearest or met.distance_m < nearest[name].distance_m:
+                nearest[name] = met
         return tuple(sorted(nearest.values(), key=lambda a: (a.distance_m, a.junction.summary.id)))
-
-    def _junctions_from(
-        self, start: DirectedEdge, horizon_m: float
-    ) -> list[tuple[Junction, float]]:
-        """Return the junctions' nodes reached from the end of `start`, with their distances."""
-        memory = (*key_of(start), horizon_m)
-        if self._reach_memory is None or self._reach_memory[0] != memory:
-            nodes = [(start.end_node, 0.0)]
-            for found in reach(self._graph, start, limit_m=horizon_m, legal_only=True).values():
-                end_m = found.gap_m + found.directed_edge.edge.length_m
-                nodes.append((found.directed_edge.end_node, end_m))
-            junctions = [
-                (self._junction_at[node], distance_m)
-                for node, distance_m in nodes
-                if node in self._junction_at
-            ]
-            self._reach_memory = (memory, junctions)
-        return self._reach_memory[1]
 
     # --- where the car is -------------------------------------------------------------------
 
     def _begin(self, match: Match) -> None:
-        place = self._find_given(match, direction_matters=match.direction_known)
         edge = match.directed_edge
+        place = self._given.find(edge, direction_matters=match.direction_known)
         s_on_edge = match.s_on_edge_m
         if place is not None:
-            route_number, number = self._given[place]
-            edges = self._given_routes[route_number].edges[number:]
+            edges = self._given.edges_from(place)
             if edges[0].reverse != edge.reverse:
                 s_on_edge = edge.edge.length_m - s_on_edge
             self._given_from = place
@@ -254,27 +228,13 @@ class RouteFollower:
             self._turning = False
             self._set_route(Route(self._route.edges[: self._place + 1], self._route.origin_m))
 
-    def _find_given(
-        self, match: Match, *, direction_matters: bool = True, start: int = 0
-    ) -> int | None:
-        for offset in range(len(self._given)):
-            place = (start + offset) % len(self._given)
-            route_number, number = self._given[place]
-            edge = self._given_routes[route_number].edges[number]
-            if edge.edge.index != match.directed_edge.edge.index:
-                continue
-            if edge.reverse == match.directed_edge.reverse or not direction_matters:
-                return place
-        return None
-
     def _rejoin(self, match: Match) -> None:
         """Take the given route up again where the car is back on it."""
-        place = self._find_given(match, start=self._given_from)
+        place = self._given.find(match.directed_edge, start=self._given_from)
         if place is None:
             return
         assert self._route is not None
-        route_number, number = self._given[place]
-        rest = self._given_routes[route_number].edges[number + 1 :]
+        rest = self._given.edges_from(place)[1:]
         self._on_given = True
         self._given_from = place
         self._set_route(Route((*self._route.edges[: self._place + 1], *rest), self._route.origin_m))
