@@ -12,15 +12,7 @@ from typing import Any
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.drive import (
-    GnssFix,
-    HeadingSample,
-    ImuSample,
-    SpeedSample,
-    SteeringSample,
-    VehicleInfo,
-    VehicleState,
-)
+from contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
 from contracts.frames import (
     GeoPoint,
     LocalFrame,
@@ -28,27 +20,18 @@ from contracts.frames import (
     geo_from_local,
     grid_convergence,
     local_from_geo,
-    wrap_angle,
 )
-from telemetry.kinematic_filter import (
-    ACCEL,
-    CURVATURE,
-    GYRO_BIAS,
-    SPEED,
-    YAW,
-    KinematicFilter,
-    X,
-    Y,
-)
-from telemetry.measured import Doubt, Measured
+from telemetry.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
+from telemetry.measured import Measured
+from telemetry.motion_corrections import STANDING_MPS, MotionCorrections
 from telemetry.position_gate import PositionGate
+from telemetry.reported_state import moving_state, unmoved_state
 
 _STATE_PERIOD_NS = 20_000_000
 _UNKNOWN_STD_M = 0.01
 """Of positions that state none, until they turn out worse."""
 _ROUGH_M = 0.3
 _CREEPING_MPS = 1.0
-_STANDING_MPS = 0.05
 _FRAME_REACH_M = 20_000.0
 _FAR_M = 1e8
 
@@ -79,6 +62,7 @@ class StateEstimator:
             steering_offset_rad=steering_offset_rad,
             skipped=self._gate.skipped,
         )
+        self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
         self._frame: LocalFrame | None = None
         self._start_ns = 0
         self._filter: KinematicFilter | None = None
@@ -86,8 +70,6 @@ class StateEstimator:
         self._state_stamp_ns: int | None = None
         self._convergence_rad = 0.0
         self._altitude_m = 0.0
-        self._speed_doubt = Doubt(0.05)
-        self._yaw_doubt = Doubt(0.02)
         self._shifts = 0
         self._standing = False
 
@@ -112,39 +94,13 @@ class StateEstimator:
 
     def _take(self, message: Any) -> None:
         filter_ = self._advance(message.stamp_ns)
-        match message:
-            case SpeedSample(speed_mps=speed):
-                self._standing = abs(speed) < _STANDING_MPS
-                if filter_ is None:
-                    return
-                if speed < -0.1:
-                    filter_.may_reverse = True
-                elif speed > 0.1:
-                    filter_.may_reverse = False
-                if self._standing:
-                    filter_.stand()
-                else:
-                    surprise = abs(speed - filter_.mean[SPEED])
-                    std = self._speed_doubt.std(surprise)
-                    filter_.correct_speed(speed, std + 0.005 * abs(speed))
-            case ImuSample(accel_mps2=accel, rate_radps=rate):
-                if filter_ is not None:
-                    filter_.correct_yaw_rate(rate[2], 0.01, biased=True)
-                    filter_.correct_accel(accel[0], 0.5)
-            case HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw, yaw_rate_radps=yaw_rate):
-                local_yaw = yaw + self._convergence_rad
-                if filter_ is None:
-                    self._start(stamp_ns, local_yaw, yaw_std_rad=0.02)
-                    return
-                surprise = abs(math.remainder(local_yaw - filter_.mean[YAW], math.tau))
-                filter_.correct_yaw(local_yaw, self._yaw_doubt.std(surprise))
-                if yaw_rate is not None:
-                    filter_.correct_yaw_rate(yaw_rate, 0.01, biased=False)
-            case SteeringSample():
-                angle = self._measured.tire_angle_rad
-                if filter_ is not None and angle is not None:
-                    # Understeer and an unknown offset make steering a rough witness of the path.
-                    filter_.correct_curvature(math.tan(angle) / self._wheelbase_m, 0.03)
+        if isinstance(message, SpeedSample):
+            self._standing = abs(message.speed_mps) < STANDING_MPS
+        if filter_ is not None:
+            self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
+        elif isinstance(message, HeadingSample):
+            local_yaw = message.yaw_rad + self._convergence_rad
+            self._start(message.stamp_ns, local_yaw, yaw_std_rad=0.02)
 
     # Positions.
 
@@ -295,44 +251,24 @@ class StateEstimator:
 
     def _state(self, stamp_ns: int, fix: GnssFix | None) -> VehicleState:
         self._state_stamp_ns = stamp_ns
-        estimated = self._measured.estimated(stamp_ns)
-        angle = None if "tire_angle_rad" in estimated else self._measured.tire_angle_rad
-        wheel = self._measured.steering_wheel_rad
         position = self._place(fix)
-        filter_ = self._filter
-        if filter_ is None:
-            known = "speed_mps" not in estimated
-            return VehicleState(
+        if self._filter is None:
+            return unmoved_state(
+                self._measured,
                 vehicle_id=self._info.vehicle_id,
                 stamp_ns=stamp_ns,
                 position=position,
-                yaw_rad=0.0,
-                speed_mps=self._measured.speed_mps if known else 0.0,
-                yaw_rate_radps=0.0,
-                accel_mps2=0.0,
-                tire_angle_rad=angle,
-                steering_wheel_rad=wheel,
                 position_std_m=None if fix is None else fix.std_m,
-                estimated=estimated,
-                yaw_valid=False,
             )
-        spread = np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
-        if angle is None:
-            angle = math.atan(self._wheelbase_m * filter_.mean[CURVATURE])
-        return VehicleState(
+        return moving_state(
+            self._filter,
+            self._measured,
             vehicle_id=self._info.vehicle_id,
             stamp_ns=stamp_ns,
             position=position,
-            yaw_rad=float(wrap_angle(filter_.mean[YAW] - self._convergence_rad)),
-            speed_mps=0.0 if self._standing else float(filter_.mean[SPEED]),
-            yaw_rate_radps=0.0 if self._standing else filter_.yaw_rate_radps,
-            accel_mps2=0.0 if self._standing else float(filter_.mean[ACCEL]),
-            tire_angle_rad=angle,
-            steering_wheel_rad=wheel,
-            position_std_m=float(math.hypot(spread[X], spread[Y]) / math.sqrt(2.0)),
-            yaw_std_rad=float(spread[YAW]),
-            speed_std_mps=float(spread[SPEED]),
-            estimated=estimated,
+            convergence_rad=self._convergence_rad,
+            wheelbase_m=self._wheelbase_m,
+            standing=self._standing,
         )
 
     @property
