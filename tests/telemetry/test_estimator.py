@@ -1,72 +1,27 @@
+"""The estimator on clean input: what it makes of positions alone, and of every sensor."""
+
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.drive import (
-    GnssFix,
-    HeadingSample,
-    ImuSample,
-    SpeedSample,
-    SteeringSample,
-    VehicleInfo,
-    VehicleState,
+from contracts.drive import HeadingSample, SpeedSample
+from contracts.frames import wrap_angle
+from tests.telemetry.position_track import (
+    Sample,
+    along,
+    circle,
+    fix,
+    info,
+    states_of,
+    xy,
+    yaw,
 )
-from contracts.frames import (
-    GeoPoint,
-    LocalFrame,
-    geo_from_local,
-    local_from_geo,
-    local_from_geo_yaw,
-    wrap_angle,
-)
-from telemetry.estimator import StateEstimator
 from tests.telemetry.standin_drive import whole_drive
-
-FRAME = LocalFrame(GeoPoint(52.51, 13.39, 0.0))
-Sample = tuple[str, Any]
-
-
-def info(**fields: Any) -> VehicleInfo:
-    return VehicleInfo(vehicle_id="car", time_base="log", start_stamp_ns=0, **fields)
-
-
-def fix(time_s: float, x_m: float, y_m: float, std_m: float | None = None) -> Sample:
-    lat, lon = geo_from_local(FRAME, np.array([x_m, y_m]))
-    position = GeoPoint(float(lat), float(lon))
-    return "gnss", GnssFix(stamp_ns=round(time_s * 1e9), position=position, std_m=std_m)
-
-
-def states_of(samples: Iterable[Sample], **options: Any) -> list[VehicleState]:
-    estimator = StateEstimator(options.pop("info", info()), **options)
-    states = (estimator.handle(channel, message) for channel, message in samples)
-    return [state for state in states if state is not None]
-
-
-def xy(state: VehicleState) -> np.ndarray:
-    return local_from_geo(FRAME, state.position.lat_deg, state.position.lon_deg)
-
-
-def yaw(state: VehicleState) -> float:
-    position = state.position
-    return float(local_from_geo_yaw(FRAME, state.yaw_rad, position.lat_deg, position.lon_deg))
-
-
-def along(
-    path: Callable[[float], tuple[float, float]], until_s: float, *, rate_hz: float = 5.0
-) -> list[Sample]:
-    return [fix(k / rate_hz, *path(k / rate_hz)) for k in range(round(until_s * rate_hz))]
-
-
-def circle(time_s: float, *, radius_m: float = 15.0, speed_mps: float = 6.0) -> tuple[float, float]:
-    angle = speed_mps / radius_m * time_s
-    return radius_m * math.sin(angle), radius_m * (1.0 - math.cos(angle))
 
 
 def test_positions_alone_give_the_motion_on_a_circle() -> None:
@@ -202,23 +157,6 @@ def test_reverse_needs_a_negative_measured_speed() -> None:
     assert abs(abs(yaw(forward)) - math.pi) < 0.02
 
 
-def test_wild_positions_are_skipped_and_counted() -> None:
-    samples = along(circle, 10.0)
-    nowhere = GnssFix(stamp_ns=2_010_000_000, position=GeoPoint(math.nan, 13.0))
-    zero = GnssFix(stamp_ns=3_010_000_000, position=GeoPoint(0.0, 0.0))
-    late = GnssFix(stamp_ns=1_000_000_000, position=samples[0][1].position)
-    dirty = [
-        *samples[:11], ("gnss", nowhere), *samples[11:16], ("gnss", zero),
-        *samples[16:20], ("gnss", late), *samples[20:25], fix(4.9, 500.0, 500.0), *samples[25:],
-    ]  # fmt: skip
-    estimator = StateEstimator(info())
-    states = [estimator.handle(channel, message) for channel, message in dirty]
-    assert estimator.skipped == {
-        "gnss_not_finite": 1, "gnss_zero": 1, "gnss_time_backwards": 1, "gnss_jump": 1,
-    }  # fmt: skip
-    assert [state for state in states if state] == states_of(samples)
-
-
 def test_rough_positions_without_stated_noise_are_smoothed() -> None:
     noise = np.random.default_rng(5).normal(0.0, 1.5, (150, 2))
     rough = [fix(k / 5, 2.0 * k + noise[k, 0], noise[k, 1]) for k in range(150)]
@@ -227,91 +165,3 @@ def test_rough_positions_without_stated_noise_are_smoothed() -> None:
     error = np.array([xy(state) for state in late]) - truth
     assert np.sqrt(np.mean(error**2)) < 1.2
     assert np.abs([yaw(state) for state in late]).max() < 0.5
-
-
-def test_a_lasting_jump_is_accepted_after_a_second_with_the_motion_kept() -> None:
-    before = [fix(k / 5, 2.0 * k, 0.0) for k in range(25)]
-    after = [fix(5.0 + k / 5, 300.0 + 2.0 * k, 200.0) for k in range(25)]
-    estimator = StateEstimator(info())
-    states = [estimator.handle(*sample) for sample in before + after]
-    assert estimator.skipped == {"gnss_jump": 5}
-    state = states[30]
-    assert state is not None
-    assert xy(state) == pytest.approx([310.0, 200.0], abs=1e-3)
-    assert state.speed_mps == pytest.approx(10.0, abs=0.1)
-    assert abs(yaw(state)) < 0.01
-
-
-def test_one_stamp_from_the_future_does_not_silence_what_follows() -> None:
-    samples = along(circle, 8.0)
-    wild = GnssFix(stamp_ns=10**15, position=samples[0][1].position)
-    estimator = StateEstimator(info())
-    dirty = [*samples[:10], ("gnss", wild), *samples[10:]]
-    states = [estimator.handle(*sample) for sample in dirty]
-    assert estimator.skipped == {"gnss_time_leap": 1}
-    assert [state for state in states if state] == states_of(samples)
-
-
-def test_broken_samples_beside_positions_change_nothing() -> None:
-    clean = along(circle, 6.0)
-    nan = math.nan
-    broken: list[Sample] = [
-        ("speed", SpeedSample(stamp_ns=2_000_000_000, speed_mps=nan)),
-        ("imu", ImuSample(stamp_ns=2_000_000_000, accel_mps2=(nan, 0, 9), rate_radps=(0, 0, 1.0))),
-        ("heading", HeadingSample(stamp_ns=2_000_000_000, yaw_rad=math.inf)),
-        ("steering", SteeringSample(stamp_ns=2_000_000_000, tire_angle_rad=nan)),
-        ("status", None),
-    ]
-    assert states_of(clean[:11] + broken + clean[11:]) == states_of(clean)
-
-
-def test_a_wrong_beginning_on_the_other_side_of_the_earth_is_forgotten() -> None:
-    wrong = GnssFix(stamp_ns=0, position=GeoPoint(-30.0, -160.0))
-    samples = [fix(1.0 + k / 5, 2.0 * k, 0.0) for k in range(25)]
-    states = states_of([("gnss", wrong), *samples])
-    assert states[-1].position == samples[-1][1].position
-    assert states[-1].speed_mps == pytest.approx(10.0, abs=0.1)
-
-
-numbers = st.one_of(st.floats(), st.floats(-100.0, 100.0))
-stamps_ns = st.integers(0, 10**11)
-positions = st.builds(
-    GeoPoint,
-    st.one_of(st.floats(), st.floats(52.5, 52.51)),
-    st.one_of(st.floats(), st.floats(13.3, 13.31)),
-)
-messages = st.one_of(
-    st.tuples(
-        st.just("gnss"),
-        st.builds(
-            GnssFix,
-            stamp_ns=stamps_ns,
-            position=positions,
-            std_m=st.none() | st.floats(0.0, 10.0),
-        ),
-    ),
-    st.tuples(st.just("speed"), st.builds(SpeedSample, stamp_ns=stamps_ns, speed_mps=numbers)),
-    st.tuples(st.just("heading"), st.builds(HeadingSample, stamp_ns=stamps_ns, yaw_rad=numbers)),
-    st.tuples(
-        st.just("imu"),
-        st.builds(
-            ImuSample,
-            stamp_ns=stamps_ns,
-            accel_mps2=st.tuples(numbers, numbers, numbers),
-            rate_radps=st.tuples(numbers, numbers, numbers),
-        ),
-    ),
-)
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.lists(messages, max_size=40))
-def test_whatever_arrives_no_state_is_broken(samples: list[Sample]) -> None:
-    samples = sorted(samples, key=lambda sample: sample[1].stamp_ns)
-    stamps = []
-    for state in states_of(samples):
-        numbers = (state.yaw_rad, state.speed_mps, state.yaw_rate_radps, state.accel_mps2)
-        assert all(math.isfinite(number) for number in numbers)
-        state.position.validate()
-        stamps.append(state.stamp_ns)
-    assert stamps == sorted(stamps)

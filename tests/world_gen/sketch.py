@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
@@ -68,3 +69,24 @@ def _xml(tags: dict[str, str]) -> str:
         for key, value in tags.items()
         if value
     )
+
+
+def star(bearings_deg: list[float], length_m: float = 150.0) -> Sketch:
+    """Roads that meet in node 1."""
+    sketch = Sketch()
+    sketch.node(1, 0.0, 0.0)
+    for arm, bearing in enumerate(bearings_deg, start=2):
+        angle = math.radians(bearing)
+        sketch.node(arm, length_m * math.cos(angle), length_m * math.sin(angle))
+        sketch.road(100 + arm, [1, arm], f"Arm {arm}")
+    return sketch
+
+
+def only(junctions: tuple[Junction, ...]) -> Junction:
+    assert len(junctions) == 1, [j.summary for j in junctions]
+    return junctions[0]
+
+
+def off_centre_m(sketch: Sketch, junction: Junction) -> float:
+    """Return how far a junction's centre lies from the place the sketch is drawn around."""
+    return math.hypot(*local_from_geo(sketch.frame, junction.summary.lat, junction.summary.lon))

@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from contracts.frames import local_from_geo
-from tests.world_gen.sketch import MANCHESTER, Sketch
+from tests.world_gen.sketch import MANCHESTER, Sketch, off_centre_m, only, star
 from world_gen.find_intersections import find_intersections
-from world_gen.intersections import Junction
-
-
-def star(bearings_deg: list[float], length_m: float = 150.0) -> Sketch:
-    """Roads that meet in node 1."""
-    sketch = Sketch()
-    sketch.node(1, 0.0, 0.0)
-    for arm, bearing in enumerate(bearings_deg, start=2):
-        angle = math.radians(bearing)
-        sketch.node(arm, length_m * math.cos(angle), length_m * math.sin(angle))
-        sketch.road(100 + arm, [1, arm], f"Arm {arm}")
-    return sketch
 
 
 def dual_carriageway(sketch: Sketch, gap_m: float = 14.0) -> None:
@@ -32,16 +18,6 @@ def dual_carriageway(sketch: Sketch, gap_m: float = 14.0) -> None:
         sketch.node(node + 10, -x_m, gap_m / 2)
     sketch.road(110, [11, 12, 13], "Allee", highway="secondary", oneway="yes")
     sketch.road(120, [21, 22, 23], "Allee", highway="secondary", oneway="yes")
-
-
-def only(junctions: tuple[Junction, ...]) -> Junction:
-    assert len(junctions) == 1, [j.summary for j in junctions]
-    return junctions[0]
-
-
-def off_centre_m(sketch: Sketch, junction: Junction) -> float:
-    """Return how far a junction's centre lies from the place the sketch is drawn around."""
-    return math.hypot(*local_from_geo(sketch.frame, junction.summary.lat, junction.summary.lon))
 
 
 @pytest.mark.parametrize(
@@ -203,90 +179,6 @@ def test_a_ramp_that_joins_a_motorway_is_a_merge(tmp_path: Path) -> None:
     assert (found.summary.kind, found.summary.arms) == ("merge", 3)
 
 
-def roundabout(kind: str = "roundabout") -> Sketch:
-    """A ring of two ways and 15 m radius; the eastern arm parts 25 m before it."""
-    sketch = Sketch()
-    for step in range(8):
-        angle = math.radians(45.0 * step)
-        sketch.node(1 + step, 15.0 * math.cos(angle), 15.0 * math.sin(angle))
-    sketch.road(100, [1, 2, 3, 4, 5], junction=kind)
-    sketch.road(101, [5, 6, 7, 8, 1], junction=kind)
-    for node, x_m, y_m in ((20, 40, 0), (21, 150, 0), (22, 0, 150), (23, -150, 0)):
-        sketch.node(node, x_m, y_m)
-    sketch.road(110, [20, 2], "Ost", oneway="yes")
-    sketch.road(111, [8, 20], "Ost", oneway="yes")
-    sketch.road(112, [20, 21], "Ost")
-    sketch.road(113, [22, 3], "Nord")
-    sketch.road(114, [23, 5], "West")
-    return sketch
-
-
-def test_a_roundabout_is_one_junction_with_the_parting_of_its_arms(tmp_path: Path) -> None:
-    sketch = roundabout()
-    found = only(sketch.junctions(tmp_path))
-    assert (found.summary.kind, found.summary.arms) == ("roundabout", 3)
-    assert found.summary.control == "roundabout"
-    assert found.nodes == {1, 2, 3, 5, 8, 20}
-    assert found.summary.id == "n1"
-    assert off_centre_m(sketch, found) < 0.1
-    assert [arm.name for arm in found.arms] == ["Ost", "Nord", "West"]
-
-
-def test_a_circular_place_has_no_roundabout_rules(tmp_path: Path) -> None:
-    summary = only(roundabout("circular").junctions(tmp_path)).summary
-    assert (summary.kind, summary.control) == ("circular", "uncontrolled")
-
-
-def test_a_ring_without_the_tag_is_no_roundabout(tmp_path: Path) -> None:
-    kinds = {junction.summary.kind for junction in roundabout("").junctions(tmp_path)}
-    assert not kinds & {"roundabout", "circular"}
-
-
-def test_a_painted_roundabout(tmp_path: Path) -> None:
-    sketch = star([0, 120, 240])
-    sketch.nodes[0] = sketch.nodes[0].replace(
-        "</node>", '<tag k="highway" v="mini_roundabout"/></node>'
-    )
-    summary = only(sketch.junctions(tmp_path)).summary
-    assert (summary.kind, summary.control) == ("mini_roundabout", "roundabout")
-
-
-def signed(word: str, distances_m: dict[float, float], **tags: str) -> Sketch:
-    """A crossing with a sign or light on some arms: bearing in degrees → distance."""
-    sketch = Sketch()
-    sketch.node(1, 0.0, 0.0)
-    for arm, bearing in enumerate((0.0, 90.0, 180.0, 270.0), start=2):
-        angle = math.radians(bearing)
-        cos, sin = math.cos(angle), math.sin(angle)
-        sketch.node(arm, 200.0 * cos, 200.0 * sin)
-        nodes = [arm, 1]
-        if bearing in distances_m:
-            distance_m = distances_m[bearing]
-            sketch.node(arm + 10, distance_m * cos, distance_m * sin, highway=word, **tags)
-            nodes = [arm, arm + 10, 1]
-        sketch.road(100 + arm, nodes, f"Arm {arm}")
-    return sketch
-
-
-@pytest.mark.parametrize(
-    ("sketch", "control"),
-    [
-        (signed("traffic_signals", {0.0: 12.0}), "signals"),
-        (signed("traffic_signals", {0.0: 35.0}), "signals"),
-        (signed("traffic_signals", {0.0: 90.0}), "uncontrolled"),
-        (signed("traffic_signals", {0.0: 30.0}, crossing="traffic_signals"), "uncontrolled"),
-        (signed("traffic_signals", {0.0: 12.0}, direction="backward"), "uncontrolled"),
-        (signed("traffic_signals", {0.0: 12.0}, direction="forward"), "signals"),
-        (signed("stop", {0.0: 8.0}), "stop"),
-        (signed("stop", {0.0: 8.0}, stop="all"), "all_way_stop"),
-        (signed("stop", {0.0: 8.0, 90.0: 8.0, 180.0: 8.0, 270.0: 8.0}), "all_way_stop"),
-        (signed("give_way", {90.0: 8.0, 270.0: 8.0}), "give_way"),
-    ],
-)
-def test_control(sketch: Sketch, control: str, tmp_path: Path) -> None:
-    assert only(sketch.junctions(tmp_path)).summary.control == control
-
-
 def test_left_hand_traffic_is_said(tmp_path: Path) -> None:
     sketch = Sketch(MANCHESTER)
     for node, x_m, y_m in ((1, 0, 0), (2, 100, 0), (3, -100, 0), (4, 0, 100)):
@@ -306,15 +198,6 @@ def test_an_edit_elsewhere_changes_no_id(tmp_path: Path) -> None:
     after = [junction.summary.id for junction in sketch.junctions(tmp_path)]
     assert before in after
     assert len(after) == 2
-
-
-def test_the_order_in_the_file_does_not_matter(tmp_path: Path) -> None:
-    there, back = roundabout(), roundabout()
-    back.nodes.reverse()
-    back.ways.reverse()
-    a, b = only(there.junctions(tmp_path)), only(back.junctions(tmp_path))
-    assert a.summary == b.summary
-    assert a.inner == b.inner
 
 
 def test_only_those_that_touch_given_edges(tmp_path: Path) -> None:

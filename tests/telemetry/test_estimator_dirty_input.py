@@ -1,0 +1,128 @@
+"""The estimator on dirty input: what is impossible is refused, counted and changes nothing."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contracts.drive import GnssFix, HeadingSample, ImuSample, SpeedSample, SteeringSample
+from contracts.frames import GeoPoint
+from telemetry.estimator import StateEstimator
+from tests.telemetry.position_track import (
+    Sample,
+    along,
+    circle,
+    fix,
+    info,
+    states_of,
+    xy,
+    yaw,
+)
+
+
+def test_wild_positions_are_skipped_and_counted() -> None:
+    samples = along(circle, 10.0)
+    nowhere = GnssFix(stamp_ns=2_010_000_000, position=GeoPoint(math.nan, 13.0))
+    zero = GnssFix(stamp_ns=3_010_000_000, position=GeoPoint(0.0, 0.0))
+    late = GnssFix(stamp_ns=1_000_000_000, position=samples[0][1].position)
+    dirty = [
+        *samples[:11], ("gnss", nowhere), *samples[11:16], ("gnss", zero),
+        *samples[16:20], ("gnss", late), *samples[20:25], fix(4.9, 500.0, 500.0), *samples[25:],
+    ]  # fmt: skip
+    estimator = StateEstimator(info())
+    states = [estimator.handle(channel, message) for channel, message in dirty]
+    assert estimator.skipped == {
+        "gnss_not_finite": 1, "gnss_zero": 1, "gnss_time_backwards": 1, "gnss_jump": 1,
+    }  # fmt: skip
+    assert [state for state in states if state] == states_of(samples)
+
+
+def test_a_lasting_jump_is_accepted_after_a_second_with_the_motion_kept() -> None:
+    before = [fix(k / 5, 2.0 * k, 0.0) for k in range(25)]
+    after = [fix(5.0 + k / 5, 300.0 + 2.0 * k, 200.0) for k in range(25)]
+    estimator = StateEstimator(info())
+    states = [estimator.handle(*sample) for sample in before + after]
+    assert estimator.skipped == {"gnss_jump": 5}
+    state = states[30]
+    assert state is not None
+    assert xy(state) == pytest.approx([310.0, 200.0], abs=1e-3)
+    assert state.speed_mps == pytest.approx(10.0, abs=0.1)
+    assert abs(yaw(state)) < 0.01
+
+
+def test_one_stamp_from_the_future_does_not_silence_what_follows() -> None:
+    samples = along(circle, 8.0)
+    wild = GnssFix(stamp_ns=10**15, position=samples[0][1].position)
+    estimator = StateEstimator(info())
+    dirty = [*samples[:10], ("gnss", wild), *samples[10:]]
+    states = [estimator.handle(*sample) for sample in dirty]
+    assert estimator.skipped == {"gnss_time_leap": 1}
+    assert [state for state in states if state] == states_of(samples)
+
+
+def test_broken_samples_beside_positions_change_nothing() -> None:
+    clean = along(circle, 6.0)
+    nan = math.nan
+    broken: list[Sample] = [
+        ("speed", SpeedSample(stamp_ns=2_000_000_000, speed_mps=nan)),
+        ("imu", ImuSample(stamp_ns=2_000_000_000, accel_mps2=(nan, 0, 9), rate_radps=(0, 0, 1.0))),
+        ("heading", HeadingSample(stamp_ns=2_000_000_000, yaw_rad=math.inf)),
+        ("steering", SteeringSample(stamp_ns=2_000_000_000, tire_angle_rad=nan)),
+        ("status", None),
+    ]
+    assert states_of(clean[:11] + broken + clean[11:]) == states_of(clean)
+
+
+def test_a_wrong_beginning_on_the_other_side_of_the_earth_is_forgotten() -> None:
+    wrong = GnssFix(stamp_ns=0, position=GeoPoint(-30.0, -160.0))
+    samples = [fix(1.0 + k / 5, 2.0 * k, 0.0) for k in range(25)]
+    states = states_of([("gnss", wrong), *samples])
+    assert states[-1].position == samples[-1][1].position
+    assert states[-1].speed_mps == pytest.approx(10.0, abs=0.1)
+
+
+numbers = st.one_of(st.floats(), st.floats(-100.0, 100.0))
+stamps_ns = st.integers(0, 10**11)
+positions = st.builds(
+    GeoPoint,
+    st.one_of(st.floats(), st.floats(52.5, 52.51)),
+    st.one_of(st.floats(), st.floats(13.3, 13.31)),
+)
+messages = st.one_of(
+    st.tuples(
+        st.just("gnss"),
+        st.builds(
+            GnssFix,
+            stamp_ns=stamps_ns,
+            position=positions,
+            std_m=st.none() | st.floats(0.0, 10.0),
+        ),
+    ),
+    st.tuples(st.just("speed"), st.builds(SpeedSample, stamp_ns=stamps_ns, speed_mps=numbers)),
+    st.tuples(st.just("heading"), st.builds(HeadingSample, stamp_ns=stamps_ns, yaw_rad=numbers)),
+    st.tuples(
+        st.just("imu"),
+        st.builds(
+            ImuSample,
+            stamp_ns=stamps_ns,
+            accel_mps2=st.tuples(numbers, numbers, numbers),
+            rate_radps=st.tuples(numbers, numbers, numbers),
+        ),
+    ),
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(messages, max_size=40))
+def test_whatever_arrives_no_state_is_broken(samples: list[Sample]) -> None:
+    samples = sorted(samples, key=lambda sample: sample[1].stamp_ns)
+    stamps = []
+    for state in states_of(samples):
+        numbers = (state.yaw_rad, state.speed_mps, state.yaw_rate_radps, state.accel_mps2)
+        assert all(math.isfinite(number) for number in numbers)
+        state.position.validate()
+        stamps.append(state.stamp_ns)
+    assert stamps == sorted(stamps)
