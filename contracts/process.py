@@ -65,6 +65,8 @@ class ProcessLife:
         self._mailbox = Mailbox(16)
         self._orchestrator_seen = False
         self._orchestrator_gone_since: float | None = None
+        self.run_ended = False
+        """Whether the orchestrator has said that the run is over, and waits for files."""
         self.terminated = threading.Event()
         bus.subscribe("run_end", self._mailbox, run=setup.run_id)
         bus.watch_alive(alive_key(run=setup.run_id, process="orchestrator"), self._mailbox)
@@ -91,6 +93,7 @@ class ProcessLife:
     def _look(self) -> None:
         while (item := self._mailbox.take()) is not None:
             if not isinstance(item, Alive):
+                self.run_ended = True
                 self.terminated.set()
             elif item.up:
                 self._orchestrator_seen = True

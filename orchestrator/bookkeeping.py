@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contracts.simulation import Comparison
+from contracts.simulation import Comparison, PlanComparison
 from orchestrator.rounds import RoundDone
 
 
@@ -86,13 +86,17 @@ class FuturesCount:
         self.latencies_ms.append(done.latency_ms)
         return own.hexdigest()
 
-    def record(self, *, missed: int) -> dict[str, Any]:
-        """Return the `futures` part of run.json; `rounds` counts the complete ones."""
+    def record(self, *, missed: int, unseeded: int) -> dict[str, Any]:
+        """Return the `futures` part of run.json; `rounds` counts the complete ones.
+
+        `missed_rounds` were due and late, `unseeded_rounds` had nothing to start from.
+        """
         return {
             "count": self.count,
             "distinct": self.distinct,
             "distinct_min_per_round": self.distinct_min,
             "missed_rounds": missed,
+            "unseeded_rounds": unseeded,
             "rounds": self.rounds,
             "sim_seconds": round(self.sim_seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3),
@@ -128,3 +132,25 @@ class ComparisonCount:
             "count": {f"{h:g}": len(rows) for h, rows in sorted(self.errors.items())},
             "independent": independent,
         }
+
+
+@dataclass(slots=True)
+class PlanCount:
+    """How far the car's own plans lie from the nominal futures and from the route's lane centre."""
+
+    rows: list[tuple[float, float, float]] = field(default_factory=list)
+
+    def take(self, comparison: PlanComparison) -> None:
+        """Count one comparison of plans."""
+        difference = comparison.difference
+        self.rows.append((difference.ade_m, difference.fde_m, comparison.path_offset_m))
+
+    def record(self) -> dict[str, Any] | None:
+        """Return the `plan_comparison` part of run.json, None where the car sent no plans.
+
+        `path_offset_m` is the mean signed distance from the lane centre, positive to the left.
+        """
+        if not self.rows:
+            return None
+        ade, fde, offset = (round(float(v), 4) for v in np.mean(self.rows, axis=0))
+        return {"count": len(self.rows), "ade_m": ade, "fde_m": fde, "path_offset_m": offset}

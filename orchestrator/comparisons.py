@@ -15,6 +15,8 @@ from orchestrator.config import HORIZONS_S
 from orchestrator.rounds import RoundDone
 from sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 
+LEAD_NS = 1_000_000_000
+"""How much of the real track before a future's beginning goes into its comparison."""
 KEEP_S = 5.0
 """How long the real track is kept beyond the longest horizon."""
 
@@ -82,8 +84,13 @@ class ComparisonDesk:
         return waiting[0].stamp_ns + round(waiting[3] * 1e9)
 
     def _compare(self, nominal: NominalTrack, junction_id: str, round_id: int) -> list[Comparison]:
+        # The same stretch whenever this is called: unwrapping angles from another start would
+        # change their last digits, and a cut log the results before the cut.
+        first = nominal.stamp_ns - LEAD_NS
+        kept = [(s, p) for s, p in zip(self._stamps_ns, self._poses, strict=True) if s >= first]
         track = ActualTrack(
-            stamps_ns=np.array(self._stamps_ns, dtype=np.int64), xy_yaw=np.array(self._poses)
+            stamps_ns=np.array([stamp for stamp, _ in kept], dtype=np.int64),
+            xy_yaw=np.array([pose for _, pose in kept]),
         )
         return compare_nominal(
             nominal,
@@ -96,7 +103,7 @@ class ComparisonDesk:
     def _forget(self, now_ns: int) -> None:
         oldest = now_ns - round((self.horizon_s + KEEP_S) * 1e9)
         if self._waiting:
-            oldest = min(oldest, self._waiting[0][0].stamp_ns - 1_000_000_000)
+            oldest = min(oldest, self._waiting[0][0].stamp_ns - LEAD_NS)
         while len(self._stamps_ns) > 2 and self._stamps_ns[1] < oldest:
             self._stamps_ns.popleft()
             self._poses.popleft()

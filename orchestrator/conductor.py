@@ -61,6 +61,8 @@ class Conductor:
         )
         self.alive: set[str] = set()
         self.missed_rounds = 0
+        self.unseeded_rounds = 0
+        """Rounds that no machine could have run: no heading known yet, or no road ahead."""
         self.mirror_stamp_ns = 0
         self.mirror_independent: bool | None = None
         self._active_world: str | None = None
@@ -138,7 +140,10 @@ class Conductor:
         if intent is None or latest is None:
             return False
         if isinstance(intent, NotReady):
-            self.missed_rounds += 1
+            if intent.world_late:
+                self.missed_rounds += 1
+            else:
+                self.unseeded_rounds += 1
             return False
         self.rounds.start(intent, latest, self.intake.plan)
         return True

@@ -9,7 +9,7 @@ import time
 from types import FrameType
 
 from contracts.bus import Mailbox, Reply, ZenohBus
-from contracts.drive import InfoRequest
+from contracts.drive import InfoRequest, VehicleInfo
 from contracts.keys import alive_key
 from contracts.process import log_to_file
 from contracts.setup import ProcessSetup
@@ -183,8 +183,16 @@ class _Drive:
             if isinstance(reply, Reply) and reply.message is not None:
                 conductor.take_info(reply.message)
                 return True
-            # A live car may start its telemetry when it likes; a process of ours may not.
-            if self._plan.config.resolved_source != "live" and time.monotonic() > deadline:
+            if self._plan.config.resolved_source == "live":
+                # A live car may start when it likes, and need not know our question.
+                while (item := conductor.mailbox.take()) is not None:
+                    conductor.handle(item)
+                self._look_after(conductor, time.monotonic())
+                first_ns = conductor.intake.first_stamp_ns
+                if first_ns is not None:
+                    conductor.take_info(unannounced(self._plan.config.vehicle_id, first_ns))
+                    return True
+            elif time.monotonic() > deadline:
                 raise DriveError("the vehicle does not say what it is; see log.jsonl")
         return False
 
@@ -248,6 +256,17 @@ class _Drive:
         logging.shutdown()
         fold_stderr(plan.processes_dir, plan.folder / "log.jsonl")
         line.say(summary_text(record))
+
+
+def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
+    """Return what is taken for granted of a live car that does not say what it is."""
+    return VehicleInfo(
+        vehicle_id=vehicle_id,
+        time_base="utc",
+        start_stamp_ns=first_stamp_ns,
+        source="live telemetry",
+        reference_point="antenna",
+    )
 
 
 def summary_text(record: dict[str, object]) -> str:

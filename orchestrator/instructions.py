@@ -50,6 +50,7 @@ class RoundIntent:
 
 @dataclass(frozen=True, slots=True)
 class NotReady:
-    """A round should run now, but cannot."""
+    """A round should run now, but cannot; `world_late` says that its World should be there."""
 
     reason: str
+    world_late: bool

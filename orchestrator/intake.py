@@ -30,6 +30,7 @@ class Intake:
         self.latest: LatestState | None = None
         self.plan: PlannedTrajectory | None = None
         self.states = 0
+        self.first_stamp_ns: int | None = None
         self.refused = 0
         self._vehicle = vehicle
         self._estimator: StateEstimator | None = None
@@ -55,6 +56,8 @@ class Intake:
             self.refused += 1
             raise
         message = envelope.message
+        if self.first_stamp_ns is None:
+            self.first_stamp_ns = message.stamp_ns
         if isinstance(message, DriveEnd):
             self.end = message
             return None

@@ -128,14 +128,14 @@ class Mission:
             return None
         visit = self._visits.latest(self._current) if self._current else None
         if visit is None or visit.world is None:
-            return NotReady("the world is not ready")
+            return NotReady("the world is not ready", world_late=True)
         if not car.yaw_valid:
-            return NotReady("the heading is not known")
+            return NotReady("the heading is not known", world_late=False)
         path = self._way.path(
             visit.world.frame, speed_mps=car.speed_mps, horizon_s=self._settings.horizon_s
         )
         if path is None:
-            return NotReady("the road ends here")
+            return NotReady("the road ends here", world_late=False)
         return RoundIntent(
             junction_id=visit.junction.summary.id,
             world_id=visit.world.id,

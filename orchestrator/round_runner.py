@@ -10,7 +10,7 @@ from contracts.bus import Bus, Mailbox, Reply
 from contracts.drive import PlannedTrajectory, VehicleState
 from contracts.simulation import Comparison, FuturesJob
 from contracts.world import World
-from orchestrator.bookkeeping import ComparisonCount, FuturesCount
+from orchestrator.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from orchestrator.comparisons import ComparisonDesk
 from orchestrator.instructions import RoundIntent
 from orchestrator.intake import LatestState
@@ -66,6 +66,7 @@ class RoundRunner:
         self.desk = RoundDesk()
         self.futures = FuturesCount()
         self.comparisons = ComparisonCount()
+        self.plans = PlanCount()
         self.rtf: dict[str, float] = {}
         self.failed_jobs = 0
         self.start_stamp_ns = 0
@@ -190,6 +191,7 @@ class RoundRunner:
             round_id=done.order.round_id,
         )
         if compared is not None:
+            self.plans.take(compared)
             self._tables.add("plan_comparisons", [plan_row(compared)])
             self._bus.publish("plan_comparison", compared, run=self._plan.run_id)
 

@@ -60,10 +60,13 @@ def run_record(
         "config": msgspec.to_builtins(plan.config),
         "intersections": mission.records(mono_s=mono_s),
         "telemetry": conductor.intake.counts.record(conductor.intake.skipped_invalid),
-        "futures": futures.record(missed=conductor.missed_rounds),
+        "futures": futures.record(
+            missed=conductor.missed_rounds, unseeded=conductor.unseeded_rounds
+        ),
         "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
         "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),
         "comparison": conductor.rounds.comparisons.record(independent=independent),
+        "plan_comparison": conductor.rounds.plans.record(),
         "workers": {
             "started": plan.config.workers,
             "restarted": supervisor.restarted,

@@ -135,7 +135,6 @@ class Recorder:
 def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
     """Record until the run is over."""
     messages = Mailbox(MAILBOX_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
-    run_end = Mailbox(1)
 
     def find_start(first_stamp_ns: int) -> int:
         if setup.start_stamp_ns:
@@ -152,15 +151,13 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
         bus.subscribe(channel, messages, vehicle=setup.vehicle_id)
     for channel in RUN_CHANNELS:
         bus.subscribe(channel, messages, run=setup.run_id)
-    bus.subscribe("run_end", run_end, run=setup.run_id)
     life.ready()
     while not life.over:
         recorder.take_one(0.1)
-    ended_well = len(run_end) > 0
-    farewell = ENDED if ended_well else HURRIED
+    farewell = ENDED if life.run_ended else HURRIED
     recorder.drain(farewell)
     messages.close()
-    recorder.close(farewell, keep_window=ended_well)
+    recorder.close(farewell, keep_window=life.run_ended)
 
 
 def show(recording: Path) -> None:

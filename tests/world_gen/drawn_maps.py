@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from contracts.world import World
+from contracts.world import ATTRIBUTION, World
 from world_gen.build import build_world
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
@@ -32,7 +32,7 @@ def drawn_map(
     geo = geo_from_local(frame, np.array(list(nodes.values()), dtype=np.float64))
     locations = {node: (float(p[0]), float(p[1])) for node, p in zip(nodes, geo, strict=True)}
     return OsmMap(
-        attribution="drawn for a test",
+        attribution=ATTRIBUTION,
         file="drawn.osm",
         sha256=hashlib.sha256(repr((nodes, ways, relations, node_tags)).encode()).hexdigest(),
         bounds=LatLonBounds(*geo.min(axis=0), *geo.max(axis=0)),
