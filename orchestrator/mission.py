@@ -81,9 +81,7 @@ class Mission:
 
     def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:
         """A junction's World is built and loaded by the workers."""
-        self._visits.latest(junction_id).take_world(
-            world, mono_s=mono_s, drive_time_s=self.drive_time_s
-        )
+        self._visits.take_world(junction_id, world, mono_s=mono_s, drive_time_s=self.drive_time_s)
         return self._choose_current()
 
     def on_world_failed(self, junction_id: str) -> None:

@@ -73,20 +73,34 @@ class VisitBook:
     def see(self, junction: Junction, *, load: bool, mono_s: float, drive_time_s: float) -> bool:
         """Note a junction ahead; returns whether its World must be built or loaded.
 
-        After a passage the next one begins with the World that is there already.
+        After a passage the next one begins with the World that is there already, or with the word
+        that there will be none.
         """
         before = self._latest.get(junction.summary.id)
         if before is not None and before.arrived_at_s is None:
             more = load and not before.load
             before.load = before.load or load
             return more
-        if before is not None and before.world is None and not before.failed:
-            return False
         visit = Visit(junction, load)
         self._latest[junction.summary.id] = visit
-        if before is not None and before.world is not None:
-            visit.take_world(before.world, mono_s=mono_s, drive_time_s=drive_time_s)
-        return load or before is None
+        if before is None:
+            return True
+        if before.failed:
+            visit.failed = True
+            return False
+        if before.world is None:
+            return load and not before.load  # asked for, and still on its way
+        visit.take_world(before.world, mono_s=mono_s, drive_time_s=drive_time_s)
+        return load
+
+    def take_world(
+        self, junction_id: str, world: World, *, mono_s: float, drive_time_s: float
+    ) -> None:
+        """A junction's World is ready, for every visit that has waited for it."""
+        late = [visit for visit in self.arrived if visit.junction.summary.id == junction_id]
+        for visit in [*late, self._latest[junction_id]]:
+            if visit.world is None:
+                visit.take_world(world, mono_s=mono_s, drive_time_s=drive_time_s)
 
     def arrive(self, junction_id: str, *, mono_s: float, drive_time_s: float) -> Visit:
         """The car is at the junction's centre."""
