@@ -84,6 +84,8 @@ CHANNELS: dict[str, Channel] = {
              "simulate futures", simulation.FuturesResult),
         _row("prepare", f"{_RUN}/worker/{{process}}/prepare", simulation.PrepareRequest, None,
              REQUEST, "load a World", simulation.PrepareReply),
+        _row("use_world", f"{_RUN}/worker/{{process}}/use_world", simulation.ActiveWorld, None,
+             REQUEST, "the mirror's World", simulation.ActiveWorld),
         _row("build", f"{_RUN}/builder/{{process}}/build", simulation.BuildRequest, None, REQUEST,
              "build a World", simulation.BuildReply),
         # What those who watch receive.

@@ -27,6 +27,7 @@ from orchestrator.world_desk import WorldDesk
 log = logging.getLogger(ORCHESTRATOR)
 
 MAILBOX_DEPTH = 16384
+MIRROR_TIMEOUT_S = 10.0
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
@@ -63,9 +64,12 @@ class Conductor:
         self.missed_rounds = 0
         self.unseeded_rounds = 0
         """Rounds that no machine could have run: no heading known yet, or no road ahead."""
+        self.mirror_asked = 0
+        """Questions to the mirror that are not answered yet."""
         self.mirror_stamp_ns = 0
         self.mirror_independent: bool | None = None
         self._active_world: str | None = None
+        self._world_untold = False
 
     # Joining.
 
@@ -114,6 +118,8 @@ class Conductor:
                 )
             case Reply(channel="prepare"):
                 self.worlds.prepare_reply(item)
+            case Reply(channel="use_world"):
+                self.mirror_asked -= 1
             case Alive():
                 self._alive(item)
             case _:
@@ -164,13 +170,32 @@ class Conductor:
                     self.worlds.want(junction_id, load=load, workers=self.rounds.desk.workers)
                 case UseWorld(world_id):
                     self._active_world = world_id
-                    self._publish_active_world()
+                    self._world_untold = True
+                    if not self.plan.config.lock_step:
+                        self.announce_world()
                 case Tell():
                     self.tell(instruction)
 
-    def _publish_active_world(self) -> None:
-        active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns, world_id=self._active_world)
+    def announce_world(self) -> None:
+        """Tell those who watch, and the mirror, which World counts from the next state on.
+
+        In lock step only between steps, when no state is on its way that may overtake this.
+        """
+        if not self._world_untold:
+            return
+        self._world_untold = False
+        active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns + 1, world_id=self._active_world)
         self.bus.publish("active_world", active, run=self.plan.run_id)
+        if MIRROR in self.alive:
+            self.mirror_asked += 1
+            self.bus.request(
+                "use_world",
+                active,
+                self.mailbox,
+                timeout_s=MIRROR_TIMEOUT_S,
+                run=self.plan.run_id,
+                process=MIRROR,
+            )
 
     def _world_ready(self, junction_id: str, world: World) -> None:
         self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
@@ -198,7 +223,8 @@ class Conductor:
                 self.worlds.prepare(process_id, world_id)
             self.rounds.give_out()
         elif process_id == MIRROR:
-            self._publish_active_world()
+            self._world_untold = True
+            self.announce_world()
         elif process_id == BUILDER:
             self.worlds.builder_up()
 

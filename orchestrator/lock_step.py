@@ -57,6 +57,8 @@ class LockStepLoop:
             for sample in self._in_order():
                 conductor.take_telemetry(sample)
             self._wait("worlds", lambda: not conductor.worlds.building)
+            conductor.announce_world()
+            self._wait("the mirror", lambda: not conductor.mirror_asked)
             if not advanced.ended and conductor.start_round():
                 self._wait("the round", lambda: not conductor.rounds.desk.open_rounds)
             if self._stop():

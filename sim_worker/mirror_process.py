@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from pathlib import Path
 
-from contracts.bus import Bus, Mailbox, Received
+from contracts.bus import Bus, Mailbox, Received, Request
 from contracts.drive import ControlCommand, VehicleState
 from contracts.process import ProcessLife
 from contracts.setup import WorkerSetup
 from contracts.simulation import ActiveWorld
 from sim_worker.twin import Mirror
-from sim_worker.worker import load_world
+from sim_worker.worker import load_world, one_line
 
 _DEPTH = 4096
 _IDLE_S = 0.2
@@ -23,12 +24,19 @@ log = logging.getLogger("sim_worker")
 
 
 class MirrorWorker:
-    """Feeds a Mirror from messages; a message that cannot be used is logged and passed over."""
+    """Feeds a Mirror from messages; a message that cannot be used is logged and passed over.
+
+    In lock step a state waits until the commands up to its stamp are there: they come from
+    another process, and results must not depend on who is faster.
+    """
 
     def __init__(self, setup: WorkerSetup, bus: Bus) -> None:
         self._run_id = setup.run_id
         self._worlds_dir = Path(setup.worlds_dir)
         self._bus = bus
+        self._waits = setup.bus.lossless and setup.commands_recorded
+        self._held: deque[VehicleState] = deque()
+        self._commanded_ns: int | None = None
         self._mirror = Mirror(
             setup.vehicle,
             drive_frame=setup.drive_frame,
@@ -37,20 +45,37 @@ class MirrorWorker:
             commands_recorded=setup.commands_recorded,
         )
 
-    def handle(self, received: Received) -> None:
-        """Take one message; never raises."""
+    def handle(self, item: Received | Request) -> None:
+        """Take one message or question; never raises."""
         try:
-            message = received.message()
+            message = item.message()
             if isinstance(message, VehicleState):
-                sample = self._mirror.handle_state(message)
-                if sample is not None:
-                    self._bus.publish("mirror", sample, run=self._run_id)
+                self._held.append(message)
+                self._release(everything=not self._waits)
             elif isinstance(message, ControlCommand):
                 self._mirror.handle_command(message)
-            elif isinstance(message, ActiveWorld):
+                self._commanded_ns = message.stamp_ns
+                self._release(everything=not self._waits)
+            elif isinstance(message, ActiveWorld) and isinstance(item, Request):
                 self._change_world(message)
-        except Exception:
-            log.exception("message on %s passed over", received.key)
+                item.reply(message)
+        except Exception as error:
+            log.exception("message on %s passed over", item.key)
+            if isinstance(item, Request):
+                item.refuse(one_line(error))
+
+    def finish(self) -> None:
+        """Handle the states that still wait for commands: none will come."""
+        self._release(everything=True)
+
+    def _release(self, *, everything: bool) -> None:
+        while self._held:
+            late = self._commanded_ns is None or self._held[0].stamp_ns > self._commanded_ns
+            if late and not everything:
+                return
+            sample = self._mirror.handle_state(self._held.popleft())
+            if sample is not None:
+                self._bus.publish("mirror", sample, run=self._run_id)
 
     def _change_world(self, active: ActiveWorld) -> None:
         world = None
@@ -63,7 +88,7 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     """Mirror the car until the run is over, then finish what has arrived."""
     mailbox = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
     worker = MirrorWorker(setup, bus)
-    bus.subscribe("active_world", mailbox, run=setup.run_id)
+    bus.serve("use_world", mailbox, run=setup.run_id, process=setup.process_id)
     bus.subscribe("control", mailbox, vehicle=setup.vehicle_id)
     bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)
     life.ready()
@@ -72,12 +97,13 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     deadline = time.monotonic() + _LAST_WORDS_S
     while time.monotonic() < deadline and _take(worker, mailbox, 0.0):
         pass
+    worker.finish()
     if mailbox.dropped:
         log.warning("the mirror fell behind and passed over %d messages", mailbox.dropped)
 
 
 def _take(worker: MirrorWorker, mailbox: Mailbox, timeout_s: float) -> bool:
     item = mailbox.take(timeout_s)
-    if isinstance(item, Received):
+    if isinstance(item, Received | Request):
         worker.handle(item)
     return item is not None

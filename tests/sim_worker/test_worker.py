@@ -120,8 +120,11 @@ def test_a_mirror_worker_turns_states_into_samples(folder: Path) -> None:
     thread = threading.Thread(target=serve_mirror, args=(setup, bus, life))
     thread.start()
     assert alive.take(10.0) is not None
-    bus.publish("active_world", ActiveWorld(stamp_ns=1_000_000_000, world_id="nowhere"), **RUN)
-    bus.publish("active_world", ActiveWorld(stamp_ns=1_000_000_000, world_id="crossroads"), **RUN)
+    nowhere = ActiveWorld(stamp_ns=1_000_000_000, world_id="nowhere")
+    crossroads_world = ActiveWorld(stamp_ns=1_000_000_000, world_id="crossroads")
+    with pytest.raises(TimeoutError, match="nowhere"):
+        ask(bus, "use_world", nowhere, process="w0", **RUN)
+    assert ask(bus, "use_world", crossroads_world, process="w0", **RUN) == crossroads_world
     _drive_past(bus)
     samples = [_sample(heard) for _ in range(21)]
     bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
 from tests.system.foretwin_command import foretwin
 
 BERLIN_LOG = "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt"
@@ -54,3 +55,18 @@ def test_cutting_the_log_changes_nothing_before_the_cut(tmp_path: Path, data_dir
                 del row["worker_id"]
         assert full, table
         assert full == part, table
+
+
+def test_a_recording_replays_to_the_same_futures(tmp_path: Path) -> None:
+    """What drive.mcap holds is all that the futures depend on."""
+    driven = foretwin(tmp_path / "driven", *SMALL, "--end", "9")
+    assert driven.code == 0, driven.screen
+    assert driven.run is not None
+    again = foretwin(
+        tmp_path / "again", *SMALL, "--map", str(EMBEDDED_MAP), "--route", str(EMBEDDED_ROUTE),
+        "--log", str(driven.run / "drive.mcap"),
+    )  # fmt: skip
+    assert again.code == 0, again.screen
+    one, two = driven.record(), again.record()
+    assert one["futures"]["count"] > 0
+    assert one["futures"]["sha256"] == two["futures"]["sha256"]
