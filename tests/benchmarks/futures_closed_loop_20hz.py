@@ -24,6 +24,8 @@ def measure_scene(*, buildings: int, road_users: bool) -> Measurement:
     stage = Stage(
         world, load_vehicle(), nsim=scenes.FUTURES, control_hz=scenes.CONTROL_HZ, threads=1
     )
+    if stage.model.ngeom < buildings:
+        raise AssertionError(f"{buildings} buildings, but the stage has {stage.model.ngeom} geoms")
     variants = plan_variants(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])
     job = scenes.job(world, variants if road_users else scenes.without_road_users(variants))
     valid = run_job(job, stage).outcome.valid

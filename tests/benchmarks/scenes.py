@@ -11,7 +11,7 @@ from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, LocalFrame
 from contracts.simulation import FuturesJob, PathAhead, Variant
-from contracts.world import Building, IntersectionSummary, Quantity, World
+from contracts.world import Area, Building, IntersectionSummary, Quantity, World
 
 FUTURES = 64
 HORIZON_S = 8.0
@@ -20,6 +20,7 @@ CONTROL_HZ = 20.0
 
 _ORIGIN = GeoPoint(45.0, -30.0)
 _CURVE_RADIUS_M = 80.0
+_HALF_ROAD_M = 4.0
 
 
 def street(*, buildings: int) -> World:
@@ -27,6 +28,10 @@ def street(*, buildings: int) -> World:
     count = buildings // 2
     along = np.linspace(-30.0, 230.0, count) if count else np.empty(0)
     boxes = [_box(f"b{side}{i}", s, side * 22.0) for i, s in enumerate(along) for side in (-1, 1)]
+    # Workers leave out what no road comes near: without a road, all of it.
+    kerbs = np.concatenate(
+        [_beside(np.arange(-35.0, 240.0, 5.0), side)[::side] for side in (1, -1)]
+    )
     return World(
         id=f"street-{buildings}",
         intersection=IntersectionSummary(
@@ -44,7 +49,7 @@ def street(*, buildings: int) -> World:
         signals=(),
         islands=(),
         kerbs=(),
-        road_surface=(),
+        road_surface=(Area(id="road", outline=kerbs[::-1]),),
         junction_area=None,
         buildings=tuple(boxes),
         attribution="drawn for a benchmark",
@@ -84,6 +89,11 @@ def _path(along_m: Array) -> tuple[Array, Array]:
     x_m = np.minimum(along_m, 60.0) + _CURVE_RADIUS_M * np.sin(turned)
     y_m = _CURVE_RADIUS_M * (1.0 - np.cos(turned))
     return np.stack([x_m, y_m], axis=-1), turned
+
+
+def _beside(along_m: Array, side: int) -> Array:
+    xy_m, yaw_rad = _path(along_m)
+    return xy_m + side * _HALF_ROAD_M * np.stack([-np.sin(yaw_rad), np.cos(yaw_rad)], axis=-1)
 
 
 def _box(name: str, along_m: float, aside_m: float) -> Building:
