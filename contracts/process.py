@@ -50,7 +50,11 @@ class JsonLines(logging.Formatter):
 
 
 def log_to_file(setup: ProcessSetup) -> None:
-    """Send the process's log to the run's file; short appends of several processes interleave."""
+    """Send the process's log to the run's file; short appends of several processes interleave.
+
+    A log that cannot be written (a full disk) is lost in silence: it must not end a drive.
+    """
+    logging.raiseExceptions = False
     handler = logging.FileHandler(setup.log_file, encoding="utf-8", delay=True)
     handler.setFormatter(JsonLines(setup.process_id))
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)

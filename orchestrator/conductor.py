@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 
 from contracts.bus import Alive, Bus, Mailbox, Received, Reply
 from contracts.codec import SchemaMismatch
@@ -68,6 +69,7 @@ class Conductor:
         """Questions to the mirror that are not answered yet."""
         self.mirror_stamp_ns = 0
         self.mirror_independent: bool | None = None
+        self.on_event: Callable[[Event], None] | None = None
         self._active_world: str | None = None
         self._world_untold = False
 
@@ -253,6 +255,8 @@ class Conductor:
 
     def _keep_event(self, event: Event) -> None:
         log.log(_LEVELS[event.level], "%s: %s", event.source, event.text)
+        if self.on_event is not None:
+            self.on_event(event)
         row = {
             "stamp_ns": event.stamp_ns,
             "level": event.level,

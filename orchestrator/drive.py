@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import logging
 import signal
@@ -24,7 +25,7 @@ from orchestrator.plan import DrivePlan, make_plan, read_inputs
 from orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids
 from orchestrator.progress import ProgressLine
 from orchestrator.results import ResultTables
-from orchestrator.run_record import run_record, versions, write_record
+from orchestrator.run_record import reserve_record, run_record, versions, write_record
 from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
 from orchestrator.way_ahead import WayAhead
 
@@ -96,6 +97,7 @@ class _Drive:
         """Run to the end, whatever ends it; the run's files are complete afterwards."""
         plan = self._plan
         started_s = time.monotonic()
+        reserve_record(plan.run_id, plan.folder / "run.json")
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
         with ZenohBus(plan.bus, router=True) as bus:
             tables = ResultTables(
@@ -111,6 +113,7 @@ class _Drive:
             exit_word, code = "failed", EXIT_FAILED
             with ProgressLine(conductor, self._mission) as line:
                 line.say(f"run {plan.folder}")
+                conductor.on_event = line.tell
                 try:
                     exit_word, code = self._go(bus, conductor, line)
                 except Exception:
@@ -242,6 +245,8 @@ class _Drive:
         while (item := conductor.mailbox.take()) is not None:
             conductor.handle(item)
         conductor.tables.close()
+        if conductor.tables.failed:
+            line.say(f"error: {conductor.tables.failed}")
         now_s = time.monotonic()
         record = run_record(
             plan,
@@ -254,7 +259,8 @@ class _Drive:
         )
         write_record(record, plan.folder / "run.json")
         logging.shutdown()
-        fold_stderr(plan.processes_dir, plan.folder / "log.jsonl")
+        with contextlib.suppress(OSError):  # a full disk has been told of
+            fold_stderr(plan.processes_dir, plan.folder / "log.jsonl")
         line.say(summary_text(record))
 
 

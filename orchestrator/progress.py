@@ -9,7 +9,7 @@ from typing import Literal
 from rich.console import Console
 from rich.status import Status
 
-from contracts.simulation import Progress, WorkerStatus
+from contracts.simulation import Event, Progress, WorkerStatus
 from orchestrator.conductor import Conductor
 from orchestrator.mission import Mission
 
@@ -43,6 +43,11 @@ class ProgressLine:
     def say(self, text: str) -> None:
         """Print a line that stays."""
         self._console.print(text, soft_wrap=True, markup=False)
+
+    def tell(self, event: Event) -> None:
+        """Print what the engineer should know now: warnings and errors."""
+        if event.level != "info":
+            self.say(f"{event.level}: {event.source}: {event.text}")
 
     def update(self, now_s: float) -> None:
         """Renew the line and publish it, at most a few times a second."""

@@ -115,7 +115,7 @@ class ResultTables:
                 _write(writers[name], name, rows)
         except (OSError, pa.ArrowException) as error:
             self.failed = f"results cannot be written: {error}"
-            log.exception("results")
+            log.error("%s", self.failed)
         finally:
             for writer in writers.values():
                 try:

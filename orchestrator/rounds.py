@@ -12,6 +12,10 @@ from typing import NamedTuple
 from contracts.simulation import FuturesJob, FuturesResult
 
 
+MAX_FAILURES = 5
+"""A round whose jobs fail so often is given up: the same job would fail for ever."""
+
+
 class Assignment(NamedTuple):
     """One job for one worker."""
 
@@ -45,6 +49,7 @@ class _Open:
     order: RoundOrder
     waiting: deque[FuturesJob]
     results: dict[int, FuturesResult] = field(default_factory=dict)
+    failures: int = 0
 
 
 @dataclass(slots=True)
@@ -53,6 +58,7 @@ class RoundDesk:
 
     late_results: int = 0
     requeued_jobs: int = 0
+    given_up_rounds: int = 0
     _open: dict[int, _Open] = field(default_factory=dict)
     _idle: dict[str, None] = field(default_factory=dict)
     _busy: dict[str, FuturesJob] = field(default_factory=dict)
@@ -108,7 +114,10 @@ class RoundDesk:
     def result(
         self, worker_id: str, job: FuturesJob, result: FuturesResult | None, received_mono_ns: int
     ) -> RoundDone | None:
-        """Take a worker's answer (None: it failed); returns the round if this completes it."""
+        """Take a worker's answer (None: it failed); returns the round if this completes it.
+
+        A job that failed goes to the next idle worker, until its round is given up.
+        """
         if self._busy.get(worker_id) is job:
             del self._busy[worker_id]
             self._idle[worker_id] = None
@@ -117,7 +126,11 @@ class RoundDesk:
             self.late_results += 1
             return None
         if result is None:
-            if not self._holds(round_, job):
+            round_.failures += 1
+            if round_.failures >= MAX_FAILURES:
+                del self._open[job.round_id]
+                self.given_up_rounds += 1
+            elif not self._holds(round_, job):
                 round_.waiting.appendleft(job)
                 self.requeued_jobs += 1
             return None

@@ -16,6 +16,7 @@ from orchestrator.mission import Mission
 from orchestrator.plan import DrivePlan
 from orchestrator.supervisor import Supervisor
 
+RESERVED_BYTES = 65536
 _PACKAGES = ("foretwin", "mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "numpy", "shapely")
 
 
@@ -78,6 +79,7 @@ def run_record(
             "result_rows": conductor.tables.dropped,
             "failed_jobs": conductor.rounds.failed_jobs,
         },
+        "troubles": [conductor.tables.failed] if conductor.tables.failed else [],
         "off_road": [
             {
                 "reason": stretch.reason,
@@ -92,8 +94,15 @@ def run_record(
     }
 
 
+def reserve_record(run_id: str, file: Path) -> None:
+    """Write a run.json that says that the run goes on, and keeps room on the disk for the last."""
+    begun = json.dumps({"run_id": run_id, "exit": "running"})
+    file.write_text(begun.ljust(RESERVED_BYTES) + "\n", encoding="utf-8")
+
+
 def write_record(record: dict[str, Any], file: Path) -> None:
-    """Write run.json, complete or not at all."""
-    partial = file.with_suffix(".partial")
-    partial.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    partial.replace(file)
+    """Write run.json over the reserved one; works on a full disk. Raises OSError."""
+    data = (json.dumps(record, indent=2, ensure_ascii=False) + "\n").encode()
+    with file.open("r+b" if file.exists() else "wb") as target:
+        target.write(data)
+        target.truncate()
