@@ -136,13 +136,16 @@ class RoundRunner:
     def reply(self, reply: Reply) -> None:
         """Take a worker's answer."""
         worker_id, job = reply.tag
+        refused = reply.message is None and reply.error != "no answer"
         if reply.message is None:
             self.failed_jobs += 1
-            if reply.error != "no answer":
+            if refused:
                 self._on_error(f"{worker_id}: {reply.error}")
         elif reply.message.cpu_seconds > 0.0:
             self.rtf[worker_id] = reply.message.sim_seconds / reply.message.cpu_seconds
-        done = self.desk.result(worker_id, job, reply.message, reply.received_mono_ns)
+        done = self.desk.result(
+            worker_id, job, reply.message, reply.received_mono_ns, refused=refused
+        )
         if done is not None:
             self._take_apart(done)
         self.give_out()

@@ -12,8 +12,8 @@ from typing import NamedTuple
 from contracts.simulation import FuturesJob, FuturesResult
 
 
-MAX_FAILURES = 5
-"""A round whose jobs fail so often is given up: the same job would fail for ever."""
+MAX_REFUSALS = 3
+"""A round whose jobs are refused so often is given up: the same job would be refused for ever."""
 
 
 class Assignment(NamedTuple):
@@ -49,7 +49,7 @@ class _Open:
     order: RoundOrder
     waiting: deque[FuturesJob]
     results: dict[int, FuturesResult] = field(default_factory=dict)
-    failures: int = 0
+    refusals: int = 0
 
 
 @dataclass(slots=True)
@@ -112,11 +112,18 @@ class RoundDesk:
         return given
 
     def result(
-        self, worker_id: str, job: FuturesJob, result: FuturesResult | None, received_mono_ns: int
+        self,
+        worker_id: str,
+        job: FuturesJob,
+        result: FuturesResult | None,
+        received_mono_ns: int,
+        *,
+        refused: bool = False,
     ) -> RoundDone | None:
         """Take a worker's answer (None: it failed); returns the round if this completes it.
 
-        A job that failed goes to the next idle worker, until its round is given up.
+        A job that failed goes to the next idle worker. `refused` says that a worker tried it and
+        could not: after a few of these the round is given up.
         """
         if self._busy.get(worker_id) is job:
             del self._busy[worker_id]
@@ -126,8 +133,8 @@ class RoundDesk:
             self.late_results += 1
             return None
         if result is None:
-            round_.failures += 1
-            if round_.failures >= MAX_FAILURES:
+            round_.refusals += refused
+            if round_.refusals >= MAX_REFUSALS:
                 del self._open[job.round_id]
                 self.given_up_rounds += 1
             elif not self._holds(round_, job):

@@ -93,6 +93,29 @@ def test_a_failed_job_is_tried_again() -> None:
     assert second.job is first.job
 
 
+def test_a_round_whose_jobs_are_refused_again_and_again_is_given_up() -> None:
+    desk = RoundDesk()
+    desk.worker_up("w0")
+    desk.open(order(0, jobs=1))
+    for _ in range(3):
+        (given_out,) = desk.assignments()
+        desk.result("w0", given_out.job, None, 0, refused=True)
+    assert desk.open_rounds == ()
+    assert desk.given_up_rounds == 1
+    desk.open(order(1, jobs=1))
+    assert len(desk.assignments()) == 1
+
+
+def test_a_worker_that_does_not_answer_gives_no_round_up() -> None:
+    desk = RoundDesk()
+    desk.worker_up("w0")
+    desk.open(order(0, jobs=1))
+    for _ in range(20):
+        (given_out,) = desk.assignments()
+        desk.result("w0", given_out.job, None, 0)
+    assert desk.open_rounds == (0,)
+
+
 def test_a_dropped_round_frees_the_desk_and_its_results_are_late() -> None:
     desk = RoundDesk()
     desk.worker_up("w0")

@@ -1,0 +1,223 @@
+"""The other processes of a drive on a bus in memory: they answer when a test tells them to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contracts.codec import read_message
+from contracts.drive import DriveEnd, GnssFix, VehicleInfo, VehicleState
+from contracts.frames import local_from_geo, local_from_geo_yaw
+from contracts.keys import alive_key
+from contracts.mailbox import Mailbox, Request
+from contracts.memory_bus import MemoryBus
+from contracts.simulation import (
+    BuildReply,
+    BuildRequest,
+    FuturesJob,
+    FuturesResult,
+    Outcome,
+    PrepareReply,
+    PrepareRequest,
+    Trajectory,
+)
+from contracts.world import World
+from orchestrator.conductor import Conductor
+from orchestrator.mission import Mission, MissionSettings
+from orchestrator.plan import DrivePlan
+from orchestrator.results import ResultTables
+from orchestrator.way_ahead import WayAhead
+from tests.orchestrator.trip import START_NS, states_along, town, town_line, town_plan, town_world
+from world_gen.world_store import WorldStore
+
+INFO = VehicleInfo(
+    vehicle_id="ego", time_base="log", start_stamp_ns=START_NS, body_from_antenna_m=(0.0, 0.0, 0.0)
+)
+
+
+def straight_futures(job: FuturesJob, world: World, worker_id: str) -> FuturesResult:
+    """Futures that go straight on at the car's speed, each variant 3 % slower than the last."""
+    position, speed = job.state.position, job.state.speed_mps
+    xy = local_from_geo(world.frame, position.lat_deg, position.lon_deg)
+    yaw = float(
+        local_from_geo_yaw(world.frame, job.state.yaw_rad, position.lat_deg, position.lon_deg)
+    )
+    time_s = np.arange(round(job.horizon_s / job.step_s) + 1) * job.step_s
+    states = np.zeros((len(job.variants), len(time_s), 8), dtype=np.float32)
+    for row, variant in zip(states, job.variants, strict=True):
+        way_m = speed * (1.0 - 0.03 * variant.index) * time_s
+        row[:, 0], row[:, 1], row[:, 2] = (
+            xy[0] + way_m * np.cos(yaw),
+            xy[1] + way_m * np.sin(yaw),
+            yaw,
+        )
+        row[:, 3] = speed
+    count = len(job.variants)
+    return FuturesResult(
+        round_id=job.round_id, job_index=job.job_index, worker_id=worker_id,
+        world_id=job.world_id, variant_indices=tuple(v.index for v in job.variants),
+        trajectory=Trajectory(stamp_ns=job.state.stamp_ns, time_s=time_s, states=states),
+        actors=np.full((count, len(time_s), 3), np.nan, dtype=np.float32),
+        outcome=Outcome(
+            collided=np.zeros(count, dtype=bool), collision_time_s=np.full(count, np.nan),
+            collision_with=np.zeros(count, dtype=np.int64),
+            min_clearance_m=np.full(count, np.nan), progress_m=states[:, -1, 0].astype(float),
+            valid=np.ones(count, dtype=bool),
+        ),
+        sim_seconds=8.0 * count, cpu_seconds=0.1 * count, wall_seconds=0.1,
+    )  # fmt: skip
+
+
+class Process:
+    """A process that serves channels; dead, it answers nothing any more."""
+
+    def __init__(
+        self, plan: DrivePlan, bus: MemoryBus, process_id: str, channels: tuple[str, ...]
+    ) -> None:
+        self.plan = plan
+        self.process_id = process_id
+        self.requests = Mailbox(64)
+        self._bus = bus
+        for channel in channels:
+            bus.serve(channel, self.requests, run=plan.run_id, process=process_id)
+        bus.declare_alive(alive_key(run=plan.run_id, process=process_id))
+
+    def take(self) -> list[Request]:
+        """What it has been asked since the last time."""
+        taken = []
+        while (item := self.requests.take()) is not None:
+            taken.append(item)
+        return taken
+
+    def die(self) -> None:
+        """Vanish with everything that was asked."""
+        self.requests.close()
+        self.take()
+        self._bus.lose(alive_key(run=self.plan.run_id, process=self.process_id))
+
+
+class Builder(Process):
+    """Builds the town's Worlds in earnest."""
+
+    def __init__(self, plan: DrivePlan, bus: MemoryBus) -> None:
+        super().__init__(plan, bus, "builder", ("build",))
+        self.asked: list[str] = []
+
+    def answer(self, *, refusing: tuple[str, ...] = ()) -> None:
+        for request in self.take():
+            wanted: BuildRequest = request.message()
+            self.asked.append(wanted.intersection_id)
+            if wanted.intersection_id in refusing:
+                request.refuse("the map is torn there")
+                continue
+            world = town_world(wanted.intersection_id)
+            WorldStore(Path(self.plan.worlds_dir)).save(world)
+            request.reply(
+                BuildReply(
+                    intersection_id=wanted.intersection_id, world_id=world.id, seconds=0.1,
+                    cached=False,
+                )
+            )  # fmt: skip
+
+
+class Worker(Process):
+    """Loads Worlds and answers jobs with futures that go straight on."""
+
+    def __init__(self, plan: DrivePlan, bus: MemoryBus, worker_id: str) -> None:
+        super().__init__(plan, bus, worker_id, ("prepare", "job"))
+        self.prepared: list[str] = []
+        self.jobs = 0
+
+    def answer(self) -> None:
+        for request in self.take():
+            message = request.message()
+            if isinstance(message, PrepareRequest):
+                self.prepared.append(message.world_id)
+                request.reply(
+                    PrepareReply(world_id=message.world_id, worker_id=self.process_id, seconds=0.1)
+                )
+            else:
+                self.jobs += 1
+                world = read_message(self.plan.worlds_dir / f"{message.world_id}.world", World)
+                request.reply(straight_futures(message, world, self.process_id))
+
+
+class House:
+    """A conductor with its builder, its workers and a car that drives through the town."""
+
+    def __init__(self, folder: Path, **settings: Any) -> None:
+        self.plan = town_plan(folder, **{"futures": 6, "futures_per_job": 3, **settings})
+        self.bus = MemoryBus()
+        inputs = town()
+        self.mission = Mission(
+            WayAhead(inputs.graph, inputs.junctions, inputs.routes, index=inputs.index),
+            MissionSettings(),
+        )
+        self.tables = ResultTables(self.plan.folder / "results", {"run_id": self.plan.run_id})
+        self.conductor = Conductor(self.plan, self.bus, self.mission, self.tables)
+        self.conductor.join()
+        self.builder = Builder(self.plan, self.bus)
+        self.workers = [Worker(self.plan, self.bus, name) for name in ("w0", "w1")]
+        self.conductor.take_info(INFO)
+        self.seen = Mailbox(4096)
+        """What those who watch receive."""
+        for channel in ("event", "active_world", "world", "round", "comparison", "plan_comparison"):
+            self.bus.subscribe(channel, self.seen, run=self.plan.run_id)
+        self.states = states_along(inputs.graph.frame, town_line())
+        self._sent = 0
+        self.settle()
+
+    def settle(self) -> None:
+        """Let the conductor handle everything that lies in its mailbox."""
+        while (item := self.conductor.mailbox.take()) is not None:
+            self.conductor.handle(item)
+
+    def work(self) -> None:
+        """Let everybody answer until nobody is asked anything."""
+        before = -1
+        while before != len(self.builder.asked) + sum(
+            w.jobs + len(w.prepared) for w in self.workers
+        ):
+            before = len(self.builder.asked) + sum(w.jobs + len(w.prepared) for w in self.workers)
+            self.builder.answer()
+            self.settle()
+            for worker in self.workers:
+                worker.answer()
+            self.settle()
+
+    def send(self, state: VehicleState) -> None:
+        """Let the car publish where it is."""
+        fix = GnssFix(stamp_ns=state.stamp_ns, position=state.position)
+        self.bus.publish("gnss", fix, vehicle="ego")
+        self._sent += 1
+
+    def drive(self, until: int, *, working: bool = True, round_every: int = 0) -> None:
+        """Let the car drive to its state number `until`, everybody at work on the way."""
+        for number in range(self._sent, until):
+            self.send(self.states[number])
+            self.settle()
+            if working:
+                self.work()
+            if round_every and number % round_every == 0:
+                self.conductor.start_round()
+                if working:
+                    self.work()
+
+    def end(self) -> None:
+        """Let the car say its last word, and write everything."""
+        stamp_ns = self.states[self._sent - 1].stamp_ns
+        end = DriveEnd(stamp_ns=stamp_ns, published={"gnss": self._sent})
+        self.bus.publish("end", end, vehicle="ego")
+        self.settle()
+        self.conductor.finish()
+        self.tables.close()
+
+    def watched(self, channel: str) -> list[Any]:
+        """Messages on a channel since the last time."""
+        found = []
+        while (item := self.seen.take()) is not None:
+            if item.channel == channel:
+                found.append(item.message())
+        return found

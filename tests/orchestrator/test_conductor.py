@@ -1,0 +1,270 @@
+"""The conductor between bus and core: Worlds asked for and loaded, rounds run, faults survived."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from contracts.codec import encode
+from contracts.drive import GnssFix, PlannedTrajectory
+from contracts.frames import geo_from_local, geo_from_local_yaw, local_from_geo
+from contracts.frames import local_from_geo_yaw as to_local_yaw
+from contracts.mailbox import Received
+from orchestrator.conductor import Conductor
+from tests.orchestrator.house import Builder, House, Worker
+from tests.orchestrator.trip import town
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Iterator[House]:
+    made = House(tmp_path)
+    yield made
+    made.tables.close()
+
+
+def ready(conductor: Conductor) -> list[str]:
+    return conductor.mission.worlds_ahead()
+
+
+def test_a_world_is_ready_once_every_worker_has_loaded_it(house: House) -> None:
+    house.drive(20, working=False)
+    assert "n4" in house.conductor.worlds.building
+    house.builder.answer()
+    house.settle()
+    assert ready(house.conductor) == []
+
+    first, second = house.workers
+    first.answer()
+    house.settle()
+    assert first.prepared
+    assert ready(house.conductor) == []
+
+    second.answer()
+    house.settle()
+    assert set(ready(house.conductor)) == set(first.prepared) == set(second.prepared)
+    assert house.conductor.worlds.building == []
+    notices = house.watched("world")
+    assert {n.world_id for n in notices} == set(first.prepared)
+    assert all((house.plan.worlds_dir / n.file).exists() for n in notices)
+
+
+def test_a_worker_that_dies_while_loading_is_waited_for_no_more(house: House) -> None:
+    house.drive(20, working=False)
+    house.builder.answer()
+    house.settle()
+    house.workers[0].answer()
+    house.workers[1].die()
+    house.settle()
+
+    assert ready(house.conductor)
+    assert house.conductor.rounds.desk.workers == ("w0",)
+
+
+def test_a_worker_that_comes_back_loads_what_the_coming_rounds_need(house: House) -> None:
+    house.drive(20)
+    house.workers[1].die()
+    house.settle()
+    back = Worker(house.plan, house.bus, "w1")
+    house.settle()
+    back.answer()
+
+    assert back.prepared == ready(house.conductor)
+
+
+def test_a_builder_that_dies_is_asked_again_when_it_is_back(house: House) -> None:
+    house.drive(20, working=False)
+    house.builder.die()
+    house.settle()
+    assert ready(house.conductor) == []
+    assert not any(event.level == "error" for event in house.watched("event"))
+
+    house.builder = Builder(house.plan, house.bus)
+    house.settle()
+    house.work()
+    assert "n4" in house.builder.asked
+    assert ready(house.conductor)
+
+
+def test_a_world_that_was_built_is_not_built_again(house: House) -> None:
+    house.drive(20)
+    asked = list(house.builder.asked)
+    house.builder.die()
+    house.builder = Builder(house.plan, house.bus)
+    house.settle()
+    house.work()
+    house.drive(60)
+
+    assert not set(asked) & set(house.builder.asked)
+
+
+def test_what_cannot_be_built_is_told_and_passed_over(house: House) -> None:
+    house.drive(20, working=False)
+    house.builder.answer(refusing=("n4",))
+    house.settle()
+    house.work()
+
+    (error,) = (e for e in house.watched("event") if e.level == "error")
+    assert error.text == "no world for n4: the map is torn there"
+    assert house.conductor.start_round()
+
+
+def other_schema(house: House, state_number: int) -> Received:
+    state = house.states[state_number]
+    data = bytearray(encode(GnssFix(stamp_ns=state.stamp_ns, position=state.position)))
+    data[4] = 99
+    return Received("gnss", "foretwin/v1/vehicle/ego/telemetry/gnss", bytes(data), GnssFix)
+
+
+def test_samples_of_another_schema_are_refused_with_one_event(house: House) -> None:
+    house.drive(5)
+    for number in (5, 6, 7):
+        house.conductor.handle(other_schema(house, number))
+    house.drive(20)
+
+    (error,) = (e for e in house.watched("event") if e.level == "error")
+    assert "schema version 99" in error.text
+    assert house.conductor.intake.refused == 3
+    assert house.conductor.intake.skipped_invalid == 3
+    assert house.conductor.intake.states == 20
+
+
+def test_a_whole_drive_leaves_its_rounds_in_the_tables(house: House) -> None:
+    house.drive(320, round_every=5)
+    house.end()
+
+    rounds = house.conductor.rounds
+    folder = house.plan.folder / "results"
+    rows = {p.stem: pq.read_table(p).to_pylist() for p in folder.glob("*.parquet")}
+    assert rounds.futures.rounds == len(rows["rounds"]) > 30
+    assert rounds.futures.count == len(rows["futures"]) == 6 * len(rows["rounds"])
+    assert [r["round_id"] for r in rows["rounds"]] == list(range(len(rows["rounds"])))
+    assert {r["worker_id"] for r in rows["futures"]} == {"w0", "w1"}
+    assert {r["horizon_s"] for r in rows["comparisons"]} == {1.0, 2.0, 4.0, 8.0}
+    records = house.mission.records(mono_s=0.0)
+    assert [r["id"] for r in records] == ["n4", "n10"]
+    counted = {r["id"]: r["rounds"] for r in records}
+    told = [r["intersection_id"] for r in rows["rounds"]]
+    assert counted == {name: told.count(name) for name in counted}
+    assert house.conductor.missed_rounds == 0
+    # These futures go straight on at the car's speed: they are the constant-velocity baseline.
+    for row in rows["comparisons"]:
+        assert row["nominal_ade_m"] == pytest.approx(row["constant_velocity_ade_m"], abs=0.01)
+
+
+def test_those_who_watch_see_every_round(house: House) -> None:
+    house.drive(60, round_every=10)
+    views = house.watched("round")
+
+    assert len(views) == house.conductor.rounds.futures.rounds > 2
+    assert views[0].xy_m.shape == (6, 25, 2)
+    assert views[0].names[0] == "nominal"
+    assert not views[0].criticality.any()
+
+
+def test_a_worker_that_dies_at_work_costs_no_future_and_counts_none_twice(house: House) -> None:
+    house.drive(20)
+    assert house.conductor.start_round()
+    house.workers[0].die()
+    house.settle()
+    house.workers[1].answer()
+    house.settle()
+    house.workers[1].answer()
+    house.settle()
+
+    assert house.conductor.rounds.desk.open_rounds == ()
+    assert house.conductor.rounds.futures.count == 6
+    assert house.conductor.rounds.futures.rounds == 1
+    assert house.conductor.rounds.desk.requeued_jobs >= 1
+    assert house.workers[1].jobs == 2
+
+
+def test_a_job_that_every_worker_refuses_ends_its_round_and_not_the_drive(house: House) -> None:
+    house.drive(20)
+    assert house.conductor.start_round()
+    refused = 0
+    while requests := house.workers[0].take() + house.workers[1].take():
+        refused += len(requests)
+        assert refused < 100
+        for request in requests:
+            request.refuse("path has no length")
+        house.settle()
+
+    assert house.conductor.rounds.desk.open_rounds == ()
+    assert house.conductor.rounds.desk.given_up_rounds == 1
+    assert {e.text.split(": ", 1)[1] for e in house.watched("event") if e.level == "error"} == {
+        "path has no length"
+    }
+    house.drive(30)
+    assert house.conductor.start_round()
+    house.work()
+    assert house.conductor.rounds.futures.rounds == 1
+
+
+def test_a_round_whose_world_is_late_is_missed_and_one_without_heading_is_not(house: House) -> None:
+    assert not house.conductor.start_round()
+    house.drive(1, working=False)
+    house.conductor.start_round()
+    house.drive(20, working=False)
+    house.conductor.start_round()
+
+    assert house.conductor.missed_rounds == 2  # near a junction, and nobody has built its World
+    house.work()
+    house.send(house.states[20])
+    house.settle()
+    assert house.conductor.start_round()
+    assert (house.conductor.missed_rounds, house.conductor.unseeded_rounds) == (2, 0)
+
+
+def car_plan(house: House, number: int, *, left_m: float) -> PlannedTrajectory:
+    """A plan at the car's speed straight on, shifted to the left."""
+    frame, state = town().graph.frame, house.states[number]
+    position = state.position
+    xy = local_from_geo(frame, position.lat_deg, position.lon_deg)
+    yaw = float(to_local_yaw(frame, state.yaw_rad, position.lat_deg, position.lon_deg))
+    time_s = np.linspace(0.0, 4.0, 21)
+    ahead, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+    points = xy + 10.0 * time_s[:, None] * ahead + left_m * left
+    geo = geo_from_local(frame, points)
+    return PlannedTrajectory(
+        stamp_ns=state.stamp_ns, time_from_stamp_s=time_s, lat_deg=geo[:, 0].copy(),
+        lon_deg=geo[:, 1].copy(), yaw_rad=geo_from_local_yaw(frame, np.full(21, yaw), points),
+        speed_mps=np.full(21, 10.0),
+    )  # fmt: skip
+
+
+def test_a_plan_shifted_by_a_metre_is_a_metre_off(house: House) -> None:
+    house.drive(49)
+    house.bus.publish("plan", car_plan(house, 49, left_m=1.0), vehicle="ego")
+    house.drive(50)
+    assert house.conductor.start_round()
+    house.work()
+
+    (compared,) = house.watched("plan_comparison")
+    assert compared.difference.lateral_m == pytest.approx(1.0, abs=0.1)
+    assert compared.difference.ade_m == pytest.approx(1.0, abs=0.1)
+    assert house.conductor.rounds.plans.record()["count"] == 1
+
+
+def test_an_old_plan_of_the_car_is_not_compared(house: House) -> None:
+    house.bus.publish("plan", car_plan(house, 0, left_m=1.0), vehicle="ego")
+    house.drive(30)
+    assert house.conductor.start_round()
+    house.work()
+
+    assert house.watched("plan_comparison") == []
+
+
+def test_the_reference_point_of_a_source_that_keeps_it_to_itself_is_mentioned(house: House) -> None:
+    import msgspec
+
+    from tests.orchestrator.house import INFO
+
+    silent = msgspec.structs.replace(INFO, body_from_antenna_m=None, reference_point="roof")
+    house.conductor.take_info(silent)
+
+    (warning,) = (e for e in house.watched("event") if e.level == "warning")
+    assert "roof" in warning.text
