@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from contracts.simulation import FuturesJob, FuturesResult
 
-
 MAX_REFUSALS = 3
 """A round whose jobs are refused so often is given up: the same job would be refused for ever."""
 
