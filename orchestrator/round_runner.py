@@ -180,8 +180,9 @@ class RoundRunner:
         self._tables.add("rounds", [row])
         view = round_view(done, futures, world.frame, self._plan.drive_frame, self._variants)
         self._bus.publish("round", view, run=self._plan.run_id)
-        self._comparison_desk.take_round(done, world.frame, seed.state)
-        self._compare_plans(done, seed, world)
+        if futures.valid[0]:  # a nominal future that diverged says nothing of anything
+            self._comparison_desk.take_round(done, world.frame, seed.state)
+            self._compare_plans(done, seed, world)
 
     def _compare_plans(self, done: RoundDone, seed: _Seed, world: World) -> None:
         if seed.plan is None or seed.state.stamp_ns - seed.plan.stamp_ns > PLAN_FRESH_NS:

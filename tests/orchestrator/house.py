@@ -129,6 +129,8 @@ class Worker(Process):
         super().__init__(plan, bus, worker_id, ("prepare", "job"))
         self.prepared: list[str] = []
         self.jobs = 0
+        self.diverges = False
+        """Whether its simulations end in numbers that are none."""
 
     def answer(self) -> None:
         for request in self.take():
@@ -141,7 +143,11 @@ class Worker(Process):
             else:
                 self.jobs += 1
                 world = read_message(self.plan.worlds_dir / f"{message.world_id}.world", World)
-                request.reply(straight_futures(message, world, self.process_id))
+                futures = straight_futures(message, world, self.process_id)
+                if self.diverges:
+                    futures.trajectory.states[:, 1:] = np.nan
+                    futures.outcome.valid[:] = False
+                request.reply(futures)
 
 
 class House:

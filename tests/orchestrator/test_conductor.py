@@ -249,6 +249,21 @@ def test_a_plan_shifted_by_a_metre_is_a_metre_off(house: House) -> None:
     assert house.conductor.rounds.plans.record()["count"] == 1
 
 
+def test_a_nominal_future_that_diverged_is_compared_with_nothing(house: House) -> None:
+    house.workers[0].diverges = house.workers[1].diverges = True
+    house.drive(49)
+    house.bus.publish("plan", car_plan(house, 49, left_m=1.0), vehicle="ego")
+    house.drive(50)
+    assert house.conductor.start_round()
+    house.work()
+    house.drive(160)
+    house.end()
+
+    assert house.conductor.rounds.futures.count == 6
+    assert house.conductor.rounds.plans.record() is None
+    assert house.conductor.rounds.comparisons.record(independent=True)["ade_m"] == {}
+
+
 def test_an_old_plan_of_the_car_is_not_compared(house: House) -> None:
     house.bus.publish("plan", car_plan(house, 0, left_m=1.0), vehicle="ego")
     house.drive(30)
