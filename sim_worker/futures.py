@@ -181,7 +181,9 @@ def _drive(
     valid = np.ones((count, ticks + 1), dtype=bool)
     arc = np.full(count, start_arc_m)
     states[:, 0] = stage.states
-    steps = stage.steps_per_tick
+    users = None
+    if np.isfinite(motion.poses[:, 0, 0]).any():
+        users = stage.road_user_motion(motion.poses[:, 1:])
     for tick in range(ticks):
         alive = valid[:, tick]
         # What has diverged is not shown to planners: one bad future must not spoil the job.
@@ -210,7 +212,7 @@ def _drive(
         fine = np.isfinite(accel) & np.isfinite(angle)
         stage.step(
             Controls(np.where(fine, accel, 0.0), np.where(fine, angle, 0.0)),
-            road_users=motion.poses[:, tick * steps + 1 : (tick + 1) * steps + 1],
+            road_users=None if users is None else users.at(tick),
         )
         states[:, tick + 1] = stage.states
         contact[:, tick + 1] = stage.static_contact

@@ -66,6 +66,7 @@ class MirrorWorld:
         self._actuation = Actuation(
             vehicle,
             ids,
+            friction=np.array([vehicle.friction.value]),
             ctrl=self.data.ctrl[None],
             biasprm=model.actuator_biasprm[None],
             forcerange=model.actuator_forcerange[None],
@@ -73,7 +74,6 @@ class MirrorWorld:
         self._joints = np.array([model.joint(TWIN + name).qposadr[0] for name in JOINTS])
         self._dofs = np.array([model.joint(TWIN + name).dofadr[0] for name in JOINTS])
         self._mocap = {name: int(model.body(name).mocapid[0]) for name in (SHADOW, GHOST)}
-        self._friction = np.array([vehicle.friction.value])
         self._state = np.zeros((1, 8))
         self._tire_command = 0.0
         self._steps = 0
@@ -115,11 +115,7 @@ class MirrorWorld:
     def step(self, *, accel_mps2: float, tire_angle_rad: float) -> None:
         """Advance 10 ms under one command."""
         if self._steps % _REFRESH_STEPS == 0:
-            self._actuation.apply(
-                speed_mps=self._state[:, 3],
-                accel_mps2=np.array([accel_mps2]),
-                friction=self._friction,
-            )
+            self._actuation.apply(speed_mps=self._state[:, 3], accel_mps2=np.array([accel_mps2]))
         self._steps += 1
         reach = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
         change = tire_angle_rad - self._tire_command

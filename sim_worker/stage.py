@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import mujoco
@@ -12,12 +13,15 @@ from mujoco import batch as mujoco_batch
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
+from sim_worker.nearness import NearStatics, RoadUserMotion, RoadUserTick
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
 from sim_worker.vehicle.planar import (
+    JOINTS,
     TIMESTEP_S,
     base_from_cog,
+    box_centre_from_base_m,
     check_steering_delay,
     cog_from_base,
     set_physics_options,
@@ -33,6 +37,10 @@ _STATIC_CONTACT = "static_contact"
 _ROAD_USER_CONTACT = "road_user_contact"
 _FAR_M = 1.0e4
 """Where the road user of a future without one is kept."""
+_MAX_SPEED_MPS, _MAX_SLIDE_MPS, _MAX_YAW_RATE_RADPS = 25.0, 5.0, 3.0
+"""Within these, a car cannot come from beyond the reach of `NearStatics` in a tick."""
+_SLACK_M = 0.2
+"""What it may go farther by accelerating."""
 
 
 class Controls(NamedTuple):
@@ -96,9 +104,11 @@ class Stage:
         self.model = _compile(world_spec(world) if spec is None else spec, vehicle)
         self._batch = mujoco_batch.Batch(self.model, nsim, nthread=threads, persistent=True)
         self._bind()
+        self._bound_reach()
         self._ids: Any = None
         self._count = 0
-        self._states = np.zeros((nsim, 8))
+        # Columns that lie together in memory: each is read far more often than a row.
+        self._states = np.zeros((8, nsim)).T
         self._record: dict[str | int | mujoco.mjtState, np.ndarray[Any, Any]] = {}
 
     def _bind(self) -> None:
@@ -109,9 +119,9 @@ class Stage:
         self._biasprm = batch.expand("actuator_biasprm")
         self._forcerange = batch.expand("actuator_forcerange")
         self._actuators = actuator_ids(model, PREFIX)
-        names = ("x", "y", "yaw", "steer")
-        self._joints = np.array([model.joint(PREFIX + name).qposadr[0] for name in names])
-        self._dofs = np.array([model.joint(PREFIX + name).dofadr[0] for name in names])
+        first, dof = model.joint(PREFIX + JOINTS[0]).qposadr[0], model.joint(PREFIX + JOINTS[0])
+        self._joints = slice(first, first + len(JOINTS))
+        self._dofs = slice(dof.dofadr[0], dof.dofadr[0] + len(JOINTS))
         steer = self._actuators.steer
         samples = int(model.actuator_history[steer][0])
         first = int(model.actuator_historyadr[steer]) + 2 + samples
@@ -119,12 +129,30 @@ class Stage:
         self._history_samples = samples
         self._static_contact = int(model.sensor(_STATIC_CONTACT).adr[0])
         self._road_user_contact = int(model.sensor(_ROAD_USER_CONTACT).adr[0])
+        self._flags = batch.expand("opt.disableflags").reshape(self.nsim)
+        self._looking = int(model.opt.disableflags)
+        # The planar vehicle has no other constraint, and no other sensor.
+        disable = mujoco.mjtDisableBit
+        self._not_looking = self._looking | int(
+            disable.mjDSBL_CONSTRAINT | disable.mjDSBL_CONTACT | disable.mjDSBL_SENSOR
+        )
         state = mujoco.mjtState
         # Control, road user position and orientation, in the order of the state's bits.
         self._control_spec = int(
             state.mjSTATE_CTRL | state.mjSTATE_MOCAP_POS | state.mjSTATE_MOCAP_QUAT
         )
         self._control_size = model.nu + 7 * model.nmocap
+
+    def _bound_reach(self) -> None:
+        vehicle = self.vehicle
+        self._centre_ahead_m = box_centre_from_base_m(vehicle)
+        own = math.hypot(vehicle.length_m.value, vehicle.width_m.value) / 2.0
+        fastest = math.hypot(_MAX_SPEED_MPS, _MAX_SLIDE_MPS)
+        fastest += abs(self._centre_ahead_m) * _MAX_YAW_RATE_RADPS
+        reach = own + fastest * self.control_dt_s + _SLACK_M
+        self._near_statics = NearStatics(self.model, reach_m=reach)
+        self._user_reach_m = reach + math.hypot(ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M) / 2.0
+        self._bounds = np.array([[_MAX_SPEED_MPS], [_MAX_SLIDE_MPS], [_MAX_YAW_RATE_RADPS]])
 
     def seed(
         self,
@@ -167,68 +195,81 @@ class Stage:
             self._tire_command = given[:, -1].copy()
         self._history[rows, self._steer_history] = history
         self._delay[rows, self._actuators.steer] = steering_delay_s
-        self._friction = self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64)
         self._actuation = Actuation(
             self.vehicle,
             self._actuators,
+            friction=self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64),
             ctrl=self._ctrl[rows],
             biasprm=self._biasprm[rows],
             forcerange=self._forcerange[rows],
         )
-        steps = self.steps_per_tick
-        self._controls = np.zeros((count, steps, self._control_size))
+        self._controls = np.zeros((count, self.steps_per_tick, self._control_size))
         self._road_users = self._controls[:, :, self.model.nu :]
         self._road_users[:, :, 0:3] = (_FAR_M, _FAR_M, 0.0)
         self._road_users[:, :, 3] = 1.0
-        self._record = {
-            "sensordata": np.zeros((count, steps, self.model.nsensordata)),
-        }
+        record = np.zeros((count, self.steps_per_tick, self.model.nsensordata))
+        self._record = {"sensordata": record}
+        self._looked = np.zeros(count, dtype=bool)
+        self._positions, self._velocities = np.empty((4, count)).T, np.empty((4, count)).T
 
-    def step(self, controls: Controls, *, road_users: Array | None = None) -> None:
-        """Advance one control tick.
+    def road_user_motion(self, poses: Array) -> RoadUserMotion:
+        """Prepare road users for `step`: x, y, yaw (S, N, 3) of box centres, NaN where none.
 
-        `road_users` (S, K, 3) gives x, y, yaw of the road user's box centre at the end of each of
-        the K physics steps of the tick, NaN where a future has none: a road user that jumped once
-        a tick would hit with several times its speed.
+        They are those at the end of each of N physics steps: a road user that jumped once a
+        control tick would hit with several times its speed.
         """
+        return RoadUserMotion(poses, steps_per_tick=self.steps_per_tick, far_m=_FAR_M)
+
+    def step(self, controls: Controls, *, road_users: RoadUserTick | None = None) -> None:
+        """Advance one control tick; `road_users` are those of `road_user_motion` at this tick."""
         rows = slice(0, self._count)
-        self._actuation.apply(
-            speed_mps=self._states[rows, 3],
-            accel_mps2=controls.accel_mps2,
-            friction=self._friction,
-        )
-        nu, per_step = self.model.nu, self._controls
-        per_step[:, :, :nu] = self._ctrl[rows, None, :]
+        states = self._states[rows]
+        speed = states[:, 3].copy()
+        self._actuation.apply(speed_mps=speed, accel_mps2=controls.accel_mps2)
+        per_step, ids = self._controls, self._actuators
+        per_step[:, :, ids.drive] = self._ctrl[rows, None, ids.drive]
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
         change = (controls.tire_angle_rad - self._tire_command)[:, None]
-        per_step[:, :, self._actuators.steer] = self._tire_command[:, None] + np.minimum(
+        spread = self._tire_command[:, None] + np.minimum(
             np.maximum(change, -self._reach), self._reach
         )
-        self._tire_command = per_step[:, -1, self._actuators.steer].copy()
+        per_step[:, :, ids.steer] = spread
+        self._tire_command = spread[:, -1]
         if road_users is not None:
-            self._place_road_users(road_users)
+            self._road_users[:] = road_users.mocap
+        self._looked = self._near_anything(states, road_users)
+        self._flags[rows] = np.where(self._looked, self._looking, self._not_looking)
         self._batch.rollout(
             self.steps_per_tick,
             control=per_step,
             control_spec=self._control_spec,
             record=("sensordata",),
-            ids=self._ids,
+            ids=None if self._count == self.nsim else self._ids,
             out=self._record,
         )
-        states = self._states[rows]
-        before = states[:, 3].copy()
-        base_from_cog(
-            self.vehicle, self._qpos[rows, self._joints], self._qvel[rows, self._dofs], states
-        )
-        states[:, 7] = (states[:, 3] - before) / self.control_dt_s
+        np.copyto(self._positions, self._qpos[rows, self._joints])
+        np.copyto(self._velocities, self._qvel[rows, self._dofs])
+        base_from_cog(self.vehicle, self._positions, self._velocities, states)
+        np.divide(states[:, 3] - speed, self.control_dt_s, out=states[:, 7])
 
-    def _place_road_users(self, poses: Array) -> None:
-        there = np.isfinite(poses[:, :, :1])
-        users = self._road_users
-        users[:, :, :2] = np.where(there, poses[:, :, :2], _FAR_M)
-        half = np.where(there[:, :, 0], 0.5 * poses[:, :, 2], 0.0)
-        users[:, :, 3] = np.cos(half)
-        users[:, :, 6] = np.sin(half)
+    def _near_anything(
+        self, states: Array, road_users: RoadUserTick | None
+    ) -> npt.NDArray[np.bool_]:
+        """(S,) bool: whether a contact during the coming tick cannot be ruled out."""
+        if self._near_statics.empty and road_users is None:
+            return np.zeros(len(states), dtype=bool)
+        yaw = states[:, 2]
+        x = states[:, 0] + self._centre_ahead_m * np.cos(yaw)
+        y = states[:, 1] + self._centre_ahead_m * np.sin(yaw)
+        near = self._near_statics.at(x, y)
+        if road_users is not None:
+            user_x, user_y = road_users.xy_m
+            reach = road_users.travel_m + self._user_reach_m
+            near |= np.square(user_x - x) + np.square(user_y - y) < np.square(reach)
+        slow = np.abs(states[:, 3:6].T) < self._bounds
+        if not slow.all():
+            near |= ~slow.all(axis=0)
+        return near
 
     @property
     def states(self) -> Array:
@@ -247,7 +288,7 @@ class Stage:
 
     def _touched(self, sensor: int) -> npt.NDArray[np.bool_]:
         found = self._record["sensordata"][:, :, sensor]
-        return np.asarray((found > 0.0).any(axis=1))
+        return np.asarray((found > 0.0).any(axis=1) & self._looked)
 
     def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""

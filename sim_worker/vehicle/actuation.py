@@ -14,7 +14,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from sim_worker.vehicle.parameters import GRAVITY_MPS2
-from sim_worker.vehicle.planar import BRAKE, DRIVE, STEER, TYRE_FRONT, TYRE_REAR
+from sim_worker.vehicle.planar import DRIVE, STEER, TYRE_FRONT, TYRE_REAR
 
 _MIN_SPEED_MPS = 1.0
 """Below it tyres act as dampers: slip angles lose their meaning towards standstill."""
@@ -29,21 +29,22 @@ class ActuatorIds(NamedTuple):
 
     tyre_front: int
     tyre_rear: int
-    brake: int
     drive: int
     steer: int
 
 
 def actuator_ids(model: mujoco.MjModel, prefix: str) -> ActuatorIds:
     """Find the actuators of the vehicle attached under `prefix`; KeyError where there is none."""
-    names = (TYRE_FRONT, TYRE_REAR, BRAKE, DRIVE, STEER)
+    names = (TYRE_FRONT, TYRE_REAR, DRIVE, STEER)
     return ActuatorIds(*(model.actuator(prefix + name).id for name in names))
 
 
 class Actuation:
     """Writes tyre stiffness, force limits and drive force of S vehicles at each control tick.
 
-    `ctrl` (S, nu), `biasprm` (S, nu, k) and `forcerange` (S, nu, 2) are written in place.
+    `ctrl` (S, nu), `biasprm` (S, nu, k) and `forcerange` (S, nu, 2) are written in place;
+    `friction` (S,) stays. The actuator along the road is a brake, a strong damper within ± its
+    force, shifted by the drive force: at speed drive minus brake, at standstill a hold.
     """
 
     def __init__(
@@ -51,57 +52,66 @@ class Actuation:
         vehicle: VehicleParameters,
         ids: ActuatorIds,
         *,
+        friction: Array,
         ctrl: Array,
         biasprm: Array,
         forcerange: Array,
     ) -> None:
-        self._ids = ids
-        self._ctrl, self._biasprm, self._forcerange = ctrl, biasprm, forcerange
-        self._mass = vehicle.mass_kg.value
+        tyres = slice(ids.tyre_front, ids.tyre_rear + 1)
+        if ids.tyre_rear != ids.tyre_front + 1:
+            raise ValueError(f"the tyres' actuators must follow each other: {ids}")
+        self._drive_n = ctrl[:, ids.drive]
+        self._damping = biasprm[:, tyres, 2].T
+        self._lateral_low = forcerange[:, tyres, 0].T
+        self._lateral_high = forcerange[:, tyres, 1].T
+        self._along_low, self._along_high = forcerange[:, ids.drive].T
+        mass = self._mass = vehicle.mass_kg.value
         wheelbase = vehicle.wheelbase_m.value
         rear = vehicle.cog_from_rear_axle_m.value
-        self._front_load = self._mass * GRAVITY_MPS2 * rear / wheelbase
-        self._rear_load = self._mass * GRAVITY_MPS2 * (wheelbase - rear) / wheelbase
-        self._transfer = self._mass * vehicle.cog_height_m.value / wheelbase
-        self._front_stiffness = vehicle.front_cornering_stiffness_npr.value / self._front_load
-        self._rear_stiffness = vehicle.rear_cornering_stiffness_npr.value / self._rear_load
-        self._effective = vehicle.wheel_inertia_mass_factor.value
-        self._drive_gain = vehicle.drive_gain.value / self._effective
-        self._brake_gain = vehicle.brake_gain.value / self._effective
+        loads = mass * GRAVITY_MPS2 / wheelbase * np.array([[rear], [wheelbase - rear]])
+        transfer = mass * vehicle.cog_height_m.value / wheelbase
+        stiffness = np.array(
+            [
+                [vehicle.front_cornering_stiffness_npr.value],
+                [vehicle.rear_cornering_stiffness_npr.value],
+            ]
+        )
+        self._loads_n = loads + _TINY_N
+        self._transfer_kg = np.array([[-transfer], [transfer]])
+        self._stiffness_prad = -stiffness / loads
+        effective = vehicle.wheel_inertia_mass_factor.value
+        self._drive_gain = vehicle.drive_gain.value / effective
+        self._brake_gain = vehicle.brake_gain.value / effective
         self._max_drive = vehicle.max_drive_accel_mps2.value
         self._max_brake = vehicle.max_brake_decel_mps2.value
-        self._drag = vehicle.drag_npv2.value / self._effective
-        self._rolling = vehicle.rolling_resistance_n.value / self._effective + _TINY_N
+        self._drag = vehicle.drag_npv2.value / effective
+        self._rolling = vehicle.rolling_resistance_n.value / effective + _TINY_N
+        self._friction = np.asarray(friction, dtype=np.float64)
+        self._grip = self._friction * GRAVITY_MPS2
+        self._grip_square = self._grip**2
 
-    def apply(self, *, speed_mps: Array, accel_mps2: Array, friction: Array) -> None:
-        """Set the forces of the next control tick from body speed, command, friction, each (S,).
+    def apply(self, *, speed_mps: Array, accel_mps2: Array) -> None:
+        """Set the forces of the next control tick from body speed and command, each (S,).
 
         Forces along the road are divided by the effective mass factor instead of adding wheel
         inertia to the chassis, which would add it sideways too.
         """
-        ids, mass = self._ids, self._mass
         command = np.minimum(np.maximum(accel_mps2, -self._max_brake), self._max_drive)
-        grip = friction * GRAVITY_MPS2
         accel = command * np.where(command > 0.0, self._drive_gain, self._brake_gain)
-        accel = np.minimum(np.maximum(accel, -grip), grip)
-        share = np.sqrt(np.maximum(1.0 - np.square(accel / grip), _MIN_LATERAL_SHARE**2))
-        shift = self._transfer * accel
-        front_load = np.maximum(self._front_load - shift, 0.0) + _TINY_N
-        rear_load = np.maximum(self._rear_load + shift, 0.0) + _TINY_N
-        slow = np.maximum(np.abs(speed_mps), _MIN_SPEED_MPS)
-        self._biasprm[:, ids.tyre_front, 2] = -self._front_stiffness * front_load / slow
-        self._biasprm[:, ids.tyre_rear, 2] = -self._rear_stiffness * rear_load / slow
-        lateral = friction * share
-        self._limit(ids.tyre_front, lateral * front_load)
-        self._limit(ids.tyre_rear, lateral * rear_load)
-        self._limit(ids.brake, mass * np.maximum(-accel, 0.0) + self._rolling)
-        self._ctrl[:, ids.drive] = mass * np.maximum(accel, 0.0) - self._drag * speed_mps * np.abs(
-            speed_mps
-        )
-
-    def _limit(self, actuator: int, force_n: Array) -> None:
-        self._forcerange[:, actuator, 0] = -force_n
-        self._forcerange[:, actuator, 1] = force_n
+        accel = np.minimum(np.maximum(accel, -self._grip), self._grip)
+        share = np.maximum(1.0 - accel * accel / self._grip_square, _MIN_LATERAL_SHARE**2)
+        loads = np.maximum(self._loads_n + self._transfer_kg * accel, _TINY_N)
+        speed = np.abs(speed_mps)
+        np.copyto(self._damping, self._stiffness_prad * loads / np.maximum(speed, _MIN_SPEED_MPS))
+        lateral = self._friction * np.sqrt(share) * loads
+        np.copyto(self._lateral_high, lateral)
+        np.negative(lateral, out=self._lateral_low)
+        drive = self._mass * np.maximum(accel, 0.0)
+        brake = drive - self._mass * accel + self._rolling
+        drive -= self._drag * speed_mps * speed
+        np.copyto(self._drive_n, drive)
+        np.subtract(drive, brake, out=self._along_low)
+        np.add(drive, brake, out=self._along_high)
 
 
 def resistance_mps2(vehicle: VehicleParameters, speed_mps: Array) -> Array:

@@ -23,7 +23,7 @@ MAX_STEERING_DELAY_S = 1.0
 """The longest delay the sample buffer of the steering actuator holds."""
 
 CHASSIS = "chassis"
-TYRE_FRONT, TYRE_REAR, DRIVE, BRAKE, STEER = "tyre_front", "tyre_rear", "drive", "brake", "steer"
+TYRE_FRONT, TYRE_REAR, DRIVE, STEER = "tyre_front", "tyre_rear", "drive", "steer"
 JOINTS = ("x", "y", "yaw", "steer")
 
 _GROUND_CLEARANCE_M = 0.15
@@ -119,27 +119,28 @@ def set_physics_options(spec: mujoco.MjSpec, *, timestep_s: float = TIMESTEP_S) 
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     option.gravity = [0.0, 0.0, -GRAVITY_MPS2]
     option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    # Nothing here has springs, joint dampers, or a way to fall: their passes cost time alone.
+    flags = mujoco.mjtDisableBit
+    option.disableflags |= int(flags.mjDSBL_SPRING | flags.mjDSBL_DAMPER | flags.mjDSBL_GRAVITY)
     # A diverged car must stay diverged and be reported, not be put back to the origin.
-    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    option.disableflags |= int(flags.mjDSBL_AUTORESET)
 
 
 def _add_actuators(spec: mujoco.MjSpec, vehicle: VehicleParameters, *, timestep_s: float) -> None:
     site, joint = mujoco.mjtTrn.mjTRN_SITE, mujoco.mjtTrn.mjTRN_JOINT
     affine, fixed = mujoco.mjtBias.mjBIAS_AFFINE, mujoco.mjtGain.mjGAIN_FIXED
     rows = (
-        (TYRE_FRONT, "axle_front", [0, 1, 0, 0, 0, 0], 1000.0),
-        (TYRE_REAR, "axle_rear", [0, 1, 0, 0, 0, 0], 1000.0),
-        (BRAKE, "cog", [1, 0, 0, 0, 0, 0], _BRAKE_NS_PER_M),
+        (TYRE_FRONT, "axle_front", [0, 1, 0, 0, 0, 0], 0.0, 1000.0),
+        (TYRE_REAR, "axle_rear", [0, 1, 0, 0, 0, 0], 0.0, 1000.0),
+        (DRIVE, "cog", [1, 0, 0, 0, 0, 0], 1.0, _BRAKE_NS_PER_M),
     )
-    for name, target, gear, damping in rows:
+    for name, target, gear, gain, damping in rows:
         actuator = spec.add_actuator(name=name, trntype=site, target=target, gear=gear)
         actuator.gaintype, actuator.biastype = fixed, affine
-        actuator.gainprm[0] = 0.0
+        actuator.gainprm[0] = gain
         actuator.biasprm[2] = -damping
         actuator.forcelimited = True
         actuator.forcerange = [-1e-9, 1e-9]
-    drive = spec.add_actuator(name=DRIVE, trntype=site, target="cog", gear=[1, 0, 0, 0, 0, 0])
-    drive.set_to_motor()
     limit = vehicle.max_tire_angle_rad.value
     steer = spec.add_actuator(name=STEER, trntype=joint, target="steer")
     steer.set_to_position(kp=_STEER_KP, kv=_STEER_KV)

@@ -104,8 +104,9 @@ def test_a_road_user_is_run_into_and_a_missing_one_is_not() -> None:
     seed(stage, states(2, speed=8.0))
     users = np.full((2, stage.steps_per_tick, 3), np.nan)
     users[0] = (20.0, 0.0, 0.0)
+    standing = stage.road_user_motion(users).at(0)
     for _ in range(100):
-        stage.step(Controls(np.zeros(2), np.zeros(2)), road_users=users)
+        stage.step(Controls(np.zeros(2), np.zeros(2)), road_users=standing)
     assert stage.states[0, 0] < 17.0
     assert stage.states[1, 0] > 39.0
     assert not stage.static_contact.any()
