@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 
 from contracts.bus import Received, Reply
+from contracts.codec import SchemaMismatch
 from contracts.drive import AdvanceReply, AdvanceRequest
 from contracts.keys import TELEMETRY_CHANNELS
 from orchestrator.conductor import Conductor
@@ -134,8 +135,12 @@ class LockStepLoop:
         order = {name: place for place, name in enumerate(TELEMETRY_CHANNELS)}
         keyed = []
         for sample in self._samples:
-            envelope = sample.envelope()
-            stamp = envelope.message.stamp_ns
-            keyed.append(((stamp, order[sample.channel], envelope.seq), sample))
+            place = order[sample.channel]
+            try:
+                envelope = sample.envelope()
+            except SchemaMismatch:
+                keyed.append(((0, place, 0), sample))  # refused and counted by who takes it
+            else:
+                keyed.append(((envelope.message.stamp_ns, place, envelope.seq), sample))
         self._samples = []
         return [sample for _, sample in sorted(keyed, key=lambda pair: pair[0])]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -70,15 +71,31 @@ def straight_futures(job: FuturesJob, world: World, worker_id: str) -> FuturesRe
     )  # fmt: skip
 
 
+class AtOnce:
+    """Takes the place of a mailbox: what is put in is handled there and then."""
+
+    def __init__(self, handle: Callable[[Any], None]) -> None:
+        self.put = handle
+
+
 class Process:
-    """A process that serves channels; dead, it answers nothing any more."""
+    """A process that serves channels; dead, it answers nothing any more.
+
+    `at_once` makes it answer within the question, otherwise `answer` does when a test calls it.
+    """
 
     def __init__(
-        self, plan: DrivePlan, bus: MemoryBus, process_id: str, channels: tuple[str, ...]
+        self,
+        plan: DrivePlan,
+        bus: MemoryBus,
+        process_id: str,
+        channels: tuple[str, ...],
+        *,
+        at_once: bool = False,
     ) -> None:
         self.plan = plan
         self.process_id = process_id
-        self.requests = Mailbox(64)
+        self.requests: Any = AtOnce(self.answer_one) if at_once else Mailbox(64)
         self._bus = bus
         for channel in channels:
             bus.serve(channel, self.requests, run=plan.run_id, process=process_id)
@@ -91,6 +108,14 @@ class Process:
             taken.append(item)
         return taken
 
+    def answer(self) -> None:
+        """Answer whatever has been asked."""
+        for request in self.take():
+            self.answer_one(request)
+
+    def answer_one(self, request: Request) -> None:
+        raise NotImplementedError
+
     def die(self) -> None:
         """Vanish with everything that was asked."""
         self.requests.close()
@@ -101,59 +126,60 @@ class Process:
 class Builder(Process):
     """Builds the town's Worlds in earnest."""
 
-    def __init__(self, plan: DrivePlan, bus: MemoryBus) -> None:
-        super().__init__(plan, bus, "builder", ("build",))
+    def __init__(self, plan: DrivePlan, bus: MemoryBus, *, at_once: bool = False) -> None:
         self.asked: list[str] = []
+        self.refuses: tuple[str, ...] = ()
+        super().__init__(plan, bus, "builder", ("build",), at_once=at_once)
 
-    def answer(self, *, refusing: tuple[str, ...] = ()) -> None:
-        for request in self.take():
-            wanted: BuildRequest = request.message()
-            self.asked.append(wanted.intersection_id)
-            if wanted.intersection_id in refusing:
-                request.refuse("the map is torn there")
-                continue
-            world = town_world(wanted.intersection_id)
-            WorldStore(Path(self.plan.worlds_dir)).save(world)
-            request.reply(
-                BuildReply(
-                    intersection_id=wanted.intersection_id, world_id=world.id, seconds=0.1,
-                    cached=False,
-                )
-            )  # fmt: skip
+    def answer_one(self, request: Request) -> None:
+        wanted: BuildRequest = request.message()
+        self.asked.append(wanted.intersection_id)
+        if wanted.intersection_id in self.refuses:
+            request.refuse("the map is torn there")
+            return
+        world = town_world(wanted.intersection_id)
+        WorldStore(Path(self.plan.worlds_dir)).save(world)
+        request.reply(
+            BuildReply(
+                intersection_id=wanted.intersection_id, world_id=world.id, seconds=0.1,
+                cached=False,
+            )
+        )  # fmt: skip
 
 
 class Worker(Process):
     """Loads Worlds and answers jobs with futures that go straight on."""
 
-    def __init__(self, plan: DrivePlan, bus: MemoryBus, worker_id: str) -> None:
-        super().__init__(plan, bus, worker_id, ("prepare", "job"))
+    def __init__(
+        self, plan: DrivePlan, bus: MemoryBus, worker_id: str, *, at_once: bool = False
+    ) -> None:
         self.prepared: list[str] = []
         self.jobs = 0
         self.diverges = False
         """Whether its simulations end in numbers that are none."""
+        super().__init__(plan, bus, worker_id, ("prepare", "job"), at_once=at_once)
 
-    def answer(self) -> None:
-        for request in self.take():
-            message = request.message()
-            if isinstance(message, PrepareRequest):
-                self.prepared.append(message.world_id)
-                request.reply(
-                    PrepareReply(world_id=message.world_id, worker_id=self.process_id, seconds=0.1)
-                )
-            else:
-                self.jobs += 1
-                world = read_message(self.plan.worlds_dir / f"{message.world_id}.world", World)
-                futures = straight_futures(message, world, self.process_id)
-                if self.diverges:
-                    futures.trajectory.states[:, 1:] = np.nan
-                    futures.outcome.valid[:] = False
-                request.reply(futures)
+    def answer_one(self, request: Request) -> None:
+        message = request.message()
+        if isinstance(message, PrepareRequest):
+            self.prepared.append(message.world_id)
+            request.reply(
+                PrepareReply(world_id=message.world_id, worker_id=self.process_id, seconds=0.1)
+            )
+            return
+        self.jobs += 1
+        world = read_message(self.plan.worlds_dir / f"{message.world_id}.world", World)
+        futures = straight_futures(message, world, self.process_id)
+        if self.diverges:
+            futures.trajectory.states[:, 1:] = np.nan
+            futures.outcome.valid[:] = False
+        request.reply(futures)
 
 
 class House:
     """A conductor with its builder, its workers and a car that drives through the town."""
 
-    def __init__(self, folder: Path, **settings: Any) -> None:
+    def __init__(self, folder: Path, *, at_once: bool = False, **settings: Any) -> None:
         self.plan = town_plan(folder, **{"futures": 6, "futures_per_job": 3, **settings})
         self.bus = MemoryBus()
         inputs = town()
@@ -164,8 +190,11 @@ class House:
         self.tables = ResultTables(self.plan.folder / "results", {"run_id": self.plan.run_id})
         self.conductor = Conductor(self.plan, self.bus, self.mission, self.tables)
         self.conductor.join()
-        self.builder = Builder(self.plan, self.bus)
-        self.workers = [Worker(self.plan, self.bus, name) for name in ("w0", "w1")]
+        self.builder = Builder(self.plan, self.bus, at_once=at_once)
+        self.workers = [
+            Worker(self.plan, self.bus, f"w{number}", at_once=at_once)
+            for number in range(self.plan.config.workers)
+        ]
         self.conductor.take_info(INFO)
         self.seen = Mailbox(4096)
         """What those who watch receive."""

@@ -103,7 +103,8 @@ def test_a_world_that_was_built_is_not_built_again(house: House) -> None:
 
 def test_what_cannot_be_built_is_told_and_passed_over(house: House) -> None:
     house.drive(20, working=False)
-    house.builder.answer(refusing=("n4",))
+    house.builder.refuses = ("n4",)
+    house.builder.answer()
     house.settle()
     house.work()
 
