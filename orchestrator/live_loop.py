@@ -59,28 +59,33 @@ class LiveLoop:
             now_s = time.monotonic()
             fresh = conductor.intake.states > seen
             if now_s >= next_due_s and (fresh or now_s >= next_due_s + 0.5 * self._period_s):
-                self._start_round(now_s)
                 # A machine that was asleep does not catch up on rounds; the grid stays.
-                periods = max(1, int((now_s - next_due_s) / self._period_s))
-                next_due_s += periods * self._period_s
+                left_out = int((now_s - next_due_s) / self._period_s)
+                next_due_s += (left_out + 1) * self._period_s
+                if self._start_round(now_s):
+                    conductor.missed_rounds += left_out
             if conductor.intake.end is not None and not self._telemetry_waits():
                 self._let_finish()
                 return True
         return False
 
-    def _start_round(self, now_s: float) -> None:
+    def _start_round(self, now_s: float) -> bool:
+        """Start a round if one can be; returns whether rounds are due here at all."""
         conductor = self._conductor
         latest = conductor.intake.latest
         if latest is None:
-            return
+            return False
         if (now_s - latest.receipt_mono_ns / 1e9) * self._speed > STALE_AFTER_S:
-            return
+            return False
         if conductor.rounds.desk.open_rounds:
             conductor.missed_rounds += 1
             if now_s - self._started_s > GIVE_UP_ROUND_S:
                 conductor.rounds.desk.drop()
-        elif conductor.start_round():
-            self._started_s = now_s
+            return True
+        if not conductor.start_round():
+            return False
+        self._started_s = now_s
+        return True
 
     def _telemetry_waits(self) -> bool:
         return len(self._conductor.mailbox) > 0
