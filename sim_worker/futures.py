@@ -22,7 +22,7 @@ from contracts.codec import content_bytes
 from contracts.simulation import FuturesJob, FuturesResult, Trajectory
 from sim_worker.actors.conflicts import CrossingPaths
 from sim_worker.actors.motion import ActorMotion, actor_motion
-from sim_worker.actors.perception import see_road_users
+from sim_worker.actors.perception import Lead, Sight, see_road_users
 from sim_worker.judging import DriveRecord, judge
 from sim_worker.planners.base import Planner, PlannerOutput, PlannerView
 from sim_worker.planners.path import FrenetPath
@@ -36,7 +36,6 @@ _log = logging.getLogger(__name__)
 _MAX_OFFSET_M = 8.0
 _CAR_WITHIN_M = 60.0
 """The car is looked for on this much of the path's beginning."""
-_LEAD_MARGIN_M = 0.3
 
 
 Rows = npt.NDArray[np.intp]
@@ -169,32 +168,32 @@ def _drive(
         friction_factor=np.array([v.friction_factor for v in job.variants]),
     )
     groups = _planner_groups(job)
-    leads = see_road_users(path, motion.poses[:, :: stage.steps_per_tick], motion.speed_mps)
+    tick_poses = motion.poses[:, :: stage.steps_per_tick]
+    users = sight = None
+    if np.isfinite(tick_poses[:, 0, 0]).any():
+        users = stage.road_user_motion(motion.poses[:, 1:])
+        sight = Sight(see_road_users(path, tick_poses, motion.speed_mps), stage.vehicle)
     limit_share = _limit_share(path, start_arc_m)
-    centre_ahead = box_centre_from_base_m(stage.vehicle)
-    front = centre_ahead + stage.vehicle.length_m.value / 2.0
-    half_width = stage.vehicle.width_m.value / 2.0
 
     states = np.empty((count, ticks + 1, 8))
     contact = np.zeros((count, ticks + 1), dtype=bool)
     user_contact = contact.copy()
     valid = np.ones((count, ticks + 1), dtype=bool)
-    arc = np.full(count, start_arc_m)
+    sound = True
+    arc, target = np.full(count, start_arc_m), aims.target_speed_mps
+    lead = Lead(np.full(count, np.inf), np.zeros(count))
     states[:, 0] = stage.states
-    users = None
-    if np.isfinite(motion.poses[:, 0, 0]).any():
-        users = stage.road_user_motion(motion.poses[:, 1:])
     for tick in range(ticks):
-        alive = valid[:, tick]
-        # What has diverged is not shown to planners: one bad future must not spoil the job.
-        now = stage.states if alive.all() else np.where(alive[:, None], stage.states, start)
+        now = stage.states
+        if not sound:
+            # What has diverged is not shown to planners: one bad future must not spoil the job.
+            now = np.where(valid[:, tick, None], now, start)
         place = path.locate(now[:, :2], near_arc_m=arc)
         arc = place.arc_m
-        gap = leads.rear_arc_m[tick] - arc - front
-        beside = np.abs(leads.offset_m[tick] - place.offset_m) - half_width
-        in_way = (beside < leads.half_width_m[tick] + _LEAD_MARGIN_M) & (
-            gap > -stage.vehicle.length_m.value
-        )
+        if sight is not None:
+            lead = sight.at(tick, place)
+        if limit_share is not None:
+            target = aims.target_speed_mps * path.at_nodes(limit_share, arc)
         view = PlannerView(
             time_s=tick * stage.control_dt_s,
             states=now,
@@ -202,22 +201,28 @@ def _drive(
             arc_m=arc,
             offset_m=place.offset_m,
             desired_offset_m=aims.offset_m,
-            target_speed_mps=aims.target_speed_mps * path.at_nodes(limit_share, arc),
+            target_speed_mps=target,
             speed_factor=aims.speed_factor,
-            lead_gap_m=np.where(in_way, gap, np.inf),
-            lead_speed_mps=np.where(in_way, leads.speed_mps[tick], 0.0),
+            lead_gap_m=lead.gap_m,
+            lead_speed_mps=lead.speed_mps,
             vehicle=stage.vehicle,
         )
         accel, angle = _plan(groups, view)
-        fine = np.isfinite(accel) & np.isfinite(angle)
+        fine = np.isfinite(accel + angle)
+        if not fine.all():
+            accel, angle = np.where(fine, accel, 0.0), np.where(fine, angle, 0.0)
         stage.step(
-            Controls(np.where(fine, accel, 0.0), np.where(fine, angle, 0.0)),
+            Controls(accel, angle),
             road_users=None if users is None else users.at(tick),
         )
         states[:, tick + 1] = stage.states
-        contact[:, tick + 1] = stage.static_contact
-        user_contact[:, tick + 1] = stage.road_user_contact
-        valid[:, tick + 1] = alive & fine & ~stage.diverged()
+        if stage.looked:
+            contact[:, tick + 1] = stage.static_contact
+            user_contact[:, tick + 1] = stage.road_user_contact
+        diverged = stage.diverged()
+        if not sound or diverged.any() or not fine.all():
+            valid[:, tick + 1] = valid[:, tick] & fine & ~diverged
+            sound = bool(valid[:, tick + 1].all())
     ends = np.where(valid[:, -1:], stage.states[:, :2], start[:2])
     end = path.locate(ends, near_arc_m=arc).arc_m
     return DriveRecord(states, contact, user_contact, valid, end - start_arc_m)
@@ -266,13 +271,14 @@ def _rows_of(view: PlannerView, rows: Rows) -> PlannerView:
     )
 
 
-def _limit_share(path: FrenetPath, start_arc_m: float) -> Array:
-    """Return (M,) how far the limits ahead lie below the one where the car is, at most 1.
+def _limit_share(path: FrenetPath, start_arc_m: float) -> Array | None:
+    """Return (M,) how far the limits lie below the one where the car is, at most 1; None for 1.
 
     A driver's speed relates to the limit, which the map may have guessed: only its drops count.
     """
     limits = path.speed_limit_mps
     here = limits[int(np.clip(np.searchsorted(path.arc_m, start_arc_m), 0, len(limits) - 1))]
     if not np.isfinite(here):
-        return np.ones(len(limits))
-    return np.asarray(np.minimum(np.where(np.isfinite(limits), limits, here) / here, 1.0))
+        return None
+    share = np.minimum(np.where(np.isfinite(limits), limits, here) / here, 1.0)
+    return np.asarray(share) if share.min() < 1.0 else None

@@ -41,6 +41,9 @@ _MAX_SPEED_MPS, _MAX_SLIDE_MPS, _MAX_YAW_RATE_RADPS = 25.0, 5.0, 3.0
 """Within these, a car cannot come from beyond the reach of `NearStatics` in a tick."""
 _SLACK_M = 0.2
 """What it may go farther by accelerating."""
+_SANE = np.full((8, 1), np.inf)
+_SANE[[3, 5], 0] = 200.0, 50.0
+"""Bounds of a state's columns: beyond them, a simulation has diverged."""
 
 
 class Controls(NamedTuple):
@@ -209,7 +212,10 @@ class Stage:
         self._road_users[:, :, 3] = 1.0
         record = np.zeros((count, self.steps_per_tick, self.model.nsensordata))
         self._record = {"sensordata": record}
-        self._looked = np.zeros(count, dtype=bool)
+        self._near = np.zeros(count, dtype=bool)
+        self._flags[rows] = self._not_looking
+        self.looked = False
+        """Whether contacts were looked for in any simulation during the last tick."""
         self._positions, self._velocities = np.empty((4, count)).T, np.empty((4, count)).T
 
     def road_user_motion(self, poses: Array) -> RoadUserMotion:
@@ -237,8 +243,10 @@ class Stage:
         self._tire_command = spread[:, -1]
         if road_users is not None:
             self._road_users[:] = road_users.mocap
-        self._looked = self._near_anything(states, road_users)
-        self._flags[rows] = np.where(self._looked, self._looking, self._not_looking)
+        self._near = self._near_anything(states, road_users)
+        looked, self.looked = self.looked, bool(self._near.any())
+        if looked or self.looked:
+            self._flags[rows] = np.where(self._near, self._looking, self._not_looking)
         self._batch.rollout(
             self.steps_per_tick,
             control=per_step,
@@ -288,16 +296,11 @@ class Stage:
 
     def _touched(self, sensor: int) -> npt.NDArray[np.bool_]:
         found = self._record["sensordata"][:, :, sensor]
-        return np.asarray((found > 0.0).any(axis=1) & self._looked)
+        return np.asarray((found > 0.0).any(axis=1) & self._near)
 
     def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""
-        states = self.states
-        return np.asarray(
-            ~np.isfinite(states).all(axis=1)
-            | (np.abs(states[:, 3]) > 200.0)
-            | (np.abs(states[:, 5]) > 50.0)
-        )
+        return np.asarray(~(np.abs(self.states.T) < _SANE).all(axis=0))
 
 
 def _compile(spec: mujoco.MjSpec, vehicle: VehicleParameters) -> mujoco.MjModel:

@@ -7,8 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from sim_worker.planners.path import FrenetPath
+from contracts.vehicle import VehicleParameters
+from sim_worker.planners.path import FrenetPath, FrenetPoint
 from sim_worker.stage import ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
+from sim_worker.vehicle.planar import box_centre_from_base_m
+
+_MARGIN_M = 0.3
+"""What passes the car's side by less than this is in its way."""
 
 
 class Leads(NamedTuple):
@@ -39,3 +44,28 @@ def see_road_users(path: FrenetPath, poses: Array, speed_mps: Array) -> Leads:
         half_width[there] = across.reshape(shape)
         speed[there] = speed_mps[there, None] * cos.reshape(shape)
     return Leads(arc.T.copy(), offset.T.copy(), half_width.T.copy(), speed.T.copy())
+
+
+class Lead(NamedTuple):
+    """What is ahead of S cars: bumper to bumper, infinite without a lead, and its speed; (S,)."""
+
+    gap_m: Array
+    speed_mps: Array
+
+
+class Sight:
+    """Which road users are in the way of cars at their places on the path, tick by tick."""
+
+    def __init__(self, leads: Leads, vehicle: VehicleParameters) -> None:
+        self._length_m = vehicle.length_m.value
+        front = box_centre_from_base_m(vehicle) + self._length_m / 2.0
+        self._gap_from_m = leads.rear_arc_m - front
+        self._offset_m, self._speed_mps = leads.offset_m, leads.speed_mps
+        self._beside_m = leads.half_width_m + vehicle.width_m.value / 2.0 + _MARGIN_M
+
+    def at(self, tick: int, place: FrenetPoint) -> Lead:
+        """Return what is ahead of base_link at `place` (S,) at a control tick."""
+        gap = self._gap_from_m[tick] - place.arc_m
+        in_way = np.abs(self._offset_m[tick] - place.offset_m) < self._beside_m[tick]
+        in_way &= gap > -self._length_m
+        return Lead(np.where(in_way, gap, np.inf), np.where(in_way, self._speed_mps[tick], 0.0))

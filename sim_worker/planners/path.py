@@ -67,7 +67,19 @@ class FrenetPath:
         self._heading = heading
         self._cos, self._sin = np.cos(heading), np.sin(heading)
         self._nodes = np.stack([self._x, self._y, self._cos, self._sin], axis=-1)
+        self._steps = np.diff(self._nodes, axis=0)
         self._last = len(self.arc_m) - 1
+        window = 2 * _WINDOW + 1
+        self._windows = [
+            np.lib.stride_tricks.sliding_window_view(values, window)
+            for values in (self._x, self._y)
+        ]
+        """(M - 2 W, 2 W + 1) the nodes around each, for the search near a known place."""
+        length = np.hypot(self._steps[:, 0], self._steps[:, 1])
+        self._segments = np.column_stack(
+            [self._x[:-1], self._y[:-1], self._steps[:, :2] / length[:, None], 1.0 / length]
+        )
+        """(M - 1, 5) start, direction, one over the length."""
         if speed_limit_mps is None:
             self.speed_limit_mps = np.full(len(self.arc_m), np.inf)
         else:
@@ -104,9 +116,8 @@ class FrenetPath:
 
     def _place(self, arc_m: Array) -> tuple[npt.NDArray[np.intp], Array]:
         """Return node index and fraction towards the next, clipped to the path."""
-        place = np.minimum(
-            np.maximum((arc_m - self._first_arc) / SPACING_M, 0.0), self._last - 1e-9
-        )
+        place = (arc_m - self._first_arc) / SPACING_M
+        place = np.minimum(np.maximum(place, 0.0), self._last - 1e-9)
         index = place.astype(np.intp)
         return index, place - index
 
@@ -119,13 +130,13 @@ class FrenetPath:
     def point_at(self, arc_m: Array, offset_m: Array | float = 0.0) -> Array:
         """Return positions (…, 2) at arc lengths (…) and offsets to the left."""
         index, share = self._place(arc_m)
-        after = index + 1
-        low, high = self._nodes[index], self._nodes[after]
-        x, y, cos, sin = np.moveaxis(low + share[..., None] * (high - low), -1, 0)
-        point = np.empty((*np.shape(arc_m), 2))
-        point[..., 0] = x - sin * offset_m
-        point[..., 1] = y + cos * offset_m
-        return point
+        rows = self._steps.take(index, axis=0)
+        rows *= share[..., None]
+        rows += self._nodes.take(index, axis=0)
+        point = rows[..., :2]
+        point[..., 0] -= rows[..., 3] * offset_m
+        point[..., 1] += rows[..., 2] * offset_m
+        return np.asarray(point)
 
     def pose_at(self, arc_m: Array, offset_m: Array | float = 0.0) -> PathPose:
         """Return positions and headings at arc lengths (…) and offsets to the left."""
@@ -146,26 +157,26 @@ class FrenetPath:
             square = dx * dx + dy * dy
             index = square.argmin(axis=1)
         else:
-            centre, _ = self._place(near_arc_m)
-            start = np.minimum(np.maximum(centre - _WINDOW, 0), self._last - 2 * _WINDOW)
-            nodes = start[:, None] + _OFFSETS
-            dx, dy = self._x[nodes] - x[:, None], self._y[nodes] - y[:, None]
-            square = dx * dx + dy * dy
-            index = start + square.argmin(axis=1)
+            centre = (near_arc_m - (self._first_arc + _WINDOW * SPACING_M)) / SPACING_M
+            centre = np.minimum(np.maximum(centre, 0.0), self._last - 2 * _WINDOW)
+            start = centre.astype(np.intp)
+            dx, dy = (window[start] for window in self._windows)
+            dx -= x[:, None]
+            dy -= y[:, None]
+            dx *= dx
+            dy *= dy
+            dx += dy
+            index = start + dx.argmin(axis=1)
         # The node's own tangent decides between the segment before and the one after.
-        x0, y0, cos, sin = self._nodes[index].T
+        x0, y0, cos, sin = self._nodes.take(index, axis=0).T
         index = index - ((x - x0) * cos + (y - y0) * sin < 0.0)
         index = np.minimum(np.maximum(index, 0), self._last - 1)
-        x0, y0, _, _ = self._nodes[index].T
-        x1, y1, _, _ = self._nodes[index + 1].T
-        dx, dy, x, y = x1 - x0, y1 - y0, x - x0, y - y0
-        square = dx * dx + dy * dy
-        share = np.minimum(np.maximum((x * dx + y * dy) / square, 0.0), 1.0)
-        offset = (dx * y - dy * x) / np.sqrt(square)
-        return FrenetPoint(self._first_arc + (index + share) * SPACING_M, offset)
-
-
-_OFFSETS = np.arange(2 * _WINDOW + 1)
+        x0, y0, cos, sin, per_length = self._segments.take(index, axis=0).T
+        x, y = x - x0, y - y0
+        share = (x * cos + y * sin) * per_length
+        share = np.minimum(np.maximum(share, 0.0), 1.0)
+        arc = (index + share) * SPACING_M + self._first_arc
+        return FrenetPoint(arc, cos * y - sin * x)
 
 
 def _prolonged(at: Array, arc: Array, values: Array) -> Array:

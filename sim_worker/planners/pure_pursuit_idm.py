@@ -44,7 +44,10 @@ class PurePursuitIdm:
         target = np.maximum(view.target_speed_mps, 0.0)
         allowed = np.maximum(target, 0.1)
         ratio = speed / allowed
-        below = start * (1.0 - ratio**EXPONENT)
+        fourth = np.square(np.square(ratio))
+        below = start * (1.0 - fourth)
+        if not (target < 0.05).any() and not (ratio > 1.0).any():
+            return np.asarray(below)
         above = -COMFORT_DECEL_MPS2 * (
             1.0 - np.maximum(ratio, 1.0) ** (-start * EXPONENT / COMFORT_DECEL_MPS2)
         )

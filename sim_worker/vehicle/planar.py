@@ -171,14 +171,15 @@ def base_from_cog(
 ) -> Array:
     """Fill columns 0 to 6 of base_link states `out` (S, 8) from joints (S, 4); returns `out`."""
     rear = vehicle.cog_from_rear_axle_m.value
-    yaw = positions[:, 2]
+    x, y, yaw, steer = positions.T
+    vx, vy, rate, _ = velocities.T
     cos, sin = np.cos(yaw), np.sin(yaw)
-    vx, vy, r = velocities[:, 0], velocities[:, 1], velocities[:, 2]
-    out[:, 0] = positions[:, 0] - rear * cos
-    out[:, 1] = positions[:, 1] - rear * sin
-    out[:, 2] = yaw
-    out[:, 3] = cos * vx + sin * vy
-    out[:, 4] = cos * vy - sin * vx - rear * r
-    out[:, 5] = r
-    out[:, 6] = positions[:, 3]
+    columns = out.T
+    np.subtract(x, rear * cos, out=columns[0])
+    np.subtract(y, rear * sin, out=columns[1])
+    columns[2] = yaw
+    np.add(cos * vx, sin * vy, out=columns[3])
+    np.subtract(cos * vy - sin * vx, rear * rate, out=columns[4])
+    columns[5] = rate
+    columns[6] = steer
     return out
