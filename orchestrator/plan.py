@@ -25,7 +25,7 @@ from orchestrator.route import Route
 from orchestrator.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import load_planner
 from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.logs import line_of_log, open_log, read_line
+from telemetry.logs import LogError, line_of_log, open_log, read_line
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
@@ -145,13 +145,12 @@ def _read_log(
     if not log_file.exists():
         raise FileNotFoundError(f"recorded drive {log_file}: no such file or folder")
     log = open_log(log_file)
-    line = line_of_log(log, start_s=config.start_s, end_s=config.end_s)
+    try:
+        line = line_of_log(log, start_s=config.start_s, end_s=config.end_s)
+    except LogError as error:
+        end = "its end" if config.end_s is None else f"--end {config.end_s:g}"
+        raise UserError(f"{log_file} from --start {config.start_s:g} to {end}: {error}") from error
     positions = np.stack([line.lat_deg, line.lon_deg], axis=-1)
-    if len(positions) == 0:
-        raise UserError(
-            f"{log_file}: no position between --start {config.start_s:g} and --end "
-            f"{config.end_s if config.end_s is not None else 'its end'}"
-        )
     xy = local_from_geo(index.graph.frame, positions[:, 0], positions[:, 1])
     every = max(1, len(xy) // 500)
     if not any(index.near(point, NEAR_ROAD_M) for point in xy[::every]):
