@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import pure_pursuit
+from sim_worker.planners.tracking import MAX_LATERAL_ACCEL_MPS2, pure_pursuit, turning_speed
 from sim_worker.vehicle.actuation import resistance_mps2
 
 _TIME_CONSTANT_S = 1.0
@@ -18,9 +18,11 @@ class ConstantSpeed:
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
         speed = view.states[:, 3]
-        accel = (view.target_speed_mps - speed) / _TIME_CONSTANT_S
+        angle = pure_pursuit(view)
+        turning = turning_speed(view, angle, lateral_accel_mps2=MAX_LATERAL_ACCEL_MPS2)
+        accel = (np.minimum(view.target_speed_mps, turning) - speed) / _TIME_CONSTANT_S
         most = _LIMIT_MPS2 * np.minimum(np.maximum(view.speed_factor, 0.3), 2.0)
         accel = np.maximum(np.minimum(accel, most), -_LIMIT_MPS2)
         stands = (np.abs(speed) < 0.05) & (view.target_speed_mps < 0.05)
         command = accel + resistance_mps2(view.vehicle, speed)
-        return PlannerOutput(np.where(stands, -_LIMIT_MPS2, command), pure_pursuit(view))
+        return PlannerOutput(np.where(stands, -_LIMIT_MPS2, command), angle)

@@ -6,7 +6,7 @@ import numpy as np
 
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import pure_pursuit
+from sim_worker.planners.tracking import pure_pursuit, turning_speed
 from sim_worker.vehicle.actuation import resistance_mps2
 
 MAX_ACCEL_MPS2 = 1.5
@@ -15,6 +15,8 @@ MAX_DECEL_MPS2 = 8.0
 TIME_GAP_S = 1.5
 STANDSTILL_GAP_M = 2.0
 LATERAL_ACCEL_MPS2 = 2.5
+TURNING_ACCEL_MPS2 = 4.0
+"""Of the wheels' own curvature: more than that of the path, which alone governs on it."""
 EXPONENT = 4.0
 _CURVE_TIME_S = 0.5
 _HOLD_SPEED_MPS = 0.3
@@ -27,12 +29,14 @@ class PurePursuitIdm:
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
         speed = np.maximum(view.states[:, 3], 0.0)
-        accel = np.minimum(self._free(view, speed), self._curves(view, speed))
+        angle = pure_pursuit(view)
+        turning = turning_speed(view, angle, lateral_accel_mps2=TURNING_ACCEL_MPS2)
+        accel = np.minimum(self._free(view, speed), self._curves(view, speed, turning))
         accel = accel - self._interaction(view, speed)
         accel = np.maximum(accel, -MAX_DECEL_MPS2)
         command = accel + resistance_mps2(view.vehicle, speed)
         hold = (speed < _HOLD_SPEED_MPS) & (accel <= 0.0)
-        return PlannerOutput(np.where(hold, _HOLD_MPS2, command), pure_pursuit(view))
+        return PlannerOutput(np.where(hold, _HOLD_MPS2, command), angle)
 
     def _free(self, view: PlannerView, speed: Array) -> Array:
         """Free-road acceleration; above the target speed it approaches the comfortable one.
@@ -53,14 +57,14 @@ class PurePursuitIdm:
         )
         return np.where(target < 0.05, -COMFORT_DECEL_MPS2, np.where(ratio <= 1.0, below, above))
 
-    def _curves(self, view: PlannerView, speed: Array) -> Array:
-        """Acceleration that follows the speed profile of the curves ahead."""
+    def _curves(self, view: PlannerView, speed: Array, turning_mps: Array) -> Array:
+        """Acceleration that follows the speed profile of the curves ahead and of the wheels."""
         profile = view.path.speed_profile(
             lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
         )
         ahead = view.arc_m + _CURVE_TIME_S * speed
         allowed = view.speed_factor * view.path.at_nodes(profile, ahead)
-        return (allowed - speed) / _CURVE_TIME_S
+        return np.asarray((np.minimum(allowed, turning_mps) - speed) / _CURVE_TIME_S)
 
     def _interaction(self, view: PlannerView, speed: Array) -> Array:
         """IDM deceleration for what is ahead: a (s* / s)², s* = s0 + v T + v Δv / (2 √(a b))."""

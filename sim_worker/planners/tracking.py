@@ -1,4 +1,4 @@
-"""Path tracking shared by the built-in planners: pure pursuit with a speed-dependent look-ahead."""
+"""Path tracking shared by the built-in planners: pure pursuit and the speed that it can bear."""
 
 from __future__ import annotations
 
@@ -9,6 +9,13 @@ from sim_worker.planners.base import PlannerView
 
 MIN_LOOKAHEAD_M = 4.0
 LOOKAHEAD_TIME_S = 0.6
+_KEPT_M, _LOOKAHEAD_ASIDE = 0.2, 2.0
+"""From this far beside its line, a car looks farther ahead by so many times the excess: with the
+nearest goal, wheels that turn slowly would swing from side to side for ever."""
+MAX_LATERAL_ACCEL_MPS2 = 7.0
+"""No more is steered for, so that wheels at speed need little time to come back."""
+_MAX_TURN_RAD = 0.4
+"""How far the car may turn while its wheels are on their way to the wanted angle."""
 
 
 def pure_pursuit(view: PlannerView) -> Array:
@@ -19,10 +26,29 @@ def pure_pursuit(view: PlannerView) -> Array:
     """
     states = view.states
     lookahead = np.maximum(MIN_LOOKAHEAD_M, LOOKAHEAD_TIME_S * states[:, 3])
+    aside = np.abs(view.offset_m - view.desired_offset_m) - _KEPT_M
+    lookahead = lookahead + _LOOKAHEAD_ASIDE * np.maximum(aside, 0.0)
     goal = view.path.point_at(view.arc_m + lookahead, view.desired_offset_m)
     dx, dy = goal[:, 0] - states[:, 0], goal[:, 1] - states[:, 1]
     cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
     left = cos * dy - sin * dx
-    angle = np.arctan(2.0 * view.vehicle.wheelbase_m.value * left / (dx * dx + dy * dy + 1e-9))
-    limit = view.vehicle.max_tire_angle_rad.value
-    return np.asarray(np.minimum(np.maximum(angle, -limit), limit))
+    wheelbase = view.vehicle.wheelbase_m.value
+    slope = 2.0 * wheelbase * left / (dx * dx + dy * dy + 1e-9)
+    most = wheelbase * MAX_LATERAL_ACCEL_MPS2 / np.square(np.maximum(states[:, 3], 1.0))
+    most = np.minimum(most, np.tan(view.vehicle.max_tire_angle_rad.value))
+    return np.arctan(np.minimum(np.maximum(slope, -most), most))
+
+
+def turning_speed(view: PlannerView, tire_angle_rad: Array, *, lateral_accel_mps2: float) -> Array:
+    """Return the speed (S,) that the wheels allow on their way to the wanted angles (S,).
+
+    √(a_lat / |κ|) with κ = tan δ / L of the wider of both angles, and less where the wheels still
+    have to turn: a car that starts with wheels turned would drive a loop before they are straight.
+    """
+    vehicle, present = view.vehicle, view.states[:, 6]
+    wider = np.maximum(np.abs(present), np.abs(tire_angle_rad))
+    curvature = np.tan(wider) / vehicle.wheelbase_m.value + 1e-6
+    on_the_way_s = np.abs(present - tire_angle_rad) / vehicle.max_tire_rate_radps.value + 1e-6
+    return np.minimum(
+        np.sqrt(lateral_accel_mps2 / curvature), _MAX_TURN_RAD / (curvature * on_the_way_s)
+    )
