@@ -78,6 +78,7 @@ def run_record(
             "orchestrator_mailbox": conductor.mailbox.dropped,
             "result_rows": conductor.tables.dropped,
             "failed_jobs": conductor.rounds.failed_jobs,
+            "given_up_rounds": conductor.rounds.desk.given_up_rounds,
         },
         "troubles": [conductor.tables.failed] if conductor.tables.failed else [],
         "off_road": [

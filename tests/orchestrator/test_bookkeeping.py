@@ -46,7 +46,8 @@ def test_each_key_has_its_own_numbering() -> None:
 
 
 def test_what_the_vehicle_says_it_sent_settles_the_losses() -> None:
-    count = counted(3, 4, 5)  # the first three went before we listened
+    count = counted(3, 4, 6)  # the first three went before we listened, one on the way
+    assert count.lost == 1
     count.settle({"gnss": 8, "imu": 10})
 
     assert count.lost == 5 + 10

@@ -64,6 +64,21 @@ def test_a_worker_that_dies_while_loading_is_waited_for_no_more(house: House) ->
     assert house.conductor.rounds.desk.workers == ("w0",)
 
 
+def test_a_worker_that_hangs_while_loading_is_waited_for_until_it_is_gone(house: House) -> None:
+    house.drive(20, working=False)
+    house.builder.answer()
+    house.settle()
+    house.workers[0].answer()
+    unanswered = house.workers[1].take()
+    house.settle()
+    assert unanswered
+    assert ready(house.conductor) == []
+
+    house.workers[1].die()
+    house.settle()
+    assert ready(house.conductor)
+
+
 def test_a_worker_that_comes_back_loads_what_the_coming_rounds_need(house: House) -> None:
     house.drive(20)
     house.workers[1].die()

@@ -1,0 +1,70 @@
+"""A round is cut into jobs that together hold every variant once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.round_runner import planners_of
+from tests.orchestrator.house import House
+
+
+@pytest.mark.parametrize(("futures", "size"), [(6, 3), (7, 3), (1, 32), (64, 32)])
+def test_every_variant_is_in_one_job(futures: int, size: int, tmp_path: Path) -> None:
+    house = House(tmp_path, futures=futures, futures_per_job=size)
+    house.drive(20)
+    assert house.conductor.start_round()
+    jobs = []
+    while requests := house.workers[0].take() + house.workers[1].take():
+        for request in requests:
+            jobs.append(request.message())
+            house.workers[0].answer_one(request)
+        house.settle()
+    house.tables.close()
+
+    indices = sorted(v.index for job in jobs for v in job.variants)
+    assert indices == list(range(futures))
+    assert max(len(job.variants) for job in jobs) <= size
+    (first,) = (job for job in jobs if job.job_index == 0)
+    assert first.variants[0].name == "nominal"
+    assert len({(job.state.stamp_ns, job.cruise_speed_mps, job.seed) for job in jobs}) == 1
+    assert house.conductor.rounds.futures.count == futures
+
+
+def test_rounds_differ_by_their_state_and_not_by_their_variants(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    seen = []
+    for until in (20, 40):
+        house.drive(until)
+        assert house.conductor.start_round()
+        seen.append(house.workers[0].take()[0])
+        house.workers[0].answer_one(seen[-1])
+        house.work()
+    house.tables.close()
+    early, late = (request.message() for request in seen)
+
+    assert early.variants == late.variants
+    assert late.state.stamp_ns - early.state.stamp_ns == 2_000_000_000
+    assert (early.round_id, late.round_id) == (0, 1)
+    moved = late.path.xy_m[0] - early.path.xy_m[0]
+    assert np.hypot(*moved) == pytest.approx(20.0, abs=2.0)
+
+
+def test_one_future_in_eight_is_driven_by_somebody_heedless() -> None:
+    assert Counter(planners_of("pure_pursuit_idm")) == {
+        "pure_pursuit_idm": 7, "constant_speed": 1,
+    }  # fmt: skip
+    assert set(planners_of("constant_speed")) == {"constant_speed"}
+
+
+def test_speed_of_simulation_is_known_of_each_worker(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    house.drive(20)
+    assert house.conductor.start_round()
+    house.work()
+    house.tables.close()
+
+    assert house.conductor.rounds.rtf == {"w0": pytest.approx(80.0), "w1": pytest.approx(80.0)}
