@@ -61,6 +61,7 @@ class MapMatcher:
         self._lost_after_m = lost_after_m
         self._hypotheses: list[Hypothesis] = []
         self._step_xy: Array | None = None
+        self._road_xy: Array | None = None
         self._away_m = 0.0
         self._direction_known = False
         self._stretches: list[OffRoadStretch] = []
@@ -81,7 +82,7 @@ class MapMatcher:
         """
         xy = np.asarray(xy_m, dtype=np.float64)
         if not np.isfinite(xy).all():
-            return self._match(self._step_xy) if self._step_xy is not None else None
+            return self._match(self._road_xy)
         yaw = yaw_rad if yaw_valid and math.isfinite(yaw_rad) else None
         if speed_mps < -0.3 and yaw is not None:
             yaw += math.pi
@@ -90,7 +91,11 @@ class MapMatcher:
             self._begin(xy, yaw)
         elif moved >= self._weights.step_m or (yaw is not None and not self._direction_known):
             self._step(xy, yaw, moved)
-        match = self._match(xy)
+        if self._away_m == 0.0:
+            self._road_xy = xy
+        # Away from every road the car's place on its last one is where it left it: a wild
+        # position must not carry it to the road's end and past a junction.
+        match = self._match(self._road_xy)
         if match is None or yaw is None or not self._direction_known:
             return match
         road_rad = project(match.directed_edge, xy).heading_rad

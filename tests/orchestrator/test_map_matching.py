@@ -192,3 +192,18 @@ def test_a_line_off_the_map_is_refused_in_one_line() -> None:
 def test_a_line_of_one_point_is_refused() -> None:
     with pytest.raises(RouteError, match="1 usable points; at least 2"):
         match_line(TOWN, np.array([[52.5, 13.4], [math.nan, 13.4]]))
+
+
+def test_a_wild_position_leaves_the_car_where_it_was_on_its_road() -> None:
+    town = grid(5, 4)
+    matcher = MapMatcher(town)
+    before = None
+    for x in range(20, 61, 2):
+        before = matcher.update(np.array([float(x), 100.0]), 0.0, True, 8.0)
+    wild = matcher.update(np.array([5000.0, 5000.0]), 0.0, True, 8.0)
+
+    assert before is not None
+    assert wild is not None
+    assert wild.directed_edge == before.directed_edge
+    assert wild.s_on_edge_m == pytest.approx(before.s_on_edge_m)
+    assert not wild.confident
