@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
+import msgspec
 import pyarrow.parquet as pq
 import pytest
 
 from contracts.codec import encode
-from contracts.drive import GnssFix, PlannedTrajectory
-from contracts.frames import geo_from_local, geo_from_local_yaw, local_from_geo
-from contracts.frames import local_from_geo_yaw as to_local_yaw
+from contracts.drive import GnssFix
 from contracts.mailbox import Received
 from orchestrator.conductor import Conductor
-from tests.orchestrator.house import Builder, House, Worker
-from tests.orchestrator.trip import town
+from tests.orchestrator.house import INFO, Builder, House, Worker
 
 
 @pytest.fixture
@@ -235,65 +232,7 @@ def test_a_round_whose_world_is_late_is_missed_and_one_without_heading_is_not(ho
     assert (house.conductor.missed_rounds, house.conductor.unseeded_rounds) == (2, 0)
 
 
-def car_plan(house: House, number: int, *, left_m: float) -> PlannedTrajectory:
-    """A plan at the car's speed straight on, shifted to the left."""
-    frame, state = town().graph.frame, house.states[number]
-    position = state.position
-    xy = local_from_geo(frame, position.lat_deg, position.lon_deg)
-    yaw = float(to_local_yaw(frame, state.yaw_rad, position.lat_deg, position.lon_deg))
-    time_s = np.linspace(0.0, 4.0, 21)
-    ahead, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
-    points = xy + 10.0 * time_s[:, None] * ahead + left_m * left
-    geo = geo_from_local(frame, points)
-    return PlannedTrajectory(
-        stamp_ns=state.stamp_ns, time_from_stamp_s=time_s, lat_deg=geo[:, 0].copy(),
-        lon_deg=geo[:, 1].copy(), yaw_rad=geo_from_local_yaw(frame, np.full(21, yaw), points),
-        speed_mps=np.full(21, 10.0),
-    )  # fmt: skip
-
-
-def test_a_plan_shifted_by_a_metre_is_a_metre_off(house: House) -> None:
-    house.drive(49)
-    house.bus.publish("plan", car_plan(house, 49, left_m=1.0), vehicle="ego")
-    house.drive(50)
-    assert house.conductor.start_round()
-    house.work()
-
-    (compared,) = house.watched("plan_comparison")
-    assert compared.difference.lateral_m == pytest.approx(1.0, abs=0.1)
-    assert compared.difference.ade_m == pytest.approx(1.0, abs=0.1)
-    assert house.conductor.rounds.plans.record()["count"] == 1
-
-
-def test_a_nominal_future_that_diverged_is_compared_with_nothing(house: House) -> None:
-    house.workers[0].diverges = house.workers[1].diverges = True
-    house.drive(49)
-    house.bus.publish("plan", car_plan(house, 49, left_m=1.0), vehicle="ego")
-    house.drive(50)
-    assert house.conductor.start_round()
-    house.work()
-    house.drive(160)
-    house.end()
-
-    assert house.conductor.rounds.futures.count == 6
-    assert house.conductor.rounds.plans.record() is None
-    assert house.conductor.rounds.comparisons.record(independent=True)["ade_m"] == {}
-
-
-def test_an_old_plan_of_the_car_is_not_compared(house: House) -> None:
-    house.bus.publish("plan", car_plan(house, 0, left_m=1.0), vehicle="ego")
-    house.drive(30)
-    assert house.conductor.start_round()
-    house.work()
-
-    assert house.watched("plan_comparison") == []
-
-
 def test_the_reference_point_of_a_source_that_keeps_it_to_itself_is_mentioned(house: House) -> None:
-    import msgspec
-
-    from tests.orchestrator.house import INFO
-
     silent = msgspec.structs.replace(INFO, body_from_antenna_m=None, reference_point="roof")
     house.conductor.take_info(silent)
 

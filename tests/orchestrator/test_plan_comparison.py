@@ -1,0 +1,76 @@
+"""The car's own plan against the nominal future of the round that it comes with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contracts.drive import PlannedTrajectory
+from contracts.frames import geo_from_local, geo_from_local_yaw, local_from_geo
+from contracts.frames import local_from_geo_yaw as to_local_yaw
+from tests.orchestrator.house import House
+from tests.orchestrator.trip import town
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Iterator[House]:
+    made = House(tmp_path)
+    yield made
+    made.tables.close()
+
+
+def car_plan(house: House, number: int, *, left_m: float) -> PlannedTrajectory:
+    """A plan at the car's speed straight on, shifted to the left."""
+    frame, state = town().graph.frame, house.states[number]
+    position = state.position
+    xy = local_from_geo(frame, position.lat_deg, position.lon_deg)
+    yaw = float(to_local_yaw(frame, state.yaw_rad, position.lat_deg, position.lon_deg))
+    time_s = np.linspace(0.0, 4.0, 21)
+    ahead, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+    points = xy + 10.0 * time_s[:, None] * ahead + left_m * left
+    geo = geo_from_local(frame, points)
+    return PlannedTrajectory(
+        stamp_ns=state.stamp_ns, time_from_stamp_s=time_s, lat_deg=geo[:, 0].copy(),
+        lon_deg=geo[:, 1].copy(), yaw_rad=geo_from_local_yaw(frame, np.full(21, yaw), points),
+        speed_mps=np.full(21, 10.0),
+    )  # fmt: skip
+
+
+def test_a_plan_shifted_by_a_metre_is_a_metre_off(house: House) -> None:
+    house.drive(49)
+    house.bus.publish("plan", car_plan(house, 49, left_m=1.0), vehicle="ego")
+    house.drive(50)
+    assert house.conductor.start_round()
+    house.work()
+
+    (compared,) = house.watched("plan_comparison")
+    assert compared.difference.lateral_m == pytest.approx(1.0, abs=0.1)
+    assert compared.difference.ade_m == pytest.approx(1.0, abs=0.1)
+    assert house.conductor.rounds.plans.record()["count"] == 1
+
+
+def test_a_nominal_future_that_diverged_is_compared_with_nothing(house: House) -> None:
+    house.workers[0].diverges = house.workers[1].diverges = True
+    house.drive(49)
+    house.bus.publish("plan", car_plan(house, 49, left_m=1.0), vehicle="ego")
+    house.drive(50)
+    assert house.conductor.start_round()
+    house.work()
+    house.drive(160)
+    house.end()
+
+    assert house.conductor.rounds.futures.count == 6
+    assert house.conductor.rounds.plans.record() is None
+    assert house.conductor.rounds.comparisons.record(independent=True)["ade_m"] == {}
+
+
+def test_an_old_plan_of_the_car_is_not_compared(house: House) -> None:
+    house.bus.publish("plan", car_plan(house, 0, left_m=1.0), vehicle="ego")
+    house.drive(30)
+    assert house.conductor.start_round()
+    house.work()
+
+    assert house.watched("plan_comparison") == []
