@@ -37,6 +37,8 @@ _MAX_OFFSET_M = 8.0
 _CAR_WITHIN_M = 60.0
 """The car is looked for on this much of the path's beginning."""
 
+_WITHOUT_PATH: set[str] = set()
+"""Ids of Worlds of which the log has said so: once per World and process is enough."""
 
 Rows = npt.NDArray[np.intp]
 
@@ -84,7 +86,8 @@ def run_job(
         half_lengths_m=(stage.vehicle.length_m.value + ROAD_USER_LENGTH_M) / 2.0,
         time_s=physics_times,
     )
-    if motion.invented:
+    if motion.invented and world.id not in _WITHOUT_PATH:
+        _WITHOUT_PATH.add(world.id)
         _log.info("world %s offers no path that meets the ego's: a straight one is used", world.id)
     with np.errstate(over="ignore", invalid="ignore"):
         drive = _drive(job, stage, path, start, float(place.arc_m[0]), aims, motion, ticks)

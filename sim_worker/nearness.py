@@ -105,23 +105,24 @@ class RoadUserMotion:
     """Where the road users of S futures are at every physics step, in the form a stage takes.
 
     `poses` (S, N, 3) are x, y, yaw of the box centre at the end of each of N physics steps, NaN
-    where a future has none: that one is kept at `far_m`, far away.
+    throughout where a future has none: that one is kept at `far_m`, far away.
     """
 
     def __init__(self, poses: Array, *, steps_per_tick: int, far_m: float) -> None:
         count, steps = poses.shape[:2]
-        there = np.isfinite(poses[:, :, :1])
-        xy = np.where(there, poses[:, :, :2], far_m)
-        half = np.where(there[:, :, 0], 0.5 * poses[:, :, 2], 0.0)
-        mocap = np.zeros((count, steps, 7))
-        mocap[:, :, :2], mocap[:, :, 3], mocap[:, :, 6] = xy, np.cos(half), np.sin(half)
-        shape = (count, steps // steps_per_tick, steps_per_tick, -1)
-        self._mocap = np.ascontiguousarray(mocap.reshape(shape).swapaxes(0, 1))
-        ticks = xy.reshape(shape)
-        centre = ticks.mean(axis=2)
-        travel = np.hypot(*np.moveaxis(ticks - centre[:, :, None], -1, 0)).max(axis=-1)
-        self._xy = np.ascontiguousarray(centre.transpose(1, 2, 0))
-        self._travel = np.ascontiguousarray(travel.T)
+        ticks = steps // steps_per_tick
+        self._mocap = np.zeros((ticks, count, steps_per_tick, 7))
+        self._mocap[..., 0:2], self._mocap[..., 3] = far_m, 1.0
+        self._xy, self._travel = np.full((ticks, 2, count), far_m), np.zeros((ticks, count))
+        there = np.flatnonzero(np.isfinite(poses[:, 0, 0]))
+        found = poses[there].reshape(len(there), ticks, steps_per_tick, 3).swapaxes(0, 1)
+        half = 0.5 * found[..., 2]
+        self._mocap[:, there, :, 0:2] = found[..., :2]
+        self._mocap[:, there, :, 3:4] = np.cos(half)[..., None]
+        self._mocap[:, there, :, 6:7] = np.sin(half)[..., None]
+        low, high = found[..., :2].min(axis=2), found[..., :2].max(axis=2)
+        self._xy[:, :, there] = (0.5 * (low + high)).swapaxes(1, 2)
+        self._travel[:, there] = 0.5 * np.hypot(*np.moveaxis(high - low, -1, 0))
 
     def at(self, tick: int) -> RoadUserTick:
         """Return what a stage needs for its control tick number `tick`, counted from 0."""

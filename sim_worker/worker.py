@@ -27,7 +27,7 @@ from sim_worker.stage import Controls, Stage
 
 NSIM = 32
 """Simulations of a stage: two workers share a round of 64."""
-KEPT_WORLDS = 4
+KEPT_WORLDS = 8
 _IDLE_S = 0.2
 
 log = logging.getLogger("sim_worker")

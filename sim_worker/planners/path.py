@@ -18,6 +18,8 @@ SPACING_M = 1.0
 _AFTER_M = 200.0
 _WINDOW = 12
 """Nodes searched on either side of the last known place."""
+_BLOCK = 32
+"""Points whose distances to all nodes are looked at together: they stay in the cache."""
 _SMOOTH_NODES = 2
 """Curvature is the heading change over this many nodes on either side."""
 
@@ -142,6 +144,14 @@ class FrenetPath:
         """Return positions and headings at arc lengths (…) and offsets to the left."""
         return PathPose(self.point_at(arc_m, offset_m), self.at_nodes(self._heading, arc_m))
 
+    def _nearest(self, x: Array, y: Array, end: int) -> npt.NDArray[np.intp]:
+        """Return which of the nodes before `end` is nearest to each of a few points."""
+        dx, dy = self._x[:end] - x[:, None], self._y[:end] - y[:, None]
+        dx *= dx
+        dy *= dy
+        dx += dy
+        return np.asarray(dx.argmin(axis=1))
+
     def locate(
         self, xy_m: Array, *, near_arc_m: Array | None = None, upto_arc_m: float = np.inf
     ) -> FrenetPoint:
@@ -153,9 +163,12 @@ class FrenetPath:
         x, y = xy_m[:, 0], xy_m[:, 1]
         if near_arc_m is None:
             end = max(2, int(np.searchsorted(self.arc_m, upto_arc_m, side="right")))
-            dx, dy = self._x[:end] - x[:, None], self._y[:end] - y[:, None]
-            square = dx * dx + dy * dy
-            index = square.argmin(axis=1)
+            index = np.concatenate(
+                [
+                    self._nearest(x[k : k + _BLOCK], y[k : k + _BLOCK], end)
+                    for k in range(0, len(x), _BLOCK)
+                ]
+            )
         else:
             centre = (near_arc_m - (self._first_arc + _WINDOW * SPACING_M)) / SPACING_M
             centre = np.minimum(np.maximum(centre, 0.0), self._last - 2 * _WINDOW)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from contracts.codec import content_bytes, write_message
-from contracts.simulation import FuturesJob, FuturesResult, Variant
+from contracts.simulation import ActorSpec, FuturesJob, FuturesResult, Variant
 from sim_worker.futures import result_digest, run_job
 from sim_worker.metrics.displacement import distinct_count
 from sim_worker.stage import Stage
@@ -86,7 +86,7 @@ def test_another_process_computes_the_same_bytes(
     write_message(stage.world, tmp_path / "world")
     program = (
         "import sys; from pathlib import Path; from contracts.codec import read_message;"
-        "from contracts.world import World; from contracts.simulation import FuturesJob;"
+        "from contracts.world import World; from contracts.simulation import ActorSpec, FuturesJob;"
         "from sim_worker.futures import run_job, result_digest; from sim_worker.stage import Stage;"
         "from sim_worker.vehicle.parameters import load_vehicle; d = Path(sys.argv[1]);"
         "s = Stage(read_message(d / 'world', World), load_vehicle(), nsim=16);"
@@ -222,6 +222,19 @@ def test_a_job_that_cannot_be_done_says_why(
 ) -> None:
     with pytest.raises(ValueError, match=said):
         run_job(_altered(job(NOMINAL), **changes), stage)
+
+
+def test_the_log_says_once_per_world_that_it_offers_no_path(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    world = msgspec.structs.replace(crossroads(connections=False), id="bare")
+    place = Stage(world, CAR, nsim=1)
+    variant = Variant(index=0, name="x", actor=ActorSpec(kind="crossing", speed_mps=5.0))
+    question = _altered(job((variant,), horizon_s=0.5), world_id="bare")
+    with caplog.at_level("INFO"):
+        for _ in range(3):
+            run_job(question, place)
+    assert caplog.text.count("world bare offers no path") == 1
 
 
 def test_result_digest_ignores_who_computed_it(stage: Stage) -> None:
