@@ -29,7 +29,7 @@ ATTRIBUTION = "© OpenStreetMap contributors"
 
 DRAWN_GENERATOR = "foretwin draw_town"
 """How the generator of a map drawn for foretwin begins."""
-DRAWN_ATTRIBUTION = "map drawn for foretwin, an invented town"
+DRAWN_ATTRIBUTION = "drawn for foretwin, an invented town"
 """Stands in OpenStreetMap's place where the map is none of theirs."""
 
 

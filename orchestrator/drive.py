@@ -281,10 +281,11 @@ def summary_text(record: dict[str, object]) -> str:
     assert isinstance(futures, dict)
     junctions = record["intersections"]
     assert isinstance(junctions, list)
+    latency = record["state_to_result_ms_p95"]
     lines = [
         f"{record['exit']}: {len(junctions)} junctions, {futures['count']} futures in "
-        f"{futures['rounds']} rounds ({futures['missed_rounds']} missed), "
-        f"state to result p95 {record['state_to_result_ms_p95']} ms"
+        f"{futures['rounds']} rounds ({futures['missed_rounds']} missed)"
+        + ("" if latency is None else f", state to result p95 {latency:.0f} ms")
     ]
     lines += [
         f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from contracts.bus import Bus, Mailbox, Reply
-from contracts.codec import read_message
+from contracts.codec import SchemaMismatch, read_message
 from contracts.simulation import BuildRequest, PrepareRequest, WorldNotice
 from contracts.world import World
 from orchestrator.plan import DrivePlan
@@ -28,6 +28,7 @@ class _Order:
     pending: set[str] | None = None
     """None until loading begins."""
     ready: bool = False
+    asked_again: bool = False
 
 
 class WorldDesk:
@@ -99,15 +100,18 @@ class WorldDesk:
         junction_id = reply.tag
         order = self._orders[junction_id]
         if reply.message is None:
-            if builder_up and reply.error != "no answer":
-                order.ready = True  # nothing more will come of it
-                self._on_failed(junction_id, reply.error or "no reason given")
+            if builder_up:
+                self._build_failed(junction_id, order, reply.error or "no reason given")
             return
         if order.world is not None:
             return
         answer = reply.message
         file = self._plan.worlds_dir / f"{answer.world_id}.world"
-        world = read_message(file, World)
+        try:
+            world = read_message(file, World)
+        except (OSError, SchemaMismatch) as error:
+            self._build_failed(junction_id, order, str(error))
+            return
         order.world = world
         self._junction_of[world.id] = junction_id
         how = "from the cache" if answer.cached else "built"
@@ -116,6 +120,15 @@ class WorldDesk:
             self._load(order, world, workers)
         else:
             self._settle(junction_id, order)
+
+    def _build_failed(self, junction_id: str, order: _Order, reason: str) -> None:
+        """Ask once more where the builder only took too long; else give the World up."""
+        if reason == "no answer" and not order.asked_again:
+            order.asked_again = True
+            self._ask_build(junction_id)
+            return
+        order.ready = True  # nothing more will come of it
+        self._on_failed(junction_id, reason)
 
     def _load(self, order: _Order, world: World, workers: tuple[str, ...]) -> None:
         if order.pending is None:
