@@ -28,7 +28,8 @@ from sim_worker.planners.base import Planner, PlannerOutput, PlannerView
 from sim_worker.planners.path import FrenetPath
 from sim_worker.planners.registry import load_planner
 from sim_worker.seeding import local_state
-from sim_worker.stage import ROAD_USER_LENGTH_M, Controls, Stage
+from sim_worker.stage import Controls, Stage
+from sim_worker.stage_model import ROAD_USER_LENGTH_M
 from sim_worker.vehicle.planar import box_centre_from_base_m
 
 _log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from contracts.arrays import Array
 from contracts.simulation import Outcome
 from contracts.vehicle import VehicleParameters
 from sim_worker.overlap import Rectangles, clearance
-from sim_worker.stage import ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
+from sim_worker.stage_model import ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
 from sim_worker.vehicle.planar import box_centre_from_base_m
 
 Flags = npt.NDArray[np.bool_]

@@ -11,7 +11,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from sim_worker.stage import world_spec
+from sim_worker.stage_model import world_spec
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings

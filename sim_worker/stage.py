@@ -14,6 +14,16 @@ from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from sim_worker.nearness import NearStatics, RoadUserMotion, RoadUserTick
+from sim_worker.stage_model import (
+    FAR_M,
+    PREFIX,
+    ROAD_USER_CONTACT,
+    ROAD_USER_LENGTH_M,
+    ROAD_USER_WIDTH_M,
+    STATIC_CONTACT,
+    compile_stage,
+    world_spec,
+)
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
@@ -24,19 +34,8 @@ from sim_worker.vehicle.planar import (
     box_centre_from_base_m,
     check_steering_delay,
     cog_from_base,
-    set_physics_options,
-    vehicle_spec,
 )
-from world_gen.export.mjcf import ROAD_USER, VEHICLE
-from world_gen.export.mjcf import world_spec as spec_of_world
 
-ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M, ROAD_USER_HEIGHT_M = 4.5, 1.8, 1.5
-PREFIX = "ego_"
-_ROAD_USER = "road_user"
-_STATIC_CONTACT = "static_contact"
-_ROAD_USER_CONTACT = "road_user_contact"
-_FAR_M = 1.0e4
-"""Where the road user of a future without one is kept."""
 _MAX_SPEED_MPS, _MAX_SLIDE_MPS, _MAX_YAW_RATE_RADPS = 25.0, 5.0, 3.0
 """Within these, a car cannot come from beyond the reach of `NearStatics` in a tick."""
 _SLACK_M = 0.2
@@ -51,21 +50,6 @@ class Controls(NamedTuple):
 
     accel_mps2: Array
     tire_angle_rad: Array
-
-
-def world_spec(world: World | None) -> mujoco.MjSpec:
-    """Return the spec of `world`, or of open ground, with the physics options set."""
-    if world is None:
-        spec = mujoco.MjSpec()
-        spec.modelname = "open ground"
-    else:
-        spec = spec_of_world(world, visual=False)
-    set_physics_options(spec)
-    for geom in spec.geoms:
-        # The planar vehicle never touches the ground: its plane would be tested in vain.
-        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
-            geom.contype, geom.conaffinity = 0, 0
-    return spec
 
 
 class Stage:
@@ -104,7 +88,7 @@ class Stage:
         self.timestep_s = TIMESTEP_S
         rate = vehicle.max_tire_rate_radps.value * TIMESTEP_S
         self._reach = rate * np.arange(1, self.steps_per_tick + 1)
-        self.model = _compile(world_spec(world) if spec is None else spec, vehicle)
+        self.model = compile_stage(world_spec(world) if spec is None else spec, vehicle)
         self._batch = mujoco_batch.Batch(self.model, nsim, nthread=threads, persistent=True)
         self._bind()
         self._bound_reach()
@@ -122,16 +106,16 @@ class Stage:
         self._biasprm = batch.expand("actuator_biasprm")
         self._forcerange = batch.expand("actuator_forcerange")
         self._actuators = actuator_ids(model, PREFIX)
-        first, dof = model.joint(PREFIX + JOINTS[0]).qposadr[0], model.joint(PREFIX + JOINTS[0])
-        self._joints = slice(first, first + len(JOINTS))
-        self._dofs = slice(dof.dofadr[0], dof.dofadr[0] + len(JOINTS))
+        first = model.joint(PREFIX + JOINTS[0])
+        self._joints = slice(first.qposadr[0], first.qposadr[0] + len(JOINTS))
+        self._dofs = slice(first.dofadr[0], first.dofadr[0] + len(JOINTS))
         steer = self._actuators.steer
         samples = int(model.actuator_history[steer][0])
         first = int(model.actuator_historyadr[steer]) + 2 + samples
         self._steer_history = slice(first, first + samples)
         self._history_samples = samples
-        self._static_contact = int(model.sensor(_STATIC_CONTACT).adr[0])
-        self._road_user_contact = int(model.sensor(_ROAD_USER_CONTACT).adr[0])
+        self._static_contact = int(model.sensor(STATIC_CONTACT).adr[0])
+        self._road_user_contact = int(model.sensor(ROAD_USER_CONTACT).adr[0])
         self._flags = batch.expand("opt.disableflags").reshape(self.nsim)
         self._looking = int(model.opt.disableflags)
         # The planar vehicle has no other constraint, and no other sensor.
@@ -208,7 +192,7 @@ class Stage:
         )
         self._controls = np.zeros((count, self.steps_per_tick, self._control_size))
         self._road_users = self._controls[:, :, self.model.nu :]
-        self._road_users[:, :, 0:3] = (_FAR_M, _FAR_M, 0.0)
+        self._road_users[:, :, 0:3] = (FAR_M, FAR_M, 0.0)
         self._road_users[:, :, 3] = 1.0
         record = np.zeros((count, self.steps_per_tick, self.model.nsensordata))
         self._record = {"sensordata": record}
@@ -224,7 +208,7 @@ class Stage:
         They are those at the end of each of N physics steps: a road user that jumped once a
         control tick would hit with several times its speed.
         """
-        return RoadUserMotion(poses, steps_per_tick=self.steps_per_tick, far_m=_FAR_M)
+        return RoadUserMotion(poses, steps_per_tick=self.steps_per_tick, far_m=FAR_M)
 
     def step(self, controls: Controls, *, road_users: RoadUserTick | None = None) -> None:
         """Advance one control tick; `road_users` are those of `road_user_motion` at this tick."""
@@ -301,34 +285,3 @@ class Stage:
     def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""
         return np.asarray(~(np.abs(self.states.T) < _SANE).all(axis=0))
-
-
-def _compile(spec: mujoco.MjSpec, vehicle: VehicleParameters) -> mujoco.MjModel:
-    spec.attach(vehicle_spec(vehicle), prefix=PREFIX, frame=spec.worldbody.add_frame())
-    add_road_user(spec, name=_ROAD_USER)
-    body = mujoco.mjtObj.mjOBJ_BODY
-    for name, other in ((_STATIC_CONTACT, "world"), (_ROAD_USER_CONTACT, _ROAD_USER)):
-        sensor = spec.add_sensor(
-            name=name,
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=body,
-            objname=PREFIX + "chassis",
-            reftype=body,
-            refname=other,
-        )
-        sensor.intprm = [1 << int(mujoco.mjtConDataField.mjCONDATA_FOUND), 0, 1]
-    return spec.compile()
-
-
-def add_road_user(spec: mujoco.MjSpec, *, name: str, collides: bool = True) -> None:
-    """Add a kinematic car-sized box whose body origin is its centre on the ground."""
-    body = spec.worldbody.add_body(name=name, mocap=True, pos=[_FAR_M, _FAR_M, 0.0])
-    body.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[ROAD_USER_LENGTH_M / 2, ROAD_USER_WIDTH_M / 2, ROAD_USER_HEIGHT_M / 2],
-        pos=[0.0, 0.0, ROAD_USER_HEIGHT_M / 2],
-        contype=ROAD_USER if collides else 0,
-        conaffinity=VEHICLE if collides else 0,
-        rgba=[0.9, 0.4, 0.2, 1.0],
-    )

@@ -9,7 +9,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from sim_worker.planners.path import FrenetPath, FrenetPoint
-from sim_worker.stage import ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
+from sim_worker.stage_model import ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
 from sim_worker.vehicle.planar import box_centre_from_base_m
 
 _MARGIN_M = 0.3
