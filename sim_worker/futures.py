@@ -23,7 +23,7 @@ from contracts.simulation import FuturesJob, FuturesResult, Trajectory
 from sim_worker.actors.conflicts import CrossingPaths
 from sim_worker.actors.motion import ActorMotion, actor_motion
 from sim_worker.actors.perception import Lead, Sight, see_road_users
-from sim_worker.judging import DriveRecord, judge
+from sim_worker.judging import DriveRecord, held_from_collision, judge
 from sim_worker.planners.base import Planner, PlannerOutput, PlannerView
 from sim_worker.planners.path import FrenetPath
 from sim_worker.planners.registry import load_planner
@@ -104,7 +104,7 @@ def run_job(
         trajectory=Trajectory(
             stamp_ns=job.state.stamp_ns,
             time_s=np.arange(0, ticks + 1, every, dtype=np.float64) * stage.control_dt_s,
-            states=states,
+            states=held_from_collision(states, outcome, step_s=job.step_s),
         ),
         actors=poses[:, ::every].astype(np.float32),
         outcome=outcome,

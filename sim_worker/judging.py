@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
+from contracts.arrays import Array, Array32
 from contracts.simulation import Outcome
 from contracts.vehicle import VehicleParameters
 from sim_worker.overlap import Rectangles, clearance
@@ -73,3 +73,17 @@ def ego_rectangles(vehicle: VehicleParameters, states: Array) -> Rectangles:
     yaw = states[..., 2]
     centre = states[..., :2] + ahead * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
     return Rectangles(centre, yaw, vehicle.length_m.value, vehicle.width_m.value)
+
+
+def held_from_collision(states: Array32, outcome: Outcome, *, step_s: float) -> Array32:
+    """Return states (S, N, 8) in which a car stands from its collision with a road user on.
+
+    Road users are kinematic, so to speak of infinite mass: what they would do to the car after
+    the first touch means nothing. A building or island stops the car as it should.
+    """
+    held = np.array(states)
+    for row in np.flatnonzero(np.asarray(outcome.collision_with) == ROAD_USER):
+        first = min(int(np.ceil(outcome.collision_time_s[row] / step_s - 1e-6)), held.shape[1] - 1)
+        held[row, first:] = held[row, first]
+        held[row, first:, [3, 4, 5, 7]] = 0.0
+    return held

@@ -163,6 +163,21 @@ def test_a_building_in_the_way_is_a_collision_with_a_building(
     assert outcome.collision_time_s[0] == pytest.approx((50.0 - 4.0 - front) / 8.0, abs=0.15)
 
 
+def test_after_a_collision_with_a_road_user_the_car_stands_where_it_happened(
+    stage: Stage, round_of_64: tuple[Variant, ...]
+) -> None:
+    result = run_job(job(round_of_64[32:]), stage)
+    hit = np.flatnonzero(result.outcome.collision_with == 1)
+    assert len(hit) > 0
+    states = result.trajectory.states
+    for row in hit:
+        after = result.trajectory.time_s > result.outcome.collision_time_s[row] + 0.1
+        assert np.ptp(states[row, after, :3], axis=0).max(initial=0.0) == 0.0
+        assert not states[row, after][:, [3, 4, 5, 7]].any()
+    free = np.flatnonzero(result.outcome.collision_with == 0)
+    assert np.ptp(states[free[0], :, 0]) > 1.0
+
+
 def test_a_diverged_future_is_marked_and_spoils_no_other(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
