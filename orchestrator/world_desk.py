@@ -158,7 +158,10 @@ class WorldDesk:
     def prepare_reply(self, reply: Reply) -> None:
         """Take a worker's answer."""
         worker_id, world_id, asked_s = reply.tag
-        if reply.message is None:
+        if reply.error == "no answer":
+            # Just started or just gone; a job loads the World too.
+            log.info("world %s not loaded by %s beforehand", world_id, worker_id)
+        elif reply.message is None:
             self._on_warning(f"{worker_id} could not load world {world_id}: {reply.error}")
         else:
             taken_s = time.perf_counter() - asked_s
