@@ -33,6 +33,8 @@ class ProcessRow(NamedTuple):
     count: Callable[[DrivePlan], int]
     when_dead: WhenDead
     setup: Callable[[DrivePlan, str], ProcessSetup]
+    nice: int = 0
+    """Added to the scheduling niceness: who writes for later gives way to who is waited for."""
 
 
 def _one(_: DrivePlan) -> int:
@@ -119,11 +121,11 @@ def _source_is(source: str) -> Callable[[DrivePlan], bool]:
 
 
 PROCESSES: tuple[ProcessRow, ...] = (
-    ProcessRow(BUILDER, "orchestrator.world_builder", _always, _one, "restart", _builder),
+    ProcessRow(BUILDER, "orchestrator.world_builder", _always, _one, "restart", _builder, 10),
     ProcessRow("w", "sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker),
     ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
     ProcessRow("recorder", "telemetry.recorder", _always, _one, "report", _recorder),
-    ProcessRow("viewer", "viewer", _always, _one, "report", _viewer),
+    ProcessRow("viewer", "viewer", _always, _one, "report", _viewer, 10),
     ProcessRow(VEHICLE, "telemetry.replay", _source_is("log"), _one, "end_drive", _replay),
     ProcessRow(VEHICLE, "telemetry.standin", _source_is("standin"), _one, "end_drive", _standin),
 )

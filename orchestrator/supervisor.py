@@ -107,10 +107,17 @@ class Supervisor:
 
     def start(self, row: ProcessRow, setup: ProcessSetup) -> None:
         """Start one process."""
-        child = self.launch(module=row.module, setup=setup)
+        child = self._launch(row, setup)
         log.info("started %s (%s) as process %d", setup.process_id, row.module, child.pid)
         self._managed[setup.process_id] = _Managed(row, setup, child)
         self.started += 1
+
+    def _launch(self, row: ProcessRow, setup: ProcessSetup) -> Child:
+        child = self.launch(module=row.module, setup=setup)
+        if row.nice:
+            with contextlib.suppress(OSError):
+                os.setpriority(os.PRIO_PROCESS, child.pid, row.nice)
+        return child
 
     def poll(self, now_s: float) -> list[Death]:
         """Return the processes that died since the last call, restarted where the table says so."""
@@ -123,7 +130,7 @@ class Supervisor:
                 continue
             again = managed.row.when_dead == "restart" and self._may_restart(process_id, now_s)
             if again:
-                managed.child = self.launch(module=managed.row.module, setup=managed.setup)
+                managed.child = self._launch(managed.row, managed.setup)
                 log.info("started %s again as process %d", process_id, managed.child.pid)
                 self.restarted += 1
             else:

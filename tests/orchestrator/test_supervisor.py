@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -17,7 +19,7 @@ from orchestrator.supervisor import MAX_RESTARTS, FreshInterpreter, Supervisor, 
 
 class FakeChild:
     def __init__(self) -> None:
-        self.pid = 1
+        self.pid = 2**22 + 1  # beyond any real process
         self.exit_code: int | None = None
         self.signals: list[int] = []
 
@@ -67,6 +69,19 @@ def test_a_dead_worker_is_started_again_and_a_dead_viewer_reported() -> None:
     ]
     assert (len(children), supervisor.restarted) == (3, 1)
     assert supervisor.poll(0.1) == []
+
+
+def test_who_writes_for_later_gives_way() -> None:
+    nice = {r.name: r.nice for r in PROCESSES}
+    assert nice["w"] == nice["recorder"] == nice["vehicle"] == 0
+    assert nice["viewer"] > 0
+    child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    try:
+        supervisor = Supervisor(lambda *, module, setup: child)
+        supervisor.start(row("viewer"), setup("viewer"))
+        assert os.getpriority(os.PRIO_PROCESS, child.pid) >= nice["viewer"]
+    finally:
+        child.communicate(b"\n")
 
 
 def test_a_worker_that_keeps_dying_is_given_up() -> None:
