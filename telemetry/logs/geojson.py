@@ -15,10 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from contracts.drive import GnssFix, VehicleInfo
+from contracts.drive import GnssFix
 from contracts.frames import GeoPoint
 from telemetry.logs.gpx import stamp_ns_from_iso
-from telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+from telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample, fixes_log
 
 _TIME_NAMES = ("coordTimes", "times")
 
@@ -99,21 +99,7 @@ def open_geojson(path: Path) -> Log:
             position = GeoPoint(lat_deg, lon_deg, alt_m)
             yield "gnss", GnssFix(stamp_ns=stamp_ns, position=position)
 
-    return Log(
-        info=VehicleInfo(
-            vehicle_id="car",
-            time_base="utc",
-            start_stamp_ns=known_ns[0],
-            end_stamp_ns=max(known_ns),
-            source=path.name,
-            reference_point="antenna",
-            sends=("gnss",),
-        ),
-        declared=Declared(
-            units="degrees, m", frame="WGS84", time_base="UTC", reference_point="antenna"
-        ),
-        read=read,
-    )
+    return fixes_log(path, known_ns, read)
 
 
 def _timed_line(path: Path) -> tuple[GeoLine, list[Any]]:

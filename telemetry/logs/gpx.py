@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from contracts.drive import GnssFix, VehicleInfo
+from contracts.drive import GnssFix
 from contracts.frames import GeoPoint
-from telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+from telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample, fixes_log
 
 
 class GpxPoint(NamedTuple):
@@ -43,21 +43,7 @@ def open_gpx(path: Path) -> Log:
             position = GeoPoint(point.lat_deg, point.lon_deg, point.alt_m)
             yield "gnss", GnssFix(stamp_ns=point.stamp_ns or 0, position=position)
 
-    return Log(
-        info=VehicleInfo(
-            vehicle_id="car",
-            time_base="utc",
-            start_stamp_ns=stamps_ns[0],
-            end_stamp_ns=max(stamps_ns),
-            source=path.name,
-            reference_point="antenna",
-            sends=("gnss",),
-        ),
-        declared=Declared(
-            units="degrees, m", frame="WGS84", time_base="UTC", reference_point="antenna"
-        ),
-        read=read,
-    )
+    return fixes_log(path, stamps_ns, read)
 
 
 def gpx_lines(path: Path) -> list[tuple[list[float], list[float]]]:

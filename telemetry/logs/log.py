@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from contracts import drive
+from contracts.drive import VehicleInfo
 from contracts.errors import UserError
 
 Sample = tuple[str, msgspec.Struct]
@@ -122,3 +124,24 @@ _NUMBERS: dict[type, Callable[[Any], tuple[float | None, ...]]] = {
     drive.ControlCommand: lambda m: (m.accel_mps2, m.steering_wheel_rad, m.tire_angle_rad),
     drive.PlannedTrajectory: _plan_numbers,
 }
+
+
+def fixes_log(
+    path: Path, stamps_ns: Sequence[int], read: Callable[[Counter[str]], Iterator[Sample]]
+) -> Log:
+    """Return the log of a file that holds timed satellite positions in UTC and nothing else."""
+    return Log(
+        info=VehicleInfo(
+            vehicle_id="car",
+            time_base="utc",
+            start_stamp_ns=stamps_ns[0],
+            end_stamp_ns=max(stamps_ns),
+            source=path.name,
+            reference_point="antenna",
+            sends=("gnss",),
+        ),
+        declared=Declared(
+            units="degrees, m", frame="WGS84", time_base="UTC", reference_point="antenna"
+        ),
+        read=read,
+    )
