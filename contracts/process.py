@@ -80,12 +80,6 @@ class ProcessLife:
         self._bus.declare_alive(alive_key(run=self._setup.run_id, process=self._setup.process_id))
 
     @property
-    def orchestrator_ready(self) -> bool:
-        """Whether the orchestrator has said that it can receive."""
-        self._look()
-        return self._orchestrator_seen
-
-    @property
     def over(self) -> bool:
         """Whether the process should finish what it holds and leave."""
         self._look()

@@ -53,7 +53,6 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     cache_dir: str | None = None
     endpoint: str | None = None
     """Where the router listens, such as tcp/127.0.0.1:7447; None takes a free loopback port."""
-    standin_end_s: float | None = None
     standin_plan_shift_m: float = 0.0
 
     def validate(self) -> DriveConfig:
