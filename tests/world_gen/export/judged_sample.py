@@ -1,0 +1,52 @@
+"""Sixty junctions of all extracts in the data folder, always the same, for every export's judges."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from contracts.world import World
+from world_gen.build import build_world
+from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
+from world_gen.intersections import Junction
+from world_gen.map_index import index_map
+from world_gen.read_osm import read_map
+
+SEED = 20
+QUOTA = {
+    "osm-berlin-mitte/berlin-mitte.osm": 9,
+    "osm-berlin-moritzplatz/berlin-moritzplatz.osm": 8,
+    "osm-kingsway/kingsway_junction.osm": 5,
+    "osm-badhersfeld/badhersfeld.osm.xml.gz": 11,
+    "osm-monaco/monaco.osm.gz": 9,
+    "osm-liechtenstein/liechtenstein-latest.osm.pbf": 10,
+    "osm-testfeld-nds/TestfeldNDS_main_roads.osm.xml.gz": 8,
+}
+"""How many junctions of each extract are judged: 60 in all."""
+
+
+class SampledWorld(NamedTuple):
+    """A World of the sample; its name says extract and junction, and is fit for a file."""
+
+    name: str
+    world: World
+
+
+def sample_worlds(data_dir: Path) -> Iterator[SampledWorld]:
+    """Build the sample's Worlds one after another, each map read once and let go."""
+    for file, count in QUOTA.items():
+        osm = read_map(data_dir / file)
+        graph = build_road_graph(osm)
+        junctions = find_intersections(osm, graph)
+        index = index_map(osm, graph, junctions)
+        for junction in sorted(junctions, key=_draw)[:count]:
+            world = build_world(osm, graph, junction, index=index)
+            yield SampledWorld(f"{Path(file).name.split('.')[0]}-{junction.summary.id}", world)
+
+
+def _draw(junction: Junction) -> str:
+    # By hash and not by position: a junction more or less elsewhere leaves the others drawn.
+    return hashlib.sha256(f"{SEED}:{junction.summary.id}".encode()).hexdigest()
