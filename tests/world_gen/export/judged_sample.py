@@ -1,9 +1,10 @@
-"""Sixty junctions of all extracts in the data folder, always the same, for every export's judges."""
+"""Sixty junctions of all extracts in the data folder, always the same, for the exports' judges."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,11 +43,22 @@ def sample_worlds(data_dir: Path) -> Iterator[SampledWorld]:
         graph = build_road_graph(osm)
         junctions = find_intersections(osm, graph)
         index = index_map(osm, graph, junctions)
-        for junction in sorted(junctions, key=_draw)[:count]:
+        for junction in _drawn(junctions)[:count]:
             world = build_world(osm, graph, junction, index=index)
             yield SampledWorld(f"{Path(file).name.split('.')[0]}-{junction.summary.id}", world)
 
 
-def _draw(junction: Junction) -> str:
+def _drawn(junctions: Iterable[Junction]) -> list[Junction]:
+    """Return the junctions in the order in which they are drawn: one of each kind, then another."""
+    seen: Counter[str] = Counter()
+    turns = []
+    for junction in sorted(junctions, key=_lot):
+        kind = junction.summary.kind
+        turns.append((seen[kind], _lot(junction), junction))
+        seen[kind] += 1
+    return [junction for _, _, junction in sorted(turns, key=lambda turn: turn[:2])]
+
+
+def _lot(junction: Junction) -> str:
     # By hash and not by position: a junction more or less elsewhere leaves the others drawn.
     return hashlib.sha256(f"{SEED}:{junction.summary.id}".encode()).hexdigest()
