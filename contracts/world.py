@@ -15,14 +15,27 @@ from contracts.frames import LocalFrame
 
 Provenance = Literal["tagged", "inferred", "default"]
 JunctionKind = Literal[
-    "roundabout", "circular", "mini_roundabout", "crossing", "t_junction", "staggered", "merge",
-    "other",
+    "roundabout", "circular", "mini_roundabout", "crossing", "t_junction", "y_junction",
+    "staggered", "merge", "other", "region",
 ]  # fmt: skip
+"""`region` is no junction: it names a World made of a whole stretch of map."""
 Control = Literal["signals", "stop", "all_way_stop", "give_way", "roundabout", "uncontrolled"]
 DrivingSide = Literal["right", "left"]
 LaneKind = Literal["driving", "bus", "bicycle", "parking", "tram"]
 Turn = Literal["straight", "left", "right", "u_turn"]
 LineControl = Literal["signal", "stop", "give_way", "none"]
+LaneChange = Literal["both", "left", "right", "none"]
+"""To which sides, as the driver sees them, a lane may be left."""
+YieldRule = Literal[
+    "stop", "give_way", "roundabout", "priority_road", "lesser_road", "turn_across", "near_side",
+    "u_turn", "merge_order", "order",
+]  # fmt: skip
+"""Why one movement waits for another.
+
+A stop or give-way sign, a ring, a signed priority road, a road of lower class or a way out of a
+yard, a turn across oncoming traffic, who comes from the near side (right before left where traffic
+keeps right), a U-turn, merging lanes, or, where no rule says, a fixed order.
+"""
 
 ATTRIBUTION = "© OpenStreetMap contributors"
 """Stands in every picture, report and export made from OpenStreetMap data."""
@@ -72,6 +85,30 @@ class Arm(msgspec.Struct, frozen=True, kw_only=True):
     lanes_out: int
 
 
+class Road(msgspec.Struct, frozen=True, kw_only=True):
+    """A stretch of street between two places where lanes meet, with its lanes side by side.
+
+    `reference_line` (N, 2) runs along the OSM way's nodes; lanes and edges lie beside it:
+    `left_m` and `right_m` are how far the carriageway's edges lie to its left (`right_m` is
+    usually negative). `lane_ids` stand from left to right, of both directions. `from_place`
+    and `to_place` name where lanes meet at its ends (see `Connection`); None at the World's edge.
+    """
+
+    id: str
+    osm_way: int
+    name: str
+    road_class: str
+    reference_line: Array
+    left_m: float
+    right_m: float
+    lane_ids: tuple[str, ...]
+    from_place: str | None = None
+    to_place: str | None = None
+    layer: int = 0
+    bridge: bool = False
+    tunnel: bool = False
+
+
 class Lane(msgspec.Struct, frozen=True, kw_only=True):
     """One lane; `centerline` (N, 2) in driving direction, neighbours as its driver sees them."""
 
@@ -88,12 +125,25 @@ class Lane(msgspec.Struct, frozen=True, kw_only=True):
     direction_source: Provenance = "inferred"
     left_id: str | None = None
     right_id: str | None = None
+    """Neighbours that are driven the same way."""
+    change: LaneChange = "both"
+    change_source: Provenance = "default"
+    road_id: str = ""
+    reverse: bool = False
+    """Driven against the road's reference line."""
+    left_of_reference_m: float = 0.0
+    """How far the lane's middle lies to the left of the road's reference line."""
+    layer: int = 0
     successor_ids: tuple[str, ...] = ()
     """Lanes and connections that begin where this lane ends."""
 
 
 class Connection(msgspec.Struct, frozen=True, kw_only=True):
-    """A legal path through the junction from one lane to another; `centerline` (N, 2)."""
+    """A legal path through the junction from one lane to another; `centerline` (N, 2).
+
+    `place_id` is where its lanes meet: one place for each node of a ring, else one for a junction.
+    `junction_id` is empty where roads merely go on or part without what drivers call a junction.
+    """
 
     id: str
     from_lane_id: str
@@ -105,6 +155,27 @@ class Connection(msgspec.Struct, frozen=True, kw_only=True):
     conflicts_with: tuple[str, ...] = ()
     """Connections whose swept areas cross this one's, from other lanes."""
     yields_to: tuple[str, ...] = ()
+    junction_id: str = ""
+    place_id: str = ""
+    signal_group_id: str | None = None
+    layer: int = 0
+
+
+class Conflict(msgspec.Struct, frozen=True, kw_only=True):
+    """Two connections of one junction whose paths meet, and the one of them that waits.
+
+    `point` (2,) is where their middles cross or come nearest, `area` (N, 2) the outline of the
+    ground both sweep. The answer holds wherever no signal says otherwise.
+    """
+
+    first_id: str
+    second_id: str
+    kind: Literal["crossing", "merging"]
+    point: Array
+    area: Array
+    yields_id: str
+    rule: YieldRule
+    source: Provenance
 
 
 class StopLine(msgspec.Struct, frozen=True, kw_only=True):
@@ -125,6 +196,8 @@ class Crossing(msgspec.Struct, frozen=True, kw_only=True):
     kind: Choice
     """Such as zebra, traffic_signals, unmarked."""
     osm_node: int | None = None
+    island: bool = False
+    """Whether a refuge in the middle parts it."""
 
 
 class Signal(msgspec.Struct, frozen=True, kw_only=True):
@@ -136,6 +209,35 @@ class Signal(msgspec.Struct, frozen=True, kw_only=True):
     lane_ids: tuple[str, ...]
     position: Array
     yaw_rad: float
+    source: Provenance
+
+
+class SignalGroup(msgspec.Struct, frozen=True, kw_only=True):
+    """What is green together: connections, and crossings for those on foot; live by this id."""
+
+    id: str
+    connection_ids: tuple[str, ...]
+    crossing_ids: tuple[str, ...] = ()
+
+
+class SignalPhase(msgspec.Struct, frozen=True, kw_only=True):
+    """A stretch of a cycle in which the named groups are green and all others red."""
+
+    green_s: float
+    green_group_ids: tuple[str, ...]
+
+
+class SignalPlan(msgspec.Struct, frozen=True, kw_only=True):
+    """A fixed-time plan: phases in order, each followed by `amber_s` and `all_red_s`.
+
+    Groups of one phase never conflict, but for turns across oncoming traffic, which wait as
+    `Conflict` says. A live `SignalState` overrides it.
+    """
+
+    groups: tuple[SignalGroup, ...]
+    phases: tuple[SignalPhase, ...]
+    amber_s: float
+    all_red_s: float
     source: Provenance
 
 
@@ -158,15 +260,28 @@ class Building(msgspec.Struct, frozen=True, kw_only=True):
     min_height_m: float = 0.0
 
 
+class WorldJunction(msgspec.Struct, frozen=True, kw_only=True):
+    """A junction that lies whole in a World; connections name it by `summary.id`."""
+
+    summary: IntersectionSummary
+    arms: tuple[Arm, ...]
+    area: Area | None
+    plan: SignalPlan | None = None
+
+
 class World(msgspec.Struct, frozen=True, kw_only=True):
-    """A junction and its surroundings; `id` is a hash of everything else in it."""
+    """A junction, or a region, and its surroundings; `id` is a hash of everything else in it.
+
+    It ends `radius_m` around the origin, or, where `bounds_m` (west, south, east, north) is
+    given, at that rectangle. `junctions` are all that lie whole in it, the one that it is made
+    for first.
+    """
 
     id: str
     intersection: IntersectionSummary
     frame: LocalFrame
     radius_m: float
     map_sha256: str
-    arms: tuple[Arm, ...]
     lanes: tuple[Lane, ...]
     connections: tuple[Connection, ...]
     stop_lines: tuple[StopLine, ...]
@@ -176,8 +291,12 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     kerbs: tuple[Array, ...]
     """Road edges, each (N, 2)."""
     road_surface: tuple[Area, ...]
-    junction_area: Area | None
     buildings: tuple[Building, ...]
+    junctions: tuple[WorldJunction, ...] = ()
+    roads: tuple[Road, ...] = ()
+    conflicts: tuple[Conflict, ...] = ()
+    sidewalks: tuple[Area, ...] = ()
+    bounds_m: tuple[float, float, float, float] | None = None
     notes: tuple[str, ...] = ()
     """What was guessed or left out, in words."""
     attribution: str = ATTRIBUTION

@@ -53,7 +53,7 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
     ground = flat_mesh(move.polygons([Polygon(disc)]), height_m=GROUND_HEIGHT_M, colour=GROUND)
     rows = [row("ground", _archetype(ground))]
     surface = [Polygon(area.outline, area.holes) for area in world.road_surface]
-    junction = [] if world.junction_area is None else [world.junction_area]
+    junction = [place.area for place in world.junctions[:1] if place.area is not None]
     if surface:
         rows.append(
             row("roads/surface", _archetype(

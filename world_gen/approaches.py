@@ -38,7 +38,7 @@ class Met(NamedTuple):
 
 
 class Approach(NamedTuple):
-    """One leg driven toward the main junction, and how it is controlled there.
+    """One leg driven toward a junction, and how it is controlled there.
 
     `line_m` is where vehicles stop, metres along the leg from its node; None: where lanes end.
     `signal_node` is the OSM node of the signal that governs it, where the map has one.
@@ -54,7 +54,7 @@ class Approach(NamedTuple):
 def approaches(
     around: Surroundings, node_tags: Mapping[int, Mapping[str, str]]
 ) -> tuple[Approach, ...]:
-    """Return every approach to the main junction with its control."""
+    """Return every approach to a whole junction with its control."""
     plain_from = {
         leg.start_node: cluster
         for cluster in around.clusters
@@ -62,23 +62,30 @@ def approaches(
         for leg in cluster.legs
     }
     found = []
-    top = _top_rank(around)
+    top = _top_ranks(around)
     for cluster in around.clusters:
-        if not cluster.main:
+        junction = cluster.junction
+        if not cluster.whole or junction is None:
             continue
         for leg in cluster.legs:
             toward = DirectedEdge(leg.edge, not leg.reverse)
-            inside = leg.edge.index in around.junction.inner
+            inside = leg.edge.index in junction.inner
             if not toward.allowed or (inside and (is_ring_edge(leg.edge) or not cluster.ring)):
                 continue
-            met = _met(leg, plain_from, node_tags, around.junction)
-            found.append(_approach(cluster, toward, met, around.junction, top))
+            met = _met(leg, plain_from, node_tags, junction)
+            found.append(_approach(cluster, toward, met, junction, top[junction.summary.id]))
     return tuple(found)
 
 
-def _top_rank(around: Surroundings) -> int:
-    legs = [leg for c in around.clusters if c.main for leg in c.legs]
-    return max((class_rank(leg.edge.road_class) for leg in legs), default=0)
+def _top_ranks(around: Surroundings) -> dict[str, int]:
+    """Return the highest rank among the roads of each whole junction, by its id."""
+    top: dict[str, int] = {}
+    for cluster in around.clusters:
+        if cluster.whole and cluster.junction is not None:
+            name = cluster.junction.summary.id
+            ranks = [class_rank(leg.edge.road_class) for leg in cluster.legs]
+            top[name] = max([top.get(name, 0), *ranks])
+    return top
 
 
 def class_rank(road_class: str) -> int:
@@ -107,7 +114,7 @@ def _met(
         if (
             gone > LOOK_BACK_M
             or cluster is None
-            or cluster.main
+            or cluster.whole
             or current.end_node in junction.nodes
         ):
             break

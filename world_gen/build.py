@@ -1,4 +1,4 @@
-"""From a junction of a map to its World: the one entry to world generation."""
+"""From a junction, or a stretch, of a map to its World: the one entry to world generation."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ import msgspec
 import numpy as np
 
 from contracts.codec import content_bytes
-from contracts.world import Arm, World
+from contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from contracts.world import Arm, IntersectionSummary, World, WorldJunction
 from world_gen.approaches import approaches
 from world_gen.buildings import buildings_in_frame
-from world_gen.clusters import Surroundings, surroundings
+from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
 from world_gen.connections import ConnectionDraft, connect
 from world_gen.crossings import crossings
+from world_gen.extent import Disc, Rectangle
+from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
 from world_gen.lanes import LaneSet, build_lanes, join_straight_on
 from world_gen.map_index import MapIndex, index_map
 from world_gen.movements import movements
-from world_gen.osm_map import OsmMap
+from world_gen.osm_map import LatLonBounds, MapError, OsmMap
 from world_gen.right_of_way import add_right_of_way
 from world_gen.road_graph import RoadGraph
 from world_gen.road_surface import areas
 from world_gen.stop_lines import line_controls, signals, stop_lines
 
-GENERATOR_VERSION = 2
+GENERATOR_VERSION = 3
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 
@@ -46,8 +49,65 @@ def build_world(
     if not 10.0 <= radius_m <= 2000.0:
         raise ValueError(f"radius {radius_m} m is not between 10 and 2000 m")
     index = index or index_map(osm, graph, (junction,))
+    around = surroundings(index, world_frame(junction), Disc(radius_m), (junction,))
+    return _world(index, around, junction.summary)
+
+
+def build_region(
+    osm: OsmMap,
+    graph: RoadGraph,
+    bounds: LatLonBounds,
+    *,
+    index: MapIndex | None = None,
+) -> World:
+    """Build one World of all that lies within `bounds`, in a frame about their middle.
+
+    Every junction whose roads all reach into the bounds gets the same treatment as the one
+    that `build_world` is asked for. Pass an `index` made with all junctions of the map. Raises
+    `MapError` where the bounds hold no road for cars.
+    """
+    index = index or index_map(osm, graph, find_intersections(osm, graph))
+    middle = GeoPoint((bounds.south + bounds.north) / 2, (bounds.west + bounds.east) / 2)
+    frame = LocalFrame(middle)
+    around = surroundings(index, frame, _rectangle(bounds, frame), ())
+    if not around.edges:
+        raise MapError(f"{osm.file}: no road for cars between {_words(bounds)}")
+    return _world(index, around, _region_summary(bounds, middle, graph))
+
+
+def _rectangle(bounds: LatLonBounds, frame: LocalFrame) -> Rectangle:
+    """Return the largest rectangle of the frame within bounds in degrees."""
+    south, north, west, east = bounds.south, bounds.north, bounds.west, bounds.east
+    corners = local_from_geo(
+        frame, np.array([south, south, north, north]), np.array([west, east, west, east])
+    )
+    (sw, se, nw, ne) = np.round(corners, 3).tolist()
+    return Rectangle(max(sw[0], nw[0]), max(sw[1], se[1]), min(se[0], ne[0]), min(nw[1], ne[1]))
+
+
+def _region_summary(
+    bounds: LatLonBounds, middle: GeoPoint, graph: RoadGraph
+) -> IntersectionSummary:
+    return IntersectionSummary(
+        id=f"region {_words(bounds)}",
+        kind="region",
+        lat=round(middle.lat_deg, 7),
+        lon=round(middle.lon_deg, 7),
+        arms=0,
+        control="uncontrolled",
+        driving_side=graph.driving_side,
+        osm_nodes=(),
+    )
+
+
+def _words(bounds: LatLonBounds) -> str:
+    """Return west, south, east, north in degrees, as `--bbox` takes them."""
+    return f"{bounds.west:g},{bounds.south:g},{bounds.east:g},{bounds.north:g}"
+
+
+def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) -> World:
+    osm, extent = index.osm, around.extent
     notes: list[str] = []
-    around = surroundings(index, junction, radius_m)
     lanes = build_lanes(around)
     connections = _connections(index, around, lanes, notes)
     found = approaches(around, osm.node_tags)
@@ -55,17 +115,26 @@ def build_world(
     controls = line_controls(lines)
     for connection in connections:
         connection.control = controls.get(connection.start.id, "none")
-    add_right_of_way([c for c in connections if c.cluster.main], around.driving_side)
+    add_right_of_way([c for c in connections if c.cluster.whole], around.driving_side)
     surface = areas(around, lanes, connections)
-    near = index.buildings_within(np.asarray(junction.centre_xy_m), radius_m)
-    buildings, cut = buildings_in_frame(near, around.frame, graph.frame, surface.lanes_free)
+    near = index.buildings_in(in_map(extent, around.frame, index.graph.frame))
+    buildings, cut = buildings_in_frame(near, around.frame, index.graph.frame, surface.lanes_free)
     world = World(
         id="",
-        intersection=junction.summary,
+        intersection=summary,
         frame=around.frame,
-        radius_m=radius_m,
+        radius_m=extent.radius_m,
+        bounds_m=extent.bounds_m,
         map_sha256=osm.sha256,
-        arms=_arms(around, lanes),
+        junctions=tuple(
+            WorldJunction(
+                summary=junction.summary,
+                arms=_arms(junction, around),
+                area=surface.junction_areas.get(junction.summary.id),
+            )
+            for junction in around.junctions
+        ),
+        roads=lanes.roads,
         lanes=tuple(lane.finished() for lane in lanes.lanes.values()),
         connections=tuple(c.finished() for c in connections),
         stop_lines=lines,
@@ -74,7 +143,6 @@ def build_world(
         islands=surface.islands,
         kerbs=surface.kerbs,
         road_surface=surface.road_surface,
-        junction_area=surface.junction_area,
         buildings=buildings,
         notes=tuple(dict.fromkeys((*lanes.notes, *notes, *cut))),
         attribution=osm.attribution,
@@ -101,9 +169,9 @@ def _connections(
     return found
 
 
-def _arms(around: Surroundings, lanes: LaneSet) -> tuple[Arm, ...]:
+def _arms(junction: Junction, around: Surroundings) -> tuple[Arm, ...]:
     arms = []
-    for i, arm in enumerate(around.junction.arms):
+    for i, arm in enumerate(junction.arms):
         lanes_in = lanes_out = 0
         for leg in arm.outward:
             section = around.sections.get(leg.edge.index)

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -15,6 +16,7 @@ from contracts.arrays import Array
 from contracts.frames import GeoPoint, LocalFrame, target_from_source
 from contracts.world import DrivingSide
 from world_gen.cross_section import CrossSection, cross_section
+from world_gen.extent import Extent
 from world_gen.intersections import Junction
 from world_gen.map_index import MapIndex
 from world_gen.polyline import direction_at, unit, without_repeats
@@ -33,28 +35,34 @@ class Cluster:
     """Graph nodes where lanes end and begin: one junction, one node of a ring, or a lone node.
 
     `legs` leave the cluster outward; `inner` edges lie within and have no lanes of their own.
+    `whole` tells that it belongs to a junction that lies whole in the World: such a junction
+    gets stop lines, control and right of way.
     """
 
     key: str
     nodes: frozenset[int]
     inner: frozenset[int]
     legs: tuple[DirectedEdge, ...]
-    main: bool
+    junction: Junction | None
+    whole: bool
     ring: bool
 
     @property
     def plain(self) -> bool:
         """Whether one road merely goes on here."""
-        return len(self.legs) == 2 and len(self.nodes) == 1 and not self.main
+        return len(self.legs) == 2 and len(self.nodes) == 1 and not self.whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surroundings:
-    """Everything around one junction in the World's frame; edges and sections by edge index."""
+    """Everything around a place in the World's frame; edges and sections by edge index.
+
+    `junctions` are all that lie whole in the World, the one it is made for first.
+    """
 
     frame: LocalFrame
-    junction: Junction
-    radius_m: float
+    junctions: tuple[Junction, ...]
+    extent: Extent
     driving_side: DrivingSide
     edges: Mapping[int, RoadEdge]
     sections: Mapping[int, CrossSection]
@@ -62,6 +70,11 @@ class Surroundings:
     trims_m: Mapping[tuple[int, bool], float]
     """Metres cut off an edge's lanes by (edge index, at its end node)."""
     ring_edges: frozenset[int]
+
+    @property
+    def inner_edges(self) -> frozenset[int]:
+        """Indices of the edges inside whole junctions."""
+        return frozenset(i for junction in self.junctions for i in junction.inner)
 
     def section(self, edge: DirectedEdge) -> CrossSection:
         """Return the cross-section of a directed edge's road."""
@@ -73,28 +86,42 @@ def is_ring_edge(edge: RoadEdge) -> bool:
     return edge.tags.get("junction") in RING_KINDS
 
 
+def in_map(extent: Extent, frame: LocalFrame, map_frame: LocalFrame) -> shapely.Polygon:
+    """Return a World's extent in the map's frame."""
+    return shapely.transform(
+        extent.polygon, lambda xy: target_from_source(map_frame, frame, xy, 0.0).xy_m
+    )
+
+
 def world_frame(junction: Junction) -> LocalFrame:
     """Return the frame of a junction's World: its origin is the junction's centre."""
     return LocalFrame(GeoPoint(junction.summary.lat, junction.summary.lon))
 
 
-def surroundings(index: MapIndex, junction: Junction, radius_m: float) -> Surroundings:
-    """Collect the roads within `radius_m` of the junction's centre and cluster their nodes."""
+def surroundings(
+    index: MapIndex, frame: LocalFrame, extent: Extent, made_for: tuple[Junction, ...]
+) -> Surroundings:
+    """Collect the roads within `extent` of the frame's origin and cluster their nodes.
+
+    Roads of the junctions in `made_for` are kept even where they lie beyond.
+    """
     graph = index.graph
-    frame = world_frame(junction)
-    wanted = set(index.car_edges_within(np.asarray(junction.centre_xy_m), radius_m))
-    wanted.update(i for i in junction.inner if _drivable(graph.edges[i]))
-    wanted.update(
-        leg.edge.index for arm in junction.arms for leg in arm.outward if _drivable(leg.edge)
-    )
+    wanted = set(index.car_edges_in(in_map(extent, frame, graph.frame)))
+    for junction in made_for:
+        wanted.update(i for i in junction.inner if _drivable(graph.edges[i]))
+        wanted.update(
+            leg.edge.index for arm in junction.arms for leg in arm.outward if _drivable(leg.edge)
+        )
     edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
     sections = {i: cross_section(edge, graph.driving_side) for i, edge in edges.items()}
-    clusters = _clusters(index, junction, edges, radius_m)
-    ring_edges = frozenset(i for i in junction.inner if i in edges and is_ring_edge(edges[i]))
+    clusters = _clusters(index, made_for, edges, extent)
+    whole = {id(c.junction): c.junction for c in clusters if c.whole and c.junction is not None}
+    inner = {i for junction in whole.values() for i in junction.inner}
+    ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
     return Surroundings(
         frame=frame,
-        junction=junction,
-        radius_m=radius_m,
+        junctions=tuple(whole.values()),
+        extent=extent,
         driving_side=graph.driving_side,
         edges=edges,
         sections=sections,
@@ -123,39 +150,59 @@ def _in_frame(
     }
 
 
+class _Group(NamedTuple):
+    nodes: frozenset[int]
+    inner: frozenset[int] = frozenset()
+    junction: Junction | None = None
+    whole: bool = False
+    ring: bool = False
+
+
 def _clusters(
-    index: MapIndex, junction: Junction, edges: Mapping[int, RoadEdge], radius_m: float
+    index: MapIndex, made_for: tuple[Junction, ...], edges: Mapping[int, RoadEdge], extent: Extent
 ) -> tuple[Cluster, ...]:
     leaving: dict[int, list[DirectedEdge]] = {}
-    near: set[int] = set(junction.nodes)
     for edge in edges.values():
         for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
             leaving.setdefault(directed.start_node, []).append(directed)
-            if np.hypot(*directed.xy_m[0]) <= radius_m:
-                near.add(directed.start_node)
-    others = {id(j): j for node in sorted(near) if (j := index.junction_of_node.get(node))}
-    groups: list[tuple[frozenset[int], frozenset[int], bool, bool]] = []
-    for j in (junction, *(j for j in others.values() if j.summary.id != junction.summary.id)):
-        groups.extend(_groups_of(j, leaving, main=j.summary.id == junction.summary.id))
-    taken = frozenset().union(*(nodes for nodes, *_ in groups))
-    groups.extend((frozenset([n]), frozenset(), False, False) for n in sorted(near - taken))
-    found = []
-    for nodes, inner, main, ring in groups:
+    known = list(leaving)
+    at = [leaving[node][0].xy_m[0] for node in known]
+    near: set[int] = {node for junction in made_for for node in junction.nodes}
+    if known:
+        near.update(n for n, ok in zip(known, extent.holds(np.array(at)), strict=True) if ok)
+    others = {j.summary.id: j for j in made_for}
+    for node in sorted(near):
+        if found := index.junction_of_node.get(node):
+            others.setdefault(found.summary.id, found)
+    named = {j.summary.id for j in made_for}
+    groups: list[_Group] = []
+    for junction in others.values():
+        whole = junction.summary.id in named or (junction.nodes <= near and _drawn(junction, edges))
+        groups.extend(_groups_of(junction, leaving, whole=whole))
+    taken = frozenset().union(*(group.nodes for group in groups))
+    groups.extend(_Group(frozenset([n])) for n in sorted(near - taken))
+    clusters = []
+    for group in groups:
         legs = tuple(
-            d for node in sorted(nodes) for d in leaving.get(node, ()) if d.edge.index not in inner
+            d
+            for node in sorted(group.nodes)
+            for d in leaving.get(node, ())
+            if d.edge.index not in group.inner
         )
         if len(legs) >= 2:
-            found.append(
-                Cluster(
-                    key=str(min(nodes)), nodes=nodes, inner=inner, legs=legs, main=main, ring=ring
-                )
-            )
-    return tuple(found)
+            clusters.append(Cluster(key=str(min(group.nodes)), legs=legs, **group._asdict()))
+    return tuple(clusters)
+
+
+def _drawn(junction: Junction, edges: Mapping[int, RoadEdge]) -> bool:
+    """Return whether all roads of a junction that cars may use are among `edges`."""
+    legs = (leg.edge for arm in junction.arms for leg in arm.outward)
+    return all(edge.index in edges for edge in legs if _drivable(edge))
 
 
 def _groups_of(
-    junction: Junction, leaving: Mapping[int, list[DirectedEdge]], *, main: bool
-) -> list[tuple[frozenset[int], frozenset[int], bool, bool]]:
+    junction: Junction, leaving: Mapping[int, list[DirectedEdge]], *, whole: bool
+) -> list[_Group]:
     """A ring is driven node by node, every other junction in one go."""
     on_ring = {
         node for node in junction.nodes if any(is_ring_edge(d.edge) for d in leaving.get(node, ()))
@@ -163,11 +210,11 @@ def _groups_of(
     if junction.summary.kind in RING_KINDS and on_ring:
         # Where a street parts into entry and exit before the ring, nobody has to stop.
         return [
-            (frozenset([n]), frozenset(), main and n in on_ring, n in on_ring)
+            _Group(frozenset([n]), frozenset(), junction, whole and n in on_ring, n in on_ring)
             for n in sorted(junction.nodes)
         ]
     nodes = frozenset(node for node in junction.nodes if node in leaving)
-    return [(nodes, frozenset(junction.inner), main, False)] if nodes else []
+    return [_Group(nodes, frozenset(junction.inner), junction, whole)] if nodes else []
 
 
 def _trims(

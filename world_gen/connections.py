@@ -38,6 +38,7 @@ class ConnectionDraft:
 
     def finished(self) -> Connection:
         """Return the connection as the World holds it."""
+        junction = self.cluster.junction
         return Connection(
             id=self.id,
             from_lane_id=self.start.id,
@@ -48,6 +49,9 @@ class ConnectionDraft:
             control=self.control,
             conflicts_with=self.conflicts_with,
             yields_to=self.yields_to,
+            junction_id=junction.summary.id if junction is not None else "",
+            place_id=self.cluster.key,
+            layer=self.start.edge.layer,
         )
 
 

@@ -28,7 +28,7 @@ def crossings(
             at = edge.xy_m[i] if i < len(edge.xy_m) else None
             if not crosses or tags.get("crossing") == "no" or at is None or node in found:
                 continue
-            if np.hypot(*at) > around.radius_m:
+            if not around.extent.holds(at[None])[0]:
                 continue
             left = left_of(direction_at(edge.xy_m, float(along[i])))
             line = np.stack([at + left * section.left_m, at + left * section.right_m])

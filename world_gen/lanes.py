@@ -9,10 +9,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.world import Lane, LaneKind, Quantity, Turn
+from contracts.world import Lane, LaneKind, Quantity, Road, Turn
 from world_gen.clusters import Cluster, Surroundings
 from world_gen.cross_section import LanePlan
-from world_gen.polyline import arc_lengths, cut, inside_disc, offset, rounded, unit, without_repeats
+from world_gen.extent import stretches_inside
+from world_gen.polyline import arc_lengths, cut, offset, rounded, unit, without_repeats
 from world_gen.road_graph import DirectedEdge, RoadEdge
 
 Role = Literal["approach", "exit", "ring", "other"]
@@ -38,6 +39,7 @@ class LaneDraft:
     centerline: Array
     role: Role
     turns: tuple[Turn, ...]
+    road_id: str
     left_id: str | None = None
     right_id: str | None = None
     successors: list[str] = field(default_factory=list)
@@ -68,6 +70,10 @@ class LaneDraft:
             direction_source=self.plan.direction_source,
             left_id=self.left_id,
             right_id=self.right_id,
+            road_id=self.road_id,
+            reverse=self.plan.reverse,
+            left_of_reference_m=round(self.plan.left_m, 3),
+            layer=self.edge.layer,
             successor_ids=tuple(sorted(set(self.successors))),
         )
 
@@ -77,6 +83,7 @@ class LaneSet:
     """All lanes of a World; `begins` and `ends` hold those not cut off by the World's edge."""
 
     lanes: Mapping[str, LaneDraft]
+    roads: tuple[Road, ...]
     begins: Mapping[LaneKey, str]
     ends: Mapping[LaneKey, str]
     notes: tuple[str, ...]
@@ -93,8 +100,15 @@ class LaneSet:
 
 
 def build_lanes(around: Surroundings) -> LaneSet:
-    """Return every car lane within the World's radius, joined to lanes that simply go on."""
+    """Return every car lane within the World's extent, joined to lanes that simply go on."""
     lanes: dict[str, LaneDraft] = {}
+    roads: list[Road] = []
+    names: set[str] = set()
+    places = {
+        (leg.edge.index, leg.reverse): cluster.key
+        for cluster in around.clusters
+        for leg in cluster.legs
+    }
     begins: dict[LaneKey, str] = {}
     ends: dict[LaneKey, str] = {}
     notes: list[str] = []
@@ -116,44 +130,70 @@ def build_lanes(around: Surroundings) -> LaneSet:
         way = rounded(cut(way, start, total - stop))
         before = continuing.get((index, False)) if start == 0.0 else None
         after = continuing.get((index, True)) if stop == 0.0 else None
-        for plan in section.lanes:
-            key = LaneKey(index, plan.reverse, plan.number)
-            curve = offset(way, plan.left_m, before=before, after=after)
-            curve = curve[::-1] if plan.reverse else curve
-            pieces = inside_disc(curve, around.radius_m)
-            for i, piece in enumerate(pieces):
-                points = np.round(without_repeats(piece), 3)
-                if len(points) < 2:
+        full_m = float(arc_lengths(way)[-1])
+        for from_m, to_m in stretches_inside(way, around.extent):
+            first, last = from_m == 0.0, to_m == full_m
+            line = way if first and last else cut(way, from_m, to_m)
+            road = _road_id(edge, names)
+            mine: list[str] = []
+            for plan in section.lanes:
+                key = LaneKey(index, plan.reverse, plan.number)
+                curve = offset(
+                    line,
+                    plan.left_m,
+                    before=before if first else None,
+                    after=after if last else None,
+                )
+                curve = np.round(without_repeats(curve), 3)
+                if len(curve) < 2:
                     continue
-                name = _lane_id(edge, plan, i, lanes)
+                name = f"{road}.{'b' if plan.reverse else 'f'}{plan.number}"
                 role = roles.get((index, plan.reverse), "other")
-                lanes[name] = LaneDraft(name, key, edge, plan, points, role, plan.turns)
-                if np.array_equal(piece[0], curve[0]):
-                    begins[key] = name
-                if np.array_equal(piece[-1], curve[-1]):
-                    ends[key] = name
-    found = LaneSet(lanes, begins, ends, tuple(notes))
-    _join_neighbours(found)
-    return found
+                points = curve[::-1] if plan.reverse else curve
+                lanes[name] = LaneDraft(name, key, edge, plan, points, role, plan.turns, road)
+                mine.append(name)
+                if first:
+                    (ends if plan.reverse else begins)[key] = name
+                if last:
+                    (begins if plan.reverse else ends)[key] = name
+            _join_neighbours(mine, lanes)
+            roads.append(
+                Road(
+                    id=road,
+                    osm_way=edge.way_id,
+                    name=edge.name,
+                    road_class=edge.road_class,
+                    reference_line=np.round(line, 3),
+                    left_m=round(section.left_m, 3),
+                    right_m=round(section.right_m, 3),
+                    lane_ids=tuple(mine),
+                    from_place=places.get((index, False)) if first else None,
+                    to_place=places.get((index, True)) if last else None,
+                    layer=edge.layer,
+                    bridge=edge.tags.get("bridge", "no") != "no",
+                    tunnel=edge.tags.get("tunnel", "no") not in ("no", "building_passage"),
+                )
+            )
+    return LaneSet(lanes, tuple(roads), begins, ends, tuple(notes))
 
 
-def _lane_id(edge: RoadEdge, plan: LanePlan, piece: int, taken: Mapping[str, LaneDraft]) -> str:
-    way = "b" if plan.reverse else "f"
-    name = f"w{edge.way_id}.{edge.start_node}.{edge.end_node}.{way}{plan.number}"
-    name = name if piece == 0 else f"{name}.{piece}"
+def _road_id(edge: RoadEdge, taken: set[str]) -> str:
+    """Return a name that the same map always gives; pieces and twins of an edge are counted."""
+    name = first = f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
     twin = 2
     while name in taken:
-        name, twin = f"{name.split('#')[0]}#{twin}", twin + 1
+        name, twin = f"{first}#{twin}", twin + 1
+    taken.add(name)
     return name
 
 
 def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:
     """Return the role of lanes by (edge index, reverse)."""
     roles: dict[tuple[int, bool], Role] = {}
-    on_ring = {n for c in around.clusters if c.main and c.ring for n in c.nodes}
-    inner = set(around.junction.inner)
+    on_ring = {n for c in around.clusters if c.whole and c.ring for n in c.nodes}
+    inner = around.inner_edges
     for cluster in around.clusters:
-        if not cluster.main:
+        if not cluster.whole:
             continue
         for leg in cluster.legs:
             index = leg.edge.index
@@ -183,15 +223,12 @@ def _directions_beyond(around: Surroundings) -> dict[tuple[int, bool], Array]:
     return beyond
 
 
-def _join_neighbours(lanes: LaneSet) -> None:
-    of_key: dict[LaneKey, list[LaneDraft]] = {}
-    for lane in lanes.lanes.values():
-        of_key.setdefault(lane.key, []).append(lane)
-    for key, pieces in of_key.items():
-        right = of_key.get(key._replace(number=key.number + 1), [])
-        if len(right) == len(pieces):
-            for mine, other in zip(pieces, right, strict=True):
-                mine.right_id, other.left_id = other.id, mine.id
+def _join_neighbours(names: list[str], lanes: Mapping[str, LaneDraft]) -> None:
+    of_key = {lanes[name].key: lanes[name] for name in names}
+    for key, lane in of_key.items():
+        right = of_key.get(key._replace(number=key.number + 1))
+        if right is not None:
+            lane.right_id, right.left_id = right.id, lane.id
 
 
 def join_straight_on(cluster: Cluster, around: Surroundings, lanes: LaneSet) -> bool:

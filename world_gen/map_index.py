@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
 from world_gen.buildings import Footprint, footprints
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
@@ -30,16 +29,14 @@ class MapIndex:
     junction_of_node: Mapping[int, Junction]
     notes: tuple[str, ...]
 
-    def car_edges_within(self, centre_xy_m: Array, radius_m: float) -> tuple[int, ...]:
-        """Return indices of car roads within `radius_m` of a point (2,) in the map's frame."""
-        disc = shapely.Point(centre_xy_m).buffer(radius_m)
-        found = self.car_edge_tree.query(disc, predicate="intersects")
+    def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:
+        """Return indices of car roads that touch an area in the map's frame."""
+        found = self.car_edge_tree.query(area, predicate="intersects")
         return tuple(sorted(self.car_edges[i] for i in found))
 
-    def buildings_within(self, centre_xy_m: Array, radius_m: float) -> tuple[Footprint, ...]:
-        """Return buildings that reach within `radius_m` of a point (2,) in the map's frame."""
-        disc = shapely.Point(centre_xy_m).buffer(radius_m)
-        found = self.building_tree.query(disc, predicate="intersects")
+    def buildings_in(self, area: shapely.Polygon) -> tuple[Footprint, ...]:
+        """Return buildings that reach into an area in the map's frame."""
+        found = self.building_tree.query(area, predicate="intersects")
         return tuple(self.buildings[i] for i in sorted(found.tolist()))
 
 

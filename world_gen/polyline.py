@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
@@ -185,28 +184,3 @@ def _straight(start: Array, end: Array) -> Array:
     gap = math.hypot(*(end - start))
     count = max(int(gap), 1) + 1
     return start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
-
-
-def inside_disc(xy_m: Array, radius_m: float) -> list[Array]:
-    """Return the pieces of the polyline within `radius_m` of the origin, in order."""
-    r2 = radius_m * radius_m
-    inside = (xy_m * xy_m).sum(axis=1) <= r2
-    if inside.all():
-        return [xy_m]
-    a, d = xy_m[:-1], np.diff(xy_m, axis=0)
-    aa = np.maximum((d * d).sum(axis=1), 1e-12)
-    half_b = (a * d).sum(axis=1)
-    disc = half_b * half_b - aa * ((a * a).sum(axis=1) - r2)
-    s = arc_lengths(xy_m)
-    cuts = [0.0, float(s[-1])]
-    for i in np.nonzero(disc > 0.0)[0]:
-        root = math.sqrt(disc[i])
-        roots = ((-half_b[i] - root) / aa[i], (-half_b[i] + root) / aa[i])
-        cuts.extend(float(s[i] + t * math.sqrt(aa[i])) for t in roots if 0.0 < t < 1.0)
-    cuts.sort()
-    pieces = []
-    for begin, stop in pairwise(cuts):
-        middle = points_at(xy_m, 0.5 * (begin + stop))
-        if stop - begin > 0.5 and (middle * middle).sum() <= r2:
-            pieces.append(cut(xy_m, begin, stop))
-    return pieces

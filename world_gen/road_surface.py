@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +11,11 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 from contracts.arrays import Array
+from contracts.frames import local_from_geo
 from contracts.world import Area
-from world_gen.clusters import Surroundings, is_ring_edge
+from world_gen.clusters import Cluster, Surroundings, is_ring_edge
 from world_gen.connections import ConnectionDraft
+from world_gen.intersections import Junction
 from world_gen.lanes import LaneSet
 from world_gen.polyline import offset, rounded, without_repeats
 
@@ -29,7 +32,8 @@ class Areas(NamedTuple):
     """All areas of a World."""
 
     road_surface: tuple[Area, ...]
-    junction_area: Area | None
+    junction_areas: Mapping[str, Area]
+    """By junction id."""
     islands: tuple[Area, ...]
     kerbs: tuple[Array, ...]
     lanes_free: shapely.Geometry
@@ -38,7 +42,7 @@ class Areas(NamedTuple):
 
 def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraft]) -> Areas:
     """Return the paved areas and what borders them."""
-    disc = shapely.Point(0.0, 0.0).buffer(around.radius_m, quad_segs=32)
+    disc = around.extent.polygon
     paths = [(lane.centerline, lane.width_m.value) for lane in lanes.lanes.values()]
     paths += [(c.centerline, c.width_m.value) for c in connections]
     swept = shapely.buffer(
@@ -47,9 +51,9 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
     lanes_free = shapely.union_all(swept) if len(swept) else Polygon()
     roads = _carriageways(around)
     paved = shapely.union_all([lanes_free, *roads])
-    hull = _junction_hull(around, lanes)
-    if hull is not None:
-        around_corners = hull.buffer(4.0)
+    hulls = _junction_hulls(around, lanes)
+    if hulls:
+        around_corners = shapely.union_all([hull.buffer(4.0) for hull in hulls.values()])
         inside = paved.intersection(around_corners)
         closed = inside.buffer(CORNER_FILLET_M, quad_segs=6).buffer(-CORNER_FILLET_M, quad_segs=6)
         paved = paved.union(closed.intersection(around_corners))
@@ -64,7 +68,7 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
     islands += _traffic_islands(around, paved, rings)
     return Areas(
         road_surface=tuple(_area(f"road:{i}", p) for i, p in enumerate(_sorted(paved))),
-        junction_area=_junction_area(hull, paved),
+        junction_areas=_junction_areas(hulls, paved),
         islands=tuple(islands),
         kerbs=_kerbs(paved, disc),
         lanes_free=lanes_free,
@@ -108,15 +112,27 @@ def _middle(around: Surroundings, index: int) -> Array:
     return offset(way, (section.left_m + section.right_m) / 2)
 
 
-def _junction_hull(around: Surroundings, lanes: LaneSet) -> Polygon | None:
-    """Return the convex hull of the main junction's nodes and of the lane ends around them."""
+def _junction_hulls(around: Surroundings, lanes: LaneSet) -> dict[str, Polygon]:
+    """Return by junction id the convex hull of its nodes and of the lane ends around them."""
+    found: dict[str, Polygon] = {}
+    for junction in around.junctions:
+        mine = [c for c in around.clusters if c.whole and c.junction is junction]
+        points = _lane_corners(mine, junction, around, lanes)
+        if len(points) >= 3:
+            hull = shapely.MultiPoint(np.array(points)).convex_hull
+            if isinstance(hull, Polygon) and hull.area > 1.0:
+                found[junction.summary.id] = hull
+    return found
+
+
+def _lane_corners(
+    clusters: list[Cluster], junction: Junction, around: Surroundings, lanes: LaneSet
+) -> list[Array]:
     points: list[Array] = []
-    ring = any(c.main and c.ring for c in around.clusters)
-    for cluster in around.clusters:
-        if not cluster.main:
-            continue
+    ring = any(c.ring for c in clusters)
+    for cluster in clusters:
         for leg in cluster.legs:
-            if ring and leg.edge.index in around.junction.inner:
+            if ring and leg.edge.index in junction.inner:
                 points.extend(leg.xy_m)
                 continue
             section = around.section(leg)
@@ -137,17 +153,17 @@ def _junction_hull(around: Surroundings, lanes: LaneSet) -> Polygon | None:
                     side = np.array([-step[1], step[0]]) / max(float(np.hypot(*step)), 1e-9)
                     half = lane.width_m.value / 2
                     points.extend([at + half * side, at - half * side])
-    if len(points) < 3:
-        return None
-    hull = shapely.MultiPoint(np.array(points)).convex_hull
-    return hull if isinstance(hull, Polygon) and hull.area > 1.0 else None
+    return points
 
 
-def _junction_area(hull: Polygon | None, paved: shapely.Geometry) -> Area | None:
-    if hull is None:
-        return None
-    parts = _sorted(shapely.set_precision(hull.intersection(paved), GRID_M))
-    return _area("junction", parts[0]) if parts else None
+def _junction_areas(hulls: Mapping[str, Polygon], paved: shapely.Geometry) -> dict[str, Area]:
+    found: dict[str, Area] = {}
+    shapely.prepare(paved)
+    for name, hull in hulls.items():
+        parts = _sorted(shapely.set_precision(hull.intersection(paved), GRID_M))
+        if parts:
+            found[name] = _area(f"junction:{name}", parts[0])
+    return found
 
 
 def _ring_islands(around: Surroundings, lanes_free: shapely.Geometry) -> list[Polygon]:
@@ -173,20 +189,27 @@ def _ring_islands(around: Surroundings, lanes_free: shapely.Geometry) -> list[Po
 def _traffic_islands(
     around: Surroundings, paved: shapely.Geometry, rings: list[Polygon]
 ) -> list[Area]:
-    reach = around.junction.radius_m + ISLANDS_WITHIN_M
+    places = shapely.points([_centre(j, around) for j in around.junctions])
+    near = shapely.buffer(places, [j.radius_m + ISLANDS_WITHIN_M for j in around.junctions])
+    reach = shapely.union_all(near)
+    shapely.prepare(reach)
     middle = shapely.union_all(rings) if rings else Polygon()
     found: list[Area] = []
     for surface in _sorted(paved):
         for hole in surface.interiors:
             island = Polygon(hole)
-            near = island.distance(shapely.Point(0.0, 0.0)) <= reach
             if (
-                near
+                reach.intersects(island)
                 and MIN_ISLAND_M2 <= island.area <= MAX_ISLAND_M2
                 and not island.intersects(middle)
             ):
                 found.append(_area(f"island:traffic:{len(found)}", island))
     return found
+
+
+def _centre(junction: Junction, around: Surroundings) -> Array:
+    here = junction.summary
+    return local_from_geo(around.frame, here.lat, here.lon)
 
 
 def _kerbs(paved: shapely.Geometry, disc: Polygon) -> tuple[Array, ...]:

@@ -1,4 +1,4 @@
-"""Stop lines across the lanes that enter the junction, and the signals that stand at them."""
+"""Stop lines across the lanes that enter junctions, and the signals that stand at them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ GROUP_AXIS_RAD = math.radians(30.0)
 def stop_lines(
     found: tuple[Approach, ...], around: Surroundings, lanes: LaneSet
 ) -> tuple[StopLine, ...]:
-    """Return one line for each lane that enters the junction, whatever controls it."""
+    """Return one line for each lane that enters a whole junction, whatever controls it."""
     lines = []
     for approach in found:
         for lane in entering(approach, around, lanes):
@@ -78,10 +78,13 @@ def signals(
     Approaches that face each other share a group, since they are green together.
     """
     line_of = {line.lane_id: line for line in lines}
-    groups: list[float] = []
+    axes: dict[str, list[float]] = {}
     heads = []
     for approach in found:
         mine = entering(approach, around, lanes)
+        junction = approach.cluster.junction
+        name = junction.summary.id if junction is not None else ""
+        groups = axes.setdefault(name, [])
         if approach.control.value != "signal" or not mine:
             continue
         outward = DirectedEdge(approach.toward.edge, not approach.toward.reverse)
@@ -101,7 +104,7 @@ def signals(
             Signal(
                 id=f"{kerb_side.id}:signal",
                 osm_node=approach.signal_node,
-                group_id=f"g{group}",
+                group_id=f"{name}:g{group}",
                 lane_ids=tuple(lane.id for lane in mine),
                 position=np.round(np.array([beside[0], beside[1], SIGNAL_HEIGHT_M]), 3),
                 yaw_rad=round(math.atan2(out[1], out[0]), 4),

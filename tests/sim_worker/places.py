@@ -51,13 +51,13 @@ def crossroads(*, buildings: tuple[Building, ...] = (), connections: bool = True
             )
         )  # fmt: skip
     return World(
-        id="crossroads", frame=FRAME, radius_m=150.0, map_sha256="0" * 64, arms=(),
+        id="crossroads", frame=FRAME, radius_m=150.0, map_sha256="0" * 64,
         intersection=IntersectionSummary(
             id="i1", kind="crossing", lat=52.5, lon=13.4, arms=4, control="uncontrolled",
             driving_side="right", osm_nodes=(1,),
         ),
         lanes=tuple(lanes), connections=tuple(links) if connections else (), stop_lines=(),
-        crossings=(), signals=(), islands=(), kerbs=(), junction_area=None,
+        crossings=(), signals=(), islands=(), kerbs=(),
         road_surface=(_street("ew", 150.0, 4.0), _street("ns", 4.0, 150.0)),
         buildings=buildings,
     )  # fmt: skip

@@ -18,6 +18,7 @@ from contracts.world import (
     Signal,
     StopLine,
     World,
+    WorldJunction,
 )
 
 WORLD_FRAME = LocalFrame(GeoPoint(52.5125, 13.3925))
@@ -100,17 +101,23 @@ def junction() -> World:
         ],
         dtype=np.float64,
     )  # fmt: skip
+    summary = IntersectionSummary(
+        id="x1",
+        kind="crossing",
+        lat=WORLD_FRAME.origin.lat_deg,
+        lon=WORLD_FRAME.origin.lon_deg,
+        arms=4,
+        control="signals",
+        driving_side="right",
+        osm_nodes=(42,),
+        name="Kronenstraße / 東京通り",
+    )
     return World(
         id=WORLD_ID,
-        intersection=IntersectionSummary(
-            id="x1", kind="crossing", lat=WORLD_FRAME.origin.lat_deg,
-            lon=WORLD_FRAME.origin.lon_deg, arms=4, control="signals", driving_side="right",
-            osm_nodes=(42,), name="Kronenstraße / 東京通り",
-        ),
+        intersection=summary,
         frame=WORLD_FRAME,
         radius_m=150.0,
         map_sha256="0" * 64,
-        arms=(),
         lanes=lanes,
         connections=connections,
         stop_lines=(
@@ -128,6 +135,11 @@ def junction() -> World:
         islands=(Area(id="i1", outline=_box(-5.8, 4.8, 1.0, 1.0)),),
         kerbs=(road,),
         road_surface=(Area(id="r1", outline=road),),
-        junction_area=Area(id="j1", outline=_box(-9.0, -4.0, 18.0, 8.0)),
+        junctions=(
+            WorldJunction(
+                summary=summary, arms=(),
+                area=Area(id="j1", outline=_box(-9.0, -4.0, 18.0, 8.0)),
+            ),
+        ),
         buildings=tuple(buildings),
     )  # fmt: skip

@@ -50,8 +50,8 @@ def test_a_plain_crossing_has_twelve_movements():
     assert len(world.lanes) == 8
     assert {lane.role for lane in world.lanes} == {"approach", "exit"}
     assert _turns(world) == TURNS
-    assert len(world.arms) == 4
-    assert all((arm.lanes_in, arm.lanes_out) == (1, 1) for arm in world.arms)
+    assert len(world.junctions[0].arms) == 4
+    assert all((arm.lanes_in, arm.lanes_out) == (1, 1) for arm in world.junctions[0].arms)
     assert _headings_meet(world) < math.radians(6.0)
     assert world.attribution == ATTRIBUTION
 
@@ -238,7 +238,9 @@ def test_the_same_map_has_the_same_world_to_the_last_bit():
 
 def test_lanes_end_at_the_worlds_edge():
     world = world_of(crossing(), radius_m=40.0)
-    assert max(np.hypot(*lane.centerline.T).max() for lane in world.lanes) <= 40.01
+    assert max(np.hypot(*road.reference_line.T).max() for road in world.roads) <= 40.001
+    # Lanes beside the middle of the road are cut square with it.
+    assert max(np.hypot(*lane.centerline.T).max() for lane in world.lanes) <= 40.1
 
 
 def test_a_radius_out_of_range_is_refused():

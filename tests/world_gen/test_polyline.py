@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from world_gen.polyline import (
     cut,
-    inside_disc,
     length,
     locate,
     offset,
@@ -92,13 +91,3 @@ def test_rounding_stays_near_the_line_and_keeps_its_ends():
     gaps = [np.hypot(*(p - points_at(line, locate(line, p)))) for p in smooth]
     assert max(gaps) <= 0.36
     assert len(smooth) > len(line)
-
-
-def test_a_road_through_a_disc_keeps_the_piece_inside():
-    (piece,) = inside_disc(np.array([[-50.0, 3.0], [50.0, 3.0]]), 5.0)
-    np.testing.assert_allclose(piece, [[-4.0, 3.0], [4.0, 3.0]])
-
-
-def test_a_road_that_leaves_and_returns_has_two_pieces():
-    detour = np.array([[-4.0, 0.0], [0.0, 0.0], [0.0, 20.0], [1.0, 20.0], [1.0, 0.0], [4.0, 0.0]])
-    assert len(inside_disc(detour, 10.0)) == 2

@@ -97,8 +97,7 @@ def _draw(axes: Axes, world: World, reach: float, *, close_up: bool) -> None:
     axes.set_yticks([])
     for area in world.road_surface:
         axes.add_patch(_patch(area.outline, area.holes, facecolor=ROAD, edgecolor="none", zorder=1))
-    if world.junction_area is not None:
-        area = world.junction_area
+    for area in (j.area for j in world.junctions if j.area is not None):
         axes.add_patch(
             _patch(area.outline, area.holes, facecolor=JUNCTION, edgecolor="none", zorder=1.1)
         )

@@ -122,7 +122,7 @@ def draw_notes(figure: Figure, world: World) -> None:
     heights = [b.height_m.source for b in world.buildings]
     lines = [
         f"arm {arm.id}: {arm.name or 'unnamed'}, {arm.lanes_in} in, {arm.lanes_out} out"
-        for arm in world.arms[:8]
+        for arm in world.junctions[0].arms[:8]
     ]
     lines += [
         "",

@@ -1,0 +1,120 @@
+"""Where a World ends: a disc around a junction, or a rectangle of map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
+from world_gen.polyline import arc_lengths, points_at
+
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+MIN_PIECE_M = 0.5
+"""Shorter pieces of road at the World's edge are left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """All within `radius_m` of the World's origin."""
+
+    radius_m: float
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float] | None:
+        """None: a disc is told by its radius alone."""
+        return None
+
+    @property
+    def polygon(self) -> shapely.Polygon:
+        """The disc as a polygon in the World's frame."""
+        return shapely.Point(0.0, 0.0).buffer(self.radius_m, quad_segs=32)
+
+    def holds(self, xy_m: Array) -> Flags:
+        """Return for points (N, 2) whether they lie inside, as (N,) of bool."""
+        inside: Flags = np.hypot(xy_m[:, 0], xy_m[:, 1]) <= self.radius_m
+        return inside
+
+    def crossings(self, xy_m: Array) -> list[float]:
+        """Return arc lengths at which a polyline (N, 2) meets the edge."""
+        a, d = xy_m[:-1], np.diff(xy_m, axis=0)
+        aa = np.maximum((d * d).sum(axis=1), 1e-12)
+        half_b = (a * d).sum(axis=1)
+        disc = half_b * half_b - aa * ((a * a).sum(axis=1) - self.radius_m**2)
+        s = arc_lengths(xy_m)
+        found: list[float] = []
+        for i in np.nonzero(disc > 0.0)[0]:
+            root = math.sqrt(disc[i])
+            roots = ((-half_b[i] - root) / aa[i], (-half_b[i] + root) / aa[i])
+            found.extend(float(s[i] + t * math.sqrt(aa[i])) for t in roots if 0.0 < t < 1.0)
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """All between `west_m`, `south_m`, `east_m` and `north_m` of the World's origin."""
+
+    west_m: float
+    south_m: float
+    east_m: float
+    north_m: float
+
+    @property
+    def radius_m(self) -> float:
+        """Distance of the farthest corner from the origin."""
+        return math.hypot(
+            max(abs(self.west_m), abs(self.east_m)), max(abs(self.south_m), abs(self.north_m))
+        )
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float] | None:
+        """West, south, east and north."""
+        return (self.west_m, self.south_m, self.east_m, self.north_m)
+
+    @property
+    def polygon(self) -> shapely.Polygon:
+        """The rectangle as a polygon in the World's frame."""
+        return shapely.box(self.west_m, self.south_m, self.east_m, self.north_m)
+
+    def holds(self, xy_m: Array) -> Flags:
+        """Return for points (N, 2) whether they lie inside, as (N,) of bool."""
+        x, y = xy_m[:, 0], xy_m[:, 1]
+        inside: Flags = (
+            (x >= self.west_m) & (x <= self.east_m) & (y >= self.south_m) & (y <= self.north_m)
+        )
+        return inside
+
+    def crossings(self, xy_m: Array) -> list[float]:
+        """Return arc lengths at which a polyline (N, 2) meets the lines of the edge."""
+        s = arc_lengths(xy_m)
+        found: list[float] = []
+        for axis, level in (
+            (0, self.west_m), (0, self.east_m), (1, self.south_m), (1, self.north_m),
+        ):  # fmt: skip
+            gap = xy_m[:, axis] - level
+            for i in np.nonzero(gap[:-1] * gap[1:] < 0.0)[0]:
+                share = gap[i] / (gap[i] - gap[i + 1])
+                found.append(float(s[i] + share * (s[i + 1] - s[i])))
+        return found
+
+
+Extent = Disc | Rectangle
+
+
+def stretches_inside(xy_m: Array, extent: Extent) -> list[tuple[float, float]]:
+    """Return the arc lengths (from, to) between which a polyline (N, 2) lies inside, in order."""
+    total = float(arc_lengths(xy_m)[-1])
+    if extent.holds(xy_m).all():  # both extents are convex
+        return [(0.0, total)]
+    cuts = [0.0, *sorted(extent.crossings(xy_m)), total]
+    found: list[tuple[float, float]] = []
+    for begin, stop in pairwise(cuts):
+        middle = points_at(xy_m, np.array([0.5 * (begin + stop)]))
+        if stop - begin > 1e-9 and extent.holds(middle)[0]:
+            if found and found[-1][1] == begin:
+                begin = found.pop()[0]
+            found.append((begin, stop))
+    return [(a, b) for a, b in found if b - a > MIN_PIECE_M]
