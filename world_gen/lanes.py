@@ -84,6 +84,8 @@ class LaneSet:
 
     lanes: Mapping[str, LaneDraft]
     roads: tuple[Road, ...]
+    edges: Mapping[str, tuple[Array, Array]]
+    """Left and right edge (N, 2) of each road's carriageway, along its reference line."""
     begins: Mapping[LaneKey, str]
     ends: Mapping[LaneKey, str]
     notes: tuple[str, ...]
@@ -103,6 +105,7 @@ def build_lanes(around: Surroundings) -> LaneSet:
     """Return every car lane within the World's extent, joined to lanes that simply go on."""
     lanes: dict[str, LaneDraft] = {}
     roads: list[Road] = []
+    borders: dict[str, tuple[Array, Array]] = {}
     names: set[str] = set()
     places = {
         (leg.edge.index, leg.reverse): cluster.key
@@ -157,6 +160,11 @@ def build_lanes(around: Surroundings) -> LaneSet:
                 if last:
                     (begins if plan.reverse else ends)[key] = name
             _join_neighbours(mine, lanes)
+            on_before, on_after = before if first else None, after if last else None
+            borders[road] = (
+                offset(line, section.left_m, before=on_before, after=on_after),
+                offset(line, section.right_m, before=on_before, after=on_after),
+            )
             roads.append(
                 Road(
                     id=road,
@@ -174,7 +182,7 @@ def build_lanes(around: Surroundings) -> LaneSet:
                     tunnel=edge.tags.get("tunnel", "no") not in ("no", "building_passage"),
                 )
             )
-    return LaneSet(lanes, tuple(roads), begins, ends, tuple(notes))
+    return LaneSet(lanes, tuple(roads), borders, begins, ends, tuple(notes))
 
 
 def _road_id(edge: RoadEdge, taken: set[str]) -> str:
