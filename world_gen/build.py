@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 
 import msgspec
 import numpy as np
+import shapely
 
+from contracts.arrays import Array
 from contracts.codec import content_bytes
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from contracts.frames import GeoPoint, LocalFrame, local_from_geo, target_from_source
 from contracts.world import Arm, IntersectionSummary, World, WorldJunction
 from world_gen.approaches import approaches
-from world_gen.buildings import buildings_in_frame
+from world_gen.buildings import Footprint, buildings_in_frame
 from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
 from world_gen.connections import ConnectionDraft, connect
 from world_gen.crossings import crossings
@@ -118,7 +121,8 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
     add_right_of_way([c for c in connections if c.cluster.whole], around.driving_side)
     surface = areas(around, lanes, connections)
     near = index.buildings_in(in_map(extent, around.frame, index.graph.frame))
-    buildings, cut = buildings_in_frame(near, around.frame, index.graph.frame, surface.lanes_free)
+    free = _driven_beside(surface.driven, near, around.frame, index.graph.frame)
+    buildings, cut = buildings_in_frame(near, around.frame, index.graph.frame, free)
     world = World(
         id="",
         intersection=summary,
@@ -155,6 +159,18 @@ def with_id(world: World) -> World:
     nameless = msgspec.structs.replace(world, id="")
     digest = hashlib.sha256(content_bytes(nameless)).hexdigest()
     return msgspec.structs.replace(nameless, id=digest[:16])
+
+
+def _driven_beside(
+    driven: Array, near: Sequence[Footprint], frame: LocalFrame, map_frame: LocalFrame
+) -> shapely.Geometry:
+    """Return the ground that cars drive on where buildings stand, in the World's frame."""
+    if not near or not len(driven):
+        return shapely.Polygon()
+    shapes = np.array([f.polygon for f in near], dtype=object)
+    moved = shapely.transform(shapes, lambda xy: target_from_source(frame, map_frame, xy, 0.0).xy_m)
+    hit = shapely.STRtree(driven).query(moved, predicate="intersects")[1]
+    return shapely.union_all(driven[np.unique(hit)])
 
 
 def _connections(

@@ -1,4 +1,7 @@
-"""Areas: road surface, kerbs, the junction itself, and the islands it encloses."""
+"""Areas of a World: the carriageway of each road and, between them, of each place where they meet.
+
+Nothing is dissolved into one surface: a region has thousands of pieces, and each is cheap alone.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +11,22 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
-from shapely.geometry.polygon import orient
 
 from contracts.arrays import Array
-from contracts.frames import local_from_geo
 from contracts.world import Area
-from world_gen.clusters import Cluster, Surroundings, is_ring_edge
+from world_gen.clusters import Cluster, Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.intersections import Junction
+from world_gen.islands import RING_ISLAND as RING_ISLAND
+from world_gen.islands import island_areas
+from world_gen.kerbs import kerb_lines
 from world_gen.lanes import LaneSet
-from world_gen.polyline import offset, rounded, without_repeats
+from world_gen.paved import GRID_M, Paved, area_of
+from world_gen.polyline import arc_lengths, cut, offset, without_repeats
+from world_gen.road_graph import DirectedEdge
 
 CORNER_FILLET_M = 3.0
-GRID_M = 0.001
-MIN_ISLAND_M2 = 2.5
-MAX_ISLAND_M2 = 2500.0
-ISLANDS_WITHIN_M = 25.0
-RING_ISLAND = "island:ring"
-"""Ids of a roundabout's middle begin with this; other islands begin with `island:traffic`."""
+SMALLEST_M2 = 0.5
 
 
 class Areas(NamedTuple):
@@ -36,203 +37,173 @@ class Areas(NamedTuple):
     """By junction id."""
     islands: tuple[Area, ...]
     kerbs: tuple[Array, ...]
-    lanes_free: shapely.Geometry
-    """What lanes and connections cover; nothing solid may stand there."""
+    driven: np.ndarray
+    """What lanes and connections cover, polygon by polygon; nothing solid may stand there."""
 
 
 def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraft]) -> Areas:
     """Return the paved areas and what borders them."""
-    disc = around.extent.polygon
-    paths = [(lane.centerline, lane.width_m.value) for lane in lanes.lanes.values()]
-    paths += [(c.centerline, c.width_m.value) for c in connections]
-    swept = shapely.buffer(
-        _lines([xy for xy, _ in paths]), [w / 2 for _, w in paths], cap_style="flat", quad_segs=4
-    )
-    lanes_free = shapely.union_all(swept) if len(swept) else Polygon()
-    roads = _carriageways(around)
-    paved = shapely.union_all([lanes_free, *roads])
-    hulls = _junction_hulls(around, lanes)
-    if hulls:
-        around_corners = shapely.union_all([hull.buffer(4.0) for hull in hulls.values()])
-        inside = paved.intersection(around_corners)
-        closed = inside.buffer(CORNER_FILLET_M, quad_segs=6).buffer(-CORNER_FILLET_M, quad_segs=6)
-        paved = paved.union(closed.intersection(around_corners))
-    paved = paved.buffer(0.4, quad_segs=2).buffer(-0.4, quad_segs=2)
-    rings = _ring_islands(around, lanes_free)
-    for island in rings:
-        paved = paved.difference(island)
-    # On the millimetre grid on which the World is written, so that rounding breaks nothing.
-    paved = shapely.set_precision(shapely.simplify(paved.intersection(disc), 0.04), GRID_M)
-    rings = [p for r in rings for p in _sorted(shapely.set_precision(r, GRID_M))]
-    islands = [_area(f"{RING_ISLAND}:{i}", island) for i, island in enumerate(rings)]
-    islands += _traffic_islands(around, paved, rings)
+    lane_paths = [(lane.centerline, lane.width_m.value) for lane in lanes.lanes.values()]
+    swept_lanes = _swept(lane_paths)
+    swept = _swept([(c.centerline, c.width_m.value) for c in connections])
+    roads = _road_polygons(lanes)
+    clusters, places = _place_polygons(around, connections, swept)
+    islands, middles = island_areas(around, lanes, Paved(roads, places, clusters))
+    if len(middles):
+        # Where a turn sweeps over a roundabout's middle, the middle stays.
+        hit, which = shapely.STRtree(middles).query(places, predicate="intersects")
+        for place, middle in zip(hit, which, strict=True):
+            places[place] = shapely.difference(places[place], middles[middle])
+    paved = Paved(roads, places, clusters)
     return Areas(
-        road_surface=tuple(_area(f"road:{i}", p) for i, p in enumerate(_sorted(paved))),
-        junction_areas=_junction_areas(hulls, paved),
-        islands=tuple(islands),
-        kerbs=_kerbs(paved, disc),
-        lanes_free=lanes_free,
+        road_surface=_surface(paved, lanes),
+        junction_areas=_junction_areas(around, lanes, paved),
+        islands=islands,
+        kerbs=kerb_lines(lanes, paved),
+        driven=np.concatenate([swept_lanes, swept]),
     )
 
 
-def _lines(curves: list[Array]) -> shapely.Geometry:
-    if not curves:
+def _swept(paths: list[tuple[Array, float]]) -> np.ndarray:
+    if not paths:
         return np.array([], dtype=object)
-    return shapely.linestrings(
-        np.concatenate(curves), indices=np.repeat(np.arange(len(curves)), [len(c) for c in curves])
+    counts = [len(xy) for xy, _ in paths]
+    lines = shapely.linestrings(
+        np.concatenate([xy for xy, _ in paths]), indices=np.repeat(np.arange(len(paths)), counts)
     )
-
-
-def _carriageways(around: Surroundings) -> list[shapely.Geometry]:
-    """Return each road's carriageway, and a round piece where roads meet at an angle."""
-    found = list(
-        shapely.buffer(
-            _lines([_middle(around, i) for i in around.edges]),
-            [around.sections[i].width_m / 2 for i in around.edges],
-            cap_style="flat",
-            quad_segs=4,
-        )
+    swept: np.ndarray = shapely.buffer(
+        lines, [width / 2 for _, width in paths], cap_style="flat", quad_segs=2
     )
-    halves: dict[int, list[float]] = {}
-    places: dict[int, Array] = {}
-    for index, edge in around.edges.items():
-        line = _middle(around, index)
-        for node, at in ((edge.start_node, line[0]), (edge.end_node, line[-1])):
-            halves.setdefault(node, []).append(around.sections[index].width_m / 2)
-            places[node] = at
-    for node, widths in sorted(halves.items()):
-        if len(widths) >= 2:
-            found.append(shapely.Point(places[node]).buffer(sorted(widths)[-2], quad_segs=6))
-    return found
+    return swept
 
 
-def _middle(around: Surroundings, index: int) -> Array:
-    section = around.sections[index]
-    way = rounded(without_repeats(around.edges[index].xy_m))
-    return offset(way, (section.left_m + section.right_m) / 2)
+def _road_polygons(lanes: LaneSet) -> np.ndarray:
+    sides = (lanes.edges[road.id] for road in lanes.roads)
+    return polygons([np.concatenate([right, left[::-1]]) for left, right in sides])
 
 
-def _junction_hulls(around: Surroundings, lanes: LaneSet) -> dict[str, Polygon]:
-    """Return by junction id the convex hull of its nodes and of the lane ends around them."""
-    found: dict[str, Polygon] = {}
-    for junction in around.junctions:
-        mine = [c for c in around.clusters if c.whole and c.junction is junction]
-        points = _lane_corners(mine, junction, around, lanes)
-        if len(points) >= 3:
-            hull = shapely.MultiPoint(np.array(points)).convex_hull
-            if isinstance(hull, Polygon) and hull.area > 1.0:
-                found[junction.summary.id] = hull
-    return found
-
-
-def _lane_corners(
-    clusters: list[Cluster], junction: Junction, around: Surroundings, lanes: LaneSet
-) -> list[Array]:
-    points: list[Array] = []
-    ring = any(c.ring for c in clusters)
-    for cluster in clusters:
-        for leg in cluster.legs:
-            if ring and leg.edge.index in junction.inner:
-                points.extend(leg.xy_m)
-                continue
-            section = around.section(leg)
-            for reverse in (False, True):
-                outward = reverse == leg.reverse
-                directed = type(leg)(leg.edge, reverse)
-                plans = section.driven(reverse=reverse)
-                ends = (
-                    lanes.outgoing(directed, plans) if outward else lanes.incoming(directed, plans)
-                )
-                for lane in ends:
-                    at = lane.centerline[0] if outward else lane.centerline[-1]
-                    step = (
-                        lane.centerline[1] - lane.centerline[0]
-                        if outward
-                        else lane.centerline[-1] - lane.centerline[-2]
-                    )
-                    side = np.array([-step[1], step[0]]) / max(float(np.hypot(*step)), 1e-9)
-                    half = lane.width_m.value / 2
-                    points.extend([at + half * side, at - half * side])
-    return points
-
-
-def _junction_areas(hulls: Mapping[str, Polygon], paved: shapely.Geometry) -> dict[str, Area]:
-    found: dict[str, Area] = {}
-    shapely.prepare(paved)
-    for name, hull in hulls.items():
-        parts = _sorted(shapely.set_precision(hull.intersection(paved), GRID_M))
-        if parts:
-            found[name] = _area(f"junction:{name}", parts[0])
-    return found
-
-
-def _ring_islands(around: Surroundings, lanes_free: shapely.Geometry) -> list[Polygon]:
-    """Return what rings enclose: the roundabout's middle."""
-    rings = [
-        shapely.buffer(
-            shapely.LineString(_middle(around, i)), around.sections[i].width_m / 2, quad_segs=6
-        )
-        for i in sorted(around.edges)
-        if is_ring_edge(around.edges[i])
-    ]
+def polygons(rings: list[Array]) -> np.ndarray:
+    """Return valid polygons, one for each ring (N, 2) that need not be closed or simple."""
     if not rings:
-        return []
-    tracks = shapely.union_all(rings)
-    found: list[Polygon] = []
-    for track in _sorted(tracks):
-        for hole in track.interiors:
-            middle = Polygon(hole).difference(lanes_free)
-            found.extend(p for p in _sorted(middle) if p.area >= MIN_ISLAND_M2)
-    return found
-
-
-def _traffic_islands(
-    around: Surroundings, paved: shapely.Geometry, rings: list[Polygon]
-) -> list[Area]:
-    places = shapely.points([_centre(j, around) for j in around.junctions])
-    near = shapely.buffer(places, [j.radius_m + ISLANDS_WITHIN_M for j in around.junctions])
-    reach = shapely.union_all(near)
-    shapely.prepare(reach)
-    middle = shapely.union_all(rings) if rings else Polygon()
-    found: list[Area] = []
-    for surface in _sorted(paved):
-        for hole in surface.interiors:
-            island = Polygon(hole)
-            if (
-                reach.intersects(island)
-                and MIN_ISLAND_M2 <= island.area <= MAX_ISLAND_M2
-                and not island.intersects(middle)
-            ):
-                found.append(_area(f"island:traffic:{len(found)}", island))
-    return found
-
-
-def _centre(junction: Junction, around: Surroundings) -> Array:
-    here = junction.summary
-    return local_from_geo(around.frame, here.lat, here.lon)
-
-
-def _kerbs(paved: shapely.Geometry, disc: Polygon) -> tuple[Array, ...]:
-    edge = paved.boundary.difference(disc.boundary.buffer(0.15))
-    lines = shapely.get_parts(shapely.line_merge(edge))
-    return tuple(np.round(shapely.get_coordinates(line), 3) for line in lines if line.length > 0.5)
-
-
-def _sorted(shape: shapely.Geometry) -> list[Polygon]:
-    """Return the polygons of a shape in a fixed order, largest first."""
-    parts = [p for p in shapely.get_parts(shape) if isinstance(p, Polygon) and p.area > 0.5]
-    return sorted(parts, key=lambda p: (-round(p.area, 3), p.bounds))
-
-
-def _area(name: str, polygon: Polygon) -> Area:
-    ring = orient(polygon)
-    return Area(
-        id=name,
-        outline=_coordinates(ring.exterior),
-        holes=tuple(_coordinates(hole) for hole in ring.interiors),
+        return np.array([], dtype=object)
+    counts = [len(ring) for ring in rings]
+    closed = shapely.linearrings(
+        np.concatenate(rings), indices=np.repeat(np.arange(len(rings)), counts)
     )
+    found: np.ndarray = shapely.polygons(closed)
+    bad = ~shapely.is_valid(found)
+    if bad.any():
+        # A bend tighter than the road is wide folds its inner edge.
+        found[bad] = shapely.buffer(found[bad], 0.0)
+    return found
 
 
-def _coordinates(ring: shapely.LinearRing) -> Array:
-    points: Array = np.round(shapely.get_coordinates(ring)[:-1], 3)
-    return points
+def _place_polygons(
+    around: Surroundings, connections: list[ConnectionDraft], swept: np.ndarray
+) -> tuple[tuple[Cluster, ...], np.ndarray]:
+    """Return what each cluster covers: its stubs, its inner edges and its turns, corners filled."""
+    row = {cluster.key: i for i, cluster in enumerate(around.clusters)}
+    rings: list[Array] = []
+    owners: list[int] = []
+    for i, cluster in enumerate(around.clusters):
+        mine = [ring for leg in cluster.legs if (ring := _stub(leg, around)) is not None]
+        mine += [ring for k in sorted(cluster.inner) if (ring := _inner(k, around)) is not None]
+        rings.extend(mine)
+        owners.extend([i] * len(mine))
+    pieces = np.concatenate([polygons(rings), _node_discs(around), swept])
+    owners += range(len(around.clusters))
+    owners += [row[c.cluster.key] for c in connections]
+    order = np.argsort(owners, kind="stable")
+    owner = np.asarray(owners)[order]
+    used, indices = np.unique(owner, return_inverse=True)
+    groups = shapely.geometrycollections(pieces[order], indices=indices)
+    grown = shapely.buffer(groups, CORNER_FILLET_M, quad_segs=4)
+    closed = shapely.buffer(grown, -CORNER_FILLET_M, quad_segs=4)
+    closed = shapely.set_precision(shapely.simplify(closed, 0.04), GRID_M)
+    keep = shapely.area(closed) > SMALLEST_M2
+    clusters = tuple(around.clusters[i] for i, ok in zip(used.tolist(), keep, strict=True) if ok)
+    return clusters, closed[keep]
+
+
+def _stub(leg: DirectedEdge, around: Surroundings) -> Array | None:
+    """Return the ring of a leg's carriageway between its node and where its lanes begin."""
+    trim = around.trims_m.get((leg.edge.index, leg.reverse), 0.0)
+    if trim < 0.05 or leg.edge.index not in around.sections:
+        return None
+    section = around.section(leg)
+    line = without_repeats(leg.xy_m)
+    line = cut(line, 0.0, min(trim + 0.05, float(arc_lengths(line)[-1])))
+    if leg.reverse:
+        left, right = offset(line, -section.right_m), offset(line, -section.left_m)
+    else:
+        left, right = offset(line, section.left_m), offset(line, section.right_m)
+    return np.concatenate([right, left[::-1]])
+
+
+def _inner(index: int, around: Surroundings) -> Array | None:
+    edge = around.edges.get(index)
+    if edge is None:
+        return None
+    line, section = without_repeats(edge.xy_m), around.sections[index]
+    return np.concatenate([offset(line, section.right_m), offset(line, section.left_m)[::-1]])
+
+
+def _node_discs(around: Surroundings) -> np.ndarray:
+    """Return a round piece where the legs of a cluster meet at an angle; empty where none do."""
+    centres, radii = [], []
+    for cluster in around.clusters:
+        halves = sorted(around.section(leg).width_m / 2 for leg in cluster.legs)
+        first = cluster.legs[0]
+        bent = any(around.trims_m.get((d.edge.index, d.reverse), 0.0) for d in cluster.legs)
+        radii.append(halves[-2] if bent and len(cluster.nodes) == 1 else 0.0)
+        centres.append(first.xy_m[0])
+    if not centres:
+        return np.array([], dtype=object)
+    discs: np.ndarray = shapely.buffer(shapely.points(np.array(centres)), radii, quad_segs=4)
+    return discs
+
+
+def _surface(paved: Paved, lanes: LaneSet) -> tuple[Area, ...]:
+    found: list[Area] = []
+    for road, shape in zip(lanes.roads, shapely.set_precision(paved.roads, GRID_M), strict=True):
+        found.extend(_areas(f"road:{road.layer}:{road.id}", shape))
+    for cluster, shape in zip(paved.place_of, shapely.set_precision(paved.places, GRID_M),
+                              strict=True):  # fmt: skip
+        layer = max(leg.edge.layer for leg in cluster.legs)
+        found.extend(_areas(f"road:{layer}:{cluster.key}", shape))
+    return tuple(found)
+
+
+def _junction_areas(around: Surroundings, lanes: LaneSet, paved: Paved) -> dict[str, Area]:
+    """Return for each whole junction its places, and the ring between them, as one area."""
+    pieces: dict[str, list[Polygon]] = {}
+    for cluster, shape in zip(paved.place_of, paved.places, strict=True):
+        if cluster.whole and cluster.junction is not None:
+            pieces.setdefault(cluster.junction.summary.id, []).append(shape)
+    ring_of: dict[int, Junction] = {
+        i: junction for junction in around.junctions for i in junction.inner
+        if i in around.ring_edges
+    }  # fmt: skip
+    edge_of = {lane.road_id: lane.key.edge for lane in lanes.lanes.values()}
+    for road, shape in zip(lanes.roads, paved.roads, strict=True):
+        junction = ring_of.get(edge_of.get(road.id, -1))
+        if junction is not None:
+            pieces.setdefault(junction.summary.id, []).append(shape)
+    found: dict[str, Area] = {}
+    for name, shapes in pieces.items():
+        whole = shapes[0] if len(shapes) == 1 else shapely.union_all(shapes, grid_size=GRID_M)
+        parts = _areas(f"junction:{name}", shapely.set_precision(whole, GRID_M))
+        if parts:
+            found[name] = parts[0]
+    return found
+
+
+def _areas(name: str, shape: shapely.Geometry) -> list[Area]:
+    """Return the polygons of a shape as areas in a fixed order, largest first."""
+    if isinstance(shape, Polygon):
+        parts = [shape] if shape.area > SMALLEST_M2 else []
+    else:
+        found = shapely.get_parts(shape)
+        parts = [p for p in found if isinstance(p, Polygon) and p.area > SMALLEST_M2]
+        parts.sort(key=lambda p: (-round(p.area, 3), p.bounds))
+    return [area_of(name if i == 0 else f"{name}-{i}", part) for i, part in enumerate(parts)]
