@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
+from contracts.arrays import Array
 from contracts.errors import UserError
 from contracts.frames import LocalFrame
+from world_gen.node_locations import NodeLocations
 
 
 class MapError(UserError):
@@ -42,7 +47,7 @@ class OsmRelation:
 
 
 class LatLonBounds(NamedTuple):
-    """A box in degrees."""
+    """A box in degrees; `west` is greater than `east` where it crosses the antimeridian."""
 
     south: float
     west: float
@@ -57,7 +62,8 @@ class OsmMap:
     `locations` holds (lat, lon) of every node of a kept way; `node_tags` the tags of tagged nodes;
     `ways` those with highway, railway, building, building:part, area:highway, barrier tags or in
     a kept relation; `relations` multipolygon buildings and turn restrictions. `frame` is centred
-    on the highways; all world_gen geometry of this map starts in it.
+    on the highways; all world_gen geometry of this map starts in it. `notes` say what the reader
+    left out or mended, each beginning with the object: `way 10: ...`.
     """
 
     file: str
@@ -69,3 +75,11 @@ class OsmMap:
     node_tags: Mapping[int, Mapping[str, str]]
     ways: Mapping[int, OsmWay]
     relations: Mapping[int, OsmRelation]
+    notes: tuple[str, ...] = ()
+
+    def lat_lon_deg(self, nodes: Sequence[int] | npt.NDArray[np.int64]) -> Array:
+        """Return (N, 2) degrees of many nodes at once; KeyError names one without a position."""
+        if isinstance(self.locations, NodeLocations):
+            return self.locations.of(nodes)
+        found = [self.locations[int(node)] for node in nodes]
+        return np.array(found, dtype=np.float64).reshape(-1, 2)

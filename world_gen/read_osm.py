@@ -1,25 +1,42 @@
-"""Read a map file into memory: XML, gzip, bzip2 or PBF, decoded and filtered in C++."""
+"""Read a map file into memory: XML, gzip, bzip2 or PBF, decoded in C++, taken over in bulk."""
 
 from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import osmium
 
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.world import ATTRIBUTION, DRAWN_ATTRIBUTION, DRAWN_GENERATOR
-from world_gen.opl import OplObjects, add_opl
-from world_gen.osm_map import LatLonBounds, MapError, OsmMap, OsmWay
+from world_gen.map_assembly import MapObjects, assemble_map, sorted_positions
+from world_gen.map_file import (
+    HEAD_BYTES,
+    MapHeader,
+    file_fault,
+    format_of,
+    header_of,
+    unreadable,
+)
+from world_gen.opl import (
+    OPL_OPTIONS,
+    NodePositions,
+    TagReader,
+    WayLines,
+    read_nodes,
+    read_relations,
+    sections,
+    way_lines,
+    way_nodes,
+)
+from world_gen.osm_map import OsmMap, OsmRelation
 
-WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
-NODE_KEYS = (
+WAY_KEYS = frozenset(("highway", "railway", "building", "building:part", "area:highway", "barrier"))
+NODE_KEYS = frozenset((
     "highway", "railway", "barrier", "crossing", "traffic_calming", "traffic_sign",
     "traffic_signals", "junction", "stop", "give_way", "kerb", "driving_side",
-)  # fmt: skip
+))  # fmt: skip
 
 
 def read_map(path: Path) -> OsmMap:
@@ -27,173 +44,93 @@ def read_map(path: Path) -> OsmMap:
 
     The format is recognised by the file's first bytes, not by its name. Nodes that a way names
     and the file lacks are left out of the way; where the gap is in the middle, the longest
-    unbroken stretch is kept. Ways and relations stand in the order of their ids, whatever the
-    order in the file.
+    unbroken stretch is kept; the map's notes name the way. Ways and relations stand in the order
+    of their ids, whatever the order in the file.
 
     Raises `MapError` with one line where the file is missing, is no OSM file, is damaged, or
     holds no roads.
     """
-    data = _bytes_of(path)
-    source = osmium.io.FileBuffer(data, _format_of(path, data))
     try:
-        decoded = _Decoded(source)
+        data = path.read_bytes()
+    except OSError as error:
+        raise file_fault(path, error) from None
+    form = format_of(path, data[:HEAD_BYTES])
+    try:
+        header, text = _as_opl(data, form)
     except (RuntimeError, ValueError) as error:
-        reason = str(error).replace("\n", " ")
-        raise MapError(f"{path}: not a readable OSM file: {reason}") from error
-    highway_nodes = {
-        node for way in decoded.ways.values() if "highway" in way.tags for node in way.nodes
-    }
-    if not highway_nodes:
-        raise MapError(f"{path}: the map holds no roads (no way with a highway tag and positions)")
-    box = _bounds_of(decoded.locations[node] for node in highway_nodes)
-    centre = GeoPoint((box.south + box.north) / 2.0, (box.west + box.east) / 2.0)
-    return OsmMap(
+        raise unreadable(path, error) from error
+    objects = DecodedObjects()
+    objects.add(text)
+    return assemble_map(
+        objects.for_map(),
         file=str(path),
         sha256=hashlib.sha256(data).hexdigest(),
-        attribution=_attribution(source),
-        bounds=decoded.declared_bounds or box,
-        frame=LocalFrame(centre),
-        locations=decoded.locations,
-        node_tags=decoded.node_tags,
-        ways=decoded.ways,
-        relations=decoded.relations,
+        attribution=header.attribution,
+        bounds=header.bounds,
     )
 
 
-def _bytes_of(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise MapError(f"{path}: there is no such map file") from None
-    except IsADirectoryError:
-        raise MapError(f"{path}: is a folder, not a map file") from None
-    except OSError as error:
-        raise MapError(f"{path}: the map file cannot be read: {error.strerror}") from error
-
-
-def _format_of(path: Path, data: bytes) -> str:
-    """Return osmium's name of the format, judged by the first bytes."""
-    if data.startswith(b"\x1f\x8b"):
-        return "osm.gz"
-    if data.startswith(b"BZh"):
-        return "osm.bz2"
-    if b"OSMHeader" in data[:64]:
-        return "pbf"
-    if b"<osm" in data[:4096]:
-        return "osm"
-    raise MapError(
-        f"{path}: not an OSM file (expected OSM XML, plain or packed with gzip or bzip2, or PBF)"
-    )
-
-
-class _Decoded:
-    """What passes the filters, in plain Python containers."""
-
-    def __init__(self, source: Any) -> None:
-        self.declared_bounds = _declared_bounds(source)
-        objects = OplObjects()
-        store = osmium.index.create_map("flex_mem")
-        osm = osmium.osm
-        filters = [
-            _of_keys(entity, keys)
-            for entity, keys in (
-                (osm.NODE, NODE_KEYS),
-                (osm.WAY, WAY_KEYS),
-                (osm.RELATION, ("type",)),
-            )
-        ]
-        _decode(source, osm.NODE | osm.WAY | osm.RELATION, store, filters, objects)
-        self.relations = dict(sorted(objects.relations.items()))
-        members = {
-            member.ref
-            for relation in self.relations.values()
-            for member in relation.members
-            if member.kind == "w"
-        }
-        missing = sorted(members - objects.ways.keys())
-        if missing:
-            # Outlines of buildings with courtyards carry their tags on the relation alone.
-            _decode(source, osm.WAY, store, [osmium.filter.IdFilter(missing)], objects)
-        self.node_tags = objects.node_tags
-        self.locations = objects.locations
-        self._add_negative(source, objects.ways.values())
-        self.ways = {
-            key: way
-            for key, raw in sorted(objects.ways.items())
-            if len((way := _located(raw, self.locations)).nodes) >= 2
-        }
-
-    def _add_negative(self, source: Any, ways: Iterable[OsmWay]) -> None:
-        """Look up nodes numbered below zero, as editors number what is not yet uploaded.
-
-        osmium's index holds no such ids.
-        """
-        wanted = {node for way in ways for node in way.nodes if node < 0}
-        if wanted - self.locations.keys():
-            items: Iterator[Any] = iter(osmium.FileProcessor(source, osmium.osm.NODE))
-            for item in items:
-                if item.id in wanted and item.location.valid():
-                    self.locations[item.id] = (item.location.lat, item.location.lon)
-
-
-def _of_keys(entity: Any, keys: tuple[str, ...]) -> Any:
-    wanted = osmium.filter.KeyFilter(*keys)
-    wanted.enable_for(entity)
-    return wanted
-
-
-def _decode(
-    source: Any, entities: Any, store: Any, filters: Sequence[Any], objects: OplObjects
-) -> None:
-    """Add what passes the filters, ways with the locations of `store`, which nodes fill."""
-    with_locations = osmium.NodeLocationsForWays(store)
-    with_locations.ignore_errors()
+def _as_opl(data: bytes, form: str) -> tuple[MapHeader, bytes]:
     with tempfile.TemporaryDirectory(prefix="foretwin-map-") as folder:
-        path = Path(folder) / "filtered.opl"
-        target = osmium.io.File(path, "opl,locations_on_ways=true,add_metadata=false")
-        with (
-            osmium.io.Reader(source, entities) as reader,
-            osmium.SimpleWriter(target) as writer,
-        ):
-            osmium.apply(reader, with_locations, *filters, writer)
-        with path.open(encoding="utf-8", newline="\n") as lines:
-            add_opl(objects, lines, _is_kept)
+        path = Path(folder) / "map.opl"
+        with osmium.io.Reader(osmium.io.FileBuffer(data, form)) as reader:
+            header = header_of(reader.header())
+            with osmium.SimpleWriter(osmium.io.File(path, OPL_OPTIONS)) as writer:
+                osmium.apply(reader, writer)
+        return header, path.read_bytes()
 
 
-def _is_kept(tags: Mapping[str, str]) -> bool:
-    kind = tags["type"]
+@dataclass(slots=True)
+class DecodedObjects:
+    """What of a map's objects may matter to a driver, as they come in."""
+
+    tags_of: TagReader = field(default_factory=TagReader)
+    positions: list[NodePositions] = field(default_factory=list)
+    node_tags: dict[int, Mapping[str, str]] = field(default_factory=dict)
+    ways: WayLines = field(default_factory=lambda: WayLines([], [], []))
+    relations: dict[int, OsmRelation] = field(default_factory=dict)
+
+    def add(self, text: bytes) -> None:
+        """Add whole lines of OPL."""
+        for letter, section in sections(text):
+            if letter == "n":
+                nodes = read_nodes(section, NODE_KEYS, self.tags_of)
+                self.positions.append(nodes.positions)
+                self.node_tags.update(nodes.tags)
+            elif letter == "w":
+                more = way_lines(section)
+                self.ways.ids.extend(more.ids)
+                self.ways.tag_texts.extend(more.tag_texts)
+                self.ways.node_texts.extend(more.node_texts)
+            else:
+                self.relations.update(read_relations(section, is_kept_relation, self.tags_of))
+
+    def for_map(self) -> MapObjects:
+        """Return the ways for drivers, the outlines that kept relations name, and their nodes."""
+        notes: list[str] = []
+        # Outlines of buildings with courtyards carry their tags on the relation alone.
+        members = {m.ref for r in self.relations.values() for m in r.members if m.kind == "w"}
+        ids, tags, texts = [], [], []
+        for way, tag_text, node_text in zip(*self.ways, strict=True):
+            of_way = self.tags_of(tag_text)
+            if not WAY_KEYS.isdisjoint(of_way) or way in members:
+                ids.append(way)
+                tags.append(of_way)
+                texts.append(node_text)
+        return MapObjects(
+            way_ids=ids,
+            way_tags=tags,
+            way_nodes=way_nodes(texts),
+            positions=sorted_positions(self.positions, notes),
+            node_tags=self.node_tags,
+            relations=dict(sorted(self.relations.items())),
+            notes=notes,
+        )
+
+
+def is_kept_relation(tags: Mapping[str, str]) -> bool:
+    """Return whether a relation is a turn restriction or a building."""
+    kind = tags.get("type", "")
     if kind.split(":")[0] == "restriction" or kind == "building":
         return True
     return kind == "multipolygon" and ("building" in tags or "building:part" in tags)
-
-
-def _located(way: OsmWay, locations: Mapping[int, tuple[float, float]]) -> OsmWay:
-    if all(node in locations for node in way.nodes):
-        return way
-    longest: list[int] = []
-    run: list[int] = []
-    for node in way.nodes:
-        run = [*run, node] if node in locations else []
-        if len(run) > len(longest):
-            longest = run
-    return OsmWay(way.id, tuple(longest), way.tags)
-
-
-def _bounds_of(positions: Iterable[tuple[float, float]]) -> LatLonBounds:
-    lats, lons = zip(*positions, strict=True)
-    return LatLonBounds(min(lats), min(lons), max(lats), max(lons))
-
-
-def _attribution(source: Any) -> str:
-    with osmium.io.Reader(source, osmium.osm.NOTHING) as reader:
-        generator = reader.header().get("generator")
-    return DRAWN_ATTRIBUTION if generator.startswith(DRAWN_GENERATOR) else ATTRIBUTION
-
-
-def _declared_bounds(source: Any) -> LatLonBounds | None:
-    with osmium.io.Reader(source, osmium.osm.NOTHING) as reader:
-        box = reader.header().box()
-    if not box.valid():
-        return None
-    low, high = box.bottom_left, box.top_right
-    return LatLonBounds(low.lat, low.lon, high.lat, high.lon)
