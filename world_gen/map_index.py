@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-import numpy as np
 import shapely
 
-from world_gen.buildings import Footprint, footprints
+from world_gen.building_parts import Footprint
+from world_gen.buildings import BuildingIndex
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
@@ -23,11 +23,9 @@ class MapIndex:
     graph: RoadGraph
     car_edges: tuple[int, ...]
     car_edge_tree: shapely.STRtree
-    buildings: tuple[Footprint, ...]
-    building_tree: shapely.STRtree
+    buildings: BuildingIndex
     restrictions: TurnRestrictions
     junction_of_node: Mapping[int, Junction]
-    notes: tuple[str, ...]
 
     def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:
         """Return indices of car roads that touch an area in the map's frame."""
@@ -36,28 +34,23 @@ class MapIndex:
 
     def buildings_in(self, area: shapely.Polygon) -> tuple[Footprint, ...]:
         """Return buildings that reach into an area in the map's frame."""
-        found = self.building_tree.query(area, predicate="intersects")
-        return tuple(self.buildings[i] for i in sorted(found.tolist()))
+        return self.buildings.within(area)
 
 
 def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ()) -> MapIndex:
     """Prepare a map; `junctions` are all known ones, so that neighbours are built as such."""
-    notes: list[str] = []
     car = tuple(
         edge.index
         for edge in graph.edges
         if edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
     )
     lines = [shapely.LineString(graph.edges[i].xy_m) for i in car]
-    buildings = footprints(osm, notes)
     return MapIndex(
         osm=osm,
         graph=graph,
         car_edges=car,
         car_edge_tree=shapely.STRtree(lines),
-        buildings=buildings,
-        building_tree=shapely.STRtree(np.array([b.polygon for b in buildings], dtype=object)),
+        buildings=BuildingIndex(osm),
         restrictions=read_turn_restrictions(osm),
         junction_of_node={node: j for j in junctions for node in sorted(j.nodes)},
-        notes=tuple(notes),
     )
