@@ -1,0 +1,105 @@
+"""A World as an OpenDRIVE file, 1.8 or, for CARLA, 1.4."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lxml import etree
+
+from contracts.frames import LocalFrame
+from contracts.world import ATTRIBUTION, World
+from world_gen.export.opendrive_elements import Version, number, road_element
+from world_gen.export.opendrive_places import OdrJunction, network_of
+
+
+def write_opendrive(world: World, path: Path, *, version: Version = "1.8") -> None:
+    """Write the World's roads, junctions, signals and buildings.
+
+    Metres in the World's frame, whose PROJ string stands in `<geoReference>`. Raises ValueError
+    where the World has no road with lanes.
+    """
+    root = opendrive_element(world, version=version)
+    tree = etree.ElementTree(root)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    tree.write(str(path), encoding="UTF-8", xml_declaration=True, pretty_print=True)
+
+
+def opendrive_element(world: World, *, version: Version = "1.8") -> etree._Element:
+    """Return the `<OpenDRIVE>` element that `write_opendrive` writes."""
+    network = network_of(world)
+    if not network.roads:
+        raise ValueError(f"world {world.id}: no road with lanes to write as OpenDRIVE")
+    root = etree.Element("OpenDRIVE")
+    root.append(etree.Comment(f" Made by foretwin from map data: {world.attribution} "))
+    root.append(_header(world, version))
+    for road in network.roads:
+        root.append(road_element(road, side=network.side, version=version))
+    names = {junction.summary.id: junction.summary.name for junction in world.junctions}
+    for junction in network.junctions:
+        root.append(_junction_element(junction, names.get(junction.junction_id, ""), version))
+    return root
+
+
+def proj_of(frame: LocalFrame) -> str:
+    """Return the PROJ string of a local frame (see `contracts.frames`)."""
+    return (
+        f"+proj=tmerc +lat_0={frame.origin.lat_deg!r} +lon_0={frame.origin.lon_deg!r} "
+        "+k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m +no_defs"
+    )
+
+
+def _header(world: World, version: Version) -> etree._Element:
+    if world.bounds_m is not None:
+        west, south, east, north = world.bounds_m
+    else:
+        west = south = -world.radius_m
+        east = north = world.radius_m
+    header = etree.Element(
+        "header",
+        revMajor="1",
+        revMinor=version.partition(".")[2],
+        name=world.intersection.name or world.intersection.id,
+        version="1.00",
+        north=number(north),
+        south=number(south),
+        east=number(east),
+        west=number(west),
+        vendor="foretwin",
+    )
+    reference = etree.SubElement(header, "geoReference")
+    reference.text = etree.CDATA(proj_of(world.frame))
+    if version == "1.8" and world.attribution == ATTRIBUTION:
+        etree.SubElement(
+            header,
+            "license",
+            name="Open Data Commons Open Database License 1.0",
+            spdxid="ODbL-1.0",
+            resource="https://www.openstreetmap.org/copyright",
+        )
+    for code, value in (
+        ("attribution", world.attribution),
+        ("foretwin_world", world.id),
+        ("map_sha256", world.map_sha256),
+    ):
+        etree.SubElement(header, "userData", code=code, value=value)
+    return header
+
+
+def _junction_element(junction: OdrJunction, name: str, version: Version) -> etree._Element:
+    element = etree.Element("junction", name=name)
+    element.set("id", str(junction.id))
+    if version == "1.8":
+        element.set("type", "default")
+    for i, item in enumerate(junction.connections):
+        connection = etree.SubElement(
+            element,
+            "connection",
+            incomingRoad=str(item.incoming),
+            connectingRoad=str(item.road.id),
+            contactPoint="start",
+        )
+        connection.set("id", str(i))
+        link = etree.SubElement(connection, "laneLink")
+        link.set("from", str(item.from_number))
+        link.set("to", str(item.to_number))
+    return element

@@ -1,0 +1,248 @@
+"""What joins the roads of an OpenDRIVE file where they meet: links, short roads, junctions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.world import Connection, DrivingSide, Lane, Road, World
+from world_gen.export.opendrive_curve import curve_between, fit_curve
+from world_gen.export.opendrive_roads import (
+    Cubic,
+    End,
+    OdrLane,
+    OdrRoad,
+    roads_of,
+    runs_along,
+)
+from world_gen.export.opendrive_tapers import taper
+from world_gen.polyline import unit
+
+MIN_ROAD_M = 0.005
+"""Where two lanes meet in one point a connecting road has this length: too short for a gap."""
+_MEET_M = 0.005
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdrConnection:
+    """A connecting road of a junction and the lane that leads onto it."""
+
+    connection: Connection
+    road: OdrRoad
+    incoming: int
+    from_number: int
+    to_number: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdrJunction:
+    """A place where roads meet."""
+
+    id: int
+    place: str
+    junction_id: str
+    """The World's junction that it is part of, or empty."""
+    connections: tuple[OdrConnection, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdrNetwork:
+    """All roads and junctions of a file; `road_of` names the road of each of the World's lanes."""
+
+    side: DrivingSide
+    roads: tuple[OdrRoad, ...]
+    junctions: tuple[OdrJunction, ...]
+    road_of: Mapping[str, OdrRoad]
+
+
+class _PlainEnd(NamedTuple):
+    road: Road
+    at_end: bool
+
+
+@dataclass(slots=True)
+class _Place:
+    ends: list[_PlainEnd] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list)
+
+
+def network_of(world: World) -> OdrNetwork:
+    """Return the World's roads, joined at every place as the kind of place demands.
+
+    Where two roads merely go on they are linked; where their lanes go on one by one, but bend or
+    move aside, a short road bridges the gap; everywhere else is a junction.
+    """
+    side = world.intersection.driving_side
+    lanes = {lane.id: lane for lane in world.lanes}
+    places = _places(world, lanes)
+    joined = [place for place in places.values() if _goes_on(place, lanes)]
+    roads = roads_of(world, lanes, _headings(joined))
+    by_source = {road.source: road for road in roads}
+    road_of = {lane: road for road in roads for lane in road.numbers}
+    for place in joined:
+        a, b = (End(by_source[e.road.id], e.at_end) for e in place.ends)
+        _join(a, b, lanes)
+    junctions: list[OdrJunction] = []
+    number = len(roads) + 1
+    for key, place in places.items():
+        ends = [End(by_source[e.road.id], e.at_end) for e in place.ends if e.road.id in by_source]
+        known = [c for c in place.connections if {c.from_lane_id, c.to_lane_id} <= road_of.keys()]
+        if not known and len(ends) < 3:
+            continue
+        short = taper(key, number, ends, known, lanes, side)
+        if short is not None:
+            roads.append(short)
+            number += 1
+            continue
+        junction = _junction(key, number, ends, known, lanes, road_of, side)
+        junctions.append(junction)
+        roads.extend(item.road for item in junction.connections)
+        number += 1 + len(known)
+    return OdrNetwork(side=side, roads=tuple(roads), junctions=tuple(junctions), road_of=road_of)
+
+
+def _places(world: World, lanes: Mapping[str, Lane]) -> dict[str, _Place]:
+    found: dict[str, _Place] = {}
+    for road in world.roads:
+        if not any(i in lanes for i in road.lane_ids):
+            continue
+        for key, at_end in ((road.from_place, False), (road.to_place, True)):
+            if key is not None:
+                found.setdefault(key, _Place()).ends.append(_PlainEnd(road, at_end))
+    for connection in world.connections:
+        found.setdefault(connection.place_id, _Place()).connections.append(connection)
+    return found
+
+
+def _goes_on(place: _Place, lanes: Mapping[str, Lane]) -> bool:
+    """Return whether two roads meet in a point and lanes of one lead straight into the other."""
+    if len(place.ends) != 2 or place.connections:
+        return False
+    a, b = place.ends
+    if math.hypot(*(_tip(a) - _tip(b))) > _MEET_M:
+        return False
+    return bool(_pairs(a.road, b.road, lanes) or _pairs(b.road, a.road, lanes))
+
+
+def _pairs(start: Road, to: Road, lanes: Mapping[str, Lane]) -> list[tuple[Lane, Lane]]:
+    ahead = set(to.lane_ids)
+    return [
+        (lanes[i], lanes[j])
+        for i in start.lane_ids
+        if i in lanes
+        for j in lanes[i].successor_ids
+        if j in ahead and j in lanes
+    ]
+
+
+def _tip(end: _PlainEnd) -> Array:
+    tip: Array = end.road.reference_line[-1 if end.at_end else 0]
+    return tip
+
+
+def _outward(end: _PlainEnd) -> Array:
+    line = end.road.reference_line
+    return unit(line[-1] - line[-2] if end.at_end else line[0] - line[1])
+
+
+def _headings(joined: Sequence[_Place]) -> dict[tuple[str, bool], Array]:
+    """Return the direction that both roads share where one goes on in the other."""
+    found: dict[tuple[str, bool], Array] = {}
+    for place in joined:
+        a, b = place.ends
+        shared = unit(_outward(a) - _outward(b))
+        found[a.road.id, a.at_end] = shared if a.at_end else -shared
+        found[b.road.id, b.at_end] = -shared if b.at_end else shared
+    return found
+
+
+def _join(a: End, b: End, lanes: Mapping[str, Lane]) -> None:
+    """Link two roads and those of their lanes that go on."""
+    a.road.link(at_end=a.at_end, to=("road", b.road.id, b.at_end))
+    b.road.link(at_end=b.at_end, to=("road", a.road.id, a.at_end))
+    assert a.road.road is not None
+    assert b.road.road is not None
+    for start, to in ((a, b), (b, a)):
+        for one, other in _pairs(start.road.road, to.road.road, lanes):  # type: ignore[arg-type]
+            if one.reverse == (not start.at_end) and other.reverse == to.at_end:
+                _link_lanes(start, start.road.numbers[one.id], to, to.road.numbers[other.id])
+
+
+def _link_lanes(a: End, number: int, b: End, other: int) -> None:
+    for end, mine, theirs in ((a, number, other), (b, other, number)):
+        lane = end.road.lane_numbered(mine)
+        if end.at_end:
+            lane.successor = theirs
+        else:
+            lane.predecessor = theirs
+
+
+def _junction(
+    place: str,
+    number: int,
+    ends: Sequence[End],
+    connections: Sequence[Connection],
+    lanes: Mapping[str, Lane],
+    road_of: Mapping[str, OdrRoad],
+    side: DrivingSide,
+) -> OdrJunction:
+    for end in ends:
+        end.road.link(at_end=end.at_end, to=("junction", number, False))
+    made = []
+    for i, connection in enumerate(connections, start=1):
+        start, to = lanes[connection.from_lane_id], lanes[connection.to_lane_id]
+        a = End(road_of[start.id], not start.reverse)
+        b = End(road_of[to.id], to.reverse)
+        road = _connecting_road(connection, number + i, a, b, start, to, side)
+        road.junction = number
+        made.append(
+            OdrConnection(
+                connection=connection,
+                road=road,
+                incoming=a.road.id,
+                from_number=a.road.numbers[start.id],
+                to_number=road.lanes[0].number,
+            )
+        )
+    junction_id = next((c.junction_id for c in connections if c.junction_id), "")
+    return OdrJunction(id=number, place=place, junction_id=junction_id, connections=tuple(made))
+
+
+def _connecting_road(
+    connection: Connection, number: int, a: End, b: End, start: Lane, to: Lane, side: DrivingSide
+) -> OdrRoad:
+    """Return the road of one connection: one lane about its middle, tangent to both lanes."""
+    begin = a.road.end_of(start, at_end=a.at_end)
+    finish = b.road.end_of(to, at_end=b.at_end)
+    if math.hypot(*(finish.point - begin.point)) < MIN_ROAD_M:
+        beyond = begin.point + begin.heading * MIN_ROAD_M
+        curve = curve_between(begin.point, begin.heading, beyond, begin.heading)
+    else:
+        line = np.concatenate([begin.point[None], connection.centerline[1:-1], finish.point[None]])
+        curve = fit_curve(line, start=begin.heading, end=finish.heading)
+    lane_number = -1 if runs_along(-1, side) else 1
+    first, last = start.width_m.value, to.width_m.value
+    half = -0.5 * lane_number
+    lane = OdrLane(
+        number=lane_number,
+        width=Cubic.between(first, last, curve.length_m),
+        lane=to,
+        predecessor=a.road.numbers[start.id],
+        successor=b.road.numbers[to.id],
+    )
+    return OdrRoad(
+        id=number,
+        name=a.road.name,
+        source=connection.id,
+        curve=curve,
+        offset=Cubic.between(half * first, half * last, curve.length_m),
+        lanes=[lane],
+        road_class=a.road.road_class,
+        predecessor=("road", a.road.id, a.at_end),
+        successor=("road", b.road.id, b.at_end),
+    )
