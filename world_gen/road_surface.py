@@ -5,6 +5,7 @@ Nothing is dissolved into one surface: a region has thousands of pieces, and eac
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -22,8 +23,7 @@ from world_gen.islands import island_areas
 from world_gen.kerbs import kerb_lines
 from world_gen.lanes import LaneSet
 from world_gen.paved import GRID_M, Paved, area_of
-from world_gen.polyline import arc_lengths, cut, offset, without_repeats
-from world_gen.road_graph import DirectedEdge
+from world_gen.polyline_batch import Polylines, cut, offset, without_repeats
 
 CORNER_FILLET_M = 3.0
 SMALLEST_M2 = 0.5
@@ -103,14 +103,8 @@ def _place_polygons(
 ) -> tuple[tuple[Cluster, ...], np.ndarray]:
     """Return what each cluster covers: its stubs, its inner edges and its turns, corners filled."""
     row = {cluster.key: i for i, cluster in enumerate(around.clusters)}
-    rings: list[Array] = []
-    owners: list[int] = []
-    for i, cluster in enumerate(around.clusters):
-        mine = [ring for leg in cluster.legs if (ring := _stub(leg, around)) is not None]
-        mine += [ring for k in sorted(cluster.inner) if (ring := _inner(k, around)) is not None]
-        rings.extend(mine)
-        owners.extend([i] * len(mine))
-    pieces = np.concatenate([polygons(rings), _node_discs(around), swept])
+    rings, owners = _stubs_and_inner_edges(around)
+    pieces = np.concatenate([rings, _node_discs(around), swept])
     owners += range(len(around.clusters))
     owners += [row[c.cluster.key] for c in connections]
     order = np.argsort(owners, kind="stable")
@@ -125,27 +119,43 @@ def _place_polygons(
     return clusters, closed[keep]
 
 
-def _stub(leg: DirectedEdge, around: Surroundings) -> Array | None:
-    """Return the ring of a leg's carriageway between its node and where its lanes begin."""
-    trim = around.trims_m.get((leg.edge.index, leg.reverse), 0.0)
-    if trim < 0.05 or leg.edge.index not in around.sections:
-        return None
-    section = around.section(leg)
-    line = without_repeats(leg.xy_m)
-    line = cut(line, 0.0, min(trim + 0.05, float(arc_lengths(line)[-1])))
-    if leg.reverse:
-        left, right = offset(line, -section.right_m), offset(line, -section.left_m)
-    else:
-        left, right = offset(line, section.left_m), offset(line, section.right_m)
-    return np.concatenate([right, left[::-1]])
+def _stubs_and_inner_edges(around: Surroundings) -> tuple[np.ndarray, list[int]]:
+    """Return the carriageways that clusters swallow, and the number of the cluster of each.
 
-
-def _inner(index: int, around: Surroundings) -> Array | None:
-    edge = around.edges.get(index)
-    if edge is None:
-        return None
-    line, section = without_repeats(edge.xy_m), around.sections[index]
-    return np.concatenate([offset(line, section.right_m), offset(line, section.left_m)[::-1]])
+    These are the stub of each leg, from its node to where its lanes begin, and all inner edges.
+    """
+    ways: list[Array] = []
+    stop_m: list[float] = []
+    edges_m: list[tuple[float, float]] = []
+    owners: list[int] = []
+    for i, cluster in enumerate(around.clusters):
+        for leg in cluster.legs:
+            trim = around.trims_m.get((leg.edge.index, leg.reverse), 0.0)
+            if trim >= 0.05:
+                section = around.section(leg)
+                to_left_m, to_right_m = section.left_m, section.right_m
+                ways.append(leg.xy_m)
+                stop_m.append(trim + 0.05)
+                edges_m.append(
+                    (-to_right_m, -to_left_m) if leg.reverse else (to_left_m, to_right_m)
+                )
+                owners.append(i)
+        for index in sorted(cluster.inner & around.edges.keys()):
+            section = around.sections[index]
+            ways.append(around.edges[index].xy_m)
+            stop_m.append(math.inf)
+            edges_m.append((section.left_m, section.right_m))
+            owners.append(i)
+    if not ways:
+        return np.array([], dtype=object), owners
+    lines = without_repeats(Polylines.of(ways))
+    stop = np.minimum(np.array(stop_m), lines.length_m)
+    lines = cut(lines, np.zeros(len(ways)), stop)
+    left_m, right_m = np.array(edges_m).T
+    left, right = offset(lines, left_m).split(), offset(lines, right_m).split()
+    return polygons(
+        [np.concatenate([b, a[::-1]]) for a, b in zip(left, right, strict=True)]
+    ), owners
 
 
 def _node_discs(around: Surroundings) -> np.ndarray:
