@@ -11,13 +11,12 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.world import Lane, LaneKind, Quantity, Road, Turn
 from world_gen.clusters import Cluster, Surroundings
-from world_gen.cross_section import LanePlan
-from world_gen.extent import stretches_inside
-from world_gen.polyline import arc_lengths, cut, offset, rounded, unit, without_repeats
+from world_gen.cross_section import CrossSection, LanePlan
+from world_gen.polyline_batch import Polylines, offset, without_repeats
+from world_gen.reference_lines import Stretch, reference_lines
 from world_gen.road_graph import DirectedEdge, RoadEdge
 
 Role = Literal["approach", "exit", "ring", "other"]
-MIN_LANE_M = 0.05
 
 
 class LaneKey(NamedTuple):
@@ -103,86 +102,78 @@ class LaneSet:
 
 def build_lanes(around: Surroundings) -> LaneSet:
     """Return every car lane within the World's extent, joined to lanes that simply go on."""
-    lanes: dict[str, LaneDraft] = {}
-    roads: list[Road] = []
-    borders: dict[str, tuple[Array, Array]] = {}
-    names: set[str] = set()
+    stretches, notes = reference_lines(around)
+    sections = [around.sections[stretch.edge] for stretch in stretches]
+    for index in dict.fromkeys(stretch.edge for stretch in stretches):
+        notes.extend(around.sections[index].notes)
+    curves = iter(_offsets(stretches, sections))
     places = {
         (leg.edge.index, leg.reverse): cluster.key
         for cluster in around.clusters
         for leg in cluster.legs
     }
+    lanes: dict[str, LaneDraft] = {}
+    roads: list[Road] = []
+    borders: dict[str, tuple[Array, Array]] = {}
+    names: set[str] = set()
     begins: dict[LaneKey, str] = {}
     ends: dict[LaneKey, str] = {}
-    notes: list[str] = []
-    inner = frozenset().union(*(c.inner for c in around.clusters))
     roles = _roles(around)
-    continuing = _directions_beyond(around)
-    for index, edge in sorted(around.edges.items()):
-        if index in inner:
-            continue
-        section = around.sections[index]
-        notes.extend(section.notes)
-        start = around.trims_m.get((index, False), 0.0)
-        stop = around.trims_m.get((index, True), 0.0)
-        way = without_repeats(edge.xy_m)
-        total = float(arc_lengths(way)[-1])
-        if total - start - stop < MIN_LANE_M:
-            notes.append(f"way {edge.way_id}: {total:.1f} m between junctions, too short for lanes")
-            continue
-        way = rounded(cut(way, start, total - stop))
-        before = continuing.get((index, False)) if start == 0.0 else None
-        after = continuing.get((index, True)) if stop == 0.0 else None
-        full_m = float(arc_lengths(way)[-1])
-        for from_m, to_m in stretches_inside(way, around.extent):
-            first, last = from_m == 0.0, to_m == full_m
-            line = way if first and last else cut(way, from_m, to_m)
-            road = _road_id(edge, names)
-            mine: list[str] = []
-            for plan in section.lanes:
-                key = LaneKey(index, plan.reverse, plan.number)
-                curve = offset(
-                    line,
-                    plan.left_m,
-                    before=before if first else None,
-                    after=after if last else None,
-                )
-                curve = np.round(without_repeats(curve), 3)
-                if len(curve) < 2:
-                    continue
-                name = f"{road}.{'b' if plan.reverse else 'f'}{plan.number}"
-                role = roles.get((index, plan.reverse), "other")
-                points = curve[::-1] if plan.reverse else curve
-                lanes[name] = LaneDraft(name, key, edge, plan, points, role, plan.turns, road)
-                mine.append(name)
-                if first:
-                    (ends if plan.reverse else begins)[key] = name
-                if last:
-                    (begins if plan.reverse else ends)[key] = name
-            _join_neighbours(mine, lanes)
-            on_before, on_after = before if first else None, after if last else None
-            borders[road] = (
-                offset(line, section.left_m, before=on_before, after=on_after),
-                offset(line, section.right_m, before=on_before, after=on_after),
+    for stretch, section in zip(stretches, sections, strict=True):
+        index, edge = stretch.edge, around.edges[stretch.edge]
+        road = _road_id(edge, names)
+        borders[road] = (next(curves), next(curves))
+        mine: list[str] = []
+        for plan in section.lanes:
+            points = next(curves)
+            if len(points) < 2:
+                continue
+            key = LaneKey(index, plan.reverse, plan.number)
+            name = f"{road}.{'b' if plan.reverse else 'f'}{plan.number}"
+            role = roles.get((index, plan.reverse), "other")
+            points = points[::-1] if plan.reverse else points
+            lanes[name] = LaneDraft(name, key, edge, plan, points, role, plan.turns, road)
+            mine.append(name)
+            if stretch.first:
+                (ends if plan.reverse else begins)[key] = name
+            if stretch.last:
+                (begins if plan.reverse else ends)[key] = name
+        _join_neighbours(mine, lanes)
+        roads.append(
+            Road(
+                id=road,
+                osm_way=edge.way_id,
+                name=edge.name,
+                road_class=edge.road_class,
+                reference_line=np.round(stretch.line, 3),
+                left_m=round(section.left_m, 3),
+                right_m=round(section.right_m, 3),
+                lane_ids=tuple(mine),
+                from_place=places.get((index, False)) if stretch.first else None,
+                to_place=places.get((index, True)) if stretch.last else None,
+                layer=edge.layer,
+                bridge=edge.tags.get("bridge", "no") != "no",
+                tunnel=edge.tags.get("tunnel", "no") not in ("no", "building_passage"),
             )
-            roads.append(
-                Road(
-                    id=road,
-                    osm_way=edge.way_id,
-                    name=edge.name,
-                    road_class=edge.road_class,
-                    reference_line=np.round(line, 3),
-                    left_m=round(section.left_m, 3),
-                    right_m=round(section.right_m, 3),
-                    lane_ids=tuple(mine),
-                    from_place=places.get((index, False)) if first else None,
-                    to_place=places.get((index, True)) if last else None,
-                    layer=edge.layer,
-                    bridge=edge.tags.get("bridge", "no") != "no",
-                    tunnel=edge.tags.get("tunnel", "no") not in ("no", "building_passage"),
-                )
-            )
+        )
     return LaneSet(lanes, tuple(roads), borders, begins, ends, tuple(notes))
+
+
+def _offsets(stretches: list[Stretch], sections: list[CrossSection]) -> list[Array]:
+    """Return for each stretch its left and right edge and its lanes' middles, along the nodes."""
+    if not stretches:
+        return []
+    left_m = [
+        (section.left_m, section.right_m, *(plan.left_m for plan in section.lanes))
+        for section in sections
+    ]
+    row = np.repeat(np.arange(len(stretches)), [len(mine) for mine in left_m])
+    lines = Polylines.of([stretch.line for stretch in stretches]).rows(row)
+    before = np.array([stretch.before for stretch in stretches])[row]
+    after = np.array([stretch.after for stretch in stretches])[row]
+    shift = np.array([value for mine in left_m for value in mine])
+    shifted = without_repeats(offset(lines, shift, before=before, after=after))
+    return Polylines(np.round(shifted.xy_m, 3), shifted.first).split()
 
 
 def _road_id(edge: RoadEdge, taken: set[str]) -> str:
@@ -213,22 +204,6 @@ def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:
             roles[index, leg.reverse] = roles.get((index, leg.reverse), "exit")
             roles[index, not leg.reverse] = "approach"
     return roles
-
-
-def _directions_beyond(around: Surroundings) -> dict[tuple[int, bool], Array]:
-    """Return, where a road merely goes on, its direction beyond each end (along the nodes)."""
-    beyond: dict[tuple[int, bool], Array] = {}
-    for cluster in around.clusters:
-        if not cluster.plain or any(
-            around.trims_m[leg.edge.index, leg.reverse] for leg in cluster.legs
-        ):
-            continue
-        for leg, other in (cluster.legs, cluster.legs[::-1]):
-            xy = without_repeats(other.xy_m)
-            away = unit(xy[1] - xy[0])
-            # Along the nodes: into this edge's start from the other, or on from its end.
-            beyond[leg.edge.index, leg.reverse] = away if leg.reverse else -away
-    return beyond
 
 
 def _join_neighbours(names: list[str], lanes: Mapping[str, LaneDraft]) -> None:
