@@ -1,0 +1,99 @@
+"""The formats that a World can be written in: one table, read by the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+
+OpenDriveVersion = Literal["1.8", "1.4"]
+OPENDRIVE_VERSIONS: tuple[OpenDriveVersion, ...] = get_args(OpenDriveVersion)
+Simulator = Literal["classic", "gazebo"]
+SIMULATORS: tuple[Simulator, ...] = get_args(Simulator)
+VehicleKind = Literal["twin", "shadow", "ghost"]
+VEHICLE_KINDS: tuple[VehicleKind, ...] = get_args(VehicleKind)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportOptions:
+    """What only some formats ask for."""
+
+    opendrive_version: OpenDriveVersion = "1.8"
+    simulator: Simulator = "classic"
+    vehicles: tuple[tuple[str, VehicleKind], ...] = ()
+    """Vehicles of an SDFormat world, name and kind; they need `vehicle`."""
+    vehicle: VehicleParameters | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format: how its files end, who reads them, and what writes them."""
+
+    name: str
+    suffix: str
+    read_by: str
+    write: Callable[[World, Path, ExportOptions], None]
+
+
+# Writers are imported when they are used: each needs libraries that the others do not.
+def _mjcf(world: World, path: Path, _: ExportOptions) -> None:
+    from world_gen.export.mjcf import write_mjcf
+
+    write_mjcf(world, path)
+
+
+def _sdf(world: World, path: Path, options: ExportOptions) -> None:
+    from world_gen.export.sdformat import write_sdf
+    from world_gen.export.sdformat_vehicles import place_vehicles
+
+    vehicles = place_vehicles(world, options.vehicles, options.vehicle) if options.vehicle else ()
+    write_sdf(world, path, simulator=options.simulator, vehicles=vehicles)
+
+
+def _opendrive(world: World, path: Path, options: ExportOptions) -> None:
+    from world_gen.export.opendrive import write_opendrive
+
+    write_opendrive(world, path, version=options.opendrive_version)
+
+
+def _lanelet2(world: World, path: Path, _: ExportOptions) -> None:
+    from world_gen.export.lanelet2 import write_lanelet2
+
+    write_lanelet2(world, path)
+
+
+def _commonroad(world: World, path: Path, _: ExportOptions) -> None:
+    from world_gen.export.commonroad import write_commonroad
+
+    write_commonroad(world, path)
+
+
+def _geojson(world: World, path: Path, _: ExportOptions) -> None:
+    from world_gen.export.geojson import write_geojson
+
+    write_geojson(world, path)
+
+
+def _picture(world: World, path: Path, _: ExportOptions) -> None:
+    from world_gen.export.picture import write_picture
+
+    write_picture(world, path)
+
+
+FORMATS: dict[str, Format] = {
+    format_.name: format_
+    for format_ in (
+        Format("mjcf", ".xml", "MuJoCo", _mjcf),
+        Format("sdf", ".sdf", "Gazebo Classic and Gazebo (SDFormat 1.7)", _sdf),
+        Format("opendrive", ".xodr", "esmini, CARLA, SUMO (OpenDRIVE 1.8 or 1.4)", _opendrive),
+        Format("lanelet2", ".osm", "Lanelet2 and Autoware", _lanelet2),
+        Format("commonroad", ".xml", "commonroad-io and CommonRoad's tools", _commonroad),
+        Format("geojson", ".geojson", "QGIS and other maps (RFC 7946)", _geojson),
+        Format("svg", ".svg", "browsers: the top-down picture", _picture),
+        Format("png", ".png", "everyone: the top-down picture", _picture),
+    )
+}  # fmt: skip

@@ -1,0 +1,206 @@
+"""The parts that SDFormat files are made of: links with named shapes, extrusions without holes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import shapely
+from lxml import etree
+from shapely.geometry import Polygon
+
+from contracts.arrays import Array
+
+Rgba = tuple[float, float, float, float]
+Element = etree._Element
+
+SAME_POINT_M = 0.002
+"""Gazebo triangulates extrusions after joining points this near: they must not be in the file."""
+LEAST_AREA_M2 = 0.05
+_MANY_POINTS = 400
+"""Outlines with more are halved: triangulating grows faster than the number of points."""
+
+
+def child(parent: Element, tag: str, text: str | None = None, **attributes: str) -> Element:
+    """Add an element and return it."""
+    element = etree.SubElement(parent, tag, attributes)
+    element.text = text
+    return element
+
+
+def numbers(*values: float, digits: int = 3) -> str:
+    """Return numbers as SDFormat has them, without needless zeros and never as -0."""
+    return " ".join(
+        f"{round(float(v), digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") for v in values
+    )
+
+
+def pose(parent: Element, x: float, y: float, z: float, yaw_rad: float = 0.0) -> None:
+    """Place the parent element, metres and radians."""
+    if x or y or z or yaw_rad:
+        child(parent, "pose", f"{numbers(x, y, z)} 0 0 {numbers(yaw_rad, digits=6)}")
+
+
+class StaticLink:
+    """One link of a model that never moves, to which shapes are added under names of their own."""
+
+    def __init__(self, world: Element, name: str) -> None:
+        model = child(world, "model", name=name)
+        child(model, "static", "1")
+        self._link = child(model, "link", name="link")
+        self._names: set[str] = set()
+
+    def box(
+        self, name: str, centre_m: Sequence[float], size_m: Sequence[float], *,
+        yaw_rad: float = 0.0, rgba: Rgba, solid: bool = False,
+    ) -> None:  # fmt: skip
+        """Add a box of (length, width, height) around a centre."""
+        for part in self._parts(name, solid, rgba):
+            pose(part, centre_m[0], centre_m[1], centre_m[2], yaw_rad)
+            self._finish(part, _box_geometry(size_m), rgba)
+
+    def cylinder(
+        self, name: str, centre_m: Sequence[float], radius_m: float, height_m: float, *, rgba: Rgba
+    ) -> None:  # fmt: skip
+        """Add an upright cylinder that is only seen."""
+        for part in self._parts(name, False, rgba):
+            pose(part, centre_m[0], centre_m[1], centre_m[2])
+            geometry = etree.Element("geometry")
+            shape = child(geometry, "cylinder")
+            child(shape, "radius", numbers(radius_m))
+            child(shape, "length", numbers(height_m))
+            self._finish(part, geometry, rgba)
+
+    def prism(
+        self, name: str, ring: Array, low_m: float, high_m: float, *, rgba: Rgba,
+        solid: bool = False,
+    ) -> None:  # fmt: skip
+        """Add an outline (N, 2) from one height to another, as a box where it is a rectangle."""
+        rectangle = rectangle_of(ring)
+        if rectangle is not None:
+            x, y, length, width, yaw = rectangle
+            self.box(
+                name, (x, y, (low_m + high_m) / 2), (length, width, high_m - low_m),
+                yaw_rad=yaw, rgba=rgba, solid=solid,
+            )  # fmt: skip
+            return
+        for part in self._parts(name, solid, rgba):
+            pose(part, 0.0, 0.0, low_m)
+            geometry = etree.Element("geometry")
+            polyline = child(geometry, "polyline")
+            for x, y in ring.tolist():
+                child(polyline, "point", numbers(x, y))
+            child(polyline, "height", numbers(high_m - low_m))
+            self._finish(part, geometry, rgba)
+
+    def _parts(self, name: str, solid: bool, rgba: Rgba) -> list[Element]:
+        name = self._free(name)
+        parts = [child(self._link, "collision", name=f"{name}.collision")] if solid else []
+        return [*parts, child(self._link, "visual", name=name)]
+
+    def _finish(self, part: Element, geometry: Element, rgba: Rgba) -> None:
+        part.append(geometry)
+        if part.tag == "visual":
+            material(part, rgba)
+
+    def _free(self, wanted: str) -> str:
+        """Return a name that SDFormat allows and that no other shape of the link has."""
+        plain = re.sub(r"[^\w.-]+", "_", wanted, flags=re.ASCII).strip("_") or "shape"
+        name, count = plain, 1
+        while name in self._names:
+            count += 1
+            name = f"{plain}_{count}"
+        self._names.add(name)
+        return name
+
+
+def _box_geometry(size_m: Sequence[float]) -> Element:
+    geometry = etree.Element("geometry")
+    child(child(geometry, "box"), "size", numbers(*size_m))
+    return geometry
+
+
+def material(visual: Element, rgba: Rgba) -> None:
+    """Give a visual one colour; its fourth number is opacity."""
+    if rgba[3] < 1.0:
+        child(visual, "transparency", numbers(1.0 - rgba[3]))
+    element = child(visual, "material")
+    child(element, "ambient", numbers(*rgba))
+    child(element, "diffuse", numbers(*rgba))
+
+
+def rectangle_of(
+    ring: Array, *, tolerance_m: float = 0.05
+) -> tuple[float, float, float, float, float] | None:
+    """Return x, y, length, width, yaw of a ring (4, 2) that is a rectangle, else None."""
+    if len(ring) != 4:
+        return None
+    sides = np.roll(ring, -1, axis=0) - ring
+    middle = ring.mean(axis=0)
+    if np.hypot(*(ring[0] + ring[2] - ring[1] - ring[3])) > tolerance_m:
+        return None
+    length, width = float(np.hypot(*sides[0])), float(np.hypot(*sides[1]))
+    if (
+        abs(float(sides[0] @ sides[1])) > tolerance_m * max(length, width)
+        or min(length, width) < 0.01
+    ):
+        return None
+    yaw = math.atan2(sides[0][1], sides[0][0])
+    return float(middle[0]), float(middle[1]), length, width, yaw
+
+
+def extrusions(
+    outline: Array, holes: Iterable[Array] = (), *, tolerance_m: float = 0.0
+) -> list[Array]:
+    """Return rings (N, 2) without holes that together cover a polygon.
+
+    SDFormat 1.7 has one outline per extrusion, so polygons are cut through their holes. Outlines
+    are simplified by no more than `tolerance_m`.
+    """
+    shape: shapely.Geometry = Polygon(outline, list(holes))
+    if tolerance_m:
+        shape = shape.simplify(tolerance_m)
+    if not shape.is_valid:
+        shape = shapely.make_valid(shape)
+    rings: list[Array | None] = []
+    for part in shapely.get_parts(shape):
+        if isinstance(part, Polygon):
+            rings.extend(_ring(piece) for piece in _without_holes(part))
+    return [ring for ring in rings if ring is not None]
+
+
+def _without_holes(polygon: Polygon) -> list[Polygon]:
+    if polygon.area < LEAST_AREA_M2:
+        return []
+    if not polygon.interiors and len(polygon.exterior.coords) <= _MANY_POINTS:
+        return [polygon]
+    west, south, east, north = polygon.bounds
+    across = 0 if east - west >= north - south else 1
+    if polygon.interiors:
+        inside = [
+            Polygon(hole).representative_point().coords[0][across] for hole in polygon.interiors
+        ]
+        at = sorted(inside)[len(inside) // 2]
+    else:
+        at = (west + east) / 2 if across == 0 else (south + north) / 2
+    if across == 0:
+        halves = shapely.box(west, south, at, north), shapely.box(at, south, east, north)
+    else:
+        halves = shapely.box(west, south, east, at), shapely.box(west, at, east, north)
+    pieces: list[Polygon] = []
+    for half in halves:
+        for part in shapely.get_parts(polygon.intersection(half)):
+            if isinstance(part, Polygon):
+                pieces.extend(_without_holes(part))
+    return pieces
+
+
+def _ring(polygon: Polygon) -> Array | None:
+    ring: Array = np.round(shapely.get_coordinates(shapely.orient_polygons(polygon).exterior), 3)[
+        :-1
+    ]
+    apart = np.hypot(*(ring - np.roll(ring, 1, axis=0)).T) > SAME_POINT_M
+    ring = ring[apart]
+    return ring if len(ring) >= 3 else None

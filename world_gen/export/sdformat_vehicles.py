@@ -1,0 +1,239 @@
+"""The three kinds of vehicle in an SDFormat world: twin, shadow and ghost.
+
+As in Vlasak et al., Low Fidelity Digital Twin for Automated Driving Systems (2024): a twin is a
+vehicle with physics, Ackermann steering and a GPS sensor; a shadow follows the pose of the real
+vehicle and can be run into; a ghost is a shadow that collides with nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+from world_gen.export.formats import Simulator, VehicleKind
+from world_gen.export.sdformat_plugins import ackermann_plugin, gps_sensor
+from world_gen.export.sdformat_shapes import Element, Rgba, child, material, numbers, pose
+from world_gen.polyline import direction_at, length, points_at
+
+WHEEL_RADIUS_M, WHEEL_WIDTH_M = 0.33, 0.2
+"""Assumed, as vehicle parameters do not have them: a 205/55 R16 tyre, rounded."""
+WHEEL_SHARE, KNUCKLE_SHARE = 0.018, 0.009
+"""Assumed shares of the mass of one wheel and of one steering knuckle."""
+GROUND_CLEARANCE_M = 0.18
+STEERING_DAMPING_NMSPRAD = 60.0
+"""Damps the wheels' angle to about 0.8 of critical: the drive plugin has little damping."""
+_GAP_M = 10.0
+_COLOURS: dict[str, Rgba] = {
+    "twin": (0.15, 0.6, 0.2, 1.0),
+    "shadow": (0.15, 0.35, 0.85, 0.75),
+    "ghost": (0.85, 0.85, 0.9, 0.4),
+}
+_TYRE: Rgba = (0.08, 0.08, 0.08, 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SdfVehicle:
+    """One vehicle of a world: its kind, and where base_link (the rear axle's centre) begins."""
+
+    name: str
+    kind: VehicleKind
+    parameters: VehicleParameters
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+
+
+def place_vehicles(
+    world: World, named: Sequence[tuple[str, VehicleKind]], parameters: VehicleParameters
+) -> tuple[SdfVehicle, ...]:
+    """Stand vehicles at the beginnings of the lanes towards the junction, the longest first."""
+    lanes = [lane for lane in world.lanes if lane.role == "approach" and lane.kind == "driving"]
+    lanes.sort(key=lambda lane: (-length(lane.centerline), lane.id))
+    behind = parameters.rear_overhang_m.value + 1.0
+    vehicles = []
+    for number, (name, kind) in enumerate(named):
+        row, column = divmod(number, max(len(lanes), 1))
+        x, y, yaw = row * _GAP_M, 0.0, 0.0
+        if lanes:
+            line = lanes[column].centerline
+            at = min(behind + row * _GAP_M, length(line))
+            (x, y), ahead = points_at(line, at), direction_at(line, at)
+            yaw = math.atan2(ahead[1], ahead[0])
+        vehicles.append(
+            SdfVehicle(
+                name=name, kind=kind, parameters=parameters, x_m=float(x), y_m=float(y), yaw_rad=yaw
+            )
+        )
+    return tuple(vehicles)
+
+
+def add_vehicle(parent: Element, vehicle: SdfVehicle, simulator: Simulator) -> None:
+    """Add a vehicle to a world; its model's frame is base_link."""
+    model = child(parent, "model", name=vehicle.name)
+    pose(model, vehicle.x_m, vehicle.y_m, 0.0, vehicle.yaw_rad)
+    if vehicle.kind == "twin":
+        _add_twin(model, vehicle, simulator)
+    else:
+        _add_shadow(model, vehicle)
+
+
+def _add_shadow(model: Element, vehicle: SdfVehicle) -> None:
+    """Add a body that nothing pushes and nothing pulls down: it stands where it is put."""
+    link = child(model, "link", name="base_link")
+    _body(link, vehicle, solid=vehicle.kind == "shadow")
+    car = vehicle.parameters
+    _inertial(
+        link, car.mass_kg.value, car.cog_from_rear_axle_m.value, car.cog_height_m.value,
+        _box_inertia(car, car.mass_kg.value, car.yaw_inertia_kgm2.value),
+    )  # fmt: skip
+    child(link, "gravity", "0")
+    child(link, "kinematic", "1")
+
+
+def _add_twin(model: Element, vehicle: SdfVehicle, simulator: Simulator) -> None:
+    car = vehicle.parameters
+    mass, wheelbase = car.mass_kg.value, car.wheelbase_m.value
+    wheel_kg, knuckle_kg = WHEEL_SHARE * mass, KNUCKLE_SHARE * mass
+    half_track = track_width_m(car) / 2
+    front_kg = 2 * (wheel_kg + knuckle_kg)
+    body_kg = mass - front_kg - 2 * wheel_kg
+    # The parts together have the mass, centre of gravity and yaw inertia of the parameters.
+    cog_x = (mass * car.cog_from_rear_axle_m.value - front_kg * wheelbase) / body_kg
+    low_kg = front_kg + 2 * wheel_kg
+    cog_z = (mass * car.cog_height_m.value - low_kg * WHEEL_RADIUS_M) / body_kg
+    cog = car.cog_from_rear_axle_m.value
+    rest = (
+        front_kg * ((wheelbase - cog) ** 2 + half_track**2)
+        + 2 * wheel_kg * (cog**2 + half_track**2)
+        + body_kg * (cog_x - cog) ** 2
+    )
+    yaw_inertia = max(car.yaw_inertia_kgm2.value - rest, 0.2 * car.yaw_inertia_kgm2.value)
+    body = child(model, "link", name="base_link")
+    _body(body, vehicle, solid=True)
+    _inertial(body, body_kg, cog_x, cog_z, _box_inertia(car, body_kg, yaw_inertia))
+    gps_sensor(body, vehicle.name, simulator, above_m=car.height_m.value)
+    effort = (
+        mass * WHEEL_RADIUS_M / 2
+        * max(car.max_drive_accel_mps2.value, car.max_brake_decel_mps2.value)
+    )  # fmt: skip
+    inner = steering_limit_rad(car)
+    for side, y in (("left", half_track), ("right", -half_track)):
+        _wheel(model, f"rear_{side}_wheel", 0.0, y, wheel_kg, car.friction.value)
+        _hinge(model, f"rear_{side}_wheel_joint", "base_link", f"rear_{side}_wheel", effort=effort)
+        knuckle = child(model, "link", name=f"front_{side}_knuckle")
+        pose(knuckle, wheelbase, y, WHEEL_RADIUS_M)
+        _inertial(knuckle, knuckle_kg, 0.0, 0.0, (0.2, 0.2, 0.2))
+        _hinge(
+            model, f"front_{side}_steer_joint", "base_link", f"front_{side}_knuckle",
+            axis="0 0 1", limit_rad=inner, damping=STEERING_DAMPING_NMSPRAD,
+        )  # fmt: skip
+        _wheel(model, f"front_{side}_wheel", wheelbase, y, wheel_kg, car.friction.value)
+        _hinge(
+            model, f"front_{side}_wheel_joint", f"front_{side}_knuckle", f"front_{side}_wheel"
+        )  # fmt: skip
+    ackermann_plugin(
+        model, vehicle.name, car, simulator,
+        wheel_radius_m=WHEEL_RADIUS_M, track_m=2 * half_track,
+    )  # fmt: skip
+
+
+def track_width_m(car: VehicleParameters) -> float:
+    """Distance between the middles of an axle's wheels, their outsides flush with the body."""
+    return car.width_m.value - WHEEL_WIDTH_M
+
+
+def steering_limit_rad(car: VehicleParameters) -> float:
+    """Largest angle of the inner front wheel, by Ackermann's rule from that of a bicycle."""
+    tan = math.tan(car.max_tire_angle_rad.value)
+    return math.atan2(tan, 1.0 - track_width_m(car) / (2 * car.wheelbase_m.value) * tan)
+
+
+def _body(link: Element, vehicle: SdfVehicle, *, solid: bool) -> None:
+    car = vehicle.parameters
+    high = car.height_m.value - GROUND_CLEARANCE_M
+    centre = car.length_m.value / 2 - car.rear_overhang_m.value
+    for tag in ("collision", "visual") if solid else ("visual",):
+        part = child(link, tag, name=f"body.{tag}")
+        pose(part, centre, 0.0, GROUND_CLEARANCE_M + high / 2)
+        shape = child(child(part, "geometry"), "box")
+        # The wheels of a twin stand within its box: links of one model do not collide.
+        child(shape, "size", numbers(car.length_m.value, car.width_m.value, high))
+        if tag == "visual":
+            material(part, _COLOURS[vehicle.kind])
+
+
+def _box_inertia(
+    car: VehicleParameters, mass_kg: float, yaw_inertia_kgm2: float
+) -> tuple[float, float, float]:
+    roll = mass_kg / 12.0 * (car.width_m.value**2 + car.height_m.value**2)
+    return roll, yaw_inertia_kgm2, yaw_inertia_kgm2
+
+
+def _inertial(
+    link: Element, mass_kg: float, x_m: float, z_m: float, inertia: tuple[float, float, float]
+) -> None:
+    inertial = child(link, "inertial")
+    pose(inertial, x_m, 0.0, z_m)
+    child(inertial, "mass", numbers(mass_kg))
+    tensor = child(inertial, "inertia")
+    for name, value in zip(
+        ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+        (inertia[0], 0.0, 0.0, inertia[1], 0.0, inertia[2]),
+        strict=True,
+    ):
+        child(tensor, name, numbers(value, digits=4))
+
+
+def _wheel(model: Element, name: str, x: float, y: float, mass_kg: float, friction: float) -> None:
+    link = child(model, "link", name=name)
+    pose(link, x, y, WHEEL_RADIUS_M)
+    spin = 0.5 * mass_kg * WHEEL_RADIUS_M**2
+    tilt = mass_kg / 12.0 * (3 * WHEEL_RADIUS_M**2 + WHEEL_WIDTH_M**2)
+    _inertial(link, mass_kg, 0.0, 0.0, (tilt, spin, tilt))
+    for tag in ("collision", "visual"):
+        part = child(link, tag, name=f"tyre.{tag}")
+        child(part, "pose", f"0 0 0 {numbers(np.pi / 2, digits=6)} 0 0")
+        shape = child(child(part, "geometry"), "cylinder")
+        child(shape, "radius", numbers(WHEEL_RADIUS_M))
+        child(shape, "length", numbers(WHEEL_WIDTH_M))
+        if tag == "visual":
+            material(part, _TYRE)
+            continue
+        surface = child(part, "surface")
+        grip = child(child(surface, "friction"), "ode")
+        child(grip, "mu", numbers(friction))
+        child(grip, "mu2", numbers(friction))
+        contact = child(child(surface, "contact"), "ode")
+        child(contact, "kp", "1e7")
+        child(contact, "kd", "1e3")
+        child(contact, "min_depth", "0.001")
+
+
+def _hinge(
+    model: Element,
+    name: str,
+    parent: str,
+    of: str,
+    *,
+    axis: str = "0 1 0",
+    limit_rad: float | None = None,
+    effort: float | None = None,
+    damping: float = 0.0,
+) -> None:
+    joint = child(model, "joint", name=name, type="revolute")
+    child(joint, "parent", parent)
+    child(joint, "child", of)
+    element = child(joint, "axis")
+    child(element, "xyz", axis)
+    limit = child(element, "limit")
+    child(limit, "lower", "-1e16" if limit_rad is None else numbers(-limit_rad, digits=4))
+    child(limit, "upper", "1e16" if limit_rad is None else numbers(limit_rad, digits=4))
+    if effort is not None:
+        child(limit, "effort", numbers(effort))
+    if damping:
+        child(child(element, "dynamics"), "damping", numbers(damping))
