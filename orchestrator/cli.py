@@ -85,18 +85,50 @@ def intersections(
 @app.command()
 def world(
     map_file: MapArgument,
-    out: OutOption,
+    out: Annotated[
+        Path, typer.Option("--out", help="file to write; a folder with --route and --all")
+    ],
     at: Annotated[str | None, typer.Option(help="LAT,LON: the junction nearest to it")] = None,
     junction_id: Annotated[str | None, typer.Option("--id", help="the junction's id")] = None,
+    bbox: Annotated[
+        str | None, typer.Option(help="W,S,E,N in degrees: one World of the whole region")
+    ] = None,
+    route: Annotated[
+        Path | None, typer.Option(help="each junction along this GPX or GeoJSON line")
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="each junction of the map")] = False,
+    file_format: Annotated[
+        str,
+        typer.Option(
+            "--format", help="mjcf, sdf, opendrive, lanelet2, commonroad, geojson, svg or png"
+        ),
+    ] = "mjcf",
     radius: Annotated[float, typer.Option(help="metres around the junction")] = 150.0,
-    file_format: Annotated[str, typer.Option("--format", help="mjcf or png")] = "mjcf",
+    opendrive_version: Annotated[str, typer.Option(help="1.8, or 1.4 for CARLA")] = "1.8",
+    simulator: Annotated[
+        str, typer.Option(help="sdf: classic (Gazebo Classic with ROS 2) or gazebo (gz-sim)")
+    ] = "classic",
+    vehicles: Annotated[
+        str, typer.Option(help="sdf: NAME:KIND,… (twin, shadow, ghost), or none")
+    ] = "twin:twin,shadow:shadow,ghost:ghost",
+    vehicle: Annotated[Path | None, typer.Option(help="sdf: vehicle parameters, TOML")] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="also say what was tagged and what was guessed")
+    ] = False,
 ) -> None:
-    """Write the World of one junction: a MuJoCo model or a top-down picture."""
-    from orchestrator.map_commands import write_world
+    """Write Worlds of a map: models, road networks for other simulators, or pictures."""
+    from orchestrator.world_command import WorldRequest, write_worlds
 
-    write_world(
-        map_file, at=at, junction_id=junction_id, radius_m=radius, file_format=file_format, out=out
-    )
+    raise typer.Exit(
+        write_worlds(
+            WorldRequest(
+                map_file=map_file, out=out, at=at, junction_id=junction_id, bbox=bbox,
+                route=route, everything=everything, file_format=file_format, radius_m=radius,
+                opendrive_version=opendrive_version, simulator=simulator, vehicles=vehicles,
+                vehicle=vehicle, report=report,
+            )
+        )
+    )  # fmt: skip
 
 
 @app.command()

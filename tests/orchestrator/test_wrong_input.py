@@ -110,7 +110,7 @@ def test_an_unknown_flag_and_format(tmp_path: Path, capsys: pytest.CaptureFixtur
     out = tmp_path / "w.stl"
     code = run(["world", str(EMBEDDED_MAP), "--at", "45,-30", "--format", "stl", "--out", str(out)])
     assert code == 2
-    assert "mjcf, png" in capsys.readouterr().err
+    assert "mjcf, sdf, opendrive" in capsys.readouterr().err
 
 
 def test_a_place_without_a_junction(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

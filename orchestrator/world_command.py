@@ -1,0 +1,209 @@
+"""The command `world`: checks what is asked for, builds the Worlds, writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from contracts.errors import UserError
+from contracts.world import World
+from orchestrator.map_choice import (
+    OpenMap,
+    bounds_of,
+    junction_by_id,
+    junctions_along,
+    nearest_junction,
+    open_map,
+    parse_bbox,
+)
+from orchestrator.world_files import write_each, write_report
+from world_gen.build import build_region, build_world
+from world_gen.export.formats import (
+    FORMATS,
+    OPENDRIVE_VERSIONS,
+    SIMULATORS,
+    VEHICLE_KINDS,
+    ExportOptions,
+    Format,
+    VehicleKind,
+)
+from world_gen.intersections import Junction
+from world_gen.map_index import MapIndex, index_map
+
+_Word = TypeVar("_Word", bound=str)
+MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldRequest:
+    """What was asked for on the command line, as it was typed."""
+
+    map_file: Path
+    out: Path
+    at: str | None = None
+    junction_id: str | None = None
+    bbox: str | None = None
+    route: Path | None = None
+    everything: bool = False
+    file_format: str = "mjcf"
+    radius_m: float = 150.0
+    opendrive_version: str = "1.8"
+    simulator: str = "classic"
+    vehicles: str = "twin:twin,shadow:shadow,ghost:ghost"
+    vehicle: Path | None = None
+    report: bool = False
+
+
+def write_worlds(request: WorldRequest) -> int:
+    """Build and write what is asked for; returns 0, or 3 where some of many Worlds failed.
+
+    Raises UserError, in one line, for anything that cannot be meant.
+    """
+    format_ = _format(request)
+    options = _options(request)
+    many = request.everything or request.route is not None
+    _check_out(request.out, many=many)
+    opened = open_map(request.map_file)
+    if request.bbox is not None:
+        bounds = bounds_of(opened, request.bbox)
+        world = build_region(opened.osm, opened.graph, bounds, index=_index(opened))
+        _write_one(world, request, format_, options)
+        return 0
+    if not many:
+        junction = _one_junction(opened, request)
+        world = build_world(
+            opened.osm, opened.graph, junction, radius_m=request.radius_m, index=_index(opened)
+        )
+        _write_one(world, request, format_, options)
+        return 0
+    return _write_many(opened, request, format_, options)
+
+
+def _write_one(
+    world: World, request: WorldRequest, format_: Format, options: ExportOptions
+) -> None:
+    format_.write(world, request.out, options)
+    s = world.intersection
+    place = s.kind if s.kind == "region" else f"{s.kind} {s.name or s.id} ({s.id})"
+    print(f"{request.out}: {place}, {len(world.lanes)} lanes, {len(world.buildings)} buildings, "
+          f"{len(world.notes)} notes. {world.attribution}")  # fmt: skip
+    if request.report:
+        write_report(world, request.out, show=True)
+
+
+def _write_many(
+    opened: OpenMap, request: WorldRequest, format_: Format, options: ExportOptions
+) -> int:
+    junctions = _junctions(opened, request)
+    index = _index(opened)
+
+    def built(junction: Junction) -> World:
+        return build_world(
+            opened.osm, opened.graph, junction, radius_m=request.radius_m, index=index
+        )
+
+    return write_each(
+        junctions, built, lambda world, path: format_.write(world, path, options),
+        folder=request.out, suffix=format_.suffix, report=request.report,
+        attribution=opened.osm.attribution,
+    )  # fmt: skip
+
+
+def _junctions(opened: OpenMap, request: WorldRequest) -> Sequence[Junction]:
+    if request.route is None:
+        found: Sequence[Junction] = sorted(opened.junctions, key=lambda j: j.summary.id)
+    else:  # a junction that is passed twice is written once
+        along = junctions_along(opened, request.route)
+        found = tuple({j.summary.id: j for j in along}.values())
+    if not found:
+        where = "in this map" if request.route is None else f"along {request.route}"
+        raise UserError(f"{opened.file}: no intersection {where}")
+    return found
+
+
+def _one_junction(opened: OpenMap, request: WorldRequest) -> Junction:
+    if request.junction_id is not None:
+        return junction_by_id(opened, request.junction_id)
+    return nearest_junction(opened, request.at or "")
+
+
+def _index(opened: OpenMap) -> MapIndex:
+    return index_map(opened.osm, opened.graph, opened.junctions)
+
+
+def _format(request: WorldRequest) -> Format:
+    chosen = [
+        name
+        for name, given in (
+            ("--at", request.at is not None), ("--id", request.junction_id is not None),
+            ("--bbox", request.bbox is not None), ("--route", request.route is not None),
+            ("--all", request.everything),
+        )
+        if given
+    ]  # fmt: skip
+    if len(chosen) != 1:
+        raise UserError(
+            "name the place by exactly one of --at LAT,LON, --id ID, --bbox W,S,E,N, "
+            f"--route FILE or --all; got {' and '.join(chosen) or 'none'}"
+        )
+    if request.file_format not in FORMATS:
+        raise UserError(f"--format {request.file_format}: one of {', '.join(FORMATS)}")
+    if not MIN_RADIUS_M <= request.radius_m <= MAX_RADIUS_M:
+        raise UserError(
+            f"--radius {request.radius_m}: {MIN_RADIUS_M:.0f} to {MAX_RADIUS_M:.0f} metres"
+        )
+    if request.bbox is not None:  # before the map is read, which may take long
+        parse_bbox("--bbox", request.bbox)
+    return FORMATS[request.file_format]
+
+
+def _options(request: WorldRequest) -> ExportOptions:
+    version = _one_of("--opendrive-version", request.opendrive_version, OPENDRIVE_VERSIONS)
+    simulator = _one_of("--simulator", request.simulator, SIMULATORS)
+    vehicles = _vehicles(request.vehicles)
+    if request.file_format != "sdf" or not vehicles:
+        return ExportOptions(opendrive_version=version, simulator=simulator)
+    from sim_worker.vehicle.parameters import load_vehicle
+
+    return ExportOptions(
+        simulator=simulator, vehicles=vehicles, vehicle=load_vehicle(request.vehicle)
+    )
+
+
+def _one_of(option: str, word: str, choices: tuple[_Word, ...]) -> _Word:
+    for choice in choices:
+        if choice == word:
+            return choice
+    raise UserError(f"{option} {word}: one of {', '.join(choices)}")
+
+
+def _vehicles(text: str) -> tuple[tuple[str, VehicleKind], ...]:
+    """Return (name, kind) pairs of NAME:KIND,… or none."""
+    if text == "none":
+        return ()
+    pairs = []
+    for part in text.split(","):
+        name, _, word = part.partition(":")
+        kind = next((kind for kind in VEHICLE_KINDS if kind == word), None)
+        if kind is None or not name.isidentifier():
+            raise UserError(
+                f"--vehicles {text}: none, or NAME:KIND,… with KIND one of "
+                f"{', '.join(VEHICLE_KINDS)}"
+            )
+        pairs.append((name, kind))
+    if len({name for name, _ in pairs}) < len(pairs):
+        raise UserError(f"--vehicles {text}: each vehicle needs a name of its own")
+    return tuple(pairs)
+
+
+def _check_out(out: Path, *, many: bool) -> None:
+    if many:
+        if out.exists() and not out.is_dir():
+            raise UserError(f"--out {out}: is a file; --all and --route write into a folder")
+        out.mkdir(parents=True, exist_ok=True)
+    elif out.is_dir():
+        raise UserError(f"--out {out}: is a folder; name the file to write")
+    elif not out.parent.is_dir():
+        raise UserError(f"--out {out}: folder {out.parent} does not exist")

@@ -1,0 +1,129 @@
+"""Writes many Worlds into a folder, with a progress bar, and says what became of them."""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from contracts.world import World
+from world_gen.intersections import Junction
+
+PLAIN_PERIOD_S = 5.0
+"""Between lines of progress where there is no terminal."""
+FAILURES_FILE = "failures.txt"
+SOME_FAILED = 3
+_SHOWN_KINDS = 20
+
+
+def write_each(
+    junctions: Sequence[Junction],
+    build: Callable[[Junction], World],
+    write: Callable[[World, Path], None],
+    *,
+    folder: Path,
+    suffix: str,
+    attribution: str,
+    report: bool = False,
+) -> int:
+    """Write one file per junction, named by its id; returns 0, or 3 where some failed.
+
+    What goes wrong with one junction is said in a line and in the failures file of the folder,
+    and does not stop the others.
+    """
+    kinds: Counter[str] = Counter()
+    failures: list[str] = []
+    with _progress(len(junctions)) as (advance, say):
+        for junction in junctions:
+            name = junction.summary.id
+            path = folder / f"{_file_name(name)}{suffix}"
+            try:
+                world = build(junction)
+                write(world, path)
+                if report:
+                    write_report(world, path, show=False)
+                kinds.update({_kind(note) for note in world.notes})
+            except Exception as error:  # one bad junction never stops the rest
+                path.unlink(missing_ok=True)
+                failures.append(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
+                say(f"failed: {failures[-1]}")
+            advance(name)
+    return _summary(len(junctions), failures, kinds, folder, attribution)
+
+
+def write_report(world: World, path: Path, *, show: bool) -> None:
+    """Write what was tagged, inferred and guessed beside a World's file; print it if asked to."""
+    from world_gen.report import report_of
+
+    found = report_of(world)
+    text = found.as_text()
+    path.with_name(f"{path.name}.report.md").write_text(text, encoding="utf-8")
+    json = found.as_json()
+    path.with_name(f"{path.name}.report.json").write_bytes(
+        json if isinstance(json, bytes) else json.encode()
+    )
+    if show:
+        from rich.markdown import Markdown
+
+        Console().print(Markdown(text))
+
+
+def _summary(
+    count: int, failures: list[str], kinds: Counter[str], folder: Path, attribution: str
+) -> int:
+    listed = folder / FAILURES_FILE
+    listed.unlink(missing_ok=True)
+    print(f"{folder}: {count - len(failures)} of {count} Worlds written. {attribution}")
+    for kind, junctions in kinds.most_common(_SHOWN_KINDS):
+        print(f"  {junctions:6d}  {kind}")
+    if len(kinds) > _SHOWN_KINDS:
+        print(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
+    if not failures:
+        return 0
+    listed.write_text("\n".join(failures) + "\n", encoding="utf-8")
+    print(f"{len(failures)} failed: {listed}", file=sys.stderr)
+    return SOME_FAILED
+
+
+def _kind(note: str) -> str:
+    """Return a note without what is particular to one object: its numbers and quoted values."""
+    plain = re.sub(r"'[^']*'|\"[^\"]*\"|(?<==)[^\s;,]+", "…", note)
+    return re.sub(r"-?\d+(\.\d+)?", "#", plain)
+
+
+def _file_name(junction_id: str) -> str:
+    return re.sub(r"[^\w.+-]+", "_", junction_id)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
+    """Give a function that counts one more and one that prints a line beside the bar."""
+    console = Console(stderr=True, highlight=False)
+
+    def say(text: str) -> None:
+        console.print(text, soft_wrap=True, markup=False)
+
+    if console.is_terminal:
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+                   TimeRemainingColumn())  # fmt: skip
+        with Progress(*columns, console=console) as bar:
+            task = bar.add_task("worlds", total=total)
+            yield lambda name: bar.update(task, advance=1, description=name), say
+        return
+    done, last_s = 0, time.monotonic()
+
+    def advance(name: str) -> None:
+        nonlocal done, last_s
+        done += 1
+        if time.monotonic() - last_s >= PLAIN_PERIOD_S:
+            last_s = time.monotonic()
+            say(f"{done} of {total} Worlds, {name}")
+
+    yield advance, say
