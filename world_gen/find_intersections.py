@@ -22,6 +22,9 @@ STAGGER_M = 8.0
 """Opposite arms whose axes lie farther apart make a junction staggered."""
 MERGE_RAD = math.radians(50.0)
 """A one-way road joins or leaves at no larger angle, else drivers turn."""
+THROUGH_RAD = math.radians(35.0)
+BESIDE_RAD = math.radians(45.0)
+"""The stem of a T meets a road that bends no more, at no smaller angle; else the three make a Y."""
 
 
 def find_intersections(
@@ -36,9 +39,6 @@ def find_intersections(
     no node and do not meet. The result for one place does not depend on the rest of the map.
     """
     roads = car_roads(osm, graph)
-    signalled = frozenset(
-        node for node, tags in osm.node_tags.items() if tags.get("highway") == "traffic_signals"
-    )
     wanted = None
     if edges is not None:
         wanted = {
@@ -47,7 +47,7 @@ def find_intersections(
             for node in (graph.edges[index].start_node, graph.edges[index].end_node)
         }
     found = []
-    for cluster in cluster_branchings(roads, graph, signalled):
+    for cluster in cluster_branchings(roads, graph, osm.node_tags):
         junction = _junction(cluster, roads, osm, graph)
         if junction is not None and (wanted is None or wanted & junction.nodes):
             found.append(junction)
@@ -120,7 +120,7 @@ def _kind(cluster: Cluster, arms: tuple[Approach, ...], mini: bool) -> JunctionK
     if _is_merge(arms):
         return "merge"
     if len(arms) == 3:
-        return "t_junction"
+        return "t_junction" if _has_through_road(arms) else "y_junction"
     if len(arms) == 4:
         return "staggered" if _is_staggered(arms) else "crossing"
     return "crossing" if len(arms) > 4 else "other"
@@ -140,6 +140,17 @@ def _is_merge(arms: tuple[Approach, ...]) -> bool:
         return False
     a, b = (item.arm.bearing_rad for item in pair)
     return abs(math.remainder(a - b, math.tau)) <= MERGE_RAD
+
+
+def _has_through_road(arms: tuple[Approach, ...]) -> bool:
+    """Tell whether one of three roads meets the other two from the side, as a stem does."""
+    for stem in range(3):
+        a, b = (arms[i].arm.bearing_rad for i in range(3) if i != stem)
+        straight = abs(math.remainder(a - b + math.pi, math.tau)) <= THROUGH_RAD
+        sides = (math.remainder(arms[stem].arm.bearing_rad - other, math.tau) for other in (a, b))
+        if straight and all(abs(side) >= BESIDE_RAD for side in sides):
+            return True
+    return False
 
 
 def _is_staggered(arms: tuple[Approach, ...]) -> bool:

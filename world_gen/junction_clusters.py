@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 from world_gen.chains import CarRoads, Chain
 from world_gen.grouping import Cluster, Grouping
+from world_gen.junction_control import Tags, facing
 from world_gen.road_graph import RoadGraph
 from world_gen.slip_roads import add_slips
 
@@ -19,6 +20,9 @@ MEDIAN_M = 60.0
 """Carriageways of one street are no farther apart where another road crosses them."""
 SIGNALLED_M = 45.0
 """Signalled branchings so near each other, with no signal between them, are one junction."""
+STAGGER_M = 30.0
+"""Side roads to the left and right of a road that meet it so near each other stagger a crossing."""
+STRAIGHT_RAD, BESIDE_RAD = math.radians(20.0), math.radians(50.0)
 STOP_LINE_M = 30.0
 """Signals stand no farther before the branching that they govern."""
 FLARE_M = 80.0
@@ -28,12 +32,12 @@ WIDEST_M = 70.0
 
 
 def cluster_branchings(
-    roads: CarRoads, graph: RoadGraph, signalled: frozenset[int]
+    roads: CarRoads, graph: RoadGraph, node_tags: Mapping[int, Tags]
 ) -> list[Cluster]:
     """Return the branchings and rings grouped into junctions, by their smallest node id.
 
-    `signalled` are nodes with a traffic light. A group may still turn out to be no junction:
-    a street that parts into its carriageways is a group with two arms.
+    A group may still turn out to be no junction: a street that parts into its carriageways is a
+    group with two arms.
     """
     grouping = Grouping(roads, graph.node_xy_m)
     single = [chain for chains in roads.chains_from.values() for chain in chains]
@@ -46,9 +50,11 @@ def cluster_branchings(
             chain.length_m <= CLOSE_M
             or _links_carriageways(chain, roads)
             or _in_island(chain, roads)
-            or (chain.length_m <= SIGNALLED_M and _one_signal(chain, roads, signalled))
+            or (chain.length_m <= SIGNALLED_M and _one_signal(chain, roads, node_tags))
         ):
             grouping.join(chain, WIDEST_M)
+        elif _staggers(chain, roads):
+            grouping.join(chain, STAGGER_M)
     _add_flares(grouping, roads)
     add_slips(grouping, roads)
     return grouping.clusters()
@@ -95,26 +101,52 @@ def _in_island(chain: Chain, roads: CarRoads) -> bool:
     return False
 
 
-def _one_signal(chain: Chain, roads: CarRoads, signalled: frozenset[int]) -> bool:
+def _one_signal(chain: Chain, roads: CarRoads, node_tags: Mapping[int, Tags]) -> bool:
     """Tell whether both ends of a chain are signalled and nothing stops a driver in between."""
     ends = (chain.start, chain.end)
-    if any(node in signalled for node, _ in chain.nodes() if node not in ends):
+    if any(node not in ends and _is_signal(node, node_tags) for node, _ in chain.nodes()):
         return False
-    return all(_has_signal(node, chain, roads, signalled) for node in ends)
+    return all(_has_signal(node, chain, roads, node_tags) for node in ends)
 
 
-def _has_signal(node: int, besides: Chain, roads: CarRoads, signalled: frozenset[int]) -> bool:
-    if node in signalled:
-        return True
-    for chain in roads.chains_from[node]:
-        if chain.key == besides.key or not chain.inward:
-            continue
-        for passed, distance_m in chain.nodes():
-            if distance_m > STOP_LINE_M:
-                break
-            if passed in signalled:
-                return True
-    return False
+def _has_signal(node: int, besides: Chain, roads: CarRoads, node_tags: Mapping[int, Tags]) -> bool:
+    return _is_signal(node, node_tags) or any(
+        True
+        for chain in roads.chains_from[node]
+        if chain.key != besides.key and chain.inward
+        for _ in facing(chain, node_tags, STOP_LINE_M, "traffic_signals")
+    )
+
+
+def _is_signal(node: int, node_tags: Mapping[int, Tags]) -> bool:
+    return node_tags.get(node, {}).get("highway") == "traffic_signals"
+
+
+def _staggers(chain: Chain, roads: CarRoads) -> bool:
+    """Tell whether a chain is the piece of a straight road between side roads on both sides."""
+    if chain.length_m > STAGGER_M:
+        return False
+    sides = [_side_road(chain, roads, end) for end in (chain.start, chain.end)]
+    return 0.0 not in sides and sides[0] * sides[1] < 0.0
+
+
+def _side_road(chain: Chain, roads: CarRoads, node: int) -> float:
+    """Return on which side of a chain the one road leaves that meets it at an end.
+
+    1 is left and -1 right, seen from the chain's start; 0 where no one road leaves beside a
+    straight one.
+    """
+    at_start = node == chain.start
+    others = [other for other in roads.chains_from[node] if other.key != chain.key]
+    if len(others) != 2 or any(other.one_way for other in (chain, *others)):
+        return 0.0
+    ahead = chain.bearing_rad(chain.length_m)
+    turns = [math.remainder(other.bearing_rad(15.0) - ahead, math.tau) for other in others]
+    along = math.pi if at_start else 0.0
+    turns.sort(key=lambda turn: abs(math.remainder(turn - along, math.tau)))
+    straight = abs(math.remainder(turns[0] - along, math.tau)) < STRAIGHT_RAD
+    beside = abs(math.sin(turns[1])) > math.sin(BESIDE_RAD)
+    return math.copysign(1.0, turns[1]) if straight and beside else 0.0
 
 
 def _add_flares(grouping: Grouping, roads: CarRoads) -> None:

@@ -34,7 +34,7 @@ def control_of(
     lights = any(_is_light(tags, 0.0) for tags in inner) or any(
         _is_light(tags, distance_m)
         for chain in incoming
-        for tags, distance_m in _facing(chain, node_tags, SIGNALS_WITHIN_M, "traffic_signals")
+        for tags, distance_m in facing(chain, node_tags, SIGNALS_WITHIN_M, "traffic_signals")
     )
     if lights:
         return "signals"
@@ -57,7 +57,7 @@ def control_of(
 
 
 def _sign(chain: Chain, node_tags: Mapping[int, Tags], word: str) -> Tags | None:
-    for tags, _ in _facing(chain, node_tags, SIGNS_WITHIN_M, word):
+    for tags, _ in facing(chain, node_tags, SIGNS_WITHIN_M, word):
         if tags.get("highway") == word:
             return tags
     return None
@@ -70,10 +70,14 @@ def _is_light(tags: Tags, distance_m: float) -> bool:
     return distance_m <= PEDESTRIAN_LIGHT_M or not pedestrians
 
 
-def _facing(
+def facing(
     chain: Chain, node_tags: Mapping[int, Tags], within_m: float, word: str
 ) -> Iterator[tuple[Tags, float]]:
-    """Yield (tags, metres before the junction) of nodes that drivers towards it obey."""
+    """Yield (tags, metres before the junction) of nodes that drivers towards it obey.
+
+    `chain` leaves the junction; nodes of `highway=word` on it count up to `within_m` where they
+    are tagged to face who comes in, else on its nearer half alone.
+    """
     nearer_m = min(within_m, chain.length_m / 2.0)
     directions = _directions(chain)
     for node, distance_m in chain.nodes():

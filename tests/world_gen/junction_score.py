@@ -51,6 +51,8 @@ class Seen:
 
     letter_of: Mapping[str, str]
     lanes: Mapping[str, Lane]
+    inside: frozenset[str]
+    """Lanes from one place of the junction to another: of a ring, of a flare."""
     connections: Mapping[str, Connection]
     movements_of: Mapping[str, frozenset[str]]
     """The movements that lead over each connection, by its id."""
@@ -85,6 +87,11 @@ def _see(truth: TrueJunction, world: World, junction: WorldJunction) -> Seen:
     letter_of = {arm.road: letter for letter, arm in truth.arms.items()}
     lanes = {lane.id: lane for lane in world.lanes}
     connections = {c.id: c for c in world.connections if c.junction_id == junction.summary.id}
+    places = {c.place_id for c in connections.values()}
+    between = {
+        road.id for road in world.roads if road.from_place in places and road.to_place in places
+    }
+    inside = frozenset(lane.id for lane in world.lanes if lane.road_id in between)
     onward: dict[str, list[Connection]] = defaultdict(list)
     for c in connections.values():
         onward[c.from_lane_id].append(c)
@@ -92,9 +99,9 @@ def _see(truth: TrueJunction, world: World, junction: WorldJunction) -> Seen:
     turns: dict[str, set[str]] = defaultdict(set)
     for c in connections.values():
         first = lanes[c.from_lane_id]
-        if first.kind != "driving" or first.role == "ring":
+        if first.kind != "driving" or first.id in inside:
             continue
-        for path in _paths([c], onward, lanes):
+        for path in _paths([c], onward, inside):
             last = lanes[path[-1].to_lane_id]
             if last.kind == "driving":
                 start = letter_of.get(first.name, first.name or "?")
@@ -105,6 +112,7 @@ def _see(truth: TrueJunction, world: World, junction: WorldJunction) -> Seen:
     return Seen(
         letter_of=letter_of,
         lanes=lanes,
+        inside=inside,
         connections=connections,
         movements_of={key: frozenset(found) for key, found in movements_of.items()},
         turns={key: frozenset(found) for key, found in turns.items()},
@@ -112,17 +120,17 @@ def _see(truth: TrueJunction, world: World, junction: WorldJunction) -> Seen:
 
 
 def _paths(
-    path: list[Connection], onward: Mapping[str, list[Connection]], lanes: Mapping[str, Lane]
+    path: list[Connection], onward: Mapping[str, list[Connection]], inside: frozenset[str]
 ) -> Iterator[list[Connection]]:
-    """Yield the ways on through a ring, each lane of it once, to the lanes that leave it."""
+    """Yield the ways on through the junction, each lane in it once, to the lanes that leave it."""
     end = path[-1].to_lane_id
-    if lanes[end].role != "ring":
+    if end not in inside:
         yield path
         return
     passed = {c.from_lane_id for c in path}
     for c in onward.get(end, ()):
         if c.from_lane_id not in passed:
-            yield from _paths([*path, c], onward, lanes)
+            yield from _paths([*path, c], onward, inside)
 
 
 def _score_arms(truth: TrueJunction, junction: WorldJunction, result: Score) -> None:
@@ -144,7 +152,7 @@ def _score_lanes(truth: TrueJunction, world: World, seen: Seen, result: Score) -
         road = roads[lane.road_id]
         ends = (road.to_place, road.from_place)
         there, back = ends[::-1] if lane.reverse else ends
-        if lane.role != "ring":
+        if lane.id not in seen.inside:
             found[lane.name, lane.kind, "in"] += there in places
             found[lane.name, lane.kind, "out"] += back in places
     for arm in truth.arms.values():

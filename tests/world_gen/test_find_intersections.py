@@ -24,7 +24,10 @@ def dual_carriageway(sketch: Sketch, gap_m: float = 14.0) -> None:
     ("bearings_deg", "kind"),
     [
         ([0, 90, 180], "t_junction"),
-        ([0, 120, 240], "t_junction"),
+        ([0, 60, 180], "t_junction"),
+        ([0, 100, 200], "t_junction"),
+        ([0, 120, 240], "y_junction"),
+        ([0, 160, 200], "y_junction"),
         ([0, 90, 180, 270], "crossing"),
         ([0, 60, 130, 200, 290], "crossing"),
     ],
@@ -139,7 +142,9 @@ def test_a_side_street_with_a_traffic_island_is_one_junction(tmp_path: Path) -> 
     assert found.nodes == {2, 3, 5}
 
 
-@pytest.mark.parametrize(("offset_m", "kinds"), [(14, ["staggered"]), (60, ["t_junction"] * 2)])
+@pytest.mark.parametrize(
+    ("offset_m", "kinds"), [(14, ["staggered"]), (27, ["staggered"]), (60, ["t_junction"] * 2)]
+)
 def test_offset_side_streets(offset_m: float, kinds: list[str], tmp_path: Path) -> None:
     sketch = Sketch()
     for node, x_m, y_m in (
@@ -212,3 +217,15 @@ def test_only_those_that_touch_given_edges(tmp_path: Path) -> None:
     assert len(every) == 2
     near = [edge.index for edge in graph.edges if edge.name == "Arm 4"]
     assert [j.summary.id for j in find_intersections(osm, graph, edges=near)] == ["n1"]
+
+
+def test_side_streets_on_the_same_side_stay_two_junctions(tmp_path: Path) -> None:
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -200, 0), (2, 0, 0), (3, 27, 0), (4, 200, 0), (5, 0, 150), (6, 27, 150),
+    ):  # fmt: skip
+        sketch.node(node, x_m, y_m)
+    sketch.road(100, [1, 2, 3, 4], "Haupt")
+    sketch.road(101, [5, 2], "Erste")
+    sketch.road(102, [6, 3], "Zweite")
+    assert [j.summary.kind for j in sketch.junctions(tmp_path)] == ["t_junction"] * 2
