@@ -148,6 +148,8 @@ def left_hand_crossing(d: Drawing) -> None:
 
 def u_turn_link(d: Drawing) -> None:
     carriageways(d)
+    d.node(0, -16, **GIVE_WAY)
+    d.way("Südweg", "tertiary", (0, -120), (0, -16), (0, -7))
     d.node(0, 2, **GIVE_WAY)
     d.way("", "primary_link", (0, -7), (0, 2), (0, 7), oneway="yes")
 
