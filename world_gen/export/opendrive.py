@@ -9,7 +9,10 @@ from lxml import etree
 from contracts.frames import LocalFrame
 from contracts.world import ATTRIBUTION, World
 from world_gen.export.opendrive_elements import Version, number, road_element
-from world_gen.export.opendrive_places import OdrJunction, network_of
+from world_gen.export.opendrive_junctions import junction_elements, ring_elements
+from world_gen.export.opendrive_objects import add_objects
+from world_gen.export.opendrive_places import network_of
+from world_gen.export.opendrive_signals import add_signals
 
 
 def write_opendrive(world: World, path: Path, *, version: Version = "1.8") -> None:
@@ -32,11 +35,17 @@ def opendrive_element(world: World, *, version: Version = "1.8") -> etree._Eleme
     root = etree.Element("OpenDRIVE")
     root.append(etree.Comment(f" Made by foretwin from map data: {world.attribution} "))
     root.append(_header(world, version))
+    elements = {
+        road.id: road_element(road, side=network.side, version=version) for road in network.roads
+    }
+    add_objects(world, network, elements, version)
+    controllers = add_signals(world, network, elements, version)
     for road in network.roads:
-        root.append(road_element(road, side=network.side, version=version))
-    names = {junction.summary.id: junction.summary.name for junction in world.junctions}
-    for junction in network.junctions:
-        root.append(_junction_element(junction, names.get(junction.junction_id, ""), version))
+        etree.SubElement(elements[road.id], "userData", code="foretwin_id", value=road.source)
+        root.append(elements[road.id])
+    root.extend(controller.element for controller in controllers)
+    root.extend(junction_elements(world, network, controllers, version))
+    root.extend(ring_elements(world, network))
     return root
 
 
@@ -83,23 +92,3 @@ def _header(world: World, version: Version) -> etree._Element:
     ):
         etree.SubElement(header, "userData", code=code, value=value)
     return header
-
-
-def _junction_element(junction: OdrJunction, name: str, version: Version) -> etree._Element:
-    element = etree.Element("junction", name=name)
-    element.set("id", str(junction.id))
-    if version == "1.8":
-        element.set("type", "default")
-    for i, item in enumerate(junction.connections):
-        connection = etree.SubElement(
-            element,
-            "connection",
-            incomingRoad=str(item.incoming),
-            connectingRoad=str(item.road.id),
-            contactPoint="start",
-        )
-        connection.set("id", str(i))
-        link = etree.SubElement(connection, "laneLink")
-        link.set("from", str(item.from_number))
-        link.set("to", str(item.to_number))
-    return element
