@@ -6,14 +6,18 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from contracts.arrays import Array
 from contracts.frames import GeoPoint, LocalFrame
 from world_gen.node_locations import NodeLocations
 from world_gen.opl import NO_POSITION, IntArray, NodePositions, WayNodes
 from world_gen.osm_map import LatLonBounds, MapError, OsmMap, OsmRelation, OsmWay
 
+BoolArray = npt.NDArray[np.bool_]
 UNITS_PER_DEG = 10_000_000
 LONGEST_WAY_DEG = 2.0
 """A way that reaches farther has a node in the wrong place: no street spans 200 km."""
@@ -22,6 +26,7 @@ WIDEST_MAP_DEG = 60.0
 MOST_VISITS = 16
 """A road that passes one of its nodes more often than this is a mistake."""
 MOST_NAMED = 3
+NO_WAYS = "the map holds none of its ways; left out"
 
 
 @dataclass(slots=True, kw_only=True)
@@ -51,37 +56,27 @@ def assemble_map(
 
     Raises `MapError` where there is no road with positions, or roads all over the Earth.
     """
-    notes = objects.notes
     table = objects.positions
-    rows, placed = _rows_of(table, objects.way_nodes.nodes)
+    is_road = np.array(["highway" in tags for tags in objects.way_tags], dtype=bool)
+    sound = sound_ways(objects.way_ids, is_road, objects.way_nodes, table)
+    notes = [*objects.notes, *(text for _, text in sound.notes)]
+    nodes = sound.nodes.nodes.tolist()
+    ends = list(accumulate(sound.nodes.counts.tolist(), initial=0))
+    picked = sound.picked.tolist()
     ways: dict[int, OsmWay] = {}
-    used = np.zeros(len(table.ids), dtype=bool)
-    node_ids = objects.way_nodes.nodes.tolist()
-    ends = list(accumulate(objects.way_nodes.counts.tolist(), initial=0))
-    faults = _faulty(objects, rows, placed)
-    order = sorted(range(len(objects.way_ids)), key=objects.way_ids.__getitem__)
-    for i in order:
-        way_id, begin, end = objects.way_ids[i], ends[i], ends[i + 1]
-        nodes = tuple(node_ids[begin:end])
-        if faults[i]:
-            at = slice(begin, end)
-            part = _mended(way_id, nodes, placed[at], _spots(table, rows[at]), notes)
-            if part is None:
-                continue
-            nodes = nodes[part]
-            used[rows[at][part]] = True
-        elif way_id in ways:
+    for k in sorted(range(len(picked)), key=lambda k: objects.way_ids[picked[k]]):
+        way_id, tags = objects.way_ids[picked[k]], objects.way_tags[picked[k]]
+        if way_id in ways:
             notes.append(f"way {way_id}: stands in the file more than once; the last is used")
-        tags = objects.way_tags[i]
-        if (
-            len(nodes) > MOST_VISITS
-            and "highway" in tags
-            and _turns_on_itself(way_id, nodes, notes)
-        ):
-            continue
-        ways[way_id] = OsmWay(way_id, nodes, tags)
-    sound = np.repeat(~faults, objects.way_nodes.counts)
-    used[rows[sound & placed]] = True
+        ways[way_id] = OsmWay(way_id, tuple(nodes[ends[k] : ends[k + 1]]), tags)
+    relations = {}
+    for key, relation in objects.relations.items():
+        if any(m.kind == "w" and m.ref in ways for m in relation.members):
+            relations[key] = relation
+        else:
+            notes.append(f"relation {key}: {NO_WAYS}")
+    used = np.zeros(len(table.ids), dtype=bool)
+    used[sound.rows] = True
     tagged_rows, tagged_placed = _rows_of(table, np.array(list(objects.node_tags), dtype=np.int64))
     used[tagged_rows[tagged_placed]] = True
     lat_lon = np.stack([table.lat_1e7[used], table.lon_1e7[used]], axis=-1) / UNITS_PER_DEG
@@ -95,7 +90,7 @@ def assemble_map(
         frame = frame or LocalFrame(centre_of(box))
     return OsmMap(
         file=file, sha256=sha256, attribution=attribution, bounds=bounds, frame=frame,
-        locations=locations, node_tags=objects.node_tags, ways=ways, relations=objects.relations,
+        locations=locations, node_tags=objects.node_tags, ways=ways, relations=relations,
         notes=tuple(dict.fromkeys(notes)),
     )  # fmt: skip
 
@@ -125,28 +120,67 @@ def sorted_positions(chunks: Sequence[NodePositions], notes: list[str]) -> NodeP
     return NodePositions(ids, lat, lon)
 
 
-def _rows_of(table: NodePositions, nodes: IntArray) -> tuple[IntArray, np.ndarray]:
+def _rows_of(table: NodePositions, nodes: IntArray) -> tuple[IntArray, BoolArray]:
     if not len(table.ids):
         return np.zeros(len(nodes), dtype=np.int64), np.zeros(len(nodes), dtype=bool)
     rows = np.minimum(np.searchsorted(table.ids, nodes), len(table.ids) - 1)
     return rows, table.ids[rows] == nodes
 
 
-def _spots(table: NodePositions, rows: IntArray) -> IntArray:
-    return np.stack([table.lat_1e7[rows], table.lon_1e7[rows]], axis=-1)
+class SoundWays(NamedTuple):
+    """The ways that can be used, and what was left out or mended."""
+
+    picked: IntArray
+    """Which of the given ways (K,)."""
+    nodes: WayNodes
+    rows: IntArray
+    """Where each of their nodes (M,) stands among the positions."""
+    notes: list[tuple[int, str]]
+    """The way's place among those given, and the words."""
 
 
-def _faulty(objects: MapObjects, rows: IntArray, placed: np.ndarray) -> np.ndarray:
+def sound_ways(
+    way_ids: Sequence[int], is_road: BoolArray, way_nodes: WayNodes, positions: NodePositions
+) -> SoundWays:
+    """Return ways without gaps, of two and more nodes, with a length that a street can have."""
+    nodes, counts = way_nodes
+    rows, placed = _rows_of(positions, nodes)
+    faulty = _faulty(counts, rows, placed, positions)
+    begins = np.cumsum(counts) - counts
+    kept = np.repeat(~faulty, counts)
+    notes: list[tuple[int, str]] = []
+    for i in np.flatnonzero(faulty).tolist():
+        at = slice(int(begins[i]), int(begins[i] + counts[i]))
+        spots = (
+            np.stack([c[rows[at]] for c in positions[1:]], axis=-1) if placed[at].any() else None
+        )
+        mended = _mended(nodes[at], placed[at], spots)
+        if mended.words:
+            notes.append((i, f"way {way_ids[i]}: {mended.words}"))
+        if mended.part is not None:
+            kept[at][mended.part] = True
+    for i in np.flatnonzero(is_road & (counts > MOST_VISITS)).tolist():
+        at = slice(int(begins[i]), int(begins[i] + counts[i]))
+        if words := _turns_on_itself(nodes[at].tolist()):
+            notes.append((i, f"way {way_ids[i]}: {words}; left out"))
+            kept[at] = False
+    of_way = np.repeat(np.arange(len(counts)), counts)[kept]
+    left = np.bincount(of_way, minlength=len(counts))
+    picked = np.flatnonzero(left)
+    return SoundWays(picked, WayNodes(nodes[kept], left[picked]), rows[kept], notes)
+
+
+def _faulty(
+    counts: IntArray, rows: IntArray, placed: BoolArray, positions: NodePositions
+) -> BoolArray:
     """Return per way whether it has gaps, fewer than two nodes, no length or too much of it."""
-    counts = objects.way_nodes.counts
-    faulty = counts < 2
+    faulty: BoolArray = counts < 2
     if not len(rows):
         return faulty
     filled = np.flatnonzero(counts > 0)
     begins = (np.cumsum(counts) - counts)[filled]
     reach = np.zeros(len(filled), dtype=np.int64)
-    table = objects.positions
-    for column in (table.lat_1e7, table.lon_1e7):
+    for column in positions[1:]:
         values = column[rows] if len(column) else np.zeros(len(rows), dtype=np.int64)
         span = np.maximum.reduceat(values, begins) - np.minimum.reduceat(values, begins)
         reach = np.maximum(reach, span)
@@ -155,33 +189,30 @@ def _faulty(objects: MapObjects, rows: IntArray, placed: np.ndarray) -> np.ndarr
     return faulty
 
 
-def _mended(
-    way_id: int, nodes: tuple[int, ...], placed: np.ndarray, spots: IntArray, notes: list[str]
-) -> slice | None:
-    """Return the longest stretch of a way whose nodes are known, or None; say what is lost."""
-    absent = [node for node, there in zip(nodes, placed.tolist(), strict=True) if not there]
+class _Mended(NamedTuple):
+    part: slice | None
+    words: str
+
+
+def _mended(nodes: IntArray, placed: BoolArray, spots: IntArray | None) -> _Mended:
+    """Return the longest stretch of a way whose nodes are known, or None, and what is lost."""
+    absent = nodes[~placed].tolist()
     edges = [-1, *np.flatnonzero(~placed).tolist(), len(nodes)]
     begin, end = max(pairwise(edges), key=lambda pair: pair[1] - pair[0])
-    part = slice(begin + 1, end)
-    if absent:
-        lost = f"way {way_id}: the map lacks its {_named(absent)}"
-        if end - begin - 1 < 2:
-            notes.append(f"{lost}; left out")
-            return None
-        notes.append(f"{lost}; {end - begin - 1} of its {len(nodes)} nodes are kept")
-    elif len(nodes) < 2:
-        notes.append(f"way {way_id}: has fewer than two nodes; left out")
-        return None
+    part, count = slice(begin + 1, end), end - begin - 1
+    lost = f"the map lacks its {_named(absent)}; " if absent else ""
+    if count < 2 or spots is None:
+        return _Mended(None, f"{lost or 'has fewer than two nodes; '}left out")
     known = spots[part]
     if (known == known[0]).all():
-        notes.append(f"way {way_id}: has no length; left out")
-        return None
-    reach = np.ptp(known, axis=0) / UNITS_PER_DEG
-    reach[1] = min(reach[1], np.ptp(known[:, 1] % (360 * UNITS_PER_DEG)) / UNITS_PER_DEG)
-    if reach.max() > LONGEST_WAY_DEG and np.abs(known[:, 0]).max() < 89 * UNITS_PER_DEG:
-        notes.append(f"way {way_id}: reaches over {reach.max():.0f} degrees; left out")
-        return None
-    return part
+        return _Mended(None, f"{lost}has no length; left out")
+    reach_deg = np.ptp(known, axis=0) / UNITS_PER_DEG
+    around = known[:, 1] % (360 * UNITS_PER_DEG)
+    reach_deg[1] = min(reach_deg[1], np.ptp(around) / UNITS_PER_DEG)
+    near_pole = np.abs(known[:, 0]).max() > 89 * UNITS_PER_DEG
+    if (reach_deg[0] if near_pole else reach_deg.max()) > LONGEST_WAY_DEG:
+        return _Mended(None, f"{lost}reaches over {reach_deg.max():.0f} degrees; left out")
+    return _Mended(part, f"{lost}{count} of its {len(nodes)} nodes are kept" if absent else "")
 
 
 def _named(nodes: Sequence[int]) -> str:
@@ -190,17 +221,14 @@ def _named(nodes: Sequence[int]) -> str:
     return f"node{'s' if len(nodes) > 1 else ''} {some}{more}"
 
 
-def _turns_on_itself(way_id: int, nodes: tuple[int, ...], notes: list[str]) -> bool:
+def _turns_on_itself(nodes: Sequence[int]) -> str:
     if len(nodes) - len(set(nodes)) < MOST_VISITS:
-        return False
+        return ""
     node, visits = Counter(nodes).most_common(1)[0]
-    if visits <= MOST_VISITS:
-        return False
-    notes.append(f"way {way_id}: passes node {node} {visits} times; left out")
-    return True
+    return f"passes node {node} {visits} times" if visits > MOST_VISITS else ""
 
 
-def bounds_of(file: str, lat_lon_deg: np.ndarray) -> LatLonBounds:
+def bounds_of(file: str, lat_lon_deg: Array, *, widest_deg: float = WIDEST_MAP_DEG) -> LatLonBounds:
     """Return the box around positions (N, 2); across the antimeridian where that is narrower.
 
     Raises `MapError` where it is too wide for one plane.
@@ -214,10 +242,10 @@ def bounds_of(file: str, lat_lon_deg: np.ndarray) -> LatLonBounds:
     box = LatLonBounds(float(lat.min()), west, float(lat.max()), east)
     width_deg = (east - west) % 360.0
     near_pole = max(abs(box.south), abs(box.north)) > 89.0
-    if max(0.0 if near_pole else width_deg, box.north - box.south) > WIDEST_MAP_DEG:
+    if max(0.0 if near_pole else width_deg, box.north - box.south) > widest_deg:
         raise MapError(
             f"{file}: its roads reach over {width_deg:.0f} by {box.north - box.south:.0f} degrees; "
-            f"cut out a region of less than {WIDEST_MAP_DEG:.0f}"
+            f"cut out a region of less than {widest_deg:.0f}"
         )
     return box
 

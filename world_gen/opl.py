@@ -8,7 +8,7 @@ way across. The format: https://osmcode.org/opl-file-format/
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from world_gen.osm_map import OsmMember, OsmRelation
 
 IntArray = npt.NDArray[np.int64]
 OPL_OPTIONS = "opl,add_metadata=false"
-NO_POSITION = 9_990_000_000
+NO_POSITION = 2**31 - 1
 """Stands for a coordinate that the file does not give, in units of 1e-7 degrees."""
 _ESCAPE = re.compile("%([0-9a-f]+)%")
 _LETTERS_TO_SPACES = bytes.maketrans(b"nTxy,", b"     ")
@@ -34,10 +34,10 @@ class NodePositions(NamedTuple):
 
 
 class NodeObjects(NamedTuple):
-    """Nodes in the order of the file, and the tags of those that have wanted ones."""
+    """Nodes in the order of the file, and the tags, as OPL, of those that have wanted ones."""
 
     positions: NodePositions
-    tags: dict[int, Mapping[str, str]]
+    tag_texts: dict[int, str]
 
 
 class WayLines(NamedTuple):
@@ -86,32 +86,36 @@ def sections(text: bytes) -> Iterator[tuple[str, bytes]]:
         yield chr(text[begin]), text[begin:end]
 
 
-def read_nodes(section: bytes, wanted_keys: Collection[str], tags_of: TagReader) -> NodeObjects:
-    """Read lines such as `n1 Thighway=stop x8.5 y53.25`."""
-    section, tags = _without_tags(section, frozenset(wanted_keys), tags_of)
+def any_key(keys: Iterable[str]) -> re.Pattern[str]:
+    """Return what finds one of the keys in tags as OPL."""
+    return re.compile(f"(?:^|,)(?:{'|'.join(re.escape(key) for key in keys)})=")
+
+
+def read_nodes(section: bytes, wanted: re.Pattern[str]) -> NodeObjects:
+    """Read lines such as `n1 Thighway=stop x8.5 y53.25`; `wanted` is from `any_key`."""
+    section, texts = _without_tags(section, wanted)
     if b" x " in section or b" y\n" in section:
         section = section.replace(b" x ", b" x999 ").replace(b" y\n", b" y999\n")
     numbers = _integers(section.translate(_LETTERS_TO_SPACES, b".")).reshape(-1, 3)
     scaled = numbers[:, 1:] * _missing_decimals(section).reshape(-1, 2)
-    return NodeObjects(NodePositions(numbers[:, 0], scaled[:, 1], scaled[:, 0]), tags)
+    scaled = np.minimum(scaled, NO_POSITION)
+    return NodeObjects(NodePositions(numbers[:, 0], scaled[:, 1], scaled[:, 0]), texts)
 
 
-def _without_tags(
-    section: bytes, wanted: frozenset[str], tags_of: TagReader
-) -> tuple[bytes, dict[int, Mapping[str, str]]]:
+def _without_tags(section: bytes, wanted: re.Pattern[str]) -> tuple[bytes, dict[int, str]]:
     """Cut the tags out of lines of nodes; spaces in tags are escaped, so " T" begins a field."""
     letters = np.frombuffer(section, dtype=np.uint8)
     begins = np.flatnonzero((letters[:-2] == 32) & (letters[1:-1] == 84) & (letters[2:] != 32))
-    found: dict[int, Mapping[str, str]] = {}
+    found: dict[int, str] = {}
     pieces: list[bytes] = []
     done = 0
     for begin in begins.tolist():
         end = section.index(b" ", begin + 2)
-        tags = tags_of(_text(section[begin + 2 : end]))
+        text = _text(section[begin + 2 : end])
         pieces.append(section[done : begin + 2])
         done = end
-        if not wanted.isdisjoint(tags):
-            found[int(section[section.rfind(b"n", 0, begin) + 1 : begin])] = tags
+        if wanted.search(text):
+            found[int(section[section.rfind(b"n", 0, begin) + 1 : begin])] = text
     if not pieces:
         return section, found
     return b"".join((*pieces, section[done:])), found

@@ -24,6 +24,7 @@ from world_gen.opl import (
     NodePositions,
     TagReader,
     WayLines,
+    any_key,
     read_nodes,
     read_relations,
     sections,
@@ -32,8 +33,10 @@ from world_gen.opl import (
 )
 from world_gen.osm_map import OsmMap, OsmRelation
 
-WAY_KEYS = frozenset(("highway", "railway", "building", "building:part", "area:highway", "barrier"))
-NODE_KEYS = frozenset((
+WANTED_WAYS = any_key(
+    ("highway", "railway", "building", "building:part", "area:highway", "barrier")
+)
+WANTED_NODES = any_key((
     "highway", "railway", "barrier", "crossing", "traffic_calming", "traffic_sign",
     "traffic_signals", "junction", "stop", "give_way", "kerb", "driving_side",
 ))  # fmt: skip
@@ -94,9 +97,9 @@ class DecodedObjects:
         """Add whole lines of OPL."""
         for letter, section in sections(text):
             if letter == "n":
-                nodes = read_nodes(section, NODE_KEYS, self.tags_of)
+                nodes = read_nodes(section, WANTED_NODES)
                 self.positions.append(nodes.positions)
-                self.node_tags.update(nodes.tags)
+                self.node_tags.update((n, self.tags_of(t)) for n, t in nodes.tag_texts.items())
             elif letter == "w":
                 more = way_lines(section)
                 self.ways.ids.extend(more.ids)
@@ -112,10 +115,9 @@ class DecodedObjects:
         members = {m.ref for r in self.relations.values() for m in r.members if m.kind == "w"}
         ids, tags, texts = [], [], []
         for way, tag_text, node_text in zip(*self.ways, strict=True):
-            of_way = self.tags_of(tag_text)
-            if not WAY_KEYS.isdisjoint(of_way) or way in members:
+            if way in members or WANTED_WAYS.search(tag_text):
                 ids.append(way)
-                tags.append(of_way)
+                tags.append(self.tags_of(tag_text))
                 texts.append(node_text)
         return MapObjects(
             way_ids=ids,
