@@ -1,0 +1,256 @@
+"""Left and right borders of lanes and connections, with every shared point shared exactly.
+
+The lanes of a road lie between parallels of its reference line, so neighbours have one border in
+common, point by point. Where a lane leads straight into another their ends are drawn together;
+a connection begins on its first lane's end points and ends on its second's, and takes up every
+change of width on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
+from contracts.world import Connection, Lane, World
+from world_gen.export.parallels import filled, parallel, untangled
+from world_gen.polyline import arc_lengths, left_of, unit
+
+BLEND_M = 10.0
+"""Over this length a border bends to the point where another road's border takes over."""
+_GAP_M = 0.3
+"""Lanes whose edges lie nearer to each other touch; a wider gap is no lane's."""
+_COINCIDENT_M = 0.005
+_Place = tuple[str, int, int]
+"""Road, border counted from the left of its reference line, and end: 0 first, 1 last."""
+
+
+class Borders(NamedTuple):
+    """The borders (N, 2) of one lane in metres, in driving direction, with as many points each."""
+
+    left: Array
+    right: Array
+
+
+class _Side(NamedTuple):
+    """Which of its road's borders, counted from the left, are a lane's left and right ones."""
+
+    left: int
+    right: int
+
+
+class _RoadDraft(NamedTuple):
+    line: Array
+    offsets_m: list[float]
+    sides: dict[str, _Side]
+
+
+def lane_borders(world: World) -> dict[str, Borders]:
+    """Return the borders of every lane and connection of a World by its id."""
+    lanes = {lane.id: lane for lane in world.lanes}
+    roads = _roads(world, lanes)
+    beyond = _directions_beyond(lanes, roads)
+    drawn = {
+        name: parallel(
+            road.line,
+            np.array(road.offsets_m),
+            before=beyond.get((name, 0)),
+            after=beyond.get((name, 1)),
+        )
+        for name, road in roads.items()
+    }
+    _join_ends(lanes, roads, drawn)
+    found: dict[str, Borders] = {}
+    for name, road in roads.items():
+        lines = np.round(drawn[name], 3)
+        for lane_id, side in road.sides.items():
+            step = -1 if lanes[lane_id].reverse else 1
+            found[lane_id] = Borders(lines[side.left][::step], lines[side.right][::step])
+    found.update(_connection_borders(world.connections, found))
+    return found
+
+
+def _roads(world: World, lanes: Mapping[str, Lane]) -> dict[str, _RoadDraft]:
+    """Return where borders lie on each road; a lane without a road is a road of its own."""
+    found: dict[str, _RoadDraft] = {}
+    for road in world.roads:
+        mine = [lanes[name] for name in road.lane_ids if name in lanes]
+        line = _distinct(road.reference_line)
+        if mine and len(line) >= 2:
+            found[road.id] = _road(line, mine)
+    placed = {name for road in found.values() for name in road.sides}
+    for lane in world.lanes:
+        if lane.id not in placed:
+            half = lane.width_m.value / 2
+            side = _Side(1, 0) if lane.reverse else _Side(0, 1)
+            line = _distinct(lane.centerline[::-1] if lane.reverse else lane.centerline)
+            found[f"lane {lane.id}"] = _RoadDraft(line, [half, -half], {lane.id: side})
+    return found
+
+
+def _distinct(line: Array) -> Array:
+    """Return a line (N, 2) without points that coincide with the one before; its ends stay."""
+    steps = np.hypot(*np.diff(line, axis=0).T)
+    kept: Array = line[np.concatenate([[True], steps > _COINCIDENT_M])]
+    kept[-1] = line[-1]
+    return kept
+
+
+def _road(line: Array, lanes: Sequence[Lane]) -> _RoadDraft:
+    offsets: list[float] = []
+    sides: dict[str, _Side] = {}
+    for lane in sorted(lanes, key=lambda lane: -lane.left_of_reference_m):
+        left = lane.left_of_reference_m + lane.width_m.value / 2
+        right = lane.left_of_reference_m - lane.width_m.value / 2
+        if offsets and abs(offsets[-1] - left) <= _GAP_M:
+            offsets[-1] = (offsets[-1] + left) / 2
+        else:
+            offsets.append(left)
+        offsets.append(right)
+        outer = len(offsets) - 2
+        sides[lane.id] = _Side(outer + 1, outer) if lane.reverse else _Side(outer, outer + 1)
+    return _RoadDraft(line, offsets, sides)
+
+
+def _road_of(roads: Mapping[str, _RoadDraft]) -> dict[str, str]:
+    return {lane_id: name for name, road in roads.items() for lane_id in road.sides}
+
+
+def _directions_beyond(
+    lanes: Mapping[str, Lane], roads: Mapping[str, _RoadDraft]
+) -> dict[tuple[str, int], Array]:
+    """Return, where lanes lead straight into others, the road's direction beyond its end.
+
+    By (road, end), as a unit vector (2,) along that road's own reference line.
+    """
+    road_of = _road_of(roads)
+    found: dict[tuple[str, int], Array] = {}
+    for lane in lanes.values():
+        for follower in (lanes[name] for name in lane.successor_ids if name in lanes):
+            here, there = road_of[lane.id], road_of[follower.id]
+            leaving = _heading(roads[here].line, first=False, reverse=lane.reverse)
+            entering = _heading(roads[there].line, first=True, reverse=follower.reverse)
+            found[here, 0 if lane.reverse else 1] = -entering if lane.reverse else entering
+            found[there, 1 if follower.reverse else 0] = -leaving if follower.reverse else leaving
+    return found
+
+
+def _heading(line: Array, *, first: bool, reverse: bool) -> Array:
+    """Return the driving direction where a lane of the road begins, or where it ends."""
+    step = line[1] - line[0] if first != reverse else line[-1] - line[-2]
+    return unit(-step if reverse else step)
+
+
+def _join_ends(
+    lanes: Mapping[str, Lane], roads: Mapping[str, _RoadDraft], drawn: dict[str, Array]
+) -> None:
+    """Draw the ends of borders together where a lane leads straight into another."""
+    road_of = _road_of(roads)
+    groups = _Groups()
+    for lane in lanes.values():
+        for follower in (lanes[name] for name in lane.successor_ids if name in lanes):
+            here, there = road_of[lane.id], road_of[follower.id]
+            end, start = 0 if lane.reverse else 1, 1 if follower.reverse else 0
+            mine, its = roads[here].sides[lane.id], roads[there].sides[follower.id]
+            groups.join((here, mine.left, end), (there, its.left, start))
+            groups.join((here, mine.right, end), (there, its.right, start))
+    for members in groups.found():
+        ends = np.array([drawn[road][border, -end] for road, border, end in members])
+        meeting = ends.mean(axis=0)
+        for (road, border, end), at in zip(members, ends, strict=True):
+            line = drawn[road][border]
+            s = arc_lengths(line)
+            gone = s if end == 0 else s[-1] - s
+            reach = max(min(BLEND_M, s[-1] / 2), 1e-6)
+            line += np.clip(1.0 - gone / reach, 0.0, 1.0)[:, None] * (meeting - at)
+            line[-end] = meeting
+
+
+class _Groups:
+    """Ends of borders that become one point; never two of the same end of a road."""
+
+    def __init__(self) -> None:
+        self._group_of: dict[_Place, int] = {}
+        self._members: dict[int, list[_Place]] = {}
+
+    def join(self, a: _Place, b: _Place) -> None:
+        mine, other = self._group(a), self._group(b)
+        if mine == other:
+            return
+        ends = {(road, end): border for road, border, end in self._members[mine]}
+        if any(
+            ends.get((road, end), border) != border for road, border, end in self._members[other]
+        ):
+            return
+        for place in self._members.pop(other):
+            self._members[mine].append(place)
+            self._group_of[place] = mine
+
+    def found(self) -> list[list[_Place]]:
+        return [members for members in self._members.values() if len(members) > 1]
+
+    def _group(self, place: _Place) -> int:
+        if place not in self._group_of:
+            self._group_of[place] = number = len(self._group_of)
+            self._members[number] = [place]
+        return self._group_of[place]
+
+
+def _connection_borders(
+    connections: Sequence[Connection], lanes: Mapping[str, Borders]
+) -> dict[str, Borders]:
+    found: dict[str, Borders] = {}
+    for connection in connections:
+        start, end = lanes.get(connection.from_lane_id), lanes.get(connection.to_lane_id)
+        if start is not None and end is not None:
+            middle = connection.centerline
+            found[connection.id] = Borders(
+                _beside(middle, start.left[-1], end.left[0], 1.0),
+                _beside(middle, start.right[-1], end.right[0], -1.0),
+            )
+    return _uncrossed(found)
+
+
+def _beside(middle: Array, first: Array, last: Array, side: float) -> Array:
+    """Return the line from `first` to `last` beside a path, its distance changing evenly."""
+    d = np.diff(middle, axis=0)
+    d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
+    normal = left_of(np.concatenate([d[:1], d]) + np.concatenate([d, d[-1:]]))
+    normal /= np.maximum(np.hypot(normal[:, 0], normal[:, 1]), 0.2)[:, None]
+    s = arc_lengths(middle)
+    share = (s / s[-1] if s[-1] > 1e-6 else np.linspace(0.0, 1.0, len(s)))[:, None]
+    from_m, to_m = np.hypot(*(first - middle[0])), np.hypot(*(last - middle[-1]))
+    line = middle + normal * (side * ((1.0 - share) * from_m + share * to_m))
+    line += (1.0 - share) * (first - line[0]) + share * (last - line[-1])
+    line = np.round(untangled(line, d), 3)
+    line[0], line[-1] = first, last
+    return line
+
+
+def _uncrossed(drawn: dict[str, Borders]) -> dict[str, Borders]:
+    """Return the borders with the inner one drawn straight where it crosses the outer or itself."""
+    if not drawn:
+        return drawn
+    crossed = crossing(drawn.values())
+    for name in [name for name, bad in zip(drawn, crossed, strict=True) if bad]:
+        left, right = drawn[name]
+        straight = Borders(*(filled(line[[0, -1]], len(line)).round(3) for line in (left, right)))
+        tries = [Borders(straight.left, right), Borders(left, straight.right)]
+        if arc_lengths(left)[-1] > arc_lengths(right)[-1]:
+            tries.reverse()
+        tries.append(straight)
+        clean = (pair for pair, bad in zip(tries, crossing(tries), strict=True) if not bad)
+        drawn[name] = next(clean, straight)
+    return drawn
+
+
+def crossing(drawn: Iterable[Borders]) -> list[bool]:
+    """Return for each pair of borders whether they meet, or one of them crosses itself."""
+    pairs = list(drawn)
+    left = np.array([shapely.LineString(p.left) for p in pairs])
+    right = np.array([shapely.LineString(p.right) for p in pairs])
+    bad = shapely.intersects(left, right) | ~shapely.is_simple(left) | ~shapely.is_simple(right)
+    return [bool(b) for b in bad]

@@ -1,0 +1,215 @@
+"""A World as a Lanelet2 map in OSM XML, as the Lanelet2 library and Autoware read it.
+
+Nodes carry latitude and longitude and, for readers that want metres, `local_x` and `local_y` in
+the World's frame; `ele` is the height above the World's plane. A file beside the map tells
+Autoware the projection: transverse Mercator of scale 1 about the World's origin, as the World's
+own frame.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from contracts.world import Connection, Crossing, Lane, LaneKind, World
+from world_gen.export.lane_borders import Borders, lane_borders
+from world_gen.export.lanelet2_markings import VIRTUAL, marking
+from world_gen.export.lanelet2_orientation import oriented
+from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
+from world_gen.export.lanelet2_rules import LaneletRules, add_rules
+from world_gen.export.lanelet2_surroundings import add_surroundings
+from world_gen.export.road_heights import RoadHeights
+from world_gen.polyline import left_of, unit
+
+AUTOWARE_MAP_NAME = "lanelet2_map.osm"
+"""A map of this name gets the projector file under the name that Autoware looks for beside it."""
+URBAN_MPS = 60.0 / 3.6
+"""Roads on which one may drive faster count as outside towns."""
+_SUBTYPES: dict[LaneKind, str] = {
+    "driving": "road", "bus": "bus_lane", "bicycle": "bicycle_lane", "parking": "parking",
+    "tram": "rail",
+}  # fmt: skip
+_PARTICIPANTS: dict[LaneKind, tuple[str, ...]] = {
+    "driving": ("vehicle",),
+    "bus": ("vehicle:bus", "vehicle:emergency", "vehicle:taxi"),
+    "bicycle": ("bicycle",),
+    "parking": (),
+    "tram": ("train",),
+}
+
+
+def write_lanelet2(world: World, path: Path, *, crosswalk_rules: bool = False) -> Path:
+    """Write the World as a Lanelet2 map; return the path of Autoware's projector file beside it.
+
+    That is `map_projector_info.yaml` beside a `lanelet2_map.osm`, else it is named as the map is.
+    `crosswalk_rules` adds the regulatory elements of subtype `crosswalk` that Autoware knows and
+    the Lanelet2 library alone refuses. Raises OSError where a file cannot be written.
+    """
+    drawn = lanelet2_map(world, crosswalk_rules=crosswalk_rules)
+    drawn.write(world, path)
+    projector = _projector_path(path)
+    projector.write_text(_projector_info(world), encoding="utf-8")
+    return projector
+
+
+def lanelet2_map(world: World, *, crosswalk_rules: bool = False) -> Lanelet2Map:
+    """Return the World's lanes, connections, rules and surroundings as a map not yet written."""
+    drawn = Lanelet2Map()
+    borders = lane_borders(world)
+    heights = RoadHeights(world, borders)
+    members = _lane_members(world, borders, heights, drawn)
+    members |= _connection_members(world, borders, heights, drawn)
+    crosswalks = {c.id: _crosswalk(c, drawn) for c in world.crossings}
+    ids = {name: drawn.new_id() for name in members}
+    rules = add_rules(world, ids, crosswalks if crosswalk_rules else {}, drawn)
+    lanes = {lane.id: lane for lane in world.lanes}
+    for lane in world.lanes:
+        _add_lanelet(lane.id, _lane_tags(lane), members, ids, rules, drawn)
+    for connection in world.connections:
+        if connection.id in members:
+            tags = _connection_tags(connection, lanes, world)
+            _add_lanelet(connection.id, tags, members, ids, rules, drawn)
+    add_surroundings(world, drawn)
+    return drawn
+
+
+def _add_lanelet(
+    name: str,
+    tags: Tags,
+    members: dict[str, list[Member]],
+    ids: dict[str, int],
+    rules: LaneletRules,
+    drawn: Lanelet2Map,
+) -> None:
+    mine = [Member("relation", rule, "regulatory_element") for rule in rules.of(name)]
+    drawn.relation([*members[name], *mine], tags, number=ids[name])
+
+
+def _lane_members(
+    world: World, borders: dict[str, Borders], heights: RoadHeights, drawn: Lanelet2Map
+) -> dict[str, list[Member]]:
+    """Draw the borders of lanes, each once, and return them as left and right of every lane."""
+    nodes = {
+        lane.id: tuple(
+            drawn.road_nodes(line, heights.along(line, lane.layer)) for line in borders[lane.id]
+        )
+        for lane in world.lanes
+    }
+    users: dict[tuple[int, ...], list[tuple[Lane, str]]] = {}
+    for lane in world.lanes:
+        for side, line in zip(("left", "right"), nodes[lane.id], strict=True):
+            users.setdefault(min(line, line[::-1]), []).append((lane, side))
+    roads = {road.id: road for road in world.roads}
+    found: dict[str, list[Member]] = {}
+    for lane in world.lanes:
+        found[lane.id] = []
+        for side, line in zip(("left", "right"), nodes[lane.id], strict=True):
+            beside = [u for u in users[min(line, line[::-1])] if u != (lane, side)]
+            tags = marking(lane, side, beside, roads.get(lane.road_id))
+            found[lane.id].append(Member("way", drawn.road_way(line, tags), side))
+    return found
+
+
+def _connection_members(
+    world: World, borders: dict[str, Borders], heights: RoadHeights, drawn: Lanelet2Map
+) -> dict[str, list[Member]]:
+    found: dict[str, list[Member]] = {}
+    for connection in world.connections:
+        if connection.id not in borders:
+            continue
+        lines = zip(("left", "right"), oriented(borders[connection.id]), strict=True)
+        found[connection.id] = [
+            Member(
+                "way",
+                drawn.road_way(
+                    drawn.road_nodes(line, heights.along(line, connection.layer)), VIRTUAL
+                ),
+                side,
+            )
+            for side, line in lines
+        ]
+    return found
+
+
+def _lane_tags(lane: Lane) -> dict[str, str]:
+    urban = lane.speed_limit_mps.value <= URBAN_MPS
+    tags = {
+        "type": "lanelet",
+        "subtype": _SUBTYPES[lane.kind],
+        "location": "urban" if urban else "nonurban",
+        "one_way": "yes",
+        "foretwin:id": lane.id,
+        "foretwin:width": f"{lane.width_m.value:.2f} {lane.width_m.source}",
+    }
+    tags |= {f"participant:{who}": "yes" for who in _PARTICIPANTS[lane.kind]}
+    if lane.kind == "driving" and urban:
+        tags["participant:bicycle"] = "yes"
+    if lane.kind in ("driving", "bus"):
+        tags["speed_limit"] = f"{lane.speed_limit_mps.value * 3.6:.0f}"
+        tags["foretwin:speed_limit"] = lane.speed_limit_mps.source
+    if lane.name:
+        tags["road_name"] = lane.name
+    return tags
+
+
+def _connection_tags(
+    connection: Connection, lanes: dict[str, Lane], world: World
+) -> dict[str, str]:
+    """Return the tags of the narrower of both lanes, with the turn where it is a junction's."""
+    start, end = lanes[connection.from_lane_id], lanes[connection.to_lane_id]
+    kind_of = end if start.kind == "driving" else start
+    tags = _lane_tags(kind_of)
+    tags["foretwin:id"] = connection.id
+    tags["foretwin:width"] = f"{connection.width_m.value:.2f} {connection.width_m.source}"
+    if "speed_limit" in tags:
+        slower = min(start.speed_limit_mps, end.speed_limit_mps, key=lambda limit: limit.value)
+        tags["speed_limit"] = f"{slower.value * 3.6:.0f}"
+        tags["foretwin:speed_limit"] = slower.source
+    tags.pop("road_name", None)
+    if connection.junction_id:
+        far = "left" if world.intersection.driving_side == "right" else "right"
+        # Indicators know no U-turn: one turns across the road.
+        tags["turn_direction"] = far if connection.turn == "u_turn" else connection.turn
+    return tags
+
+
+def _crosswalk(crossing: Crossing, drawn: Lanelet2Map) -> int:
+    """Draw the lanelet over which pedestrians cross and return its id."""
+    marked = crossing.kind.value not in ("unmarked", "no")
+    edge = {"type": "zebra_marking" if crossing.kind.value == "zebra" else "pedestrian_marking"}
+    across = left_of(unit(crossing.line[1] - crossing.line[0])) * (crossing.width_m.value / 2)
+    sides = []
+    for name, shift in (("left", across), ("right", -across)):
+        nodes = tuple(drawn.node(x, y, 0.0) for x, y in (crossing.line + shift).tolist())
+        sides.append(Member("way", drawn.way(nodes, edge if marked else VIRTUAL), name))
+    return drawn.relation(
+        sides,
+        {
+            "type": "lanelet",
+            "subtype": "crosswalk",
+            "location": "urban",
+            "one_way": "no",
+            "participant:pedestrian": "yes",
+            "speed_limit": "10",
+            "foretwin:id": crossing.id,
+            "foretwin:kind": f"{crossing.kind.value} {crossing.kind.source}",
+        },
+    )
+
+
+def _projector_path(path: Path) -> Path:
+    if path.name == AUTOWARE_MAP_NAME:
+        return path.with_name("map_projector_info.yaml")
+    return path.with_name(f"{path.stem}.map_projector_info.yaml")
+
+
+def _projector_info(world: World) -> str:
+    origin = world.frame.origin
+    return (
+        f"# {world.attribution}; world {world.id}\n"
+        "projector_type: TransverseMercator\n"
+        "vertical_datum: WGS84\n"
+        "map_origin:\n"
+        f"  latitude: {origin.lat_deg:.11f}\n"
+        f"  longitude: {origin.lon_deg:.11f}\n"
+        "scale_factor: 1.0\n"
+    )

@@ -1,0 +1,150 @@
+"""The primitives of a Lanelet2 map, nodes, ways and relations, gathered and written as OSM XML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from lxml import etree
+
+from contracts.arrays import Array
+from contracts.frames import LocalFrame, geo_from_local
+from contracts.world import ATTRIBUTION, World
+
+Tags = Mapping[str, str]
+LICENSE_URL = "https://opendatacommons.org/licenses/odbl/1-0/"
+
+
+class Member(NamedTuple):
+    """One member of a relation."""
+
+    kind: Literal["way", "relation"]
+    ref: int
+    role: str
+
+
+class _Relation(NamedTuple):
+    id: int
+    members: Sequence[Member]
+    tags: Tags
+
+
+class Lanelet2Map:
+    """A map while it is drawn; ids count up from 1 and are unique over all kinds.
+
+    Lanelet2 knows by a shared node that lanelets follow each other, and by a shared way that
+    they lie side by side: points of roads with the same coordinates are one node here, and
+    lines over the same nodes one way, whichever way they run.
+    """
+
+    def __init__(self) -> None:
+        self._next_id = 1
+        self._xyz: list[tuple[float, float, float]] = []
+        self._node_ids: list[int] = []
+        self._node_tags: dict[int, Tags] = {}
+        self._node_at: dict[tuple[int, int], int] = {}
+        self._way_over: dict[tuple[int, ...], int] = {}
+        self._ways: list[tuple[int, tuple[int, ...], Tags]] = []
+        self._relations: list[_Relation] = []
+
+    def new_id(self) -> int:
+        """Return an id for a relation that others name before it is drawn."""
+        self._next_id += 1
+        return self._next_id - 1
+
+    def node(self, x_m: float, y_m: float, z_m: float, tags: Tags | None = None) -> int:
+        """Add a node of its own."""
+        node = self.new_id()
+        self._node_ids.append(node)
+        self._xyz.append((x_m, y_m, z_m))
+        if tags:
+            self._node_tags[node] = tags
+        return node
+
+    def road_nodes(self, line: Array, z_m: Array) -> tuple[int, ...]:
+        """Return the nodes of a line (N, 2) at heights (N,), shared where coordinates are equal."""
+        found: list[int] = []
+        keys = np.rint(line * 1000.0).astype(np.int64).tolist()
+        for (x, y), point, z in zip(keys, line.tolist(), z_m.tolist(), strict=True):
+            node = self._node_at.get((x, y))
+            if node is None:
+                node = self._node_at[x, y] = self.node(point[0], point[1], z)
+            if not found or found[-1] != node:
+                found.append(node)
+        return tuple(found)
+
+    def road_way(self, nodes: tuple[int, ...], tags: Tags) -> int:
+        """Return the way over these nodes, drawn with `tags` where there is none yet."""
+        known = self._way_over.get(nodes) or self._way_over.get(nodes[::-1])
+        if known is None:
+            known = self._way_over[nodes] = self.way(nodes, tags)
+        return known
+
+    def way(self, nodes: tuple[int, ...], tags: Tags) -> int:
+        """Add a way of its own."""
+        way = self.new_id()
+        self._ways.append((way, nodes, tags))
+        return way
+
+    def relation(self, members: Sequence[Member], tags: Tags, *, number: int | None = None) -> int:
+        """Add a relation, under an id from `new_id` where one is given."""
+        number = self.new_id() if number is None else number
+        self._relations.append(_Relation(number, members, tags))
+        return number
+
+    def write(self, world: World, path: Path) -> None:
+        """Write the map as OSM XML, one primitive after another."""
+        xyz = np.array(self._xyz, dtype=np.float64).reshape(-1, 3)
+        lat_lon = _lat_lon(world.frame, xyz)
+        root = {"version": "0.6", "generator": "foretwin", "attribution": world.attribution}
+        if world.attribution == ATTRIBUTION:
+            root["license"] = LICENSE_URL
+        with etree.xmlfile(str(path), encoding="utf-8") as xml:
+            xml.write_declaration()
+            with xml.element("osm", root):
+                xml.write("\n")
+                note = f"{world.attribution}; world {world.id}".replace("--", "- ")
+                _put(xml, etree.Comment(note))
+                _put(xml, etree.Element("MetaInfo", format_version="1", map_version=world.id))
+                for node, (lat, lon), (x, y, z) in zip(
+                    self._node_ids, lat_lon, xyz.tolist(), strict=True
+                ):
+                    place = {"lat": f"{lat:.11f}", "lon": f"{lon:.11f}"}
+                    local = {"local_x": f"{x:.3f}", "local_y": f"{y:.3f}", "ele": f"{z:.3f}"}
+                    _put(xml, _element("node", node, place, (), local | dict(self._tags(node))))
+                for way, nodes, tags in self._ways:
+                    parts = [etree.Element("nd", ref=str(node)) for node in nodes]
+                    _put(xml, _element("way", way, {}, parts, tags))
+                for relation in self._relations:
+                    parts = [
+                        etree.Element("member", type=m.kind, ref=str(m.ref), role=m.role)
+                        for m in relation.members
+                    ]
+                    _put(xml, _element("relation", relation.id, {}, parts, relation.tags))
+
+    def _tags(self, node: int) -> Tags:
+        return self._node_tags.get(node, {})
+
+
+def _lat_lon(frame: LocalFrame, xyz: Array) -> list[list[float]]:
+    if not len(xyz):
+        return []
+    found: list[list[float]] = geo_from_local(frame, xyz[:, :2]).tolist()
+    return found
+
+
+def _element(
+    kind: str, number: int, place: dict[str, str], parts: Iterable[Any], tags: Tags
+) -> Any:
+    element = etree.Element(kind, {"id": str(number), "visible": "true", "version": "1", **place})
+    element.extend(parts)
+    for key, value in tags.items():
+        etree.SubElement(element, "tag", k=key, v=value)
+    return element
+
+
+def _put(xml: Any, element: Any) -> None:
+    element.tail = "\n"
+    xml.write(element)

@@ -1,0 +1,97 @@
+"""Parallels of a polyline that keep its number of points and never run backwards."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contracts.arrays import Array
+from world_gen.polyline import left_of
+
+_MITRE_LIMIT = 2.0
+_SHORTEST_M = 0.002
+"""Shorter steps vanish when coordinates are rounded to millimetres."""
+_LOOP_POINTS = 100
+"""A loop on the inside of a bend is looked for this many points to both sides."""
+
+
+def parallel(
+    xy_m: Array, left_m: Array, *, before: Array | None = None, after: Array | None = None
+) -> Array:
+    """Return parallels (M, N, 2) of a line (N, 2) at distances (M,) to its left, in metres.
+
+    `before` and `after` are unit directions (2,) of what continues the line beyond its ends, so
+    that parallels of consecutive lines meet. Points of one index lie on one ray across the line,
+    but on the inside of bends too tight for the distance, where loops are cut off.
+    """
+    d = np.diff(xy_m, axis=0)
+    d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
+    incoming = np.concatenate([d[:1] if before is None else before[None], d])
+    outgoing = np.concatenate([d, d[-1:] if after is None else after[None]])
+    normal = left_of(incoming) + left_of(outgoing)
+    norm = np.hypot(normal[:, 0], normal[:, 1])
+    normal = np.where(norm[:, None] > 0.2, normal / np.maximum(norm, 0.2)[:, None], left_of(d[[0]]))
+    stretch = 1.0 / np.maximum((normal * left_of(outgoing)).sum(axis=1), 1.0 / _MITRE_LIMIT)
+    rays = normal * stretch[:, None]
+    lines: Array = xy_m + left_m[:, None, None] * rays
+    forward = (np.diff(lines, axis=1) * d).sum(axis=2) > _SHORTEST_M
+    for i in np.nonzero(~forward.all(axis=1))[0]:
+        lines[i] = untangled(lines[i], d)
+    return lines
+
+
+def untangled(line: Array, directions: Array) -> Array:
+    """Return a line (N, 2) without the stretches that run against `directions` (N - 1, 2).
+
+    Both ends stay where they are, and there are N points again.
+    """
+    points, ahead = line, directions
+    for _ in range(len(line)):
+        forward = (np.diff(points, axis=0) * ahead).sum(axis=1) > _SHORTEST_M
+        if forward.all() or len(points) == 2:
+            break
+        points, ahead = _without_loop(points, ahead, int(np.argmin(forward)))
+    return points if len(points) == len(line) else filled(points, len(line))
+
+
+def _without_loop(points: Array, ahead: Array, at: int) -> tuple[Array, Array]:
+    """Cut off the loop around the backward step `at`, or one of the step's ends."""
+    low, high = max(at - _LOOP_POINTS, 0), min(at + _LOOP_POINTS, len(points) - 1)
+    met = _meeting(points[low : at + 2], points[at : high + 1])
+    if met is None:
+        drop = at + 1 if at + 1 < len(points) - 1 else at
+        return np.delete(points, drop, axis=0), np.delete(ahead, min(drop, len(ahead) - 1), axis=0)
+    i, j, where = met
+    i, j = low + i, at + j
+    kept = np.concatenate([points[: i + 1], where[None], points[j + 1 :]])
+    return kept, np.concatenate([ahead[: i + 1], ahead[j:]])
+
+
+def _meeting(first: Array, second: Array) -> tuple[int, int, Array] | None:
+    """Return the farthest apart segments of two lines that cross, and where they do."""
+    a, u = first[:-1, None], np.diff(first, axis=0)[:, None]
+    b, v = second[None, :-1], np.diff(second, axis=0)[None]
+    det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    gap = b - a
+    safe = np.where(np.abs(det) > 1e-12, det, np.inf)
+    s = (gap[..., 0] * v[..., 1] - gap[..., 1] * v[..., 0]) / safe
+    t = (gap[..., 0] * u[..., 1] - gap[..., 1] * u[..., 0]) / safe
+    inside = (np.abs(det) > 1e-12) & (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
+    if not inside.any():
+        return None
+    i, j = np.nonzero(inside)
+    apart = int(np.argmax(j - i))
+    i0, j0 = int(i[apart]), int(j[apart])
+    return i0, j0, first[i0] + s[i0, j0] * (first[i0 + 1] - first[i0])
+
+
+def filled(line: Array, count: int) -> Array:
+    """Return the line with its longest steps parted until it has `count` points."""
+    steps = np.hypot(*np.diff(line, axis=0).T)
+    parts = np.ones(len(steps), dtype=np.int64)
+    for _ in range(count - len(line)):
+        parts[int(np.argmax(steps / parts))] += 1
+    pieces = [
+        line[i] + np.linspace(0.0, 1.0, n, endpoint=False)[:, None] * (line[i + 1] - line[i])
+        for i, n in enumerate(parts.tolist())
+    ]
+    return np.concatenate([*pieces, line[-1:]])
