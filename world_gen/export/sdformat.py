@@ -77,8 +77,8 @@ def write_sdf(
         add_vehicle(element, vehicle, simulator)
     place = world.intersection
     about = f" {world.attribution}; world {world.id}, {place.kind} {place.name} ({place.id}) "
-    comment = etree.Comment(about.replace("--", "- "))
-    root.insert(0, comment)
+    printable = "".join(c for c in about if c.isprintable())  # names come from the map
+    root.insert(0, etree.Comment(printable.replace("--", "- ")))
     tree = etree.ElementTree(root)
     etree.indent(tree, space=" ")
     tree.write(str(path), xml_declaration=True, encoding="utf-8")

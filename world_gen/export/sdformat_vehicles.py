@@ -25,8 +25,8 @@ WHEEL_RADIUS_M, WHEEL_WIDTH_M = 0.33, 0.2
 WHEEL_SHARE, KNUCKLE_SHARE = 0.018, 0.009
 """Assumed shares of the mass of one wheel and of one steering knuckle."""
 GROUND_CLEARANCE_M = 0.18
-STEERING_DAMPING_NMSPRAD = 60.0
-"""Damps the wheels' angle to about 0.8 of critical: the drive plugin has little damping."""
+STEERING_DAMPING_NMSPRAD = 100.0
+"""Damps the wheels' angle to half of critical: the drive plugin itself has no damping."""
 _GAP_M = 10.0
 _COLOURS: dict[str, Rgba] = {
     "twin": (0.15, 0.6, 0.2, 1.0),

@@ -92,6 +92,12 @@ def test_the_file_has_origin_and_attribution(tmp_path: Path) -> None:
     assert ATTRIBUTION in (tmp_path / "world.sdf").read_text(encoding="utf-8")
 
 
+def test_a_strange_name_does_not_break_the_file(tmp_path: Path) -> None:
+    world = built()
+    strange = msgspec.structs.replace(world.intersection, name="a -- b \x07 <&> --->")
+    written(msgspec.structs.replace(world, intersection=strange), tmp_path)
+
+
 def test_gazebo_classics_axes_are_turned_back(tmp_path: Path) -> None:
     root = written(built(), tmp_path, simulator="classic")
     assert root.findtext("world/spherical_coordinates/heading_deg") == "180"
