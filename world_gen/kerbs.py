@@ -8,6 +8,7 @@ import shapely
 from contracts.arrays import Array
 from world_gen.lanes import LaneSet
 from world_gen.paved import Paved
+from world_gen.polyline_batch import Polylines
 
 OVERLAP_M = 0.06
 """So far around a neighbouring piece its own border is no kerb."""
@@ -16,43 +17,65 @@ SHORTEST_M = 0.3
 
 def kerb_lines(lanes: LaneSet, paved: Paved) -> tuple[Array, ...]:
     """Return the edges of roads and places, (N, 2) each, where no other piece of a level lies."""
-    if not len(paved.roads) and not len(paved.places):
+    pieces = np.concatenate([paved.roads, paved.places])
+    if not len(pieces):
         return ()
     layers = [road.layer for road in lanes.roads]
     layers += [max(leg.edge.layer for leg in c.legs) for c in paved.place_of]
-    pieces = np.concatenate([paved.roads, paved.places])
-    sides = [line for road in lanes.roads for line in lanes.edges[road.id]]
-    lines = _lines(sides)
-    owner = np.repeat(np.arange(len(lanes.roads)), 2)
-    borders = shapely.boundary(paved.places)
-    lines = np.concatenate([lines, borders])
-    owner = np.concatenate([owner, len(paved.roads) + np.arange(len(paved.places))])
-    level = np.asarray(layers)
-    row, piece = shapely.STRtree(pieces).query(lines, predicate="intersects")
-    other = (owner[row] != piece) & (level[owner[row]] == level[piece])
-    row, piece = row[other], piece[other]
-    if len(row):
-        order = np.argsort(row, kind="stable")
-        used, indices = np.unique(row[order], return_inverse=True)
-        beside = shapely.geometrycollections(pieces[piece[order]], indices=indices)
-        beside = shapely.buffer(beside, OVERLAP_M, quad_segs=1)
-        lines[used] = shapely.difference(lines[used], beside)
-    parts = shapely.get_parts(shapely.line_merge(lines[~shapely.is_empty(lines)]))
-    parts = parts[shapely.length(parts) > SHORTEST_M]
-    return _points(parts)
+    layer = np.array(layers)
+    tree = shapely.STRtree(shapely.buffer(pieces, OVERLAP_M, join_style="mitre", mitre_limit=2.0))
+    lines = [*_road_edges(lanes, paved, tree, layer), *_place_borders(paved, tree, layer)]
+    joined = shapely.get_parts(shapely.line_merge(np.array(lines, dtype=object)))
+    joined = joined[shapely.length(joined) > SHORTEST_M]
+    if not len(joined):
+        return ()
+    points, row = shapely.get_coordinates(joined, return_index=True)
+    ends = np.cumsum(np.bincount(row, minlength=len(joined)))[:-1]
+    return tuple(np.split(np.round(points, 3), ends))
 
 
-def _lines(curves: list[Array]) -> np.ndarray:
-    if not curves:
-        return np.array([], dtype=object)
-    counts = [len(c) for c in curves]
-    found: np.ndarray = shapely.linestrings(
-        np.concatenate(curves), indices=np.repeat(np.arange(len(curves)), counts)
-    )
-    return found
+def _road_edges(
+    lanes: LaneSet, paved: Paved, tree: shapely.STRtree, layer: Array
+) -> list[shapely.Geometry]:
+    """Return both edges of every road without what lies in other pieces."""
+    if not lanes.roads:
+        return []
+    sides = Polylines.of([line for road in lanes.roads for line in lanes.edges[road.id]])
+    lines = shapely.linestrings(sides.xy_m, indices=sides.line)
+    road = np.repeat(np.arange(len(lanes.roads)), 2)
+    row, piece = tree.query(lines, predicate="intersects")
+    place_row = {c.key: len(paved.roads) + k for k, c in enumerate(paved.place_of)}
+    own = np.array(
+        [
+            (place_row.get(r.from_place or "", -1), place_row.get(r.to_place or "", -1))
+            for r in lanes.roads
+        ]
+    )[road[row]]
+    # A road's edge ends where its own places begin: nothing of it lies inside.
+    wanted = (road[row] != piece) & (own != piece[:, None]).all(axis=1)
+    wanted &= layer[road[row]] == layer[piece]
+    row, piece = row[wanted], piece[wanted]
+    # Line by line would take a call each: in round k every line loses its k-th neighbour.
+    turn = np.arange(len(row)) - np.searchsorted(row, row)
+    for k in range(int(turn.max(initial=-1)) + 1):
+        now = turn == k
+        lines[row[now]] = shapely.difference(lines[row[now]], tree.geometries[piece[now]])
+    return list(lines[~shapely.is_empty(lines)])
 
 
-def _points(lines: np.ndarray) -> tuple[Array, ...]:
-    points, row = shapely.get_coordinates(lines, return_index=True)
-    ends = np.cumsum(np.bincount(row, minlength=len(lines)))[:-1]
-    return tuple(np.split(np.round(points, 3), ends)) if len(lines) else ()
+def _place_borders(paved: Paved, tree: shapely.STRtree, layer: Array) -> list[shapely.Geometry]:
+    """Return the borders of places without the mouths of roads, segment by segment."""
+    if not len(paved.places):
+        return []
+    rings, owner = shapely.get_rings(paved.places, return_index=True)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    inside = ring[1:] == ring[:-1]
+    a, b = points[:-1][inside], points[1:][inside]
+    mine = len(paved.roads) + owner[ring[1:][inside]]
+    row, piece = tree.query(shapely.points((a + b) / 2), predicate="within")
+    other = (mine[row] != piece) & (layer[mine[row]] == layer[piece])
+    open_ = np.ones(len(a), dtype=bool)
+    open_[row[other]] = False
+    segments = shapely.linestrings(np.stack([a, b], axis=1)[open_])
+    used, indices = np.unique(mine[open_], return_inverse=True)
+    return list(shapely.multilinestrings(segments, indices=indices)) if len(used) else []

@@ -72,7 +72,11 @@ def _swept(paths: list[tuple[Array, float]]) -> np.ndarray:
         np.concatenate([xy for xy, _ in paths]), indices=np.repeat(np.arange(len(paths)), counts)
     )
     swept: np.ndarray = shapely.buffer(
-        lines, [width / 2 for _, width in paths], cap_style="flat", quad_segs=2
+        shapely.simplify(lines, 0.03, preserve_topology=False),
+        [width / 2 for _, width in paths],
+        cap_style="flat",
+        join_style="mitre",
+        mitre_limit=2.0,
     )
     return swept
 
@@ -111,7 +115,9 @@ def _place_polygons(
     owner = np.asarray(owners)[order]
     used, indices = np.unique(owner, return_inverse=True)
     groups = shapely.geometrycollections(pieces[order], indices=indices)
-    grown = shapely.buffer(groups, CORNER_FILLET_M, quad_segs=4)
+    whole = shapely.union_all(groups[:, None], axis=1)
+    # Mitred outward and rounded inward: corners stay, and only what is filled becomes round.
+    grown = shapely.buffer(whole, CORNER_FILLET_M, join_style="mitre", mitre_limit=2.0)
     closed = shapely.buffer(grown, -CORNER_FILLET_M, quad_segs=4)
     closed = shapely.set_precision(shapely.simplify(closed, 0.04), GRID_M)
     keep = shapely.area(closed) > SMALLEST_M2
