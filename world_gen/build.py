@@ -16,7 +16,7 @@ from contracts.world import Arm, IntersectionSummary, World, WorldJunction
 from world_gen.approaches import approaches
 from world_gen.buildings import Footprint, buildings_in_frame
 from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
-from world_gen.connections import ConnectionDraft, connect
+from world_gen.connections import ConnectionDraft, connect, draw_paths
 from world_gen.crossings import crossings
 from world_gen.extent import Disc, Rectangle
 from world_gen.find_intersections import find_intersections
@@ -182,6 +182,7 @@ def _connections(
             continue
         ways = movements(cluster, around, index.restrictions)
         found.extend(connect(cluster, ways, around, lanes, notes))
+    draw_paths(found, around, notes)
     return found
 
 

@@ -13,10 +13,12 @@ from contracts.world import Connection, DrivingSide, LineControl, Quantity, Turn
 from world_gen.clusters import Cluster, Surroundings
 from world_gen.lanes import LaneDraft, LaneSet
 from world_gen.movements import Movement
-from world_gen.polyline import offset, rounded, turn_curve, unit, without_repeats
+from world_gen.polyline import offset, rounded, unit, without_repeats
+from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
 
 _LONG_PATH_M = 25.0
 _MAX_DETOUR_M = 9.0
+_UNDRAWN = np.zeros((0, 2))
 _FROM_LEFT: tuple[Turn, ...] = ("left", "straight", "right")
 
 
@@ -62,7 +64,7 @@ def connect(
     lanes: LaneSet,
     notes: list[str],
 ) -> list[ConnectionDraft]:
-    """Return the connections of one cluster and enter them as successors of their lanes."""
+    """Return the connections of one cluster, yet to be drawn, and enter them as successors."""
     found: list[ConnectionDraft] = []
     for leg in cluster.legs:
         mine = [
@@ -90,7 +92,7 @@ def connect(
                 )
                 continue
             for a, b in _pairs(chosen, ends, movement.turn, around.driving_side, len(mine) == 1):
-                found.append(_connection(a, b, movement, cluster, around))
+                found.append(_drafted(a, b, movement, cluster))
     for connection in found:
         connection.start.successors.append(connection.id)
         if connection.start.plan.turns_source != "tagged":
@@ -186,29 +188,49 @@ def _pairs_by_position(
     return [(starts[i], ends[j]) for i, j in sorted(pairs)]
 
 
-def _connection(
-    start: LaneDraft, end: LaneDraft, movement: Movement, cluster: Cluster, around: Surroundings
+def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
+    """Lay the path of every connection, and name those that the map makes tighter than 4 m."""
+    if not connections:
+        return
+    begins = np.array([c.start.centerline[-1] for c in connections])
+    ends = np.array([c.end.centerline[0] for c in connections])
+    headings = _units(begins - np.array([c.start.centerline[-2] for c in connections]))
+    end_headings = _units(np.array([c.end.centerline[1] for c in connections]) - ends)
+    turns = turn_curves(begins, headings, ends, end_headings)
+    for i, (c, path) in enumerate(zip(connections, turns.lines.split(), strict=True)):
+        c.centerline = path
+        radius_m = float(turns.radius_m[i])
+        if sum(part.edge.length_m for part in c.movement.inside) > _LONG_PATH_M:
+            guided = _along_path(
+                begins[i], headings[i], ends[i], end_headings[i], c.movement, around
+            )
+            far = shapely.hausdorff_distance(shapely.LineString(path), shapely.LineString(guided))
+            if far > _MAX_DETOUR_M:
+                c.centerline = np.round(guided, 3)
+                c.centerline[0], c.centerline[-1] = begins[i], ends[i]
+                continue
+        if radius_m < LEAST_RADIUS_M:
+            notes.append(
+                f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
+                f"into way {c.end.edge.way_id} ({c.turn})"
+            )
+
+
+def _units(vectors: Array) -> Array:
+    norm = np.hypot(vectors[:, 0], vectors[:, 1])
+    return np.asarray(vectors / np.maximum(norm, 1e-9)[:, None])
+
+
+def _drafted(
+    start: LaneDraft, end: LaneDraft, movement: Movement, cluster: Cluster
 ) -> ConnectionDraft:
-    begin, heading = start.centerline[-1], unit(start.centerline[-1] - start.centerline[-2])
-    finish, end_heading = end.centerline[0], unit(end.centerline[1] - end.centerline[0])
-    curve = turn_curve(begin, heading, finish, end_heading)
-    if sum(part.edge.length_m for part in movement.inside) > _LONG_PATH_M:
-        guided = _along_path(begin, heading, finish, end_heading, movement, around)
-        if (
-            shapely.hausdorff_distance(shapely.LineString(curve), shapely.LineString(guided))
-            > _MAX_DETOUR_M
-        ):
-            curve = guided
-    curve = np.round(curve, 3)
-    curve[0], curve[-1] = begin, finish
-    width = min(start.width_m.value, end.width_m.value)
     return ConnectionDraft(
         id=f"{start.id}>{end.id}",
         start=start,
         end=end,
         turn=movement.turn,
-        centerline=curve,
-        width_m=Quantity(width, "inferred"),
+        centerline=_UNDRAWN,
+        width_m=Quantity(min(start.width_m.value, end.width_m.value), "inferred"),
         cluster=cluster,
         movement=movement,
     )

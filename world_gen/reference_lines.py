@@ -10,15 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
+from world_gen.bends import rounded_through, thinned
 from world_gen.clusters import Surroundings
 from world_gen.extent import stretches_inside
-from world_gen.polyline import cut, unit, without_repeats
+from world_gen.polyline import cut
 from world_gen.polyline_batch import Polylines
 from world_gen.polyline_batch import cut as cut_all
-from world_gen.polyline_batch import rounded as rounded_all
-from world_gen.polyline_batch import without_repeats as without_repeats_all
 
 MIN_LANE_M = 0.05
+INNER_RADIUS_M = 4.0
+"""Where a road bends sharply, the radius of its inner edge."""
 _NOWHERE = np.array([np.nan, np.nan])
 
 
@@ -46,7 +47,7 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
         return [], []
     start_m = np.array([around.trims_m.get((e.index, False), 0.0) for e in edges])
     stop_m = np.array([around.trims_m.get((e.index, True), 0.0) for e in edges])
-    ways = without_repeats_all(Polylines.of([edge.xy_m for edge in edges]))
+    ways = thinned(Polylines.of([edge.xy_m for edge in edges]))
     total = ways.length_m
     long_enough = total - start_m - stop_m >= MIN_LANE_M
     notes = [
@@ -54,15 +55,19 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
         for i in np.nonzero(~long_enough)[0]
     ]
     kept = np.nonzero(long_enough)[0]
-    lines = rounded_all(cut_all(ways.rows(kept), start_m[kept], (total - stop_m)[kept]))
+    if not len(kept):
+        return [], notes
+    pieces = thinned(cut_all(ways.rows(kept), start_m[kept], (total - stop_m)[kept]))
+    indices = [edges[i].index for i in kept.tolist()]
+    half_m = np.array([around.sections[i].half_width_m for i in indices])
+    goes_on = _points_beyond(around, indices, pieces)
+    lines, befores, afters = rounded_through(pieces, half_m + INNER_RADIUS_M, *goes_on)
     outside = ~around.extent.holds(lines.xy_m)
     crosses = np.bincount(lines.line[outside], minlength=len(lines)) > 0
-    beyond = _directions_beyond(around)
     found: list[Stretch] = []
-    for i, line, crossing in zip(kept.tolist(), lines.split(), crosses.tolist(), strict=True):
-        index = edges[i].index
-        before = _NOWHERE if start_m[i] else beyond.get((index, False), _NOWHERE)
-        after = _NOWHERE if stop_m[i] else beyond.get((index, True), _NOWHERE)
+    for index, line, crossing, before, after in zip(
+        indices, lines.split(), crosses.tolist(), befores, afters, strict=True
+    ):
         if not crossing:
             found.append(Stretch(index, line, True, True, before, after))
             continue
@@ -79,17 +84,20 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
     return found, notes
 
 
-def _directions_beyond(around: Surroundings) -> dict[tuple[int, bool], Array]:
-    """Return, where a road merely goes on, its direction beyond each end (along the nodes)."""
-    beyond: dict[tuple[int, bool], Array] = {}
+def _points_beyond(
+    around: Surroundings, indices: list[int], lines: Polylines
+) -> tuple[Array, Array]:
+    """Return (L, 2) next points before and after lines where a road merely goes on, else NaN."""
+    row = {index: i for i, index in enumerate(indices)}
+    beyond = np.full((2, len(indices), 2), np.nan)
     for cluster in around.clusters:
         if not cluster.plain or any(
             around.trims_m[leg.edge.index, leg.reverse] for leg in cluster.legs
         ):
             continue
         for leg, other in (cluster.legs, cluster.legs[::-1]):
-            xy = without_repeats(other.xy_m)
-            away = unit(xy[1] - xy[0])
-            # Along the nodes: into this edge's start from the other, or on from its end.
-            beyond[leg.edge.index, leg.reverse] = away if leg.reverse else -away
-    return beyond
+            mine, its = row.get(leg.edge.index), row.get(other.edge.index)
+            if mine is not None and its is not None and mine != its:
+                at = lines.first[its + 1] - 2 if other.reverse else lines.first[its] + 1
+                beyond[int(leg.reverse), mine] = lines.xy_m[at]
+    return beyond[0], beyond[1]
