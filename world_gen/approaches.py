@@ -1,172 +1,221 @@
-"""What a driver meets on the way to the junction: signals, signs and crossings on an approach."""
+"""The roads that enter a junction, each with its signals, its sign and its standing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from contracts.world import Choice, LineControl, Provenance
-from world_gen.clusters import Cluster, Surroundings, is_ring_edge
-from world_gen.intersections import Junction
-from world_gen.polyline import arc_lengths
+from contracts.world import Choice, LineControl, YieldRule
+from world_gen.clusters import RING_KINDS, Cluster, Surroundings, heading_out, is_ring_edge
+from world_gen.connections import ConnectionDraft
+from world_gen.met_on_the_way import Met, NodeTags, is_light, met_inside, met_toward, sign_of
+from world_gen.priority_roads import Entry, Rank, Standing, standings
 from world_gen.road_graph import DirectedEdge
 
-LOOK_BACK_M = 40.0
-_CROSSING_NEAR_M = 16.0
-_SIGNAL_NEAR_M = 25.0
-_OWN_LINE_M = 3.0
+OWN_LINE_M = 3.0
 """A sign or signal farther than this from the junction's node stands at the stop line."""
-_SIGNS = ("stop", "give_way")
-_CLASS_RANK: Mapping[str, int] = {
-    "motorway": 8,
-    "trunk": 7,
-    "primary": 6,
-    "secondary": 5,
-    "tertiary": 4,
-    "unclassified": 3,
-    "residential": 3,
-    "living_street": 1,
-}
+_SIGN_NEAR_M = 25.0
+_CROSSING_NEAR_M = 16.0
+_OPPOSITE_COS = -0.75
 
 
-class Met(NamedTuple):
-    """A tagged node on an approach, `distance_m` before the junction's node."""
-
-    node: int
-    distance_m: float
-    tags: Mapping[str, str]
-
-
-class Approach(NamedTuple):
+@dataclass(slots=True, kw_only=True)
+class Approach:
     """One leg driven toward a junction, and how it is controlled there.
 
     `line_m` is where vehicles stop, metres along the leg from its node; None: where lanes end.
-    `signal_node` is the OSM node of the signal that governs it, where the map has one.
+    `signal_nodes` are the map's nodes whose light governs it, the first one met first.
+    `standing` tells how the road ranks where no light says who goes.
     """
 
     cluster: Cluster
     toward: DirectedEdge
     control: Choice
     line_m: float | None
-    signal_node: int | None
+    signal_nodes: tuple[int, ...]
+    standing: Standing
+
+    @property
+    def junction_id(self) -> str:
+        """Id of the junction that it leads to."""
+        junction = self.cluster.junction
+        return junction.summary.id if junction is not None else ""
+
+    @property
+    def key(self) -> tuple[int, bool]:
+        """(edge index, reverse) of the road as it is driven toward the junction."""
+        return self.toward.edge.index, self.toward.reverse
+
+
+@dataclass(slots=True, kw_only=True)
+class _Draft:
+    """What is known of an approach before the junction's roads are compared."""
+
+    cluster: Cluster
+    toward: DirectedEdge
+    met: list[Met]
+    lights: list[Met]
+    sign: Met | None
 
 
 def approaches(
-    around: Surroundings, node_tags: Mapping[int, Mapping[str, str]]
+    around: Surroundings, node_tags: NodeTags, connections: Sequence[ConnectionDraft]
 ) -> tuple[Approach, ...]:
-    """Return every approach to a whole junction with its control."""
+    """Return every approach to a whole junction with its control.
+
+    Roads of a ring are approaches only where a light stands on them.
+    """
+    inside: dict[tuple[int, bool], list[Met]] = {}
+    for connection in connections:
+        if connection.cluster.whole:
+            toward = connection.movement.toward
+            met = inside.setdefault((toward.edge.index, toward.reverse), [])
+            met.extend(met_inside(connection.movement.inside, node_tags))
     plain_from = {
         leg.start_node: cluster
         for cluster in around.clusters
         if cluster.plain
         for leg in cluster.legs
     }
-    found = []
-    top = _top_ranks(around)
+    drafts: dict[str, list[_Draft]] = {}
     for cluster in around.clusters:
         junction = cluster.junction
         if not cluster.whole or junction is None:
             continue
         for leg in cluster.legs:
             toward = DirectedEdge(leg.edge, not leg.reverse)
-            inside = leg.edge.index in junction.inner
-            if not toward.allowed or (inside and (is_ring_edge(leg.edge) or not cluster.ring)):
+            if not toward.allowed:
                 continue
-            met = _met(leg, plain_from, node_tags, junction)
-            found.append(_approach(cluster, toward, met, junction, top[junction.summary.id]))
+            on_ring = cluster.ring and is_ring_edge(leg.edge)
+            if not on_ring and not cluster.ring and leg.edge.index in junction.inner:
+                continue
+            met = met_toward(leg, plain_from, node_tags, junction.nodes)
+            lights = [m for m in met if is_light(m.tags)]
+            if on_ring and not lights:
+                continue
+            passed = inside.get((toward.edge.index, toward.reverse), [])
+            lights = lights or [m for m in passed if is_light(m.tags)][:1]
+            drafts.setdefault(junction.summary.id, []).append(
+                _Draft(
+                    cluster=cluster,
+                    toward=toward,
+                    met=met,
+                    lights=lights,
+                    sign=_own_sign(met, cluster),
+                )
+            )
+    found: list[Approach] = []
+    for items in drafts.values():
+        found.extend(_compared(items, around))
     return tuple(found)
 
 
-def _top_ranks(around: Surroundings) -> dict[str, int]:
-    """Return the highest rank among the roads of each whole junction, by its id."""
-    top: dict[str, int] = {}
-    for cluster in around.clusters:
-        if cluster.whole and cluster.junction is not None:
-            name = cluster.junction.summary.id
-            ranks = [class_rank(leg.edge.road_class) for leg in cluster.legs]
-            top[name] = max([top.get(name, 0), *ranks])
-    return top
+def _own_sign(met: list[Met], cluster: Cluster) -> Met | None:
+    """Return the nearest sign for this road; one on the junction's own node cannot tell."""
+    signs = [
+        m
+        for m in met
+        if sign_of(m.tags) and m.distance_m <= 40.0 and (m.distance_m > 0.1 or cluster.ring)
+    ]
+    return min(signs, key=lambda m: m.distance_m, default=None)
 
 
-def class_rank(road_class: str) -> int:
-    """Return how important a highway class is; links count as their class."""
-    return _CLASS_RANK.get(road_class.removesuffix("_link"), 2)
-
-
-def _met(
-    leg: DirectedEdge,
-    plain_from: Mapping[int, Cluster],
-    node_tags: Mapping[int, Mapping[str, str]],
-    junction: Junction,
-) -> list[Met]:
-    """Walk outward along the leg, on through nodes where the road merely goes on."""
-    found: list[Met] = []
-    gone, current = 0.0, leg
-    for _ in range(8):
-        nodes = current.edge.node_ids[::-1] if current.reverse else current.edge.node_ids
-        along = arc_lengths(current.xy_m)
-        for node, at in zip(nodes, along, strict=False):
-            tags = node_tags.get(node)
-            if tags and gone + at <= LOOK_BACK_M and _faces(tags, current):
-                found.append(Met(node, gone + float(at), tags))
-        gone += float(along[-1])
-        cluster = plain_from.get(current.end_node)
-        if (
-            gone > LOOK_BACK_M
-            or cluster is None
-            or cluster.whole
-            or current.end_node in junction.nodes
-        ):
-            break
-        onward = [d for d in cluster.legs if d.edge.index != current.edge.index]
-        if not onward:
-            break
-        current = onward[0]
+def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
+    junction = drafts[0].cluster.junction
+    assert junction is not None
+    kind, control = junction.summary.kind, junction.summary.control
+    words: list[YieldRule | None] = [sign_of(d.sign.tags) if d.sign else None for d in drafts]
+    at_node = {
+        sign_of(m.tags)
+        for d in drafts
+        for m in d.met
+        if m.distance_m <= 0.1 and sign_of(m.tags) and not d.cluster.ring
+    }
+    entries = [
+        Entry(d.toward.edge, word, _opposite(i, drafts))
+        for i, (d, word) in enumerate(zip(drafts, words, strict=True))
+    ]
+    ranks = standings(entries, around.driving_side)
+    if control == "all_way_stop":
+        ranks = [
+            rank if word else Standing(Rank.MINOR, "stop", "inferred" if any(words) else "tagged")
+            for rank, word in zip(ranks, words, strict=True)
+        ]
+    elif at_node and not any(words):
+        # A sign on the very node belongs to the lesser roads there.
+        word: YieldRule = "stop" if "stop" in at_node else "give_way"
+        ranks = [
+            Standing(rank.rank, word, "inferred") if rank.rank <= Rank.MINOR else rank
+            for rank in ranks
+        ]
+    ring_has_way = kind == "roundabout" or (
+        kind == "circular" and any(d.cluster.ring and d.sign for d in drafts)
+    )
+    lights_for_all = control == "signals" and kind not in RING_KINDS and _for_all(drafts)
+    found = []
+    for d, rank in zip(drafts, ranks, strict=True):
+        standing = rank
+        entering = d.cluster.ring and not is_ring_edge(d.toward.edge)
+        if (entering and ring_has_way) or kind == "mini_roundabout":
+            source = "tagged" if d.sign or kind != "circular" else "inferred"
+            standing = Standing(Rank.MINOR, "roundabout", source)  # type: ignore[arg-type]
+        found.append(_approach(d, standing, control == "signals", lights_for_all))
     return found
 
 
-def _faces(tags: Mapping[str, str], outward: DirectedEdge) -> bool:
-    """Return whether a sign or signal is meant for traffic toward the junction."""
-    word = tags.get("traffic_signals:direction") or tags.get("direction")
-    if word not in ("forward", "backward"):
-        return True
-    # Traffic toward the junction runs along the nodes exactly where the outward edge is reversed.
-    return (word == "forward") == outward.reverse
+def _opposite(i: int, drafts: list[_Draft]) -> int | None:
+    """Return the index of the road that lies straight ahead of another one."""
+    mine = heading_out(DirectedEdge(drafts[i].toward.edge, not drafts[i].toward.reverse), 15.0)
+    best, found = _OPPOSITE_COS, None
+    for j, d in enumerate(drafts):
+        if j != i:
+            other = heading_out(DirectedEdge(d.toward.edge, not d.toward.reverse), 15.0)
+            cos = float(mine @ other)
+            if cos < best:
+                best, found = cos, j
+    return found
 
 
-def _approach(
-    cluster: Cluster, toward: DirectedEdge, met: list[Met], junction: Junction, top_rank: int
-) -> Approach:
-    signals = [m for m in met if m.tags.get("highway") == "traffic_signals"]
-    signalled = junction.summary.control == "signals"
-    if not signalled:
-        # A light farther away is one for pedestrians, not for this junction.
-        signals = [m for m in signals if m.distance_m <= _SIGNAL_NEAR_M]
-    if signalled or signals:
-        signal = max(signals, key=lambda m: m.distance_m, default=None)
-        line = _before_crossing(met)
-        source: Provenance = "inferred"
-        node: int | None = None
-        if signal is not None:
-            source, node = "tagged", signal.node
-            line = signal.distance_m if signal.distance_m > _OWN_LINE_M else line
-        return Approach(cluster, toward, Choice("signal", source), line, node)
-    sign = min(
-        (m for m in met if m.tags.get("highway") in _SIGNS and _is_for(m, cluster, junction)),
-        key=lambda m: m.distance_m,
-        default=None,
+def _for_all(drafts: list[_Draft]) -> bool:
+    """Return whether lights stop every road in, not only those who would hit pedestrians.
+
+    A single light that is tagged on a crossing before the junction serves that crossing.
+    """
+    lit = [d for d in drafts if d.lights]
+    return (
+        len(lit) != 1
+        or len(drafts) == 1
+        or any(m.distance_m <= OWN_LINE_M or "crossing" not in m.tags for m in lit[0].lights)
     )
-    if sign is None:
-        word, guessed = _unsigned(cluster, toward, junction, top_rank)
-        return Approach(cluster, toward, Choice(word, guessed), None, None)
-    line = sign.distance_m if _OWN_LINE_M < sign.distance_m <= _SIGNAL_NEAR_M else None
-    return Approach(cluster, toward, Choice(sign.tags["highway"], "tagged"), line, None)
 
 
-def _is_for(sign: Met, cluster: Cluster, junction: Junction) -> bool:
-    """Return whether a sign is for this approach; on the junction's own node it cannot tell."""
-    at_node = sign.distance_m < 0.1 and len(cluster.legs) > 2
-    return not at_node or junction.summary.control == "all_way_stop"
+def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> Approach:
+    sign_nearer = d.sign is not None and not d.lights
+    if signalled and (d.lights or (for_all and not sign_nearer and standing.rank > Rank.YARD)):
+        on_leg = [m for m in d.lights if math.isfinite(m.distance_m)]
+        far = max((m.distance_m for m in on_leg), default=0.0)
+        line = far if far > OWN_LINE_M else _before_crossing(d.met)
+        nodes = tuple(dict.fromkeys(m.node for m in d.lights))
+        word = Choice("signal", "tagged" if nodes else "inferred")
+        return Approach(
+            cluster=d.cluster, toward=d.toward, control=word, line_m=line, signal_nodes=nodes,
+            standing=standing,
+        )  # fmt: skip
+    line = None
+    if d.sign is not None and OWN_LINE_M < d.sign.distance_m <= _SIGN_NEAR_M:
+        line = d.sign.distance_m
+    return Approach(
+        cluster=d.cluster, toward=d.toward, control=_word(standing), line_m=line,
+        signal_nodes=(), standing=standing,
+    )  # fmt: skip
+
+
+def _word(standing: Standing) -> Choice:
+    if standing.rank >= Rank.PLAIN:
+        return Choice("none", standing.source)
+    word: LineControl = "stop" if standing.rule == "stop" else "give_way"
+    return Choice(word, standing.source if standing.rule in ("stop", "give_way") else "inferred")
 
 
 def _before_crossing(met: list[Met]) -> float | None:
@@ -178,17 +227,3 @@ def _before_crossing(met: list[Met]) -> float | None:
         and 1.0 < m.distance_m <= _CROSSING_NEAR_M
     ]
     return max(at) + 3.0 if at else None
-
-
-def _unsigned(
-    cluster: Cluster, toward: DirectedEdge, junction: Junction, top_rank: int
-) -> tuple[LineControl, Provenance]:
-    control = junction.summary.control
-    if cluster.ring or control == "roundabout":
-        return "give_way", "inferred"
-    if control == "all_way_stop":
-        return "stop", "inferred"
-    lesser = class_rank(toward.edge.road_class) < top_rank and top_rank >= 4
-    if control in ("stop", "give_way"):
-        return ("give_way", "inferred") if lesser else ("none", "inferred")
-    return ("give_way", "inferred") if lesser else ("none", "default")

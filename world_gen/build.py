@@ -13,7 +13,6 @@ from contracts.arrays import Array
 from contracts.codec import content_bytes
 from contracts.frames import GeoPoint, LocalFrame, local_from_geo, target_from_source
 from contracts.world import Arm, IntersectionSummary, World, WorldJunction
-from world_gen.approaches import approaches
 from world_gen.buildings import Footprint, buildings_in_frame
 from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
 from world_gen.connections import ConnectionDraft, connect, draw_paths
@@ -21,14 +20,13 @@ from world_gen.crossings import crossings
 from world_gen.extent import Disc, Rectangle
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
+from world_gen.junction_rules import junction_rules
 from world_gen.lanes import LaneSet, build_lanes, join_straight_on
 from world_gen.map_index import MapIndex, index_map
 from world_gen.movements import movements
 from world_gen.osm_map import LatLonBounds, MapError, OsmMap
-from world_gen.right_of_way import add_right_of_way
 from world_gen.road_graph import RoadGraph
 from world_gen.road_surface import areas
-from world_gen.stop_lines import line_controls, signals, stop_lines
 
 GENERATOR_VERSION = 3
 """Counts changes of what is built from the same map; part of every cache key."""
@@ -113,12 +111,7 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
     notes: list[str] = []
     lanes = build_lanes(around)
     connections = _connections(index, around, lanes, notes)
-    found = approaches(around, osm.node_tags)
-    lines = stop_lines(found, around, lanes)
-    controls = line_controls(lines)
-    for connection in connections:
-        connection.control = controls.get(connection.start.id, "none")
-    add_right_of_way([c for c in connections if c.cluster.whole], around.driving_side)
+    rules = junction_rules(around, osm.node_tags, lanes, connections)
     surface = areas(around, lanes, connections)
     near = index.buildings_in(in_map(extent, around.frame, index.graph.frame))
     free = _driven_beside(surface.driven, near, around.frame, index.graph.frame)
@@ -135,15 +128,17 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
                 summary=junction.summary,
                 arms=_arms(junction, around),
                 area=surface.junction_areas.get(junction.summary.id),
+                plan=rules.plans.get(junction.summary.id),
             )
             for junction in around.junctions
         ),
         roads=lanes.roads,
         lanes=tuple(lane.finished() for lane in lanes.lanes.values()),
         connections=tuple(c.finished() for c in connections),
-        stop_lines=lines,
+        conflicts=rules.conflicts,
+        stop_lines=rules.stop_lines,
         crossings=crossings(around, osm.node_tags),
-        signals=signals(found, lines, around, lanes),
+        signals=rules.signals,
         islands=surface.islands,
         kerbs=surface.kerbs,
         road_surface=surface.road_surface,

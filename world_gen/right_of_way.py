@@ -1,71 +1,261 @@
-"""Which connections cross each other, and a first answer to who yields."""
+"""Who waits where the paths of two connections meet: exactly one of them, by the rules of the road.
+
+Rules stand in the order in which they are asked:
+
+1. A U-turn on the spot waits for everyone (StVO §9 (5); UVC 11-602); one by way of a road through
+   the median is two left turns.
+2. Who enters a roundabout waits for those on it (StVO §8 (1a); Highway Code 185; UVC 11-402); at a
+   mini-roundabout for those who pass the driver's own entry. A ring tagged `junction=circular`
+   has no such right unless signs at its entries say so (Code de la route R415-10): then rule 5.
+3. Lanes of one road: who turns across a lane beside waits (§7 (5), §9 (1)); where lanes merge, who
+   comes from the lane that ends (§7 (4)).
+4. Under lights of both, who turns across oncoming traffic waits (§37 (2) 1, §9 (3), (4); Highway
+   Code 180; UVC 11-402): signs count only where the lights are out.
+5. The standing of the roads: stop and give-way signs, priority roads, ways out of yards, roads of
+   lower class (see `priority_roads.standings`), and signs on slip roads past which a path leads.
+6. Of equals who come towards each other, who turns across the other waits (§9 (3), (4)). Two
+   who both turn so pass in front of each other; where they have no room for that, the later id.
+7. Of equals the one whose near side the other comes from: right before left where traffic
+   keeps right (§8 (1); Code de la route R415-5; UVC 11-401, also at all-way stops), mirrored
+   where it keeps left. British law knows no such rule (Highway Code 146): it is a default there.
+8. Roads that run together: who goes straighter (§18 (3)), then a fixed order.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-import shapely
 
-from contracts.world import DrivingSide, LineControl
+from contracts.arrays import Array
+from contracts.world import Conflict, DrivingSide, Provenance, YieldRule
+from world_gen.approaches import Approach
+from world_gen.conflicts import Meetings, meetings
 from world_gen.connections import ConnectionDraft
+from world_gen.met_on_the_way import NodeTags, met_inside, sign_of
+from world_gen.polyline import arc_lengths, locate
+from world_gen.priority_roads import Rank, Standing, has_priority, importance
 
-SWEPT_HALF_WIDTH_M = 1.0
-"""Half the width of a car's path; swept areas of two connections overlap where they conflict."""
-_RANK: dict[LineControl, int] = {"none": 2, "signal": 2, "give_way": 1, "stop": 0}
+ONCOMING_RAD, ALONGSIDE_RAD = math.radians(135.0), math.radians(30.0)
 
 
-def add_right_of_way(connections: list[ConnectionDraft], driving_side: DrivingSide) -> None:
-    """Fill conflicts and yields of connections that share a cluster.
+class Answer(NamedTuple):
+    """Whether the first of a pair waits, by which rule, and who said so."""
 
-    In each conflicting pair exactly one yields: by sign first; then who turns across oncoming
-    traffic yields, then who comes from the other's left; the last resort is their order.
+    first_waits: bool
+    rule: YieldRule
+    source: Provenance
+
+
+@dataclass(slots=True, kw_only=True)
+class Way:
+    """What the rules ask about one connection."""
+
+    id: str
+    turn_weight: int
+    """0 straight, 1 a turn to the near side, 2 across oncoming traffic, 3 a U-turn."""
+    on_the_spot: bool
+    """A U-turn without a road through a median."""
+    heading: float
+    bend_rad: float
+    """How far it turns in all."""
+    road: tuple[int, bool]
+    on_ring: bool
+    standing: Standing
+    signalled: bool
+    sign: Standing | None
+    """A sign inside the junction, on a slip road or in a median, from `sign_m` on."""
+    sign_m: float
+    centerline: Array
+    on_main: bool
+    """Has run along the main road between the two mouths of a staggered junction."""
+    mini: bool
+    exit_heading: float
+
+
+def right_of_way(
+    connections: Sequence[ConnectionDraft],
+    found: Sequence[Approach],
+    node_tags: NodeTags,
+    driving_side: DrivingSide,
+) -> tuple[tuple[Conflict, ...], Meetings]:
+    """Return every conflict with its answer, and fill what the connections say of them.
+
+    Each of `connections` belongs to a junction that lies whole in the World.
     """
-    if not connections:
-        return
-    lines = shapely.linestrings(
-        np.concatenate([c.centerline for c in connections]),
-        indices=np.repeat(np.arange(len(connections)), [len(c.centerline) for c in connections]),
+    met = meetings(connections)
+    ways = _ways(connections, found, node_tags, driving_side)
+    headings = np.array([way.heading for way in ways])
+    turned = headings[met.second] - headings[met.first]
+    angle = np.arctan2(np.sin(turned), np.cos(turned)) if len(met.first) else turned
+    conflicts = []
+    conflicting: list[list[str]] = [[] for _ in ways]
+    waiting: list[list[str]] = [[] for _ in ways]
+    rows = zip(
+        met.first.tolist(), met.second.tolist(), met.merging.tolist(), met.points, met.areas,
+        angle.tolist(), strict=True,
+    )  # fmt: skip
+    for i, j, merging, point, area, from_first in rows:
+        a, b = ways[i], ways[j]
+        standing = _standing_at(a, area), _standing_at(b, area)
+        answer = _answer(a, b, standing, from_first, driving_side)
+        loser, winner = (i, j) if answer.first_waits else (j, i)
+        conflicting[i].append(b.id)
+        conflicting[j].append(a.id)
+        waiting[loser].append(ways[winner].id)
+        conflicts.append(
+            Conflict(
+                first_id=a.id,
+                second_id=b.id,
+                kind="merging" if merging else "crossing",
+                point=point,
+                area=area,
+                yields_id=ways[loser].id,
+                rule=answer.rule,
+                source=answer.source,
+            )
+        )
+    for connection, others, first in zip(connections, conflicting, waiting, strict=True):
+        connection.conflicts_with = tuple(sorted(others))
+        connection.yields_to = tuple(sorted(first))
+    return tuple(conflicts), met
+
+
+def _ways(
+    connections: Sequence[ConnectionDraft],
+    found: Sequence[Approach],
+    node_tags: NodeTags,
+    driving_side: DrivingSide,
+) -> list[Way]:
+    by_road: dict[tuple[int, bool], Approach] = {item.key: item for item in found}
+    near = "right" if driving_side == "right" else "left"
+    weight: Mapping[str, int] = {"straight": 0, near: 1, "u_turn": 3}
+    plain = Standing(Rank.PLAIN, "near_side", "default")
+    tops: dict[str, Rank] = {}
+    classes: dict[str, float] = {}
+    for approach in found:
+        name = approach.junction_id
+        tops[name] = max(tops.get(name, Rank.YARD), approach.standing.rank)
+        classes[name] = max(classes.get(name, 0.0), importance(approach.toward.edge))
+    ways = []
+    for c in connections:
+        toward = c.movement.toward
+        mine = by_road.get((toward.edge.index, toward.reverse))
+        junction = c.cluster.junction
+        name = junction.summary.id if junction is not None else ""
+        kind = junction.summary.kind if junction is not None else "other"
+        d = np.diff(c.centerline, axis=0)
+        start, end = math.atan2(d[0, 1], d[0, 0]), math.atan2(d[-1, 1], d[-1, 0])
+        sign, sign_m = _sign_inside(c, node_tags)
+        ways.append(
+            Way(
+                id=c.id,
+                turn_weight=weight.get(c.turn, 2),
+                on_the_spot=c.turn == "u_turn" and not c.movement.inside,
+                heading=start,
+                bend_rad=abs(math.remainder(end - start, math.tau)),
+                road=(toward.edge.index, toward.reverse),
+                on_ring=c.start.role == "ring",
+                standing=plain if mine is None else mine.standing,
+                signalled=c.control == "signal",
+                sign=sign,
+                sign_m=sign_m,
+                centerline=c.centerline,
+                on_main=kind == "staggered" and _runs_along_main(c, tops, classes, name),
+                mini=kind == "mini_roundabout",
+                exit_heading=end,
+            )
+        )
+    return ways
+
+
+def _sign_inside(c: ConnectionDraft, node_tags: NodeTags) -> tuple[Standing | None, float]:
+    """Return the sign on the way through a junction, and where along the path it stands."""
+    for met in met_inside(c.movement.inside, node_tags):
+        if word := sign_of(met.tags):
+            for part in c.movement.inside:
+                nodes = part.edge.node_ids
+                if met.node in nodes:
+                    at = locate(c.centerline, part.edge.xy_m[nodes.index(met.node)])
+                    return Standing(Rank.MINOR, word, "tagged"), at
+    return None, math.inf
+
+
+def _runs_along_main(
+    c: ConnectionDraft, tops: Mapping[str, Rank], classes: Mapping[str, float], name: str
+) -> bool:
+    return any(
+        importance(part.edge) >= classes.get(name, 0.0)
+        and (tops.get(name) != Rank.PRIORITY or has_priority(part.edge.tags))
+        for part in c.movement.inside
     )
-    swept = shapely.buffer(lines, SWEPT_HALF_WIDTH_M, cap_style="flat", quad_segs=2)
-    first, second = shapely.STRtree(swept).query(swept, predicate="intersects")
-    later = first < second
-    conflicts: dict[int, set[int]] = {}
-    yields: dict[int, set[int]] = {}
-    for i, j in zip(first[later].tolist(), second[later].tolist(), strict=True):
-        a, b = connections[i], connections[j]
-        if a.cluster is not b.cluster or a.start.id == b.start.id:
-            continue
-        if a.end.id != b.end.id and shapely.intersection(swept[i], swept[j]).area < 0.3:
-            continue
-        conflicts.setdefault(i, set()).add(j)
-        conflicts.setdefault(j, set()).add(i)
-        loser, winner = (i, j) if _yields(a, b, driving_side) else (j, i)
-        yields.setdefault(loser, set()).add(winner)
-    for i, connection in enumerate(connections):
-        connection.conflicts_with = tuple(sorted(connections[j].id for j in conflicts.get(i, ())))
-        connection.yields_to = tuple(sorted(connections[j].id for j in yields.get(i, ())))
 
 
-def _yields(a: ConnectionDraft, b: ConnectionDraft, driving_side: DrivingSide) -> bool:
-    """Return whether `a` yields to `b`."""
-    if _RANK[a.control] != _RANK[b.control]:
-        return _RANK[a.control] < _RANK[b.control]
-    ring_a, ring_b = a.start.role == "ring", b.start.role == "ring"
-    if ring_a != ring_b:
-        return ring_b
-    angle = _from_right(a, b)
-    if abs(angle) > math.radians(135.0):  # oncoming: who crosses the other's lane waits
-        near, far = ("right", "left") if driving_side == "right" else ("left", "right")
-        weight = {"straight": 0, near: 1, far: 2, "u_turn": 3}
-        if weight[a.turn] != weight[b.turn]:
-            return weight[a.turn] > weight[b.turn]
-    elif abs(angle) > math.radians(30.0):
-        return angle > 0.0
-    return a.id > b.id
+def _answer(
+    a: Way, b: Way, standing: tuple[Standing, Standing], angle: float, driving_side: DrivingSide
+) -> Answer:
+    """Return who of two waits; `angle` turns a's first heading into b's, positive to the left."""
+    if a.on_the_spot != b.on_the_spot:
+        return Answer(a.on_the_spot, "u_turn", "inferred")
+    if a.on_ring != b.on_ring:
+        entry = b if a.on_ring else a
+        if entry.standing.rule == "roundabout":
+            return Answer(b.on_ring, "roundabout", entry.standing.source)
+    elif a.mini and b.mini and a.road != b.road:
+        past_a = _passes(b, a, driving_side)
+        if past_a != _passes(a, b, driving_side):
+            return Answer(past_a, "roundabout", "tagged")
+    if a.road == b.road or (a.on_ring and b.on_ring):
+        return _beside(a, b)
+    oncoming = abs(angle) > ONCOMING_RAD
+    if oncoming and a.signalled and b.signalled:
+        return _across(a, b)
+    first, second = standing
+    if first.rank != second.rank:
+        loser, winner = sorted((first, second))
+        told = loser if loser.rank < Rank.PLAIN else winner
+        return Answer(loser is first, told.rule, told.source)
+    if a.on_main != b.on_main and first.rank < Rank.PLAIN:
+        return Answer(b.on_main, first.rule if b.on_main else second.rule, "inferred")
+    if oncoming:
+        return _across(a, b)
+    if abs(angle) > ALONGSIDE_RAD:
+        # Who is seen to the right comes with a heading turned to the left.
+        return Answer((angle > 0.0) == (driving_side == "right"), "near_side", "default")
+    return _beside(a, b)
 
 
-def _from_right(a: ConnectionDraft, b: ConnectionDraft) -> float:
-    """Return the angle from a's to b's heading at the start; positive: b comes from a's right."""
-    da, db = a.centerline[1] - a.centerline[0], b.centerline[1] - b.centerline[0]
-    return math.atan2(da[0] * db[1] - da[1] * db[0], float(da @ db))
+def _standing_at(way: Way, area: Array) -> Standing:
+    """Return the standing with which a path comes to the ground that it shares with another."""
+    if way.sign is None or way.standing.rank <= way.sign.rank:
+        return way.standing
+    xy = way.centerline
+    gaps = np.hypot(*(area[:, None] - xy[None]).transpose(2, 0, 1))
+    reached_m = float(arc_lengths(xy)[gaps.argmin(axis=1)].min())
+    return way.sign if reached_m > way.sign_m else way.standing
+
+
+def _passes(mover: Way, waiting: Way, driving_side: DrivingSide) -> bool:
+    """Return whether a driver on a mini-roundabout passes another one's entry."""
+    turn = 1.0 if driving_side == "right" else -1.0
+    entry = mover.heading + math.pi
+    to_exit = (turn * (mover.exit_heading - entry)) % math.tau or math.tau
+    to_waiting = (turn * (waiting.heading + math.pi - entry)) % math.tau
+    return 1e-3 < to_waiting < to_exit - 1e-3
+
+
+def _across(a: Way, b: Way) -> Answer:
+    if a.turn_weight != b.turn_weight:
+        return Answer(a.turn_weight > b.turn_weight, "turn_across", "inferred")
+    return Answer(a.id > b.id, "turn_across" if a.turn_weight else "order", "default")
+
+
+def _beside(a: Way, b: Way) -> Answer:
+    if a.turn_weight != b.turn_weight:
+        return Answer(a.turn_weight > b.turn_weight, "merge_order", "inferred")
+    if abs(a.bend_rad - b.bend_rad) > math.radians(1.0):
+        return Answer(a.bend_rad > b.bend_rad, "merge_order", "inferred")
+    return Answer(a.id > b.id, "merge_order", "default")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,7 +22,7 @@ GROUP_AXIS_RAD = math.radians(30.0)
 
 
 def stop_lines(
-    found: tuple[Approach, ...], around: Surroundings, lanes: LaneSet
+    found: Sequence[Approach], around: Surroundings, lanes: LaneSet
 ) -> tuple[StopLine, ...]:
     """Return one line for each lane that enters a whole junction, whatever controls it."""
     lines = []
@@ -68,7 +69,7 @@ def line_controls(lines: tuple[StopLine, ...]) -> dict[str, LineControl]:
 
 
 def signals(
-    found: tuple[Approach, ...],
+    found: Sequence[Approach],
     lines: tuple[StopLine, ...],
     around: Surroundings,
     lanes: LaneSet,
@@ -103,12 +104,12 @@ def signals(
         heads.append(
             Signal(
                 id=f"{kerb_side.id}:signal",
-                osm_node=approach.signal_node,
+                osm_node=next(iter(approach.signal_nodes), None),
                 group_id=f"{name}:g{group}",
                 lane_ids=tuple(lane.id for lane in mine),
                 position=np.round(np.array([beside[0], beside[1], SIGNAL_HEIGHT_M]), 3),
                 yaw_rad=round(math.atan2(out[1], out[0]), 4),
-                source="inferred" if approach.signal_node is None else "tagged",
+                source="inferred" if not approach.signal_nodes else "tagged",
             )
         )
     return tuple(heads)

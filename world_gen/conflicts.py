@@ -1,0 +1,162 @@
+"""Where the paths of two connections of one junction meet: the point and the ground they share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from contracts.arrays import Array
+from world_gen.connections import ConnectionDraft
+from world_gen.polyline import left_of
+
+SWEPT_HALF_WIDTH_M = 1.0
+"""Half of what a car sweeps: 1.8 m of body and 0.1 m to each side, whatever the lane's width."""
+LEAST_AREA_M2 = 0.3
+"""Paths that merely brush each other do not cross; those that end in one lane always meet."""
+_MITRE_LIMIT = 2.0
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Meetings:
+    """M pairs of connections, by their indices (M,), `first` before `second`.
+
+    `merging` (M,) tells that both end in one lane; `points` (M, 2) is where their middles cross
+    or come nearest, each of `areas` (N, 2) a counter-clockwise outline. `first_m` and
+    `second_m` (M,) are how far along each path the point lies.
+    """
+
+    first: Indices
+    second: Indices
+    merging: NDArray[np.bool_]
+    points: Array
+    areas: tuple[Array, ...]
+    first_m: Array
+    second_m: Array
+
+
+def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
+    """Return every pair of connections of one junction and one level whose swept areas overlap.
+
+    Two that begin in one lane part and do not meet; of two that follow each other neither waits.
+    """
+    if not connections:
+        none = np.zeros(0, dtype=np.int64)
+        flat = np.zeros(0)
+        return Meetings(
+            first=none, second=none, merging=none.astype(bool), points=np.zeros((0, 2)), areas=(),
+            first_m=flat, second_m=flat,
+        )  # fmt: skip
+    lines, swept = _swept(connections)
+    a, b = shapely.STRtree(swept).query(swept)
+    junction = np.array([id(c.cluster.junction) for c in connections])
+    number: dict[str, int] = {}
+    start = np.array([number.setdefault(c.start.id, len(number)) for c in connections])
+    end = np.array([number.setdefault(c.end.id, len(number)) for c in connections])
+    near = (a < b) & (junction[a] == junction[b]) & (start[a] != start[b])
+    near &= (end[a] != start[b]) & (end[b] != start[a])
+    a, b = a[near], b[near]
+    merging = end[a] == end[b]
+    shared = shapely.intersection(swept[a], swept[b])
+    meet = merging | (shapely.area(shared) >= LEAST_AREA_M2)
+    meet[meet] = _on_one_level(connections, a[meet], b[meet])
+    a, b, merging, shared = a[meet], b[meet], merging[meet], shared[meet]
+    order = np.lexsort((b, a))
+    a, b, merging, shared = a[order], b[order], merging[order], shared[order]
+    nearest = shapely.get_coordinates(shapely.shortest_line(lines[a], lines[b]))
+    middle = nearest.reshape(-1, 2, 2).mean(axis=1)
+    points = np.round(middle, 3)
+    at = shapely.points(middle)
+    return Meetings(
+        first=a,
+        second=b,
+        merging=merging,
+        points=points,
+        areas=_outlines(shared, points),
+        first_m=shapely.line_locate_point(lines[a], at),
+        second_m=shapely.line_locate_point(lines[b], at),
+    )
+
+
+def _on_one_level(
+    connections: Sequence[ConnectionDraft], a: Indices, b: Indices
+) -> NDArray[np.bool_]:
+    """Return (M,) whether the paths share a node of the map or run at one level somewhere.
+
+    A bridge often begins at the very node of a junction, so levels alone do not tell.
+    """
+    if len({c.start.edge.layer for c in connections} | {c.end.edge.layer for c in connections}) < 2:
+        return np.ones(len(a), dtype=bool)
+    levels, nodes = [], []
+    for c in connections:
+        edges = [c.start.edge, c.end.edge, *(part.edge for part in c.movement.inside)]
+        levels.append({edge.layer for edge in edges})
+        passed = {part.end_node for part in c.movement.inside}
+        nodes.append(passed | {c.movement.toward.end_node, c.movement.away.start_node})
+    return np.array(
+        [
+            bool(levels[i] & levels[j] or nodes[i] & nodes[j])
+            for i, j in zip(a.tolist(), b.tolist(), strict=True)
+        ],
+        dtype=bool,
+    )
+
+
+def _outlines(shared: Array, points: Array) -> tuple[Array, ...]:
+    """Return the outline of the largest part of each area, counter-clockwise."""
+    parts, owner = shapely.get_parts(shared, return_index=True)
+    polygons = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
+    parts, owner = parts[polygons], owner[polygons]
+    order = np.lexsort((shapely.area(parts), owner))
+    owner = owner[order]
+    last = np.append(owner[1:] != owner[:-1], True) if len(owner) else np.zeros(0, dtype=bool)
+    rings = shapely.get_exterior_ring(parts[order][last])
+    backward = ~shapely.is_ccw(rings)
+    rings[backward] = shapely.reverse(rings[backward])
+    xy, of = shapely.get_coordinates(rings, return_index=True)
+    cuts = np.searchsorted(of, np.arange(1, len(rings)))
+    found = dict(
+        zip(owner[last].tolist(), np.split(np.round(xy, 3), cuts), strict=True)
+        if len(rings)
+        else ()
+    )
+    corner = 0.1 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    # Paths that end in one point but are too short to sweep anything still need an outline.
+    return tuple(
+        found[i][:-1] if i in found else np.round(points[i] + corner, 3) for i in range(len(shared))
+    )
+
+
+def _swept(connections: Sequence[ConnectionDraft]) -> tuple[Array, Array]:
+    """Return the middle lines and what a car sweeps along them, as arrays of geometries.
+
+    Vertices move out along the mean normal of their two segments. Where a bend is too sharp for
+    that the area is a buffer, which is slower.
+    """
+    counts = np.array([len(c.centerline) for c in connections])
+    xy = np.concatenate([c.centerline for c in connections])
+    owner = np.repeat(np.arange(len(counts)), counts)
+    lines = shapely.linestrings(xy, indices=owner)
+    step = np.diff(xy, axis=0)
+    step /= np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
+    last = np.cumsum(counts) - 1
+    first = last - counts + 1
+    arriving, leaving = np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]])
+    arriving[first], leaving[last] = leaving[first], arriving[last]
+    normal = left_of(arriving + leaving)
+    norm2 = (normal * normal).sum(axis=1)
+    # |in + out| = 2 cos(bend / 2), and the mitre is 1 / cos(bend / 2) long.
+    normal *= (2.0 / np.maximum(norm2, 4.0 / _MITRE_LIMIT**2))[:, None] * SWEPT_HALF_WIDTH_M
+    outline = np.empty((2 * len(xy), 2))
+    at = np.arange(len(xy)) + first[owner]
+    outline[at] = xy - normal
+    outline[2 * (first + last)[owner] + 1 - at] = xy + normal
+    swept = shapely.polygons(shapely.linearrings(outline, indices=np.repeat(owner, 2)))
+    bad = ~shapely.is_valid(swept)
+    if bad.any():
+        swept[bad] = shapely.buffer(lines[bad], SWEPT_HALF_WIDTH_M, cap_style="flat", quad_segs=2)
+    return lines, swept

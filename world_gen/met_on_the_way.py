@@ -1,0 +1,104 @@
+"""What a driver meets on the way to a junction and through it: lights, signs and crossings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+from contracts.world import YieldRule
+from world_gen.clusters import Cluster
+from world_gen.polyline import arc_lengths
+from world_gen.road_graph import DirectedEdge
+
+LOOK_BACK_M = 40.0
+NodeTags = Mapping[int, Mapping[str, str]]
+
+
+class Met(NamedTuple):
+    """A tagged node on an approach, `distance_m` before the junction's node; infinite inside."""
+
+    node: int
+    distance_m: float
+    tags: Mapping[str, str]
+
+
+def is_light(tags: Mapping[str, str]) -> bool:
+    """Return whether a node is a light for cars."""
+    return tags.get("highway") == "traffic_signals"
+
+
+def sign_of(tags: Mapping[str, str]) -> YieldRule | None:
+    """Return the sign that a node carries; German signs count by their number too."""
+    word = tags.get("highway")
+    sign = tags.get("traffic_sign", "")
+    if word == "stop" or sign.startswith("DE:206"):
+        return "stop"
+    return "give_way" if word == "give_way" or sign.startswith("DE:205") else None
+
+
+def met_toward(
+    leg: DirectedEdge,
+    plain_from: Mapping[int, Cluster],
+    node_tags: NodeTags,
+    junction_nodes: Collection[int],
+) -> list[Met]:
+    """Walk outward along the leg, on through nodes where the road merely goes on.
+
+    A node that does not say which way it faces counts for the nearer junction.
+    """
+    found: list[tuple[Met, bool]] = []
+    gone, current, meets_another = 0.0, leg, False
+    for _ in range(8):
+        nodes = current.edge.node_ids[::-1] if current.reverse else current.edge.node_ids
+        along = arc_lengths(current.xy_m)
+        for node, at in zip(nodes, along, strict=False):
+            tags = node_tags.get(node)
+            if tags and gone + at <= LOOK_BACK_M:
+                facing = faces(tags, current.reverse)
+                if facing is not False:
+                    found.append((Met(node, gone + float(at), tags), facing is None))
+        gone += float(along[-1])
+        cluster = plain_from.get(current.end_node)
+        meets_another = cluster is None
+        if (
+            gone > 2.0 * LOOK_BACK_M
+            or cluster is None
+            or cluster.whole
+            or current.end_node in junction_nodes
+        ):
+            break
+        onward = [d for d in cluster.legs if d.edge.index != current.edge.index]
+        if not onward:
+            break
+        current = onward[0]
+    nearer_m = gone / 2.0 if meets_another else math.inf
+    unique = {m.node: m for m, unsaid in found if not unsaid or m.distance_m <= nearer_m}
+    return list(unique.values())
+
+
+def met_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[Met]:
+    """Return lights and signs met between a junction's nodes, in driving order."""
+    found = []
+    for part in inside:
+        nodes = part.edge.node_ids[::-1] if part.reverse else part.edge.node_ids
+        for node in nodes:
+            tags = node_tags.get(node)
+            if not tags or not (is_light(tags) or sign_of(tags)):
+                continue
+            # Who drives along the nodes meets what faces forward.
+            if faces(tags, not part.reverse) is not False:
+                found.append(Met(node, math.inf, tags))
+    return found
+
+
+def faces(tags: Mapping[str, str], against_outward: bool) -> bool | None:
+    """Return whether a sign or light is for those who drive along (true) the way's nodes.
+
+    `against_outward` is whether traffic in question runs along the nodes. None: it does not say.
+    """
+    for key in ("traffic_signals:direction", "stop:direction", "give_way:direction", "direction"):
+        word = tags.get(key)
+        if word in ("forward", "backward"):
+            return (word == "forward") == against_outward
+    return None
