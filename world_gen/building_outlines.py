@@ -140,12 +140,10 @@ def _members(
 
 
 def _coordinates(osm: OsmMap, rings: Sequence[Sequence[int]]) -> tuple[Array, Indices]:
-    locations = osm.locations
     counts = np.fromiter(map(len, rings), dtype=np.intp, count=len(rings))
     first = np.concatenate([[0], np.cumsum(counts)])
-    flat = chain.from_iterable(map(locations.__getitem__, chain.from_iterable(rings)))
-    latlon = np.fromiter(flat, dtype=np.float64, count=2 * int(first[-1]))
-    return latlon.reshape(-1, 2), first
+    flat = chain.from_iterable(rings)
+    return osm.lat_lon_deg(np.fromiter(flat, dtype=np.int64, count=int(first[-1]))), first
 
 
 def _boxes(latlon: Array, first: Indices) -> Array:

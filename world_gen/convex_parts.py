@@ -1,99 +1,119 @@
-"""Polygons with holes cut into few convex pieces, since a mesh collides as its convex hull."""
+"""Footprints cut into few convex pieces, since a mesh collides as its convex hull.
+
+Most footprints are rectangles put together: a piece that is a rectangle, within the tolerance, is
+told as one, since a box costs a simulation a tenth of what a mesh does.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
+import numpy.typing as npt
 import shapely
-from shapely.geometry import Polygon
-from shapely.geometry.polygon import orient
 
 from contracts.arrays import Array
+from world_gen.buildings import FOOTPRINT_TOLERANCE_M, SILHOUETTE_TOLERANCE_M
+from world_gen.reflex_cuts import cut_at_reflex_corners, nearly_the_same, polygons_of
 
-_STRAIGHT = 1e-3
+COLLISION_TOLERANCE_M = SILHOUETTE_TOLERANCE_M - FOOTPRINT_TOLERANCE_M
+"""How far convex parts may move a silhouette that the footprint has moved already."""
+_MIN_AREA_M2 = 0.01
+
+Geometries = npt.NDArray[np.object_]
+Indices = npt.NDArray[np.intp]
+
+
+class ConvexParts(NamedTuple):
+    """Convex pieces (K,) of polygons: rings (N, 2) counter-clockwise, and whose piece each is.
+
+    Where `is_box`, the piece is a rectangle of `half_m` (K, 2) about `centre_m` (K, 2), its first
+    side along `yaw_rad` (K,), and its ring has those four corners.
+    """
+
+    owner: Indices
+    rings: list[Array]
+    is_box: npt.NDArray[np.bool_]
+    centre_m: Array
+    half_m: Array
+    yaw_rad: Array
 
 
 def convex_parts(
-    outline: Array, holes: tuple[Array, ...] = (), *, tolerance_m: float = 0.25
+    outline: Array, holes: tuple[Array, ...] = (), *, tolerance_m: float = COLLISION_TOLERANCE_M
 ) -> list[Array]:
-    """Return convex pieces (N, 2), counter-clockwise, that cover a polygon.
+    """Return convex pieces (N, 2), counter-clockwise, that cover a polygon; see `convex_cover`."""
+    return convex_cover([(outline, holes)], tolerance_m=tolerance_m).rings
 
-    The outline is simplified, and taken for its convex hull, as far as its silhouette moves by
-    no more than `tolerance_m`. Pieces are a constrained Delaunay triangulation merged across
-    inner edges while the result stays convex (Hertel and Mehlhorn 1983).
+
+def convex_cover(
+    outlines: Sequence[tuple[Array, tuple[Array, ...]]],
+    *,
+    tolerance_m: float = COLLISION_TOLERANCE_M,
+) -> ConvexParts:
+    """Return convex pieces that together cover polygons, each an outline (N, 2) and its holes.
+
+    No point of a silhouette moves by more than `tolerance_m`: a third of it goes into simplifying
+    outlines, one into taking a piece for its convex hull, one into taking that for a rectangle.
+    Self-crossing outlines are mended.
     """
-    shape = Polygon(outline, holes)
-    if not shape.is_valid:
-        shape = shapely.make_valid(shape)
-    pieces: list[Array] = []
-    for polygon in shapely.get_parts(shape):
-        if isinstance(polygon, Polygon) and polygon.area > 0.05:
-            pieces.extend(_parts(polygon, tolerance_m))
-    return pieces
+    share_m = tolerance_m / 3
+    shapes, owner = _sound(_polygons(outlines))
+    simple = shapely.simplify(shapes, share_m, preserve_topology=True)
+    worse = ~shapely.is_valid(simple) | shapely.is_empty(simple)
+    simple[worse] = shapes[worse]
+    pieces, of = cut_at_reflex_corners(simple, share_m)
+    keep = shapely.area(pieces) >= _MIN_AREA_M2
+    pieces, of = pieces[keep], of[keep]
+    boxes = shapely.oriented_envelope(pieces)
+    is_box = shapely.get_type_id(boxes) == _POLYGON
+    is_box[is_box] = nearly_the_same(boxes[is_box], pieces[is_box], share_m)
+    return _told(owner[of], np.where(is_box, boxes, pieces), is_box)
 
 
-def _parts(polygon: Polygon, tolerance_m: float) -> list[Array]:
-    # Half of the tolerance for simplifying, half for notches that the hull fills.
-    simple = polygon.simplify(tolerance_m / 2, preserve_topology=True)
-    if not isinstance(simple, Polygon) or not simple.is_valid or simple.area < 0.05:
-        simple = polygon
-    hull = simple.convex_hull
-    if (
-        not simple.interiors
-        and shapely.hausdorff_distance(hull.exterior, simple.exterior) <= tolerance_m / 2
-    ):
-        return [_ring(hull)]
-    triangles = [
-        _ring(t) for t in shapely.constrained_delaunay_triangles(simple).geoms if t.area > 1e-4
-    ]
-    return _merged(triangles)
+_POLYGON = 3
 
 
-def _ring(polygon: Polygon) -> Array:
-    points: Array = shapely.get_coordinates(orient(polygon).exterior)[:-1]
-    return points
+def _polygons(outlines: Sequence[tuple[Array, tuple[Array, ...]]]) -> Geometries:
+    """Return polygons of outlines and holes, made from one array of coordinates."""
+    rings = [ring for outline, holes in outlines for ring in (outline, *holes)]
+    if not rings:
+        return np.zeros(0, dtype=object)
+    counts = [len(ring) for ring in rings]
+    made = shapely.linearrings(
+        np.concatenate(rings), indices=np.repeat(np.arange(len(rings)), counts)
+    )
+    of = np.repeat(np.arange(len(outlines)), [1 + len(holes) for _, holes in outlines])
+    polygons: Geometries = shapely.polygons(made, indices=of)
+    return polygons
 
 
-def _merged(triangles: list[Array]) -> list[Array]:
-    corners, rows = np.unique(np.round(np.concatenate(triangles), 6), axis=0, return_inverse=True)
-    names = rows.reshape(-1, 3).tolist()
-    xy = corners.tolist()
-    pieces: dict[int, list[int]] = dict(enumerate(names))
-    owner: dict[tuple[int, int], int] = {}
-    for piece, ring in pieces.items():
-        for k in range(3):
-            owner[ring[k], ring[(k + 1) % 3]] = piece
-    inner = [edge for edge in owner if edge[0] < edge[1] and (edge[1], edge[0]) in owner]
-    inner.sort(key=lambda e: -_length2(xy[e[0]], xy[e[1]]))
-    for a, b in inner:
-        left, right = owner[a, b], owner[b, a]
-        if left == right:
-            continue
-        merged = _join(pieces[left], pieces[right], a, b)
-        if merged is None or not _convex(merged, xy, (a, b)):
-            continue
-        del pieces[right]
-        pieces[left] = merged
-        for k, corner in enumerate(merged):
-            owner[corner, merged[(k + 1) % len(merged)]] = left
-    return [np.array([xy[i] for i in ring]) for ring in pieces.values()]
+def _sound(shapes: Geometries) -> tuple[Geometries, Indices]:
+    """Return valid polygons, and of which shape each is."""
+    bad = ~shapely.is_valid(shapes)
+    if bad.any():
+        shapes = shapes.copy()
+        shapes[bad] = shapely.make_valid(shapes[bad])
+    return polygons_of(shapes, np.arange(len(shapes)))
 
 
-def _length2(a: list[float], b: list[float]) -> float:
-    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2
-
-
-def _join(left: list[int], right: list[int], a: int, b: int) -> list[int] | None:
-    """Return the ring of two pieces without their common edge a→b (b→a in `right`)."""
-    i, j = left.index(b), right.index(a)
-    ring = left[i:] + left[:i] + (right[j:] + right[:j])[1:-1]
-    return ring if len(set(ring)) == len(ring) else None
-
-
-def _convex(ring: list[int], xy: list[list[float]], corners: tuple[int, int]) -> bool:
-    n = len(ring)
-    for corner in corners:
-        k = ring.index(corner)
-        p, q, r = xy[ring[k - 1]], xy[corner], xy[ring[(k + 1) % n]]
-        if (q[0] - p[0]) * (r[1] - q[1]) - (q[1] - p[1]) * (r[0] - q[0]) < -_STRAIGHT:
-            return False
-    return True
+def _told(owner: Indices, pieces: Geometries, is_box: npt.NDArray[np.bool_]) -> ConvexParts:
+    pieces = shapely.orient_polygons(pieces)
+    points = shapely.get_coordinates(pieces)
+    counts = shapely.get_num_coordinates(pieces)
+    ends = np.cumsum(counts)
+    begins = ends - counts
+    first = np.where(is_box, begins, 0)
+    a, b, c = (points[first + k] if len(points) else np.zeros((0, 2)) for k in range(3))
+    along, across = b - a, c - b
+    order = np.argsort(owner, kind="stable")
+    spans = list(zip(begins.tolist(), (ends - 1).tolist(), strict=True))
+    return ConvexParts(
+        owner=owner[order],
+        rings=[points[begin:end] for begin, end in (spans[k] for k in order.tolist())],
+        is_box=is_box[order],
+        centre_m=((a + c) / 2)[order],
+        half_m=np.stack([np.hypot(*along.T), np.hypot(*across.T)], axis=1)[order] / 2,
+        yaw_rad=np.arctan2(along[:, 1], along[:, 0])[order],
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import mujoco
 import numpy as np
 import pytest
@@ -91,9 +93,12 @@ def test_static_geoms_stand_in_the_worlds_body_where_the_map_has_them(world):
     for geom in range(model.ngeom):
         if not mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom).startswith("building:w20"):
             continue
-        mesh = model.geom_dataid[geom]
-        first = model.mesh_vertadr[mesh]
-        points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+            points = np.array(list(product((-1, 1), repeat=3))) * model.geom_size[geom]
+        else:
+            mesh = model.geom_dataid[geom]
+            first = model.mesh_vertadr[mesh]
+            points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
         corners.append(points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
     low, high = np.concatenate(corners).min(axis=0), np.concatenate(corners).max(axis=0)
     np.testing.assert_allclose(low, [20.0, 20.0, 0.0], atol=0.05)

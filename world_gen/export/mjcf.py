@@ -6,6 +6,8 @@ the other. Static geoms stand in worldbody, never in bodies of their own (93 aga
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import mujoco
@@ -14,9 +16,9 @@ import shapely
 from shapely.geometry import Polygon
 
 from contracts.arrays import Array
-from contracts.world import World
-from world_gen.convex_parts import convex_parts
-from world_gen.road_surface import RING_ISLAND
+from contracts.world import Building, World
+from world_gen.convex_parts import convex_cover
+from world_gen.islands import RING_ISLAND
 
 STATIC = 1
 """Contype of buildings and islands; their conaffinity is VEHICLE."""
@@ -60,19 +62,15 @@ def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
     if visual:
         _add_road(spec, world)
         spec.worldbody.add_light(pos=[0, 0, 200], dir=[0.3, 0.2, -1], castshadow=False)
-    reach = None if visual else _near_road(world)
-    for building in world.buildings:
-        if reach is not None and not reach.intersects(Polygon(building.outline)):
-            continue
-        low, high = building.min_height_m, building.height_m.value
-        for i, part in enumerate(convex_parts(building.outline, building.holes)):
-            _add_prism(spec, f"building:{building.id}:{i}", part, low, high, _BUILDING_RGBA, True)
-    for island in world.islands:
-        solid = island.id.startswith(RING_ISLAND)
-        height = RING_ISLAND_HEIGHT_M if solid else TRAFFIC_ISLAND_HEIGHT_M
-        if solid or visual:
-            for i, part in enumerate(convex_parts(island.outline, island.holes)):
-                _add_prism(spec, f"{island.id}:{i}", part, 0.0, height, _ISLAND_RGBA, solid)
+    buildings = world.buildings if visual else _near_road(world)
+    _add_blocks(
+        spec,
+        "building",
+        [(b.outline, b.holes) for b in buildings],
+        [(b.id, b.min_height_m, b.height_m.value) for b in buildings],
+        _block_default(spec, "building", _BUILDING_RGBA, solid=True),
+    )
+    _add_islands(spec, world, visual=visual)
     return spec
 
 
@@ -98,45 +96,93 @@ def _set_options(spec: mujoco.MjSpec) -> None:
     option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
-def _near_road(world: World) -> shapely.Geometry:
+def _near_road(world: World) -> list[Building]:
+    if not world.buildings or not world.road_surface:
+        return []
     roads = [Polygon(area.outline).simplify(1.0) for area in world.road_surface]
     reach = shapely.union_all(shapely.buffer(roads, WORKER_REACH_M, quad_segs=2))
     shapely.prepare(reach)
-    return reach
+    outlines = np.array([Polygon(b.outline) for b in world.buildings], dtype=object)
+    near = shapely.intersects(reach, outlines).tolist()
+    return [b for b, is_near in zip(world.buildings, near, strict=True) if is_near]
 
 
-def _add_prism(
+def _add_islands(spec: mujoco.MjSpec, world: World, *, visual: bool) -> None:
+    for solid in (True, False):
+        chosen = [i for i in world.islands if i.id.startswith(RING_ISLAND) is solid]
+        if not chosen or not (solid or visual):
+            continue
+        height = RING_ISLAND_HEIGHT_M if solid else TRAFFIC_ISLAND_HEIGHT_M
+        name = "mound" if solid else "island"
+        _add_blocks(
+            spec,
+            "",
+            [(island.outline, island.holes) for island in chosen],
+            [(island.id, 0.0, height) for island in chosen],
+            _block_default(spec, name, _ISLAND_RGBA, solid=solid),
+        )
+
+
+def _block_default(
+    spec: mujoco.MjSpec, name: str, rgba: tuple[float, float, float, float], *, solid: bool
+) -> mujoco.MjsDefault:
+    block = spec.add_default(name, spec.default)
+    block.geom.type = mujoco.mjtGeom.mjGEOM_BOX
+    block.geom.rgba = rgba
+    block.geom.group = COLLISION_GROUP
+    block.geom.contype = STATIC if solid else 0
+    block.geom.conaffinity = VEHICLE if solid else 0
+    return block
+
+
+def _add_blocks(
     spec: mujoco.MjSpec,
-    name: str,
-    ring: Array,
-    low_m: float,
-    high_m: float,
-    rgba: tuple[float, float, float, float],
-    solid: bool,
+    prefix: str,
+    outlines: Sequence[tuple[Array, tuple[Array, ...]]],
+    extents: Sequence[tuple[str, float, float]],
+    block: mujoco.MjsDefault,
 ) -> None:
-    n = len(ring)
-    if n < 3 or high_m - low_m < 0.01:
-        return
-    bottom = np.column_stack([ring, np.full(n, low_m)])
-    top = np.column_stack([ring, np.full(n, high_m)])
+    """Add outlines, each with an id, an underside and a top, as boxes and convex prisms."""
+    parts = convex_cover(outlines)
+    add_geom, add_mesh = spec.worldbody.add_geom, spec.add_mesh
+    count: dict[int, int] = {}
+    centres, halves = parts.centre_m.tolist(), parts.half_m.tolist()
+    cosines, sines = np.cos(parts.yaw_rad / 2).tolist(), np.sin(parts.yaw_rad / 2).tolist()
+    owners, boxes = parts.owner.tolist(), parts.is_box.tolist()
+    for k, (owner, is_box) in enumerate(zip(owners, boxes, strict=True)):
+        given, low, high = extents[owner]
+        if high - low < 0.01:
+            continue
+        count[owner] = n = count.get(owner, -1) + 1
+        name = f"{prefix}:{given}:{n}" if prefix else f"{given}:{n}"
+        if is_box:
+            add_geom(
+                block,
+                name=name,
+                pos=[*centres[k], (low + high) / 2],
+                size=[*halves[k], (high - low) / 2],
+                quat=[cosines[k], 0.0, 0.0, sines[k]],
+            )
+            continue
+        ring = parts.rings[k]
+        corners = np.empty((2, len(ring), 3))
+        corners[:, :, :2] = ring
+        corners[0, :, 2], corners[1, :, 2] = low, high
+        add_mesh(name=name, uservert=corners.ravel().tolist(), userface=_prism_faces(len(ring)))
+        add_geom(block, name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name)
+
+
+@cache
+def _prism_faces(n: int) -> list[int]:
+    """Return the triangles of a prism whose bottom ring of `n` corners stands before its top."""
     k = np.arange(n)
     after = (k + 1) % n
     sides = np.concatenate([np.stack([k, after, after + n], 1), np.stack([k, after + n, k + n], 1)])
     fan = np.arange(1, n - 1)
     lid = np.stack([np.full(n - 2, n), fan + n, fan + n + 1], 1)
     base = np.stack([np.zeros(n - 2, dtype=int), fan + 1, fan], 1)
-    mesh = spec.add_mesh()
-    mesh.name = name
-    mesh.uservert = np.concatenate([bottom, top]).ravel()
-    mesh.userface = np.concatenate([sides, lid, base]).ravel()
-    geom = spec.worldbody.add_geom()
-    geom.name = name
-    geom.type = mujoco.mjtGeom.mjGEOM_MESH
-    geom.meshname = name
-    geom.rgba = rgba
-    geom.group = COLLISION_GROUP
-    geom.contype = STATIC if solid else 0
-    geom.conaffinity = VEHICLE if solid else 0
+    faces: list[int] = np.concatenate([sides, lid, base]).ravel().tolist()
+    return faces
 
 
 def _add_road(spec: mujoco.MjSpec, world: World) -> None:

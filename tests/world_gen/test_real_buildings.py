@@ -1,0 +1,66 @@
+"""Buildings of the real extracts: from the map's outline to the parts that are run into."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import shapely
+
+from world_gen.buildings import (
+    SILHOUETTE_TOLERANCE_M,
+    BuildingIndex,
+    buildings_in_frame,
+)
+from world_gen.convex_parts import convex_cover
+from world_gen.read_osm import read_map
+
+pytestmark = pytest.mark.real_data
+
+SLOT_M = 0.2
+"""Slots in a wall that are narrower are no silhouette, nor are cracks between convex parts."""
+
+
+def _without_slots(shapes: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
+    wider = shapely.buffer(shapes, SLOT_M / 2)
+    closed: npt.NDArray[np.object_] = shapely.buffer(wider, -SLOT_M / 2)
+    return closed
+
+
+@pytest.mark.parametrize(
+    ("file", "buildings"),
+    [
+        ("osm-badhersfeld/badhersfeld.osm.xml.gz", 11_000),
+        ("osm-liechtenstein/liechtenstein-latest.osm.pbf", 8_900),
+        ("osm-monaco/monaco.osm.gz", 900),
+        ("osm-berlin-mitte/berlin-mitte.osm", 400),
+        ("osm-berlin-moritzplatz/berlin-moritzplatz.osm", 300),
+        ("osm-kingsway/kingsway_junction.osm", 10),
+    ],
+)
+def test_the_silhouette_of_every_building_is_kept(
+    data_dir: Path, file: str, buildings: int
+) -> None:
+    osm = read_map(data_dir / file)
+    found = BuildingIndex(osm).all()
+    assert len(found) >= buildings
+    built, _ = buildings_in_frame(found, osm.frame, osm.frame, shapely.Polygon())
+    parts = convex_cover([(b.outline, b.holes) for b in built])
+    row = {f.id: k for k, f in enumerate(found)}
+    of_building = np.array([row[_footprint_id(b.id, row)] for b in built])
+    owner = of_building[parts.owner]
+    order = np.argsort(owner, kind="stable")
+    polygons = np.array([shapely.Polygon(parts.rings[k]) for k in order], dtype=object)
+    together = shapely.multipolygons(polygons, indices=owner[order])
+    assert len(np.unique(owner)) == len(found)
+    kept = _without_slots(together)
+    before = _without_slots(np.array([f.polygon for f in found], dtype=object))
+    moved = shapely.hausdorff_distance(shapely.boundary(before), shapely.boundary(kept))
+    worst = int(np.argmax(moved))
+    assert moved[worst] <= SILHOUETTE_TOLERANCE_M, (found[worst].id, moved[worst])
+
+
+def _footprint_id(building: str, known: dict[str, int]) -> str:
+    return building if building in known else building.rpartition("-")[0]

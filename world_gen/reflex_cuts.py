@@ -1,0 +1,213 @@
+"""Polygons cut into convex pieces along the walls that meet at their reflex corners.
+
+Cutting on along a wall leaves rectangles where walls are square, which a triangulation merged back
+to convex pieces does not, and takes at most one piece more than there are reflex corners. All
+polygons are cut at the same time, one corner each, until none is left.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from contracts.arrays import Array
+
+_SNAP_M = 1e-6
+_TO_CORNER_M = 0.06
+"""A cut that ends this near a corner ends there, lest a sliver be left beside it."""
+_MIN_AREA_M2 = 1e-4
+_DENSIFY = 0.1
+_POLYGON = 3
+_INTO_HOLE_M = 0.002
+"""Holes are opened by cuts this far inside them."""
+
+Geometries = npt.NDArray[np.object_]
+Indices = npt.NDArray[np.intp]
+
+
+def cut_at_reflex_corners(polygons: Geometries, tolerance_m: float) -> tuple[Geometries, Indices]:
+    """Return convex pieces of valid polygons, and the index of the polygon each is of.
+
+    A piece whose convex hull lies within `tolerance_m` of it is taken for its hull.
+    """
+    pieces, owner = _without_holes(polygons)
+    done: list[Geometries] = []
+    done_owner: list[Indices] = []
+    while len(pieces):
+        hulls = shapely.convex_hull(pieces)
+        convex = nearly_the_same(hulls, pieces, tolerance_m)
+        done.append(hulls[convex])
+        done_owner.append(owner[convex])
+        pieces, owner = _cut_once(pieces[~convex], owner[~convex])
+    if not done:
+        return pieces, owner
+    return np.concatenate(done), np.concatenate(done_owner)
+
+
+def nearly_the_same(
+    shapes: Geometries, others: Geometries, tolerance_m: float
+) -> npt.NDArray[np.bool_]:
+    """Return which polygons' edges lie within `tolerance_m` of the edges of their counterparts."""
+    a, b = shapely.get_exterior_ring(shapes), shapely.get_exterior_ring(others)
+    near: npt.NDArray[np.bool_] = shapely.hausdorff_distance(a, b) <= tolerance_m
+    # The corners alone miss a pocket behind a spike: look along the edges too.
+    doubtful = np.flatnonzero(near & (np.abs(shapely.area(shapes) - shapely.area(others)) > 0.01))
+    near[doubtful] = (
+        shapely.hausdorff_distance(a[doubtful], b[doubtful], densify=_DENSIFY) <= tolerance_m
+    )
+    return near
+
+
+def polygons_of(shapes: Geometries, owner: Indices) -> tuple[Geometries, Indices]:
+    """Return the polygons that shapes of any kind hold, and the owner of each."""
+    while (shapely.get_type_id(shapes) > _POLYGON).any():
+        shapes, of = shapely.get_parts(shapes, return_index=True)
+        owner = owner[of]
+    keep = (shapely.get_type_id(shapes) == _POLYGON) & (shapely.area(shapes) > _MIN_AREA_M2)
+    return shapes[keep], owner[keep]
+
+
+def _without_holes(polygons: Geometries) -> tuple[Geometries, Indices]:
+    """Return polygons cut along a wall of each hole, so that no hole is left."""
+    todo, owner = polygons, np.arange(len(polygons))
+    done: list[Geometries] = []
+    done_owner: list[Indices] = []
+    while True:
+        holed = shapely.get_num_interior_rings(todo) > 0
+        done.append(todo[~holed])
+        done_owner.append(owner[~holed])
+        if not holed.any():
+            return np.concatenate(done), np.concatenate(done_owner)
+        todo, owner = np.repeat(todo[holed], 2), np.repeat(owner[holed], 2)
+        halves = np.array([half for p in todo[::2].tolist() for half in _halves(p)], dtype=object)
+        todo, owner = polygons_of(shapely.intersection(todo, halves), owner)
+
+
+def _halves(polygon: shapely.Polygon) -> tuple[shapely.Polygon, shapely.Polygon]:
+    """Return the two halves of the plane beside the longest wall of a polygon's first hole."""
+    ring = shapely.get_interior_ring(polygon, 0)
+    hole = shapely.get_coordinates(ring)
+    steps = np.diff(hole, axis=0)
+    k = int(np.argmax((steps * steps).sum(axis=1)))
+    ahead = steps[k] / np.hypot(*steps[k])
+    left = np.array([-ahead[1], ahead[0]])
+    at = hole[k] + left * (_INTO_HOLE_M if shapely.is_ccw(ring) else -_INTO_HOLE_M)
+    west, south, east, north = polygon.bounds
+    far = 2.0 * (east - west + north - south)
+    a, b, aside = at - ahead * far, at + ahead * far, left * far
+    return shapely.Polygon([a, b, b + aside, a + aside]), shapely.Polygon(
+        [a, b, b - aside, a - aside]
+    )
+
+
+class _Corners:
+    """The corners of many rings in one row: where each is, its ring, and its neighbours."""
+
+    def __init__(self, pieces: Geometries) -> None:
+        rings = shapely.get_exterior_ring(shapely.orient_polygons(pieces))
+        counts = shapely.get_num_coordinates(rings) - 1
+        closed = shapely.get_coordinates(rings)
+        last = np.cumsum(counts + 1) - 1
+        self.xy: Array = np.delete(closed, last, axis=0)
+        self.first: Indices = np.cumsum(counts) - counts
+        self.ring: Indices = np.repeat(np.arange(len(counts)), counts)
+        row = np.arange(len(self.xy))
+        self.after = row + 1
+        self.after[self.first + counts - 1] = self.first
+        self.before = row - 1
+        self.before[self.first] = self.first + counts - 1
+
+    def sharpest(self) -> Indices:
+        """Return for each ring its reflex corner between the longest walls."""
+        into, out = self.xy - self.xy[self.before], self.xy[self.after] - self.xy
+        order = np.lexsort((_cross(into, out), self.ring))
+        found: Indices = order[self.first]
+        return found
+
+    def hits(self, corner: Indices, ahead: Array) -> tuple[Array, Indices, Array]:
+        """Return where rays from a corner of each ring meet it next: distance, wall, place.
+
+        The distance is infinite where a ray meets nothing.
+        """
+        a, b = self.xy, self.xy[self.after]
+        start, along = self.xy[corner][self.ring], ahead[self.ring]
+        side_a, side_b = _cross(along, a - start), _cross(along, b - start)
+        side_a[np.abs(side_a) < _SNAP_M] = 0.0
+        side_b[np.abs(side_b) < _SNAP_M] = 0.0
+        gap = side_a - side_b
+        share = np.divide(side_a, gap, out=np.zeros_like(gap), where=gap != 0.0)
+        place = a + (b - a) * share[:, None]
+        distance = ((place - start) * along).sum(axis=1)
+        row = np.arange(len(a))
+        meets = (side_a * side_b <= 0.0) & (gap != 0.0) & (distance > _SNAP_M)
+        meets &= (row != corner[self.ring]) & (self.after != corner[self.ring])
+        distance = np.where(meets, distance, np.inf)
+        nearest = np.lexsort((distance, self.ring))[self.first]
+        return distance[nearest], nearest, place[nearest]
+
+
+def _cross(a: Array, b: Array) -> Array:
+    turned: Array = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return turned
+
+
+def _cut_once(pieces: Geometries, owner: Indices) -> tuple[Geometries, Indices]:
+    """Return the halves of pieces without holes, cut on along a wall at one reflex corner each.
+
+    A piece that cannot be cut so is returned as its triangles.
+    """
+    corners = _Corners(pieces)
+    corner = corners.sharpest()
+    here = corners.xy[corner]
+    on, back = here - corners.xy[corners.before[corner]], here - corners.xy[corners.after[corner]]
+    first, second = corners.hits(corner, _unit(on)), corners.hits(corner, _unit(back))
+    nearer = first[0] <= second[0]
+    wall = np.where(nearer, first[1], second[1])
+    place = np.where(nearer[:, None], first[2], second[2])
+    stuck = ~np.isfinite(np.minimum(first[0], second[0]))
+    ends = np.stack([wall, corners.after[wall]], axis=1)
+    neighbours = np.stack([corner, corners.before[corner], corners.after[corner]], axis=1)
+    off = np.hypot(*np.moveaxis(corners.xy[ends] - place[:, None], 2, 0))
+    off[(ends[:, :, None] == neighbours[:, None, :]).any(axis=2)] = np.inf
+    end = np.where(off.min(axis=1) < _TO_CORNER_M, off.argmin(axis=1), -1)
+    rows: list[int] = []
+    counts: list[int] = []
+    of: list[int] = []
+    begins = corners.first.tolist()
+    stops = [*begins[1:], len(corners.xy)]
+    walls, sides = wall.tolist(), end.tolist()
+    from_corner = corner.tolist()
+    for k in np.flatnonzero(~stuck).tolist():
+        c, w, begin, stop, side = from_corner[k], walls[k], begins[k], stops[k], sides[k]
+        if c <= w:
+            head, tail = [*range(c, w + 1)], [*range(w + 1, stop), *range(begin, c + 1)]
+        else:
+            head, tail = [*range(c, stop), *range(begin, w + 1)], [*range(w + 1, c + 1)]
+        hit = len(corners.xy) + k if side < 0 else (w, tail[0])[side]
+        if side != 1:
+            tail.insert(0, hit)
+        if side != 0:
+            head.append(hit)
+        rows += head
+        rows += tail
+        counts += [len(head), len(tail)]
+        of += [k, k]
+    points = np.concatenate([corners.xy, place])[np.array(rows, dtype=np.intp)]
+    made = shapely.polygons(
+        shapely.linearrings(points, indices=np.repeat(np.arange(len(counts)), counts))
+    )
+    # Where rounding has made a piece cross itself, no ray meets a wall.
+    sound, sound_owner = polygons_of(shapely.make_valid(pieces[stuck]), owner[stuck])
+    triangles, which = shapely.get_parts(
+        shapely.constrained_delaunay_triangles(sound), return_index=True
+    )
+    found = np.concatenate([made, triangles])
+    found_owner = np.concatenate([owner[np.array(of, dtype=np.intp)], sound_owner[which]])
+    solid = shapely.area(found) > _MIN_AREA_M2
+    return found[solid], found_owner[solid]
+
+
+def _unit(vectors: Array) -> Array:
+    unit: Array = vectors / np.maximum(np.hypot(*vectors.T), 1e-12)[:, None]
+    return unit
