@@ -14,7 +14,7 @@ from world_gen.grouping import Cluster
 from world_gen.intersections import Junction
 from world_gen.junction_arms import Approach, ClusterRoads, approaches, roads_of
 from world_gen.junction_clusters import cluster_branchings
-from world_gen.junction_control import control_of
+from world_gen.junction_control import control_of, lights_of
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
 
@@ -71,11 +71,15 @@ def _junction(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) 
     centre = _centre_xy_m(cluster, graph)
     kind = _kind(cluster, arms, mini)
     lat_deg, lon_deg = geo_from_local(graph.frame, centre).tolist()
+    core = frozenset(cluster.core)
+    incoming = tuple(chain for item in arms for chain in item.chains if chain.inward)
+    lights = lights_of(core, around.inside, incoming, osm.node_tags)
     control = control_of(
-        frozenset(cluster.core),
+        core,
         around.inside,
-        arms,
+        incoming,
         osm.node_tags,
+        lights=bool(lights),
         ring=kind in ("roundabout", "mini_roundabout"),
     )
     return Junction(
@@ -95,6 +99,7 @@ def _junction(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) 
         inner=tuple(sorted({edge.index for edge in inner})),
         arms=tuple(item.arm for item in arms),
         radius_m=max(math.dist(centre, graph.node_xy_m[node]) for node in nodes),
+        lights=lights,
     )
 
 

@@ -34,3 +34,5 @@ class Junction:
     arms: tuple[JunctionArm, ...]
     radius_m: float
     """Distance from the centre to the farthest node of the junction."""
+    lights: frozenset[int] = frozenset()
+    """OSM nodes of the traffic lights that stop who comes in or drives within."""

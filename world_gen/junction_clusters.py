@@ -10,10 +10,12 @@ from world_gen.chains import CarRoads, Chain
 from world_gen.grouping import Cluster, Grouping
 from world_gen.junction_control import Tags, facing
 from world_gen.road_graph import RoadGraph
-from world_gen.slip_roads import add_slips
+from world_gen.slip_roads import add_slips, slip_ends
 
 CLOSE_M = 20.0
 """Branchings so near each other are one junction, staggered perhaps."""
+ONE_PLACE_M = 10.0
+"""Branchings no farther apart are one junction whatever slip roads end there."""
 ISLAND_SIDE_M = 30.0
 """Traffic islands have no longer side."""
 MEDIAN_M = 60.0
@@ -43,14 +45,21 @@ def cluster_branchings(
     single = [chain for chains in roads.chains_from.values() for chain in chains]
     single = [chain for chain in single if chain.start <= chain.end and chain.start != chain.end]
     single.sort(key=lambda chain: (chain.length_m, chain.key))
+    ends = slip_ends(roads)
     for chain in single:
         if chain.length_m > MEDIAN_M:
             break
+        if _leads_elsewhere(chain, ends) or _leads_elsewhere(chain, ends, back=True):
+            continue
         if (
             chain.length_m <= CLOSE_M
             or _links_carriageways(chain, roads)
             or _in_island(chain, roads)
-            or (chain.length_m <= SIGNALLED_M and _one_signal(chain, roads, node_tags))
+            or (
+                chain.length_m <= SIGNALLED_M
+                and not (chain.link and chain.end in ends.get(chain.start, ()))
+                and _one_signal(chain, roads, node_tags)
+            )
         ):
             grouping.join(chain, WIDEST_M)
         elif _staggers(chain, roads):
@@ -58,6 +67,14 @@ def cluster_branchings(
     _add_flares(grouping, roads)
     add_slips(grouping, roads)
     return grouping.clusters()
+
+
+def _leads_elsewhere(
+    chain: Chain, slip_ends: Mapping[int, frozenset[int]], *, back: bool = False
+) -> bool:
+    """Tell whether a chain leads on from the end of another junction's slip road."""
+    start, end = (chain.end, chain.start) if back else (chain.start, chain.end)
+    return chain.length_m > ONE_PLACE_M and start in slip_ends and end not in slip_ends[start]
 
 
 def _links_carriageways(chain: Chain, roads: CarRoads) -> bool:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 from contracts.world import Control
 from world_gen.chains import Chain
-from world_gen.junction_arms import Approach
-from world_gen.road_graph import DirectedEdge
 
 SIGNALS_WITHIN_M, SIGNS_WITHIN_M = 40.0, 30.0
 PEDESTRIAN_LIGHT_M = 15.0
@@ -15,31 +14,45 @@ PEDESTRIAN_LIGHT_M = 15.0
 Tags = Mapping[str, str]
 
 
+def lights_of(
+    core: frozenset[int],
+    inside: tuple[Chain, ...],
+    incoming: tuple[Chain, ...],
+    node_tags: Mapping[int, Tags],
+) -> frozenset[int]:
+    """Return the nodes of the traffic lights in a junction and on the roads that lead to it.
+
+    A light counts for the nearer junction of the road it stands on, or the one that it faces.
+    """
+    within = {*core, *(node for chain in inside for node, _ in chain.nodes())}
+    found = {node for node in within if _is_light(node_tags.get(node, {}), 0.0)}
+    for chain in incoming:
+        for item in facing(chain, node_tags, SIGNALS_WITHIN_M, "traffic_signals"):
+            if _is_light(item.tags, item.distance_m):
+                found.add(item.node)
+    return frozenset(found)
+
+
 def control_of(
     core: frozenset[int],
     inside: tuple[Chain, ...],
-    approaches: tuple[Approach, ...],
+    incoming: tuple[Chain, ...],
     node_tags: Mapping[int, Tags],
     *,
+    lights: bool,
     ring: bool,
 ) -> Control:
-    """Return how the junction is controlled, from the tags in it and on its approaches.
+    """Return how the junction is controlled, from the tags in it and on its roads in.
 
-    A light or sign counts for the nearer junction of the road it stands on, and only where it
-    faces drivers who come in; signs on every road in make an all-way stop.
+    A sign counts for the nearer junction of the road it stands on, and only where it faces
+    drivers who come in; signs on every road in make an all-way stop.
     """
-    inner = [node_tags[node] for node in core if node in node_tags]
-    inner += [node_tags[node] for chain in inside for node, _ in chain.nodes() if node in node_tags]
-    incoming = [chain for item in approaches for chain in item.chains if chain.inward]
-    lights = any(_is_light(tags, 0.0) for tags in inner) or any(
-        _is_light(tags, distance_m)
-        for chain in incoming
-        for tags, distance_m in facing(chain, node_tags, SIGNALS_WITHIN_M, "traffic_signals")
-    )
     if lights:
         return "signals"
     if ring:
         return "roundabout"
+    inner = [node_tags[node] for node in core if node in node_tags]
+    inner += [node_tags[node] for chain in inside for node, _ in chain.nodes() if node in node_tags]
     stops = [_sign(chain, node_tags, "stop") for chain in incoming]
     all_way = any(
         tags.get("highway") == "stop" and tags.get("stop") == "all" for tags in inner
@@ -57,10 +70,7 @@ def control_of(
 
 
 def _sign(chain: Chain, node_tags: Mapping[int, Tags], word: str) -> Tags | None:
-    for tags, _ in facing(chain, node_tags, SIGNS_WITHIN_M, word):
-        if tags.get("highway") == word:
-            return tags
-    return None
+    return next((item.tags for item in facing(chain, node_tags, SIGNS_WITHIN_M, word)), None)
 
 
 def _is_light(tags: Tags, distance_m: float) -> bool:
@@ -70,34 +80,35 @@ def _is_light(tags: Tags, distance_m: float) -> bool:
     return distance_m <= PEDESTRIAN_LIGHT_M or not pedestrians
 
 
+class Facing(NamedTuple):
+    """A light or sign on a road to a junction, `distance_m` before it."""
+
+    node: int
+    tags: Tags
+    distance_m: float
+
+
 def facing(
     chain: Chain, node_tags: Mapping[int, Tags], within_m: float, word: str
-) -> Iterator[tuple[Tags, float]]:
-    """Yield (tags, metres before the junction) of nodes that drivers towards it obey.
+) -> Iterator[Facing]:
+    """Yield the nodes of `highway=word` that drivers towards a junction obey, nearest first.
 
-    `chain` leaves the junction; nodes of `highway=word` on it count up to `within_m` where they
-    are tagged to face who comes in, else on its nearer half alone.
+    `chain` leaves the junction. A node counts up to `within_m` where it is tagged to face who
+    comes in, or stands on a one-way road and at no crossing; else on the nearer half alone.
     """
     nearer_m = min(within_m, chain.length_m / 2.0)
-    directions = _directions(chain)
+    directions = {node: item for item in chain.edges for node in item.edge.node_ids[1:-1]}
     for node, distance_m in chain.nodes():
-        if distance_m > within_m or node == chain.start:
-            if node == chain.start:
-                continue
+        if distance_m > within_m:
             break
         tags = node_tags.get(node)
-        if tags is None or tags.get("highway") != word or node == chain.end:
+        if tags is None or tags.get("highway") != word or node in (chain.start, chain.end):
             continue
-        facing = tags.get(f"{word}:direction") or tags.get("direction")
+        faced = tags.get(f"{word}:direction") or tags.get("direction")
         along = directions.get(node)
-        if along is not None and facing in ("forward", "backward"):
+        if along is not None and faced in ("forward", "backward"):
             # The chain leaves the junction: who comes in drives against it.
-            towards = "forward" if along.reverse else "backward"
-            if facing == towards:
-                yield tags, distance_m
-        elif distance_m <= nearer_m:
-            yield tags, distance_m
-
-
-def _directions(chain: Chain) -> dict[int, DirectedEdge]:
-    return {node: item for item in chain.edges for node in item.edge.node_ids[1:-1]}
+            if faced == ("forward" if along.reverse else "backward"):
+                yield Facing(node, tags, distance_m)
+        elif distance_m <= nearer_m or (chain.one_way and "crossing" not in tags):
+            yield Facing(node, tags, distance_m)

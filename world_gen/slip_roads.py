@@ -61,6 +61,30 @@ def add_slips(grouping: Grouping, roads: CarRoads) -> None:
                     grouping.attach(before, behind, keys, widest_m=WIDEST_WITH_BARE_ENDS_M)
 
 
+def slip_ends(roads: CarRoads) -> dict[int, frozenset[int]]:
+    """Return for each end of a slip road the other nodes of the junction that it goes around.
+
+    Where the way around is but three sides between lone branchings, it is plain to which of two
+    neighbours an end belongs.
+    """
+    found: dict[int, set[int]] = {}
+    for chains in roads.chains_from.values():
+        for slip in chains:
+            if not (slip.link and slip.one_way and slip.outward and slip.length_m <= RAMP_SLIP_M):
+                continue
+            limit_m = max(SLIP_M, slip.length_m)
+            onward = {c.end for c in roads.chains_from[slip.start]
+                      if c.outward and c.key != slip.key and c.length_m <= limit_m}  # fmt: skip
+            back = {c.end for c in roads.chains_from[slip.end]
+                    if c.inward and c.key != slip.key and c.length_m <= limit_m}  # fmt: skip
+            for corner in (onward & back) - {slip.start, slip.end}:
+                if max(_angle_leaving(slip, roads), _angle_joining(slip, roads)) > SMOOTH_RAD:
+                    continue
+                found.setdefault(slip.start, set()).update((corner, slip.end))
+                found.setdefault(slip.end, set()).update((corner, slip.start))
+    return {node: frozenset(others) for node, others in found.items()}
+
+
 def _attach_both(
     slip: Chain,
     onward: Chain,

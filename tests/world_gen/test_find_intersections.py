@@ -229,3 +229,23 @@ def test_side_streets_on_the_same_side_stay_two_junctions(tmp_path: Path) -> Non
     sketch.road(101, [5, 2], "Erste")
     sketch.road(102, [6, 3], "Zweite")
     assert [j.summary.kind for j in sketch.junctions(tmp_path)] == ["t_junction"] * 2
+
+
+def test_the_start_of_a_slip_road_stays_with_its_corner(tmp_path: Path) -> None:
+    """Another side street 15 m before a slip road parts makes a junction of its own."""
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -150, 0), (2, -55, 0), (3, -40, 0), (4, 0, 0), (5, 150, 0),
+        (6, -55, 120), (7, 0, -35), (8, 0, -150), (9, -12, -8),
+    ):  # fmt: skip
+        sketch.node(node, x_m, y_m)
+    sketch.node(50, -18.0, 0.0, highway="traffic_signals", traffic_signals__direction="forward")
+    sketch.road(100, [1, 2, 3, 50, 4, 5], "Haupt", highway="secondary")
+    sketch.road(101, [6, 2], "Neben")
+    sketch.road(102, [4, 7, 8], "Quer", highway="secondary", oneway="yes")
+    sketch.road(103, [3, 9, 7], highway="secondary_link", oneway="yes")
+    found = {j.summary.name: j for j in sketch.junctions(tmp_path)}
+    assert found["Haupt × Neben"].nodes == {2}
+    assert found["Haupt × Quer"].nodes == {3, 4, 7}
+    assert {j.summary.kind for j in found.values()} == {"t_junction"}
+    assert found["Haupt × Quer"].lights == {50}
