@@ -210,6 +210,8 @@ class Signal(msgspec.Struct, frozen=True, kw_only=True):
     position: Array
     yaw_rad: float
     source: Provenance
+    osm_nodes: tuple[int, ...] = ()
+    """All nodes of the map that stand for this light; `osm_node` is the one met first."""
 
 
 class SignalGroup(msgspec.Struct, frozen=True, kw_only=True):
@@ -295,6 +297,8 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     junctions: tuple[WorldJunction, ...] = ()
     roads: tuple[Road, ...] = ()
     conflicts: tuple[Conflict, ...] = ()
+    crossing_plans: tuple[SignalPlan, ...] = ()
+    """Of lights that stand away from junctions, such as those for people on foot."""
     sidewalks: tuple[Area, ...] = ()
     bounds_m: tuple[float, float, float, float] | None = None
     notes: tuple[str, ...] = ()

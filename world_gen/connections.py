@@ -37,6 +37,7 @@ class ConnectionDraft:
     control: LineControl = "none"
     conflicts_with: tuple[str, ...] = ()
     yields_to: tuple[str, ...] = ()
+    signal_group_id: str | None = None
 
     def finished(self) -> Connection:
         """Return the connection as the World holds it."""
@@ -53,6 +54,7 @@ class ConnectionDraft:
             yields_to=self.yields_to,
             junction_id=junction.summary.id if junction is not None else "",
             place_id=self.cluster.key,
+            signal_group_id=self.signal_group_id,
             layer=self.start.edge.layer,
         )
 
