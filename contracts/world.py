@@ -102,6 +102,8 @@ class Road(msgspec.Struct, frozen=True, kw_only=True):
     left_m: float
     right_m: float
     lane_ids: tuple[str, ...]
+    lane_count_source: Provenance = "inferred"
+    """Where the number of lanes came from; of two directions the less certain."""
     from_place: str | None = None
     to_place: str | None = None
     layer: int = 0

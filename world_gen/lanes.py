@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.world import Lane, LaneKind, Quantity, Road, Turn
+from contracts.world import Lane, LaneKind, Provenance, Quantity, Road, Turn
 from world_gen.clusters import Cluster, Surroundings
 from world_gen.cross_section import CrossSection, LanePlan
 from world_gen.polyline_batch import Polylines, offset, without_repeats
@@ -149,6 +149,7 @@ def build_lanes(around: Surroundings) -> LaneSet:
                 left_m=round(section.left_m, 3),
                 right_m=round(section.right_m, 3),
                 lane_ids=tuple(mine),
+                lane_count_source=_lane_count_source(edge),
                 from_place=places.get((index, False)) if stretch.first else None,
                 to_place=places.get((index, True)) if stretch.last else None,
                 layer=edge.layer,
@@ -157,6 +158,17 @@ def build_lanes(around: Surroundings) -> LaneSet:
             )
         )
     return LaneSet(lanes, tuple(roads), borders, begins, ends, tuple(notes))
+
+
+def _lane_count_source(edge: RoadEdge) -> Provenance:
+    counts = [
+        count.source
+        for count, driven in (
+            (edge.lanes_forward, edge.forward), (edge.lanes_backward, edge.backward),
+        )
+        if driven
+    ]  # fmt: skip
+    return next((s for s in ("default", "inferred") if s in counts), "tagged")
 
 
 def _offsets(stretches: list[Stretch], sections: list[CrossSection]) -> list[Array]:
