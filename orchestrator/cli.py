@@ -20,6 +20,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+maps = typer.Typer(name="map", help="Fetch maps and prepare them.", no_args_is_help=True)
+app.add_typer(maps)
+
 MapArgument = Annotated[Path, typer.Argument(help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")]
 OutOption = Annotated[Path, typer.Option("--out", help="file to write")]
 
@@ -129,6 +132,34 @@ def world(
             )
         )
     )  # fmt: skip
+
+
+@maps.command("get", context_settings={"ignore_unknown_options": True})
+def get_map(
+    area: Annotated[
+        str,
+        typer.Argument(metavar="BBOX|ROUTE", help="W,S,E,N in degrees, or a GPX or GeoJSON file"),
+    ],
+    out: OutOption,
+    config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
+) -> None:
+    """Fetch the map of a region, or of a route's surroundings, from an Overpass endpoint."""
+    from orchestrator.map_get import get_map as fetch
+
+    fetch(area, out=out, config=config)
+
+
+@maps.command("index")
+def index_map(
+    map_file: MapArgument,
+    folder: Annotated[
+        Path | None, typer.Option(help="folder of indexes [default: the user's cache]")
+    ] = None,
+) -> None:
+    """Read a map of any size into an index on disk, from which places and routes are clipped."""
+    from orchestrator.map_index_command import index_map_file
+
+    index_map_file(map_file, folder=folder)
 
 
 @app.command()

@@ -2,39 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from contracts.arrays import Array
 from contracts.errors import UserError
 from contracts.frames import local_from_geo
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
+from orchestrator.map_opening import OpenMap
 from world_gen.intersections import Junction
-from world_gen.osm_map import LatLonBounds, OsmMap
-from world_gen.read_osm import read_map
-from world_gen.road_graph import RoadGraph
+from world_gen.osm_map import LatLonBounds
 
 FARTHEST_M = 200.0
 """A place farther than this from every junction names none."""
-
-
-@dataclass(frozen=True, slots=True)
-class OpenMap:
-    """A map that was read, its roads, and its junctions by id."""
-
-    file: Path
-    osm: OsmMap
-    graph: RoadGraph
-    junctions: tuple[Junction, ...]
-
-
-def open_map(file: Path) -> OpenMap:
-    """Read a map and find its junctions."""
-    osm = read_map(file)
-    graph = build_road_graph(osm)
-    return OpenMap(file, osm, graph, find_intersections(osm, graph))
 
 
 def junction_by_id(opened: OpenMap, junction_id: str) -> Junction:
@@ -48,11 +28,8 @@ def junction_by_id(opened: OpenMap, junction_id: str) -> Junction:
     )
 
 
-def nearest_junction(opened: OpenMap, at: str) -> Junction:
-    """Return the junction nearest to LAT,LON; UserError where that is no place near one."""
-    lat, lon = _degrees("--at", at, "two numbers, LAT,LON", 2)
-    if not -90.0 <= lat <= 90.0 or not -180.0 <= lon <= 180.0:
-        raise UserError(f"--at {at}: latitude -90 to 90, then longitude -180 to 180")
+def nearest_junction(opened: OpenMap, lat: float, lon: float) -> Junction:
+    """Return the junction nearest to a place; UserError where there is none near it."""
     if not opened.junctions:
         raise UserError(f"{opened.file}: no intersection in this map")
     here = local_from_geo(opened.osm.frame, lat, lon)
@@ -60,20 +37,34 @@ def nearest_junction(opened: OpenMap, at: str) -> Junction:
     best = int(np.argmin(away))
     if not away[best] <= FARTHEST_M:
         raise UserError(
-            f"--at {at}: the nearest intersection of {opened.file} is {away[best]:.0f} m away"
+            f"--at {lat},{lon}: the nearest intersection of {opened.file} is "
+            f"{away[best]:.0f} m away"
         )
     return opened.junctions[best]
 
 
-def junctions_along(opened: OpenMap, route: Path) -> tuple[Junction, ...]:
-    """Return the junctions along a GPX or GeoJSON line in driving order, once per passage."""
-    from orchestrator.line_matching import match_line
+def parse_place(at: str) -> tuple[float, float]:
+    """Return latitude and longitude of LAT,LON; UserError where they are none."""
+    lat, lon = _degrees("--at", at, "two numbers, LAT,LON", 2)
+    if not -90.0 <= lat <= 90.0 or not -180.0 <= lon <= 180.0:
+        raise UserError(f"--at {at}: latitude -90 to 90, then longitude -180 to 180")
+    return lat, lon
+
+
+def read_route(route: Path) -> Array:
+    """Return a GPX or GeoJSON line as (N, 2) latitudes and longitudes in degrees."""
     from telemetry.logs import read_line
-    from world_gen.route_junctions import junctions_on_route
 
     line = read_line(route)
-    lat_lon_deg = np.stack([line.lat_deg, line.lon_deg], axis=-1)
-    matched = match_line(opened.graph, lat_lon_deg, name=f"--route {route}")
+    return np.stack([line.lat_deg, line.lon_deg], axis=-1)
+
+
+def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> tuple[Junction, ...]:
+    """Return the junctions along a route's line in driving order, once per passage."""
+    from orchestrator.line_matching import match_line
+    from world_gen.route_junctions import junctions_on_route
+
+    matched = match_line(opened.graph, line_deg, name=f"--route {route}")
     return tuple(
         passage.junction
         for stretch in matched.routes
@@ -81,9 +72,8 @@ def junctions_along(opened: OpenMap, route: Path) -> tuple[Junction, ...]:
     )
 
 
-def bounds_of(opened: OpenMap, bbox: str) -> LatLonBounds:
-    """Return W,S,E,N as bounds that the map reaches into; UserError says what else they are."""
-    bounds = parse_bbox("--bbox", bbox)
+def check_bounds(opened: OpenMap, bbox: str, bounds: LatLonBounds) -> None:
+    """Raise UserError where a map does not reach into the bounds."""
     have = opened.osm.bounds
     if (
         bounds.east <= have.west or bounds.west >= have.east
@@ -93,7 +83,6 @@ def bounds_of(opened: OpenMap, bbox: str) -> LatLonBounds:
             f"--bbox {bbox}: outside {opened.file}, which spans {have.west:.5f},{have.south:.5f},"
             f"{have.east:.5f},{have.north:.5f}"
         )
-    return bounds
 
 
 def parse_bbox(option: str, bbox: str) -> LatLonBounds:

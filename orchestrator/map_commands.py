@@ -6,15 +6,18 @@ from pathlib import Path
 
 import msgspec
 
-from orchestrator.map_choice import junctions_along, open_map
+from orchestrator.map_choice import junctions_along, read_route
+from orchestrator.map_opening import Clip, open_map
 
 
 def list_intersections(map_file: Path, *, route: Path | None, as_json: bool) -> None:
     """Print the junctions of a map, or those along a line, in driving order."""
-    opened = open_map(map_file)
     if route is not None:
-        junctions = junctions_along(opened, route)
+        line_deg = read_route(route)
+        opened = open_map(map_file, clip=Clip(line_deg, 0.0))
+        junctions = junctions_along(opened, route, line_deg)
     else:
+        opened = open_map(map_file)
         junctions = tuple(sorted(opened.junctions, key=lambda j: j.summary.id))
     if as_json:
         body = msgspec.json.encode([j.summary for j in junctions])

@@ -7,17 +7,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from contracts.errors import UserError
 from contracts.world import World
 from orchestrator.map_choice import (
-    OpenMap,
-    bounds_of,
+    FARTHEST_M,
+    check_bounds,
     junction_by_id,
     junctions_along,
     nearest_junction,
-    open_map,
     parse_bbox,
+    parse_place,
+    read_route,
 )
+from orchestrator.map_opening import Clip, OpenMap, open_map
 from orchestrator.world_files import write_each, write_report
 from world_gen.build import build_region, build_world
 from world_gen.export.formats import (
@@ -65,25 +69,53 @@ def write_worlds(request: WorldRequest) -> int:
     options = _options(request)
     many = request.everything or request.route is not None
     _check_out(request.out, many=many)
-    opened = open_map(request.map_file)
     if request.bbox is not None:
-        bounds = bounds_of(opened, request.bbox)
-        world = build_region(opened.osm, opened.graph, bounds, index=_index(opened))
-        _write_one(world, request, format_, options)
-        return 0
-    if not many:
-        junction = _one_junction(opened, request)
-        world = build_world(
-            opened.osm, opened.graph, junction, radius_m=request.radius_m, index=_index(opened)
+        return _region(request, format_, options)
+    if request.at is not None:
+        lat, lon = parse_place(request.at)
+        opened = open_map(
+            request.map_file, clip=Clip(np.array([[lat, lon]]), request.radius_m + FARTHEST_M)
         )
-        _write_one(world, request, format_, options)
-        return 0
-    return _write_many(opened, request, format_, options)
+        return _single(opened, nearest_junction(opened, lat, lon), request, format_, options)
+    if request.junction_id is not None:
+        opened = open_map(request.map_file)
+        junction = junction_by_id(opened, request.junction_id)
+        return _single(opened, junction, request, format_, options)
+    if request.route is not None:
+        line_deg = read_route(request.route)
+        opened = open_map(request.map_file, clip=Clip(line_deg, request.radius_m))
+        along = junctions_along(opened, request.route, line_deg)
+        # A junction that is passed twice is written once.
+        junctions = tuple({junction.summary.id: junction for junction in along}.values())
+    else:
+        opened = open_map(request.map_file)
+        junctions = tuple(sorted(opened.junctions, key=lambda j: j.summary.id))
+    return _write_many(opened, junctions, request, format_, options)
 
 
-def _write_one(
-    world: World, request: WorldRequest, format_: Format, options: ExportOptions
-) -> None:
+def _region(request: WorldRequest, format_: Format, options: ExportOptions) -> int:
+    bbox = request.bbox or ""
+    bounds = parse_bbox("--bbox", bbox)
+    opened = open_map(request.map_file, clip=bounds)
+    check_bounds(opened, bbox, bounds)
+    world = build_region(opened.osm, opened.graph, bounds, index=_index(opened))
+    return _write_one(world, request, format_, options)
+
+
+def _single(
+    opened: OpenMap,
+    junction: Junction,
+    request: WorldRequest,
+    format_: Format,
+    options: ExportOptions,
+) -> int:
+    world = build_world(
+        opened.osm, opened.graph, junction, radius_m=request.radius_m, index=_index(opened)
+    )
+    return _write_one(world, request, format_, options)
+
+
+def _write_one(world: World, request: WorldRequest, format_: Format, options: ExportOptions) -> int:
     format_.write(world, request.out, options)
     s = world.intersection
     place = s.kind if s.kind == "region" else f"{s.kind} {s.name or s.id} ({s.id})"
@@ -91,12 +123,19 @@ def _write_one(
           f"{len(world.notes)} notes. {world.attribution}")  # fmt: skip
     if request.report:
         write_report(world, request.out, show=True)
+    return 0
 
 
 def _write_many(
-    opened: OpenMap, request: WorldRequest, format_: Format, options: ExportOptions
+    opened: OpenMap,
+    junctions: Sequence[Junction],
+    request: WorldRequest,
+    format_: Format,
+    options: ExportOptions,
 ) -> int:
-    junctions = _junctions(opened, request)
+    if not junctions:
+        where = "in this map" if request.route is None else f"along {request.route}"
+        raise UserError(f"{opened.file}: no intersection {where}")
     index = _index(opened)
 
     def built(junction: Junction) -> World:
@@ -109,24 +148,6 @@ def _write_many(
         folder=request.out, suffix=format_.suffix, report=request.report,
         attribution=opened.osm.attribution,
     )  # fmt: skip
-
-
-def _junctions(opened: OpenMap, request: WorldRequest) -> Sequence[Junction]:
-    if request.route is None:
-        found: Sequence[Junction] = sorted(opened.junctions, key=lambda j: j.summary.id)
-    else:  # a junction that is passed twice is written once
-        along = junctions_along(opened, request.route)
-        found = tuple({j.summary.id: j for j in along}.values())
-    if not found:
-        where = "in this map" if request.route is None else f"along {request.route}"
-        raise UserError(f"{opened.file}: no intersection {where}")
-    return found
-
-
-def _one_junction(opened: OpenMap, request: WorldRequest) -> Junction:
-    if request.junction_id is not None:
-        return junction_by_id(opened, request.junction_id)
-    return nearest_junction(opened, request.at or "")
 
 
 def _index(opened: OpenMap) -> MapIndex:

@@ -75,6 +75,7 @@ def ackermann_plugin(
         ("kingpin_width", numbers(track_m)),
         ("wheel_radius", numbers(wheel_radius_m)),
         ("steering_limit", numbers(car.max_tire_angle_rad.value)),
+        ("steer_p_gain", "10"),  # rad/s per rad: the default of 1 takes seconds to turn a wheel
         ("min_velocity", numbers(-MAX_SPEED_MPS / 5)),
         ("max_velocity", numbers(MAX_SPEED_MPS)),
         ("min_acceleration", numbers(-car.max_brake_decel_mps2.value)),

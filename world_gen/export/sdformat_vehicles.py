@@ -130,7 +130,8 @@ def _add_twin(model: Element, vehicle: SdfVehicle, simulator: Simulator) -> None
         _inertial(knuckle, knuckle_kg, 0.0, 0.0, (0.2, 0.2, 0.2))
         _hinge(
             model, f"front_{side}_steer_joint", "base_link", f"front_{side}_knuckle",
-            axis="0 0 1", limit_rad=inner, damping=STEERING_DAMPING_NMSPRAD,
+            axis="0 0 1", limit_rad=inner, rate_radps=car.max_tire_rate_radps.value,
+            damping=STEERING_DAMPING_NMSPRAD,
         )  # fmt: skip
         _wheel(model, f"front_{side}_wheel", wheelbase, y, wheel_kg, car.friction.value)
         _hinge(
@@ -223,6 +224,7 @@ def _hinge(
     axis: str = "0 1 0",
     limit_rad: float | None = None,
     effort: float | None = None,
+    rate_radps: float | None = None,
     damping: float = 0.0,
 ) -> None:
     joint = child(model, "joint", name=name, type="revolute")
@@ -235,5 +237,7 @@ def _hinge(
     child(limit, "upper", "1e16" if limit_rad is None else numbers(limit_rad, digits=4))
     if effort is not None:
         child(limit, "effort", numbers(effort))
+    if rate_radps is not None:
+        child(limit, "velocity", numbers(rate_radps))
     if damping:
         child(child(element, "dynamics"), "damping", numbers(damping))

@@ -1,0 +1,83 @@
+"""Opens a map for a command: read whole, or, where it is large, clipped from its index on disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+
+from contracts.arrays import Array
+from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
+from world_gen.intersections import Junction
+from world_gen.map_store import MapStore, route_boxes
+from world_gen.osm_map import LatLonBounds, OsmMap
+from world_gen.read_osm import read_map
+from world_gen.road_graph import RoadGraph
+
+LARGE_MAP_BYTES = 64_000_000
+"""Of larger files, what is needed is clipped from an index on disk, made on first use."""
+CLIP_MARGIN_M = 600.0
+"""Beyond what is asked for: junctions at the edge must be whole, and know their neighbours."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenMap:
+    """A map that was read, its roads, and its junctions by id."""
+
+    file: Path
+    osm: OsmMap
+    graph: RoadGraph
+    junctions: tuple[Junction, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """The part of a map that is needed: what lies within `margin_m` of a line (N, 2) of degrees."""
+
+    line_deg: Array
+    margin_m: float
+
+
+def open_map(
+    file: Path,
+    *,
+    clip: Clip | LatLonBounds | None = None,
+    large_bytes: int = LARGE_MAP_BYTES,
+) -> OpenMap:
+    """Read a map, or of a large one what `clip` needs, and find its junctions.
+
+    Raises MapError where the file is no map or has no roads there.
+    """
+    if clip is not None and file.is_file() and file.stat().st_size >= large_bytes:
+        osm = _clipped(file, clip)
+    else:
+        osm = read_map(file)
+    graph = build_road_graph(osm)
+    return OpenMap(file, osm, graph, find_intersections(osm, graph))
+
+
+def _clipped(file: Path, clip: Clip | LatLonBounds) -> OsmMap:
+    columns = TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(f"reading {file.name}", total=None)
+        store = MapStore.open(
+            file, None, lambda done, total: bar.update(task, completed=done, total=total)
+        )
+    try:
+        if isinstance(clip, Clip):
+            return store.clip_route(clip.line_deg, clip.margin_m + CLIP_MARGIN_M)
+        return store.clip(_widened(clip))
+    finally:
+        store.close()
+
+
+def _widened(bounds: LatLonBounds) -> LatLonBounds:
+    low, high = (
+        route_boxes(np.array([corner]), CLIP_MARGIN_M)[0]
+        for corner in ((bounds.south, bounds.west), (bounds.north, bounds.east))
+    )
+    return LatLonBounds(south=low.south, west=low.west, north=high.north, east=high.east)
