@@ -2,7 +2,7 @@
 
 OpenDRIVE's reference lines must not bend at a point, or lanes beside them would tear open. Long
 segments of a polyline stay straight, corners between them are rounded within 2 cm, and stretches
-of short segments, which are sampled curves, become cubics that stay within 1 cm of their points.
+of short segments, which are sampled curves, become cubics that stay within 2 cm of their points.
 """
 
 from __future__ import annotations
@@ -19,11 +19,13 @@ from world_gen.polyline import unit, without_repeats
 
 STRAIGHT_M = 3.0
 """Longer segments are taken for straight; the World samples its curves more densely."""
-FIT_M = 0.01
+FIT_M = 0.02
 CORNER_M = 0.02
-SIMPLIFY_M = 0.002
+SIMPLIFY_M = 0.004
 END_BEND_M = 5.0
 """Within this distance of its end a straight takes up the heading that is asked for there."""
+TILT_M = 0.01
+"""So far the second point may give way to the heading that is asked for at the first."""
 _SAME_HEADING = 1e-7
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -41,6 +43,11 @@ class Curve:
         """Length in metres."""
         return float(self.lengths_m.sum())
 
+    def end(self, *, at_end: bool) -> tuple[Array, Array]:
+        """Return point (2,) and unit direction (2,) at the start or end."""
+        p = self.controls[-1 if at_end else 0]
+        return (p[3], unit(p[3] - p[2])) if at_end else (p[0], unit(p[1] - p[0]))
+
     def at(self, s_m: Array | float) -> tuple[Array, Array]:
         """Return points (M, 2) and unit directions (M, 2) at arc lengths `s_m` (M,)."""
         s = np.atleast_1d(np.asarray(s_m, dtype=np.float64))
@@ -57,12 +64,6 @@ class Curve:
             + t * t * (p[:, 3] - p[:, 2])
         )
         return points, step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-12)[:, None]
-
-    def beside(self, s_m: float, left_m: float) -> Array:
-        """Return the point (2,) that lies `left_m` to the left at arc length `s_m`."""
-        point, direction = self.at(s_m)
-        beside: Array = point[0] + left_m * np.array([-direction[0, 1], direction[0, 0]])
-        return beside
 
     def locate(self, points_m: Array) -> tuple[Array, Array]:
         """Return arc length and distance to the left (M,) of the nearest place to (M, 2) points."""
@@ -89,13 +90,17 @@ def fit_curve(line: Array, *, start: Array | None = None, end: Array | None = No
     xy = without_repeats(np.asarray(line, dtype=np.float64), tolerance_m=1e-6)
     if len(xy) < 2:
         raise ValueError("a road's reference line has no length")
+    # Lanes end across the line's own first and last step, however short they are.
+    first = unit(xy[1] - xy[0]) if start is None else start
+    last = unit(xy[-1] - xy[-2]) if end is None else end
     if len(xy) > 2:
         xy = shapely.get_coordinates(shapely.simplify(shapely.LineString(xy), SIMPLIFY_M))
+    if len(xy) == 2 and _nearly_straight(xy, first, last):
+        return curve_between(xy[0], first, xy[1], last)
+    xy = _tilted(xy, first, last)
     steps = np.diff(xy, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     directions = steps / lengths[:, None]
-    first = directions[0] if start is None else start
-    last = directions[-1] if end is None else end
     controls = _chain(xy, lengths, directions, first, last)
     pieces = np.array([piece for piece, _ in controls])
     return Curve(pieces, tuple(straight for _, straight in controls), _lengths(pieces))
@@ -108,6 +113,30 @@ def curve_between(begin: Array, heading: Array, finish: Array, toward: Array) ->
 
 
 Piece = tuple[Array, bool]
+
+
+def _nearly_straight(xy: Array, first: Array, last: Array) -> bool:
+    """Return whether one cubic between two points (2, 2) stays within `FIT_M` of the straight."""
+    span = xy[1] - xy[0]
+    bend = max(abs(_bend(span, first)), abs(_bend(span, last)))
+    # A cubic leaves its chord by at most 4/27 of its length times the slope at one end.
+    return 0.0 < bend < 0.5 and 4.0 / 27.0 * math.hypot(*span) * math.tan(bend) < FIT_M
+
+
+def _tilted(xy: Array, first: Array, last: Array) -> Array:
+    """Move the points next to the ends onto the headings there where they lie close to them.
+
+    Points are rounded to millimetres, so that a straight would need a bend at its end else.
+    """
+    if len(xy) < 4:
+        return xy
+    moved = xy.copy()
+    for corner, beside, heading in ((0, 1, first), (-1, -2, last)):
+        gap = xy[beside] - xy[corner]
+        onto = xy[corner] + heading * float(gap @ heading)
+        if math.hypot(*(onto - xy[beside])) <= TILT_M:
+            moved[beside] = onto
+    return moved
 
 
 def _chain(xy: Array, lengths: Array, directions: Array, first: Array, last: Array) -> list[Piece]:

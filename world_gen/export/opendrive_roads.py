@@ -109,9 +109,9 @@ class OdrRoad:
         number = self.numbers[lane.id]
         inner = number - (1 if number > 0 else -1)
         left = (self.edge_m(number, at_end=at_end) + self.edge_m(inner, at_end=at_end)) / 2.0
-        s = self.curve.length_m if at_end else 0.0
-        _, direction = self.curve.at(s)
-        return Pose(self.curve.beside(s, left), -direction[0] if lane.reverse else direction[0])
+        point, direction = self.curve.end(at_end=at_end)
+        aside = left * np.array([-direction[1], direction[0]])
+        return Pose(point + aside, -direction if lane.reverse else direction)
 
 
 def _value(cubic: Cubic, s: float) -> float:

@@ -109,8 +109,8 @@ def _road(
 
 def _pose(end: End) -> Pose:
     """Return the end of a road's reference line, looking out of the road."""
-    point, direction = end.road.curve.at(end.road.curve.length_m if end.at_end else 0.0)
-    return Pose(point[0], direction[0] if end.at_end else -direction[0])
+    point, direction = end.road.curve.end(at_end=end.at_end)
+    return Pose(point, direction if end.at_end else -direction)
 
 
 def _set_next(end: End, number: int, following: int) -> None:
