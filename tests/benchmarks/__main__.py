@@ -1,6 +1,6 @@
 """`python -m tests.benchmarks [NAME ...]` measures and writes `build/bench.json`.
 
-The file is `{name: {value, unit, baseline, ratio}}`. Exit code 1 where something could not be
+The file is `{name: {value, unit, baseline, ratio, ...}}`. Exit code 1 where something could not be
 measured, 2 for an unknown name.
 """
 
@@ -20,6 +20,9 @@ BENCHMARKS = (
     "futures_closed_loop_20hz",
     "futures_full_scene",
     "world_from_open_map",
+    "world_cutout_vs_netconvert",
+    "world_monaco_vs_netconvert",
+    "world_liechtenstein_vs_netconvert",
     "state_to_result",
     "help_startup",
 )
@@ -48,6 +51,8 @@ def main(names: list[str]) -> int:
             f" ({time.perf_counter() - start:.0f} s to measure)",
             flush=True,
         )
+        for name_of, figure in measured.more.items():
+            print(f"{'':28} {name_of} {figure:.4g}")
     OUT.parent.mkdir(exist_ok=True)
     OUT.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
     print(f"written: {OUT}")

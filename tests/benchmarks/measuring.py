@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 
@@ -12,15 +13,20 @@ class UnavailableError(RuntimeError):
 
 
 class Measurement(NamedTuple):
-    """A value and what it is held against, in the same unit and from the same run."""
+    """A value and what it is held against, in the same unit and from the same run.
+
+    `more` holds further figures of that run.
+    """
 
     value: float
     unit: str
     baseline: float
+    more: Mapping[str, float] = MappingProxyType({})
 
     def as_row(self) -> dict[str, float | str]:
         """Return the entry of `build/bench.json`."""
-        return {**self._asdict(), "ratio": self.value / self.baseline}
+        row = {"value": self.value, "unit": self.unit, "baseline": self.baseline}
+        return {**row, "ratio": self.value / self.baseline, **self.more}
 
 
 def cpu_minimum_s(work: Callable[[], object], *, repeats: int) -> float:

@@ -1,0 +1,33 @@
+"""`python -m tests.benchmarks.map_to_world MAP FOLDER` makes one World of a whole map and keeps it.
+
+The job that is held against SUMO's netconvert: from the file to lanes, connections, right of way,
+surfaces and buildings, written in the form that every room of foretwin loads.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from contracts.world import World
+from world_gen.build import build_region
+from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
+from world_gen.map_index import index_map
+from world_gen.read_osm import read_map
+from world_gen.world_store import WorldStore
+
+
+def make_world(map_file: Path, folder: Path) -> World:
+    """Build the World of all roads of a map and save it in `folder`."""
+    osm = read_map(map_file)
+    graph = build_road_graph(osm)
+    junctions = find_intersections(osm, graph)
+    index = index_map(osm, graph, junctions)
+    world = build_region(osm, graph, osm.bounds, index=index)
+    WorldStore(folder).save(world)
+    return world
+
+
+if __name__ == "__main__":
+    make_world(Path(sys.argv[1]), Path(sys.argv[2]))
