@@ -1,0 +1,43 @@
+"""Driveways, parking aisles and other service roads as roads that junctions count, by choice."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+from world_gen.road_graph import DirectedEdge, RoadGraph
+
+
+def with_service_roads(graph: RoadGraph) -> RoadGraph:
+    """Return the graph with every service road that is open to cars counted as a car road."""
+    return with_roads(
+        graph,
+        (
+            edge.index
+            for edge in graph.edges
+            if edge.road_class == "service" and (edge.forward or edge.backward)
+        ),
+    )
+
+
+def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
+    """Return the graph with these edges, say those of a route, counted as car roads.
+
+    Junctions and Worlds found in it know the places where they meet a street; edges keep their
+    indices, so what was found in one graph holds in the other.
+    """
+    added = {index for index in edges if not graph.edges[index].car}
+    if not added:
+        return graph
+    changed = tuple(
+        dataclasses.replace(edge, car=True) if edge.index in added else edge for edge in graph.edges
+    )
+    leaving = dict(graph.leaving)
+    ends = {
+        node for index in added for node in (changed[index].start_node, changed[index].end_node)
+    }
+    for node in ends:
+        leaving[node] = tuple(
+            DirectedEdge(changed[item.edge.index], item.reverse) for item in graph.leaving[node]
+        )
+    return dataclasses.replace(graph, edges=changed, leaving=leaving)
