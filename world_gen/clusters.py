@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,22 +11,18 @@ import numpy as np
 import shapely
 import shapely.ops
 
-from contracts.arrays import Array
 from contracts.frames import GeoPoint, LocalFrame, target_from_source
 from contracts.world import DrivingSide
 from world_gen.cross_section import CrossSection, cross_section
 from world_gen.extent import Extent
 from world_gen.intersections import Junction
+from world_gen.legs import RING_KINDS as RING_KINDS
+from world_gen.legs import heading_out as heading_out
+from world_gen.legs import is_ring_edge as is_ring_edge
 from world_gen.map_index import MapIndex
-from world_gen.polyline import direction_at, unit, without_repeats
+from world_gen.polyline import without_repeats
 from world_gen.road_graph import DirectedEdge, RoadEdge
-
-RING_KINDS = ("roundabout", "circular")
-CORNER_M = 3.5
-"""Room between the kerb of the other road and a lane's end: makes turns wider than 4 m radius."""
-RING_CORNER_M = 1.5
-MAX_TRIM_M = 22.0
-_LEG_LOOK_M = 45.0
+from world_gen.trims import trims
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,11 +76,6 @@ class Surroundings:
         return self.sections[edge.edge.index]
 
 
-def is_ring_edge(edge: RoadEdge) -> bool:
-    """Return whether an edge is part of a roundabout's or other circular junction's ring."""
-    return edge.tags.get("junction") in RING_KINDS
-
-
 def in_map(extent: Extent, frame: LocalFrame, map_frame: LocalFrame) -> shapely.Polygon:
     """Return a World's extent in the map's frame."""
     return shapely.transform(
@@ -126,7 +116,7 @@ def surroundings(
         edges=edges,
         sections=sections,
         clusters=clusters,
-        trims_m=_trims(clusters, edges, sections),
+        trims_m=trims(clusters, edges, sections),
         ring_edges=ring_edges,
     )
 
@@ -215,113 +205,3 @@ def _groups_of(
         ]
     nodes = frozenset(node for node in junction.nodes if node in leaving)
     return [_Group(nodes, frozenset(junction.inner), junction, whole)] if nodes else []
-
-
-def _trims(
-    clusters: tuple[Cluster, ...],
-    edges: Mapping[int, RoadEdge],
-    sections: Mapping[int, CrossSection],
-) -> dict[tuple[int, bool], float]:
-    trims: dict[tuple[int, bool], float] = {}
-    for cluster in clusters:
-        if cluster.plain:
-            values = _plain_trims(cluster, sections)
-        elif len(cluster.nodes) == 1:
-            values = _node_trims(cluster, sections)
-        else:
-            values = _area_trims(cluster, edges, sections)
-        for leg, value in zip(cluster.legs, values, strict=True):
-            trims[leg.edge.index, leg.reverse] = min(value, MAX_TRIM_M)
-    for index, edge in edges.items():
-        start, end = trims.get((index, False), 0.0), trims.get((index, True), 0.0)
-        room = 0.8 * edge.length_m
-        if start + end > room:
-            # What is left is shared in proportion, so that a lane of some length remains.
-            trims[index, False] = start * room / (start + end)
-            trims[index, True] = end * room / (start + end)
-    return trims
-
-
-def _plain_trims(cluster: Cluster, sections: Mapping[int, CrossSection]) -> list[float]:
-    """Lanes of one road run on where they fit; where lanes change they get room for a taper."""
-    a, b = (sections[leg.edge.index] for leg in cluster.legs)
-    first, second = cluster.legs
-    if lateral_positions(first, a, outward=False) == lateral_positions(second, b, outward=True):
-        bend = math.acos(float(np.clip(-heading_out(first) @ heading_out(second), -1.0, 1.0)))
-        reach = max(a.half_width_m, b.half_width_m)
-        return [0.0, 0.0] if bend < math.radians(35.0) else [reach * math.tan(bend / 2) + 2.0] * 2
-    return [min(6.0, 0.3 * leg.edge.length_m) for leg in cluster.legs]
-
-
-def lateral_positions(
-    leg: DirectedEdge, section: CrossSection, *, outward: bool
-) -> list[tuple[float, bool]]:
-    """Return (metres left, driven that way) of lanes, seen along or against an outward leg."""
-    flip = leg.reverse == outward
-    found = [
-        (round(-lane.left_m if flip else lane.left_m, 2), lane.reverse == flip)
-        for lane in section.lanes
-    ]
-    return sorted(found)
-
-
-def heading_out(leg: DirectedEdge, look_m: float = 8.0) -> Array:
-    """Return the unit direction (2,) in which a leg leaves, averaged over `look_m`."""
-    xy = without_repeats(leg.xy_m)
-    steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
-    reach = min(look_m, float(steps[-1]))
-    target = np.array([np.interp(reach, steps, xy[:, 0]), np.interp(reach, steps, xy[:, 1])])
-    gap = target - xy[0]
-    return unit(gap) if math.hypot(*gap) > 0.1 else direction_at(xy, 0.0)
-
-
-def _node_trims(cluster: Cluster, sections: Mapping[int, CrossSection]) -> list[float]:
-    """Cut each leg where the kerbs of straight legs from one point cross, and a corner more."""
-    heads = np.array([heading_out(leg) for leg in cluster.legs])
-    half = np.array([sections[leg.edge.index].half_width_m for leg in cluster.legs])
-    on_ring = np.array([is_ring_edge(leg.edge) for leg in cluster.legs])
-    cos = np.clip(heads @ heads.T, -1.0, 1.0)
-    sin = np.sqrt(1.0 - cos * cos)
-    reach = (half[None, :] + half[:, None] * cos) / np.maximum(sin, 0.2)
-    reach = np.where(cos < -0.94, 0.0, reach)  # the road goes straight on
-    np.fill_diagonal(reach, 0.0)
-    corner = np.where(on_ring, RING_CORNER_M, CORNER_M)
-    return [float(v) for v in np.maximum(reach.max(axis=1), 0.0) + corner]
-
-
-def _area_trims(
-    cluster: Cluster, edges: Mapping[int, RoadEdge], sections: Mapping[int, CrossSection]
-) -> list[float]:
-    """Cut each leg where it has left the carriageways of all other roads of the cluster."""
-    near = [shapely.LineString(without_repeats(leg.xy_m)) for leg in cluster.legs]
-    near = [shapely.ops.substring(line, 0.0, _LEG_LOOK_M) for line in near]
-    widths = [sections[leg.edge.index].half_width_m for leg in cluster.legs]
-    legs = shapely.buffer(near, widths, cap_style="flat")
-    inside = [
-        shapely.buffer(shapely.LineString(edges[i].xy_m), sections[i].half_width_m)
-        for i in sorted(cluster.inner)
-        if i in edges
-    ]
-    heads = [heading_out(leg, 15.0) for leg in cluster.legs]
-    values = []
-    for i, leg in enumerate(legs):
-        # A leg beside this one, going the same way, is the other carriageway of the same road.
-        others = [
-            legs[j]
-            for j in range(len(legs))
-            if j != i
-            and not (
-                heads[i] @ heads[j] > 0.85
-                and cluster.legs[i].start_node != cluster.legs[j].start_node
-            )
-        ]
-        overlap = shapely.intersection(leg, shapely.union_all([*others, *inside]))
-        reach = 0.0
-        for part in shapely.get_parts(overlap):
-            if part.area > 0.05 and shapely.distance(part, shapely.Point(near[i].coords[0])) < 15.0:
-                at = shapely.line_locate_point(
-                    near[i], shapely.points(shapely.get_coordinates(part))
-                )
-                reach = max(reach, float(at.max()))
-        values.append(reach + CORNER_M)
-    return values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -88,6 +89,15 @@ class CrossSection:
     def half_width_m(self) -> float:
         """The wider of both sides, measured from the way."""
         return max(abs(self.left_m), abs(self.right_m))
+
+    def reach_m(self, reverse: bool) -> tuple[float, float]:
+        """Return how far the middles of the outermost lanes of one direction lie from the way.
+
+        To the left and to the right as their driver sees it; NaN where there are none.
+        """
+        side = -1.0 if reverse else 1.0
+        lefts = [side * lane.left_m for lane in self.lanes if lane.reverse == reverse]
+        return (max(lefts), -min(lefts)) if lefts else (math.nan, math.nan)
 
     def driven(self, *, reverse: bool) -> tuple[LanePlan, ...]:
         """Return the lanes of one direction from the left as their driver sees them."""

@@ -12,12 +12,12 @@ from world_gen.polyline_batch import Polylines
 
 LEAST_RADIUS_M = 4.0
 """No car turns tighter (turning circle of a passenger car: 10 m and more from kerb to kerb)."""
-_WANTED_RADIUS_M = 4.5
-_LEAD_M = 0.4
+WANTED_RADIUS_M = 4.5
+LEAD_M = 0.4
 """Straight before the first and behind the last arc, so that paths leave along their lanes."""
 _STEP_RAD, _STEP_M = math.radians(8.0), 0.5
 _REPEAT_M = 0.02
-_TIGHTNESS = 3.0
+_TIGHTNESS = 6.0
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
@@ -50,7 +50,7 @@ def turn_curves(start: Array, heading: Array, end: Array, end_heading: Array) ->
     kept to the last bit; other points lie on the millimetre grid.
     """
     chord = end - start
-    lead = np.minimum(_LEAD_M, 0.15 * np.hypot(chord[:, 0], chord[:, 1]))
+    lead = np.minimum(LEAD_M, 0.15 * np.hypot(chord[:, 0], chord[:, 1]))
     p, q = start + lead[:, None] * heading, end - lead[:, None] * end_heading
     gap = q - p
     cross = _cross(heading, end_heading)
@@ -63,7 +63,7 @@ def turn_curves(start: Array, heading: Array, end: Array, end_heading: Array) ->
             _two_arcs(gap, heading, end_heading, side),
         ):
             turned = np.abs(found.first_rad) + np.abs(found.second_rad)
-            tight = np.maximum(1.0 - found.radius_m / _WANTED_RADIUS_M, 0.0)
+            tight = np.maximum(1.0 - found.radius_m / WANTED_RADIUS_M, 0.0)
             worth = turned + _TIGHTNESS * tight
             worth[~(found.radius_m > 0.05)] = np.inf
             better = worth < cost - 1e-6
