@@ -148,16 +148,10 @@ def test_values_say_where_they_come_from(tmp_path: Path) -> None:
 def test_what_crosses_the_antimeridian_is_cut_there(origin: GeoPoint, tmp_path: Path) -> None:
     world = built(origin)
     found = features(world, tmp_path)
-    cut = [
-        feature["geometry"]
-        for group in found.values()
-        for feature in group
-        if feature["geometry"]["type"].startswith("Multi")
-    ]
+    surfaces = [feature["geometry"] for feature in found["road_surface"]]
+    cut = [surface for surface in surfaces if surface["type"] == "MultiPolygon"]
     assert cut
-    surface = found["road_surface"][0]["geometry"]
-    assert surface["type"] == "MultiPolygon"
-    for polygon in surface["coordinates"]:
+    for polygon in [part for surface in cut for part in surface["coordinates"]]:
         lon = np.array(polygon[0])[:, 0]
         assert lon.max() - lon.min() < 0.01
         assert np.abs(lon).max() <= 180.0
