@@ -15,6 +15,8 @@ from world_gen.road_graph import DirectedEdge
 
 OWN_LINE_M = 3.0
 """A sign or signal farther than this from the junction's node stands at the stop line."""
+BEFORE_CROSSING_M = 3.0
+"""From a crossing's middle to the line before it: half its width and a metre (RMS 2)."""
 _SIGN_NEAR_M = 25.0
 _CROSSING_NEAR_M = 16.0
 _OPPOSITE_COS = -0.75
@@ -35,6 +37,8 @@ class Approach:
     line_m: float | None
     signal_nodes: tuple[int, ...]
     standing: Standing
+    lit_inside: bool = False
+    """Its light stands on the way through the junction, past where a slip road may part."""
 
     @property
     def junction_id(self) -> str:
@@ -48,7 +52,7 @@ class Approach:
         return self.toward.edge.index, self.toward.reverse
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Draft:
     """What is known of an approach before the junction's roads are compared."""
 
@@ -91,11 +95,11 @@ def approaches(
             if not on_ring and not cluster.ring and leg.edge.index in junction.inner:
                 continue
             met = met_toward(leg, plain_from, node_tags, junction.nodes)
-            lights = [m for m in met if is_light(m.tags)]
+            lights = [m for m in met if is_light(m.tags) and m.node in junction.lights]
             if on_ring and not lights:
                 continue
             passed = inside.get((toward.edge.index, toward.reverse), [])
-            lights = lights or [m for m in passed if is_light(m.tags)][:1]
+            lights = lights or [m for m in passed if is_light(m.tags)]
             drafts.setdefault(junction.summary.id, []).append(
                 _Draft(
                     cluster=cluster,
@@ -107,8 +111,26 @@ def approaches(
             )
     found: list[Approach] = []
     for items in drafts.values():
-        found.extend(_compared(items, around))
+        mine = _compared(items, around)
+        _claim_the_rest(mine)
+        found.extend(mine)
     return tuple(found)
+
+
+def _claim_the_rest(mine: list[Approach]) -> None:
+    """Give each light of the junction that no road met first to the road it stands nearest to.
+
+    These are repeaters in a median or behind the junction, or lights on the way through it.
+    """
+    junction = mine[0].cluster.junction
+    lit = [approach for approach in mine if approach.control.value == "signal"]
+    if junction is None or not lit:
+        return
+    known = {node for approach in lit for node in approach.signal_nodes}
+    for node in sorted(junction.lights - known):
+        on_road = [item for item in lit if node in item.toward.edge.node_ids]
+        nearest = (on_road or lit)[0]
+        nearest.signal_nodes = (*nearest.signal_nodes, node)
 
 
 def _own_sign(met: list[Met], cluster: Cluster) -> Met | None:
@@ -194,13 +216,16 @@ def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> 
     sign_nearer = d.sign is not None and not d.lights
     if signalled and (d.lights or (for_all and not sign_nearer and standing.rank > Rank.YARD)):
         on_leg = [m for m in d.lights if math.isfinite(m.distance_m)]
-        far = max((m.distance_m for m in on_leg), default=0.0)
-        line = far if far > OWN_LINE_M else _before_crossing(d.met)
+        far = max((m for m in on_leg), key=lambda m: m.distance_m, default=None)
+        line = _before_crossing(d.met)
+        if far is not None and far.distance_m > OWN_LINE_M:
+            on_crossing = "crossing" in far.tags
+            line = far.distance_m + (BEFORE_CROSSING_M if on_crossing else 0.0)
         nodes = tuple(dict.fromkeys(m.node for m in d.lights))
         word = Choice("signal", "tagged" if nodes else "inferred")
         return Approach(
             cluster=d.cluster, toward=d.toward, control=word, line_m=line, signal_nodes=nodes,
-            standing=standing,
+            standing=standing, lit_inside=bool(d.lights) and not on_leg,
         )  # fmt: skip
     line = None
     if d.sign is not None and OWN_LINE_M < d.sign.distance_m <= _SIGN_NEAR_M:
@@ -226,4 +251,4 @@ def _before_crossing(met: list[Met]) -> float | None:
         if (m.tags.get("highway") == "crossing" or "crossing" in m.tags)
         and 1.0 < m.distance_m <= _CROSSING_NEAR_M
     ]
-    return max(at) + 3.0 if at else None
+    return max(at) + BEFORE_CROSSING_M if at else None

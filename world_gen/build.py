@@ -111,7 +111,8 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
     notes: list[str] = []
     lanes = build_lanes(around)
     connections = _connections(index, around, lanes, notes)
-    rules = junction_rules(around, osm.node_tags, lanes, connections)
+    crossed = crossings(around, osm.node_tags)
+    rules = junction_rules(around, osm.node_tags, lanes, connections, crossed)
     surface = areas(around, lanes, connections)
     near = index.buildings_in(in_map(extent, around.frame, index.graph.frame))
     free = _driven_beside(surface.driven, near, around.frame, index.graph.frame)
@@ -137,7 +138,8 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
         connections=tuple(c.finished() for c in connections),
         conflicts=rules.conflicts,
         stop_lines=rules.stop_lines,
-        crossings=crossings(around, osm.node_tags),
+        crossings=crossed,
+        crossing_plans=rules.crossing_plans,
         signals=rules.signals,
         islands=surface.islands,
         kerbs=surface.kerbs,

@@ -5,23 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from contracts.world import Conflict, Signal, SignalPlan, StopLine
-from world_gen.approaches import approaches
+from contracts.world import Conflict, Crossing, Signal, SignalPlan, StopLine
+from world_gen.approaches import Approach, approaches
 from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.lanes import LaneSet
-from world_gen.met_on_the_way import NodeTags
+from world_gen.lone_lights import lone_lights
+from world_gen.met_on_the_way import NodeTags, is_light, met_inside, sign_of
 from world_gen.right_of_way import right_of_way
-from world_gen.stop_lines import line_controls, signals, stop_lines
+from world_gen.signal_groups import lane_groups, walk_groups
+from world_gen.signal_heads import signal_heads
+from world_gen.signal_plan import signal_plans
+from world_gen.stop_lines import line_controls, stop_lines
 
 
 class JunctionRules(NamedTuple):
-    """What tells drivers when to go; `plans` by junction id."""
+    """What tells drivers when to go.
+
+    `plans` are by junction id, `crossing_plans` those of lights away from junctions.
+    """
 
     stop_lines: tuple[StopLine, ...]
     signals: tuple[Signal, ...]
     conflicts: tuple[Conflict, ...]
     plans: Mapping[str, SignalPlan]
+    crossing_plans: tuple[SignalPlan, ...]
 
 
 def junction_rules(
@@ -29,14 +37,55 @@ def junction_rules(
     node_tags: NodeTags,
     lanes: LaneSet,
     connections: Sequence[ConnectionDraft],
+    crossings: Sequence[Crossing],
 ) -> JunctionRules:
-    """Return the rules of every whole junction; connections learn their control and conflicts."""
+    """Return the rules of every whole junction, and of every light away from one.
+
+    Connections learn their control, their signal group and their conflicts.
+    """
     found = approaches(around, node_tags, connections)
     lines = stop_lines(found, around, lanes)
-    controls = line_controls(lines)
-    for connection in connections:
-        connection.control = controls.get(connection.start.id, "none")
+    _control(connections, found, lines, node_tags, around)
     whole = {id(junction) for junction in around.junctions}
     ruled = [c for c in connections if id(c.cluster.junction) in whole]
-    conflicts, _ = right_of_way(ruled, found, node_tags, around.driving_side)
-    return JunctionRules(lines, signals(found, lines, around, lanes), conflicts, {})
+    conflicts, met = right_of_way(ruled, found, node_tags, around.driving_side)
+    groups = lane_groups(found, around, lanes, ruled)
+    walks = walk_groups(groups, crossings, around)
+    heads = signal_heads(groups, {line.lane_id: line for line in lines}, around.driving_side)
+    lone = lone_lights(around, node_tags, lanes, crossings)
+    return JunctionRules(
+        stop_lines=(*lines, *lone.stop_lines),
+        signals=(*heads, *lone.signals),
+        conflicts=conflicts,
+        plans=signal_plans(groups, walks, ruled, conflicts, met),
+        crossing_plans=lone.plans,
+    )
+
+
+def _control(
+    connections: Sequence[ConnectionDraft],
+    found: Sequence[Approach],
+    lines: Sequence[StopLine],
+    node_tags: NodeTags,
+    around: Surroundings,
+) -> None:
+    """Tell connections what controls them: their lane's line, or a sign on a slip road.
+
+    A slip road to the near side that passes no light of its own is not under the junction's.
+    """
+    controls = line_controls(lines)
+    near = "right" if around.driving_side == "right" else "left"
+    by_road = {approach.key: approach for approach in found}
+    for c in connections:
+        c.control = controls.get(c.start.id, "none")
+        toward = c.movement.toward
+        approach = by_road.get((toward.edge.index, toward.reverse))
+        if approach is None or not c.movement.inside or c.turn != near:
+            continue
+        met = met_inside(c.movement.inside, node_tags)
+        sign = next((word for m in met if (word := sign_of(m.tags))), None)
+        lit = any(is_light(m.tags) for m in met)
+        if sign is not None and not lit:
+            c.control = "stop" if sign == "stop" else "give_way"
+        elif approach.lit_inside and not lit:
+            c.control = "give_way"

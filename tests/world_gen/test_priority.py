@@ -45,8 +45,12 @@ def test_a_signal_at_its_own_stop_line_is_tagged_and_others_are_inferred():
     assert set(by_node) == {5, 6}
     assert by_node[5].position[0] == pytest.approx(-12.0, abs=0.2)
     assert by_node[5].position[1] < -3.0  # beside the kerb, right of the lane
-    assert by_node[5].group_id == by_node[6].group_id
-    assert len({signal.group_id for signal in world.signals}) == 2
+    plan = world.junctions[0].plan
+    assert plan is not None
+    both = {by_node[5].group_id, by_node[6].group_id}
+    assert [set(phase.green_group_ids) == both for phase in plan.phases].count(True) == 1
+    assert len(plan.phases) == 2
+    assert len({signal.group_id for signal in world.signals}) == 4
     assert {c.control for c in world.connections} == {"signal"}
 
 

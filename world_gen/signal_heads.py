@@ -1,0 +1,69 @@
+"""Signal heads: where each light hangs that governs a group of lanes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.world import DrivingSide, Provenance, Signal, StopLine
+from world_gen.signal_groups import LaneGroup
+
+BESIDE_HEIGHT_M, ABOVE_HEIGHT_M = 3.0, 5.5
+"""Middle of a head on a post beside the road, and of one over the lanes (RiLSA 2015 6.2.3)."""
+BESIDE_M = 0.6
+WIDE_LANES = 3
+"""Roads with as many lanes in have a head above the lanes as well."""
+
+
+def signal_heads(
+    groups: Sequence[LaneGroup], lines: Mapping[str, StopLine], driving_side: DrivingSide
+) -> tuple[Signal, ...]:
+    """Return the heads of every lane group, at its stop line.
+
+    `lines` are by lane. The group next to the kerb has a head beside the road; one that is not,
+    and any group of a wide road, a head above its lanes.
+    """
+    by_road: dict[tuple[int, bool], list[int]] = {}
+    for group in groups:
+        numbers = [lane.key.number for lane in group.lanes]
+        by_road.setdefault(group.approach.key, []).extend(numbers)
+    heads: list[Signal] = []
+    for group in groups:
+        numbers = by_road[group.approach.key]
+        outermost = max(numbers) if driving_side == "right" else min(numbers)
+        kerb_side = group.lanes[-1] if driving_side == "right" else group.lanes[0]
+        at_kerb = kerb_side.key.number == outermost
+        if at_kerb:
+            place = beside(lines[kerb_side.id].ends, driving_side)
+            heads.append(_head(f"{kerb_side.id}:signal", group, place, BESIDE_HEIGHT_M))
+        if not at_kerb or len(numbers) >= WIDE_LANES:
+            ends = np.concatenate([lines[lane.id].ends for lane in group.lanes])
+            name = f"{kerb_side.id}:signal-above"
+            heads.append(_head(name, group, ends.mean(axis=0), ABOVE_HEIGHT_M))
+    return tuple(heads)
+
+
+def beside(ends: Array, driving_side: DrivingSide) -> Array:
+    """Return the place (2,) beside a stop line's kerb end."""
+    kerb, middle = (ends[1], ends[0]) if driving_side == "right" else (ends[0], ends[1])
+    gap = kerb - middle
+    place: Array = kerb + gap / max(math.hypot(*gap), 1e-6) * BESIDE_M
+    return place
+
+
+def _head(name: str, group: LaneGroup, place: Array, height_m: float) -> Signal:
+    nodes = group.approach.signal_nodes
+    source: Provenance = group.approach.control.source
+    return Signal(
+        id=name,
+        osm_node=nodes[0] if nodes else None,
+        group_id=group.id,
+        lane_ids=tuple(lane.id for lane in group.lanes),
+        position=np.round(np.array([place[0], place[1], height_m]), 3),
+        yaw_rad=round(group.bearing_rad, 4),
+        source=source,
+        osm_nodes=nodes,
+    )
