@@ -61,7 +61,7 @@ def road_element(road: OdrRoad, *, side: DrivingSide, version: Version) -> etree
     _add_type(element, road, version)
     _add_plan_view(element, road.curve)
     profile = etree.SubElement(element, "elevationProfile")
-    etree.SubElement(profile, "elevation", s="0", a="0", b="0", c="0", d="0")
+    etree.SubElement(profile, "elevation", {"s": "0", **_coefficients(road.height)})
     _add_lanes(element, road, side=side, version=version)
     return element
 

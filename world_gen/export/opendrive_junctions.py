@@ -40,7 +40,7 @@ def junction_elements(
             junction,
             names.get(junction.junction_id, ""),
             waits.get(junction.id, ()),
-            [c.id for c in controllers if c.junction == junction.id],
+            [c.id for c in controllers if junction.id in c.junctions],
             version,
         )
         for junction in network.junctions

@@ -37,6 +37,8 @@ class _Thing(NamedTuple):
     height_m: float = 0.0
     lane_type: str = ""
     road: OdrRoad | None = None
+    grounded: bool = False
+    """Stands on the World's plane, not on the road."""
 
 
 def add_objects(
@@ -70,7 +72,7 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
         bottom = building.min_height_m
         yield _Thing(
             "building", "", building.id, (building.outline, *building.holes), bottom,
-            max(building.height_m.value - bottom, 0.0),
+            max(building.height_m.value - bottom, 0.0), grounded=True,
         )  # fmt: skip
     for area in world.islands:
         yield _Thing(
@@ -94,7 +96,7 @@ def _stripe(crossing: Crossing) -> Array:
 
 
 def _painted(line: StopLine) -> Array:
-    """Return the outline of a stop line, which lies before the point where cars stop."""
+    """Return the outline of a stop line, just beyond the place where cars stop."""
     left, right = line.ends
     ahead = left_of(unit(right - left)) * STOP_LINE_M
     return np.array([right, right + ahead, left + ahead, left])
@@ -131,7 +133,7 @@ def _placed(
             name=thing.name,
             s=number(s[i]),
             t=number(t[i]),
-            zOffset=number(thing.bottom_m),
+            zOffset=number(thing.bottom_m - (road.height.at(float(s[i])) if thing.grounded else 0)),
             orientation="none",
             hdg=number(-headings[i]),
             height=number(thing.height_m),

@@ -243,6 +243,7 @@ def _connecting_road(
         offset=Cubic.between(half * first, half * last, curve.length_m),
         lanes=[lane],
         road_class=a.road.road_class,
+        height=Cubic(a.road.height.at(a.road.curve.length_m if a.at_end else 0.0)),
         predecessor=("road", a.road.id, a.at_end),
         successor=("road", b.road.id, b.at_end),
     )

@@ -11,6 +11,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.world import DrivingSide, Lane, Road, World
 from world_gen.export.opendrive_curve import Curve, fit_curve
+from world_gen.export.opendrive_heights import heights_of, node_of
 
 GAP_M = 0.01
 """Lanes farther apart than this have a strip without traffic between them."""
@@ -31,6 +32,10 @@ class Cubic(NamedTuple):
         if abs(rise) < 1e-9:
             return Cubic(start)
         return Cubic(start, 0.0, 3.0 * rise / length_m**2, -2.0 * rise / length_m**3)
+
+    def at(self, s_m: float) -> float:
+        """Return the value at arc length `s_m`."""
+        return self.a + s_m * (self.b + s_m * (self.c + s_m * self.d))
 
 
 class Pose(NamedTuple):
@@ -75,6 +80,7 @@ class OdrRoad:
     offset: Cubic
     lanes: list[OdrLane]
     road_class: str
+    height: Cubic
     junction: int = -1
     predecessor: tuple[Literal["road", "junction"], int, bool] | None = None
     """What it is linked to before its start, its id, and, for a road, whether at its end."""
@@ -97,11 +103,11 @@ class OdrRoad:
     def edge_m(self, number: int, *, at_end: bool) -> float:
         """Return how far a lane's outer edge, or lane 0, lies to the left of the reference line."""
         s = self.curve.length_m if at_end else 0.0
-        left = _value(self.offset, s)
+        left = self.offset.at(s)
         step = 1 if number > 0 else -1
         for lane in self.lanes:
             if 0 < lane.number * step <= number * step:
-                left += step * _value(lane.width, s)
+                left += step * lane.width.at(s)
         return left
 
     def end_of(self, lane: Lane, *, at_end: bool) -> Pose:
@@ -114,10 +120,6 @@ class OdrRoad:
         return Pose(point + aside, -direction if lane.reverse else direction)
 
 
-def _value(cubic: Cubic, s: float) -> float:
-    return cubic.a + s * (cubic.b + s * (cubic.c + s * cubic.d))
-
-
 def roads_of(
     world: World, lanes: Mapping[str, Lane], headings: Mapping[tuple[str, bool], Array]
 ) -> list[OdrRoad]:
@@ -128,6 +130,7 @@ def roads_of(
     Roads without lanes are left out.
     """
     side = world.intersection.driving_side
+    heights = heights_of(world.roads)
     found: list[OdrRoad] = []
     for road in world.roads:
         mine = [lanes[i] for i in road.lane_ids if i in lanes]
@@ -148,6 +151,11 @@ def roads_of(
                 offset=Cubic(centre_m),
                 lanes=strips,
                 road_class=road.road_class,
+                height=Cubic.between(
+                    heights[node_of(road, at_end=False)],
+                    heights[node_of(road, at_end=True)],
+                    curve.length_m,
+                ),
                 road=road,
                 numbers={s.lane.id: s.number for s in strips if s.lane is not None},
             )

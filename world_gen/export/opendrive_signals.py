@@ -18,17 +18,21 @@ from world_gen.export.opendrive_places import OdrJunction, OdrNetwork
 from world_gen.export.opendrive_roads import OdrRoad
 
 SIGN_BESIDE_M = 0.6
-SIGN_HEIGHT_M = 2.2
-"""Lower edge of a sign over the road (VwV-StVO on §§ 39 to 43: 2 m, 2.20 m over footways)."""
+SIGN_HEIGHT_M = 2.65
+"""Middle of a sign, whose lower edge is 2.20 m high (VwV-StVO on §§ 39 to 43)."""
+SIGN_M = (0.9, 0.9)
+"""Width and height of a sign (VzKat 2017, size 2)."""
+LIGHT_M = (0.3, 0.9)
+"""Width and height of three lights of 200 mm above each other."""
 _SIGNS = {"stop": ("206", "stop"), "give_way": ("205", "yield")}
 """Type in Germany's catalogue of signs and meaning of the signs at stop lines by their control."""
 
 
 class Controller(NamedTuple):
-    """Signals of one junction that change together."""
+    """Signals that change together, and the junctions that they lead into."""
 
     id: int
-    junction: int
+    junctions: frozenset[int]
     element: etree._Element
 
 
@@ -38,7 +42,8 @@ def add_signals(
     """Add `<signals>` to the roads' `elements`, which are by id, and return their controllers."""
     lanes = {lane.id: lane for lane in world.lanes}
     ids = count(1)
-    groups: dict[tuple[int, str], list[int]] = {}
+    groups: dict[str, list[int]] = {}
+    leads_into: dict[str, set[int]] = {}
     junction_of = _junction_of_lane(network.junctions)
     for signal in world.signals:
         for road, mine in _by_road(signal.lane_ids, lanes, network):
@@ -47,9 +52,9 @@ def add_signals(
                 elements[road.id], road, mine, own, _light(signal), signal.position,
                 signal.yaw_rad, version,
             )  # fmt: skip
-            at = next((junction_of[lane.id] for lane in mine if lane.id in junction_of), None)
-            if at is not None:
-                groups.setdefault((at, signal.group_id), []).append(own)
+            groups.setdefault(signal.group_id, []).append(own)
+            into = leads_into.setdefault(signal.group_id, set())
+            into.update(junction_of[lane.id] for lane in mine if lane.id in junction_of)
     for lines in _signed(world.stop_lines, lanes, network):
         mine = [lanes[line.lane_id] for line in lines]
         place, yaw = _beside(lines, network.side)
@@ -59,8 +64,8 @@ def add_signals(
             version,
         )  # fmt: skip
     return [
-        Controller(i, junction, _controller(i, name, members))
-        for i, ((junction, name), members) in enumerate(groups.items(), start=1)
+        Controller(i, frozenset(leads_into[name]), _controller(i, name, members))
+        for i, (name, members) in enumerate(groups.items(), start=1)
     ]
 
 
@@ -70,16 +75,18 @@ class _Face(NamedTuple):
     country: str
     meaning: str
     dynamic: bool
+    width_m: float
+    height_m: float
 
 
 def _light(signal: Signal) -> _Face:
-    return _Face(signal.id, "1000001", "OpenDRIVE", "trafficLight", True)
+    return _Face(signal.id, "1000001", "OpenDRIVE", "trafficLight", True, *LIGHT_M)
 
 
 def _sign(line: StopLine, side: DrivingSide) -> _Face:
     kind, meaning = _SIGNS[line.control.value]
     # Germany's signs stand for the Vienna convention's, which left-hand countries may not share.
-    return _Face(line.id, kind, "DE" if side == "right" else "OpenDRIVE", meaning, False)
+    return _Face(line.id, kind, "DE" if side == "right" else "OpenDRIVE", meaning, False, *SIGN_M)
 
 
 def _junction_of_lane(junctions: Sequence[OdrJunction]) -> dict[str, int]:
@@ -122,7 +129,7 @@ def _beside(lines: Sequence[StopLine], side: DrivingSide) -> tuple[Array, float]
     ends = np.array([line.ends[kerb] for line in lines])
     at = ends[int(np.argmax(ends @ outward))] + outward * SIGN_BESIDE_M
     # `across` points to the driver's left: he looks a quarter turn clockwise of it.
-    facing = math.atan2(across[0], -across[1])
+    facing = math.atan2(-across[0], across[1])
     return np.array([at[0], at[1], SIGN_HEIGHT_M]), facing + math.pi
 
 
@@ -152,7 +159,10 @@ def _add(
         t=number(t[0]),
         dynamic="yes" if face.dynamic else "no",
         orientation="+" if along else "-",
-        zOffset=number(float(position[2])),
+        # The file asks for the lower edge, the World says where the middle is.
+        zOffset=number(float(position[2]) - face.height_m / 2.0),
+        width=number(face.width_m),
+        height=number(face.height_m),
         country=face.country,
         type=face.type,
         subtype="-1",

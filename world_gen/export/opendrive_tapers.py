@@ -53,6 +53,7 @@ def taper(
     a.road.link(at_end=a.at_end, to=("road", road.id, False))
     b.road.link(at_end=b.at_end, to=("road", road.id, True))
     road.name, road.road_class = a.road.name, a.road.road_class
+    road.height = Cubic(a.road.height.at(a.road.curve.length_m if a.at_end else 0.0))
     return road
 
 
@@ -104,6 +105,7 @@ def _road(
         offset=Cubic.between(zero[0], zero[1], curve.length_m),
         lanes=lanes,
         road_class="",
+        height=Cubic(0.0),
     )
 
 
