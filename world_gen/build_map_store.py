@@ -51,14 +51,13 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
 
     Returns the map's SHA-256. Raises `MapError` where the map cannot be read or has no roads.
     """
-    table = TableWriter(target)
+    table, nodes = TableWriter(target), NodeSpool(part)
     try:
         with (
             OplStream(map_file, progress) as stream,
             (part / "ways.opl").open("wb") as ways,
             (part / "relations.opl").open("wb") as relations,
         ):
-            nodes = NodeSpool(part)
             members: list[IntArray] = []
             for block in stream.blocks():
                 for letter, section in sections(block):
@@ -90,6 +89,7 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
         )
     except BaseException:
         table.abandon()
+        nodes.close()
         raise
     table.finish(meta)
     return meta.sha256
