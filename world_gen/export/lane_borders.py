@@ -248,9 +248,16 @@ def _uncrossed(drawn: dict[str, Borders]) -> dict[str, Borders]:
 
 
 def crossing(drawn: Iterable[Borders]) -> list[bool]:
-    """Return for each pair of borders whether they meet, or one of them crosses itself."""
+    """Return for each pair of borders whether they meet, or the ground between crosses itself.
+
+    Borders that begin and end in one point, as those of U-turns, may touch there.
+    """
     pairs = list(drawn)
     left = np.array([shapely.LineString(p.left) for p in pairs])
     right = np.array([shapely.LineString(p.right) for p in pairs])
+    ground = np.array([shapely.Polygon(np.concatenate([p.right, p.left[::-1]])) for p in pairs])
+    closed = np.array(
+        [any(np.array_equal(line[0], line[-1]) for line in pair) for pair in pairs], dtype=bool
+    )
     bad = shapely.intersects(left, right) | ~shapely.is_simple(left) | ~shapely.is_simple(right)
-    return [bool(b) for b in bad]
+    return [bool(b) for b in bad | (~closed & ~shapely.is_valid(ground))]

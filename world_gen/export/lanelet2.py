@@ -12,7 +12,8 @@ from pathlib import Path
 
 from contracts.world import Connection, Crossing, Lane, LaneKind, World
 from world_gen.export.lane_borders import Borders, lane_borders
-from world_gen.export.lanelet2_markings import VIRTUAL, marking
+from world_gen.export.lane_markings import SIDES, lane_markings
+from world_gen.export.lanelet2_markings import VIRTUAL, border_tags
 from world_gen.export.lanelet2_orientation import oriented
 from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
 from world_gen.export.lanelet2_rules import LaneletRules, add_rules
@@ -94,18 +95,13 @@ def _lane_members(
         )
         for lane in world.lanes
     }
-    users: dict[tuple[int, ...], list[tuple[Lane, str]]] = {}
-    for lane in world.lanes:
-        for side, line in zip(("left", "right"), nodes[lane.id], strict=True):
-            users.setdefault(min(line, line[::-1]), []).append((lane, side))
-    roads = {road.id: road for road in world.roads}
+    markings = lane_markings(world, borders)
     found: dict[str, list[Member]] = {}
     for lane in world.lanes:
-        found[lane.id] = []
-        for side, line in zip(("left", "right"), nodes[lane.id], strict=True):
-            beside = [u for u in users[min(line, line[::-1])] if u != (lane, side)]
-            tags = marking(lane, side, beside, roads.get(lane.road_id))
-            found[lane.id].append(Member("way", drawn.road_way(line, tags), side))
+        found[lane.id] = [
+            Member("way", drawn.road_way(line, border_tags(markings[lane.id, side])), side)
+            for side, line in zip(SIDES, nodes[lane.id], strict=True)
+        ]
     return found
 
 
@@ -116,7 +112,7 @@ def _connection_members(
     for connection in world.connections:
         if connection.id not in borders:
             continue
-        lines = zip(("left", "right"), oriented(borders[connection.id]), strict=True)
+        lines = zip(SIDES, oriented(borders[connection.id]), strict=True)
         found[connection.id] = [
             Member(
                 "way",

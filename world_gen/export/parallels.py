@@ -35,7 +35,11 @@ def parallel(
     lines: Array = xy_m + left_m[:, None, None] * rays
     forward = (np.diff(lines, axis=1) * d).sum(axis=2) > _SHORTEST_M
     for i in np.nonzero(~forward.all(axis=1))[0]:
-        lines[i] = untangled(lines[i], d)
+        kept = _forward_part(lines[i], d)
+        if len(kept) == 2 and (kept[1] - kept[0]) @ d.sum(axis=0) <= 0.0:
+            # A bend tighter than the distance from end to end: its centre is all that is left.
+            kept = np.broadcast_to(kept.mean(axis=0), kept.shape)
+        lines[i] = filled(kept, len(xy_m))
     return lines
 
 
@@ -44,13 +48,17 @@ def untangled(line: Array, directions: Array) -> Array:
 
     Both ends stay where they are, and there are N points again.
     """
+    return filled(_forward_part(line, directions), len(line))
+
+
+def _forward_part(line: Array, directions: Array) -> Array:
     points, ahead = line, directions
     for _ in range(len(line)):
         forward = (np.diff(points, axis=0) * ahead).sum(axis=1) > _SHORTEST_M
         if forward.all() or len(points) == 2:
             break
         points, ahead = _without_loop(points, ahead, int(np.argmin(forward)))
-    return points if len(points) == len(line) else filled(points, len(line))
+    return points
 
 
 def _without_loop(points: Array, ahead: Array, at: int) -> tuple[Array, Array]:
@@ -86,6 +94,8 @@ def _meeting(first: Array, second: Array) -> tuple[int, int, Array] | None:
 
 def filled(line: Array, count: int) -> Array:
     """Return the line with its longest steps parted until it has `count` points."""
+    if len(line) == count:
+        return line
     steps = np.hypot(*np.diff(line, axis=0).T)
     parts = np.ones(len(steps), dtype=np.int64)
     for _ in range(count - len(line)):
