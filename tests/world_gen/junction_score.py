@@ -177,6 +177,10 @@ def _score_movements(truth: TrueJunction, seen: Seen, result: Score) -> None:
             result.ask("turns", have == {turn}, f"{movement} is {', '.join(have)}, not {turn}")
     for movement in sorted(seen.turns.keys() - truth.turns.keys() - truth.open):
         result.ask("movements", False, f"invented {movement}")
+    for c in seen.connections.values():
+        first, last = seen.lanes[c.from_lane_id], seen.lanes[c.to_lane_id]
+        if {first.id, last.id} <= seen.inside and (first.role, last.role) == ("exit", "approach"):
+            result.ask("movements", False, f"turns back from an exit into an entry, {first.name}")
 
 
 def _score_ring(truth: TrueJunction, world: World, seen: Seen, result: Score) -> None:
