@@ -97,7 +97,6 @@ def facing(
     comes in, or stands on a one-way road and at no crossing; else on the nearer half alone.
     """
     nearer_m = min(within_m, chain.length_m / 2.0)
-    directions = {node: item for item in chain.edges for node in item.edge.node_ids[1:-1]}
     for node, distance_m in chain.nodes():
         if distance_m > within_m:
             break
@@ -105,7 +104,7 @@ def facing(
         if tags is None or tags.get("highway") != word or node in (chain.start, chain.end):
             continue
         faced = tags.get(f"{word}:direction") or tags.get("direction")
-        along = directions.get(node)
+        along = next((item for item in chain.edges if node in item.edge.node_ids[1:-1]), None)
         if along is not None and faced in ("forward", "backward"):
             # The chain leaves the junction: who comes in drives against it.
             if faced == ("forward" if along.reverse else "backward"):

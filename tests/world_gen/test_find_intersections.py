@@ -51,7 +51,8 @@ def test_a_bend_with_another_name_is_none(tmp_path: Path) -> None:
 
 def test_driveways_and_footways_make_none(tmp_path: Path) -> None:
     sketch = star([0, 180])
-    for node, highway in ((50, "service"), (51, "pedestrian"), (52, "footway"), (53, "track")):
+    others = ("service", "pedestrian", "footway", "track", "busway")
+    for node, highway in enumerate(others, start=50):
         sketch.node(node, 0.0, 10.0 * node)
         sketch.way(node, [1, node], highway=highway)
     sketch.node(60, 0.0, -80.0)
