@@ -73,9 +73,13 @@ class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Builds Worlds from one map into one folder, through a cache shared between runs."""
+    """Builds Worlds from one map into one folder, through a cache shared between runs.
+
+    `added_roads` are indices of edges that count as car roads though the map does not say so.
+    """
 
     map: str
+    added_roads: tuple[int, ...] = ()
     worlds_dir: str
     cache_dir: str
 

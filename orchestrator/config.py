@@ -49,6 +49,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     view: View = "auto"
     out: str = "runs"
     radius_m: float = 150.0
+    service_roads: bool = False
+    """Whether driveways and parking aisles make junctions even where no given route uses them."""
     look_ahead_s: float = 60.0
     cache_dir: str | None = None
     endpoint: str | None = None

@@ -32,6 +32,7 @@ from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
+from world_gen.service_roads import with_roads
 
 EMBEDDED = Path(__file__).parent / "embedded"
 EMBEDDED_MAP = EMBEDDED / "drawn_town.osm"
@@ -50,6 +51,8 @@ class DriveInputs:
     graph: RoadGraph
     index: RoadIndex
     junctions: tuple[Junction, ...]
+    added_roads: tuple[int, ...]
+    """Indices of service roads that count as car roads in this drive."""
     routes: tuple[Route, ...]
     route_source: str
     drive_frame: LocalFrame
@@ -112,6 +115,13 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         log_file = Path(config.log or "")
         info, positions = _read_log(config, log_file, index, map_file)
     routes, route_source = _routes(config, graph, index, positions)
+    added = _service_roads(config, graph, routes)
+    if added:
+        # Only now is it known where the route leaves the streets; what it meets there counts.
+        graph = with_roads(graph, added)
+        index = RoadIndex(graph)
+        junctions = find_intersections(osm, graph)
+        routes, route_source = _routes(config, graph, index, positions)
     standin = None
     if source == "standin":
         standin = standin_path(osm, graph, routes[0])
@@ -128,6 +138,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         graph=graph,
         index=index,
         junctions=junctions,
+        added_roads=added,
         routes=routes,
         route_source=route_source,
         drive_frame=LocalFrame(GeoPoint(float(origin[0]), float(origin[1]))),
@@ -185,6 +196,21 @@ def _routes(
     lat_lon = np.stack([line.lat_deg, line.lon_deg], axis=-1)
     name = f"--route {route_file}"
     return match_line(graph, lat_lon, name=name, index=index).routes, "given"
+
+
+def _service_roads(
+    config: DriveConfig, graph: RoadGraph, routes: tuple[Route, ...]
+) -> tuple[int, ...]:
+    """Return the service roads open to cars that count: those of the route, or all by choice."""
+    used = (item.edge for route in routes for item in route.edges)
+    candidates = graph.edges if config.service_roads else used
+    return tuple(
+        sorted({
+            edge.index
+            for edge in candidates
+            if edge.road_class == "service" and not edge.car and (edge.forward or edge.backward)
+        })
+    )  # fmt: skip
 
 
 def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:

@@ -70,6 +70,7 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
     return BuilderSetup(
         **_base(plan, process_id),  # type: ignore[arg-type]
         map=str(plan.map_file),
+        added_roads=plan.added_roads,
         worlds_dir=str(plan.worlds_dir),
         cache_dir=str(plan.config.worlds_cache),
     )

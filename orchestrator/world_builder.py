@@ -14,6 +14,7 @@ from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.map_index import index_map
 from world_gen.read_osm import read_map
+from world_gen.service_roads import with_roads
 from world_gen.world_store import WorldStore, cached_build
 
 log = logging.getLogger("builder")
@@ -22,7 +23,7 @@ log = logging.getLogger("builder")
 def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     """Read the map once, then answer build requests until the run ends."""
     osm = read_map(Path(setup.map))
-    graph = build_road_graph(osm)
+    graph = with_roads(build_road_graph(osm), setup.added_roads)
     junctions = {j.summary.id: j for j in find_intersections(osm, graph)}
     index = index_map(osm, graph, junctions.values())
     cache, run_worlds = WorldStore(Path(setup.cache_dir)), WorldStore(Path(setup.worlds_dir))

@@ -12,6 +12,7 @@ from world_gen.buildings import BuildingIndex
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
+from world_gen.road_tags import OTHER_CLASSES
 from world_gen.turn_restrictions import TurnRestrictions, read_turn_restrictions
 
 
@@ -26,6 +27,12 @@ class MapIndex:
     buildings: BuildingIndex
     restrictions: TurnRestrictions
     junction_of_node: Mapping[int, Junction]
+
+    @property
+    def map_key(self) -> str:
+        """The map's SHA-256, and which roads count as car roads beyond what it says."""
+        added = [i for i in self.car_edges if self.graph.edges[i].road_class in OTHER_CLASSES]
+        return self.osm.sha256 if not added else f"{self.osm.sha256} with {added}"
 
     def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:
         """Return indices of car roads that touch an area in the map's frame."""

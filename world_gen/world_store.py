@@ -49,24 +49,27 @@ class WorldStore:
             raise FileNotFoundError(f"{self.folder} holds no world {world_id!r}")
         return read_message(path, World)
 
-    def find(self, map_sha256: str, intersection_id: str, radius_m: float) -> World | None:
-        """Return the World built from this map, junction and radius by this generator, if kept."""
-        entry = self._entry(map_sha256, intersection_id, radius_m)
+    def find(self, map_key: str, intersection_id: str, radius_m: float) -> World | None:
+        """Return the World built from this map, junction and radius by this generator, if kept.
+
+        `map_key` is that of the `MapIndex`.
+        """
+        entry = self._entry(map_key, intersection_id, radius_m)
         try:
             return self.load(entry.read_text(encoding="ascii").strip())
         except (FileNotFoundError, SchemaMismatch):
             return None
 
-    def remember(self, world: World) -> None:
+    def remember(self, world: World, map_key: str) -> None:
         """Save a World and enter it under what it was built from."""
         self.save(world)
-        entry = self._entry(world.map_sha256, world.intersection.id, world.radius_m)
+        entry = self._entry(map_key, world.intersection.id, world.radius_m)
         partial = entry.with_name(f"{entry.stem}.{os.getpid()}.part")
         partial.write_text(world.id, encoding="ascii")
         partial.replace(entry)
 
-    def _entry(self, map_sha256: str, intersection_id: str, radius_m: float) -> Path:
-        key = json.dumps([map_sha256, intersection_id, float(radius_m), GENERATOR_VERSION])
+    def _entry(self, map_key: str, intersection_id: str, radius_m: float) -> Path:
+        key = json.dumps([map_key, intersection_id, float(radius_m), GENERATOR_VERSION])
         return self.folder / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.key"
 
 
@@ -74,9 +77,9 @@ def cached_build(
     store: WorldStore, index: MapIndex, junction: Junction, *, radius_m: float = DEFAULT_RADIUS_M
 ) -> CachedWorld:
     """Return the World of a junction, from the store where it is there, else built and kept."""
-    known = store.find(index.osm.sha256, junction.summary.id, radius_m)
+    known = store.find(index.map_key, junction.summary.id, radius_m)
     if known is not None:
         return CachedWorld(known, True)
     world = build_world(index.osm, index.graph, junction, radius_m=radius_m, index=index)
-    store.remember(world)
+    store.remember(world, index.map_key)
     return CachedWorld(world, False)

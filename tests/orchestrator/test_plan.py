@@ -15,6 +15,7 @@ from orchestrator.config import ConfigError, DriveConfig
 from orchestrator.embedded import MAP_FILE
 from orchestrator.plan import make_plan, read_inputs
 from tests.orchestrator.trip import NOW, town, town_line, town_plan
+from tests.world_gen.sketch import Sketch
 
 
 def inputs_for(folder: Path, **settings: object) -> object:
@@ -131,3 +132,38 @@ def test_a_stretch_without_positions_is_refused(tmp_path: Path) -> None:
 def test_an_unknown_planner_is_refused_before_the_map_is_read(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="pure_pursuit_idm"):
         inputs_for(tmp_path, planner="telepathy", map=str(tmp_path / "none.osm"), route="x.gpx")
+
+
+def _yard(folder: Path) -> tuple[str, str]:
+    """Write a street with a driveway to a yard and a lane to a field, and a route into the yard."""
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -200.0, 0.0), (2, 0.0, 0.0), (3, 200.0, 0.0), (4, 0.0, 60.0), (5, 100.0, 0.0),
+        (6, 100.0, -60.0),
+    ):  # fmt: skip
+        sketch.node(node, x_m, y_m)
+    sketch.road(10, [1, 2, 5, 3], "Street")
+    sketch.road(11, [2, 4], highway="service")
+    sketch.road(12, [5, 6], highway="service")
+    (folder / "yard.osm").write_text(sketch.xml(), encoding="utf-8")
+    line = geo_from_local(sketch.frame, [[-180.0, 0.0], [0.0, 0.0], [0.0, 55.0]]).tolist()  # type: ignore[arg-type]
+    geometry = {"type": "LineString", "coordinates": [[lon, lat] for lat, lon in line]}
+    (folder / "route.geojson").write_text(json.dumps(geometry), encoding="utf-8")
+    return str(folder / "yard.osm"), str(folder / "route.geojson")
+
+
+def test_where_the_route_leaves_the_street_a_driveway_makes_a_junction(tmp_path: Path) -> None:
+    map_file, route = _yard(tmp_path)
+
+    inputs = inputs_for(tmp_path, map=map_file, route=route)
+
+    assert [j.summary.id for j in inputs.junctions] == ["n2"]  # type: ignore[attr-defined]
+    assert {inputs.graph.edges[i].way_id for i in inputs.added_roads} == {11}  # type: ignore[attr-defined]
+
+
+def test_by_choice_every_driveway_makes_a_junction(tmp_path: Path) -> None:
+    map_file, route = _yard(tmp_path)
+
+    inputs = inputs_for(tmp_path, map=map_file, route=route, service_roads=True)
+
+    assert [j.summary.id for j in inputs.junctions] == ["n2", "n5"]  # type: ignore[attr-defined]

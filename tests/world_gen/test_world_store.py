@@ -10,6 +10,7 @@ from tests.world_gen.drawn_maps import crossing
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.map_index import index_map
+from world_gen.service_roads import with_service_roads
 from world_gen.world_store import WorldStore, cached_build
 
 
@@ -38,6 +39,18 @@ def test_another_radius_or_generator_is_another_world(tmp_path, place, monkeypat
     assert not cached_build(store, index, junction, radius_m=60.0).cached
     monkeypatch.setattr(world_store, "GENERATOR_VERSION", world_store.GENERATOR_VERSION + 1)
     assert not cached_build(store, index, junction).cached
+
+
+def test_roads_added_to_the_map_make_another_world(tmp_path):
+    lane = (90, [1, 9], {"highway": "service"})
+    osm = crossing(extra_nodes={9: (100.0, 30.0)}, extra_ways=[lane])
+    graph = build_road_graph(osm)
+    junctions = find_intersections(osm, graph)
+    store = WorldStore(tmp_path)
+    cached_build(store, index_map(osm, graph, junctions), junctions[0])
+    wider = with_service_roads(graph)
+    assert not cached_build(store, index_map(osm, wider, junctions), junctions[0]).cached
+    assert cached_build(store, index_map(osm, graph, junctions), junctions[0]).cached
 
 
 def test_a_damaged_world_is_built_anew(tmp_path, place):
