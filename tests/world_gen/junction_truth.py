@@ -34,6 +34,8 @@ def score_map(truth: TrueMap) -> Score:
     total = Score()
     left = list(truth.junctions)
     worlds = worlds_of(truth)
+    if not left:
+        total.ask("arms", not worlds, "there is no junction, but one was found")
     for world in worlds:
         if not left:
             name = world.intersection.name

@@ -123,6 +123,32 @@ def tram_crossing(d: Drawing) -> None:
     d.line((3, -120), (0, -8), (0, 0), (0, 120), railway="tram")
 
 
+def living_street(d: Drawing) -> None:
+    d.arms("WE", "residential")
+    d.arms("S", "living_street")
+
+
+def left_hand_dual(d: Drawing) -> None:
+    """The westbound carriageway lies south of the eastbound one, as traffic keeps left."""
+    tags = {"oneway": "yes", "lanes": "2"}
+    d.way("West Road", "primary", (-130, 7), (0, 7), **tags)
+    d.way("East Road", "primary", (0, 7), (130, 7), **tags)
+    d.way("East Road", "primary", (130, -7), (0, -7), **tags)
+    d.way("West Road", "primary", (0, -7), (-130, -7), **tags)
+    for name, y in (("North Road", 1), ("South Road", -1)):
+        d.node(0, 15 * y, **GIVE_WAY)
+        d.way(name, "secondary", (0, 120 * y), (0, 15 * y), (0, 7 * y), lanes="2")
+    d.way("", "secondary", (0, 7), (0, -7), lanes="2")
+
+
+def buses_alone(d: Drawing) -> None:
+    d.way("Westweg", "residential", (-120, 0), (-50, 0), CENTRE)
+    d.way("Ostweg", "residential", CENTRE, (50, 0), (120, 0))
+    d.arms("S", "residential", motor_vehicle="no", bus="yes")
+    d.way("Bustrasse", "busway", (50, 0), (50, 60))
+    d.way("", "footway", (-50, 0), (-50, 40))
+
+
 DRAWINGS = {
     "23_signals_at_node": signals_at_node,
     "24_signals_on_approaches": signals_on_approaches,
@@ -140,4 +166,7 @@ DRAWINGS = {
     "36_service_roads": service_roads,
     "37_proving_ground": proving_ground,
     "38_tram_crossing": tram_crossing,
+    "48_living_street": living_street,
+    "49_left_hand_dual": (left_hand_dual, LEEDS),
+    "50_buses_alone": buses_alone,
 }
