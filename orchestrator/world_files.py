@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from contracts.world import World
 from world_gen.intersections import Junction
+from world_gen.report import note_kind, report_of
 
 PLAIN_PERIOD_S = 5.0
 """Between lines of progress where there is no terminal."""
@@ -49,7 +50,7 @@ def write_each(
                 write(world, path)
                 if report:
                     write_report(world, path, show=False)
-                kinds.update({_kind(note) for note in world.notes})
+                kinds.update({note_kind(note) for note in world.notes})
             except Exception as error:  # one bad junction never stops the rest
                 path.unlink(missing_ok=True)
                 failures.append(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
@@ -59,20 +60,12 @@ def write_each(
 
 
 def write_report(world: World, path: Path, *, show: bool) -> None:
-    """Write what was tagged, inferred and guessed beside a World's file; print it if asked to."""
-    from world_gen.report import report_of
-
-    found = report_of(world)
-    text = found.as_text()
-    path.with_name(f"{path.name}.report.md").write_text(text, encoding="utf-8")
-    json = found.as_json()
-    path.with_name(f"{path.name}.report.json").write_bytes(
-        json if isinstance(json, bytes) else json.encode()
-    )
+    """Write what was tagged, inferred and a default beside a World's file; print it if asked to."""
+    report = report_of(world)
+    for ending, text in ((".report.md", report.as_markdown()), (".report.json", report.as_json())):
+        path.with_name(path.name + ending).write_text(text, encoding="utf-8")
     if show:
-        from rich.markdown import Markdown
-
-        Console().print(Markdown(text))
+        print(report.as_text(), end="")
 
 
 def _summary(
@@ -90,12 +83,6 @@ def _summary(
     listed.write_text("\n".join(failures) + "\n", encoding="utf-8")
     print(f"{len(failures)} failed: {listed}", file=sys.stderr)
     return SOME_FAILED
-
-
-def _kind(note: str) -> str:
-    """Return a note without what is particular to one object: its numbers and quoted values."""
-    plain = re.sub(r"'[^']*'|\"[^\"]*\"|(?<==)[^\s;,]+", "…", note)
-    return re.sub(r"-?\d+(\.\d+)?", "#", plain)
 
 
 def _file_name(junction_id: str) -> str:

@@ -32,7 +32,7 @@ from world_gen.road_surface import RING_ISLAND
 SDF_VERSION = "1.7"
 ROAD_TOP_M, MARKING_TOP_M, SIDEWALK_TOP_M = 0.01, 0.02, 0.03
 RING_ISLAND_HEIGHT_M, TRAFFIC_ISLAND_HEIGHT_M = 1.0, 0.12
-BUILDING_TOLERANCE_M = 0.1
+BUILDING_TOLERANCE_M, AREA_TOLERANCE_M = 0.1, 0.02
 STOP_LINE_WIDTH_M, YIELD_LINE_WIDTH_M = 0.5, 0.3
 STEP_S = 0.002
 
@@ -148,7 +148,8 @@ def _road(element: Element, world: World) -> None:
 
 
 def _area(link: StaticLink, area: Area, top_m: float, rgba: Rgba, *, solid: bool = False) -> None:
-    for number, ring in enumerate(extrusions(area.outline, area.holes)):
+    rings = extrusions(area.outline, area.holes, tolerance_m=AREA_TOLERANCE_M)
+    for number, ring in enumerate(rings):
         link.prism(f"{area.id}.{number}", ring, 0.0, top_m, rgba=rgba, solid=solid)
 
 

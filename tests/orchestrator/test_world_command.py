@@ -1,0 +1,222 @@
+"""The command `world`: what it writes for a place, a route or a whole map; what it refuses."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from contracts.world import World
+from orchestrator.cli import run
+from orchestrator.map_opening import Clip, open_map
+from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
+from orchestrator.world_files import FAILURES_FILE, write_each
+from world_gen.build import build_world
+from world_gen.export.formats import FORMATS
+from world_gen.intersections import Junction
+
+MAP = str(EMBEDDED_MAP)
+TOWN = "-30.004,44.998,-29.996,45.002"
+"""Bounds in the middle of the drawn town."""
+
+
+def a_junction() -> str:
+    return open_map(EMBEDDED_MAP).junctions[0].summary.id
+
+
+@pytest.mark.parametrize("name", sorted(FORMATS))
+def test_every_format_is_written(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / f"world{FORMATS[name].suffix}"
+    code = run(["world", MAP, "--id", a_junction(), "--format", name, "--out", str(out)])
+    said = capsys.readouterr()
+    assert code == 0, said.err
+    assert str(out) in said.out
+    assert out.stat().st_size > 500
+
+
+def test_an_sdf_has_the_vehicles_that_were_asked_for(tmp_path: Path) -> None:
+    out = tmp_path / "world.sdf"
+    place = ["world", MAP, "--id", a_junction(), "--format", "sdf", "--out", str(out)]
+    assert run([*place, "--vehicles", "ego:twin,real:shadow", "--simulator", "gazebo"]) == 0
+    models = {model.get("name") for model in etree.parse(str(out)).iter("model")}
+    assert {"ego", "real"} <= models
+    assert run([*place, "--vehicles", "none"]) == 0
+    models = {model.get("name") for model in etree.parse(str(out)).iter("model")}
+    assert models == {"ground", "road", "markings", "signals", "buildings"}
+
+
+@pytest.mark.real_data
+def test_a_clipped_map_gives_the_same_worlds(
+    data_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    file = data_dir / "osm-monaco" / "monaco.osm.gz"
+    whole = open_map(file)
+    for junction in whole.junctions[::25]:
+        place = junction.summary
+        clip = Clip(np.array([[place.lat, place.lon]]), 150.0)
+        part = open_map(file, clip=clip, large_bytes=0)
+        assert len(part.osm.ways) < len(whole.osm.ways)
+        same = next(j for j in part.junctions if j.summary.id == place.id)
+        clipped = build_world(part.osm, part.graph, same)
+        assert clipped.id == build_world(whole.osm, whole.graph, junction).id, place
+
+
+def test_bounds_make_one_world_of_a_region(tmp_path: Path) -> None:
+    out = tmp_path / "town.geojson"
+    assert run(["world", MAP, "--bbox", TOWN, "--format", "geojson", "--out", str(out)]) == 0
+    collection = json.loads(out.read_text(encoding="utf-8"))
+    assert collection["world"]["intersection"]["kind"] == "region"
+    kinds = [feature["properties"]["kind"] for feature in collection["features"]]
+    assert kinds.count("junction") > 1
+
+
+def test_all_junctions_are_written_by_their_ids(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "new" / "worlds"
+    assert run(["world", MAP, "--all", "--format", "geojson", "--out", str(out)]) == 0
+    ids = {junction.summary.id for junction in open_map(EMBEDDED_MAP).junctions}
+    assert {path.stem for path in out.iterdir()} == ids
+    assert f"{len(ids)} of {len(ids)} Worlds written" in capsys.readouterr().out
+
+
+def test_a_route_writes_the_junctions_along_it(tmp_path: Path) -> None:
+    out = tmp_path / "worlds"
+    arguments = ["--route", str(EMBEDDED_ROUTE), "--format", "geojson", "--out", str(out)]
+    assert run(["world", MAP, *arguments]) == 0
+    kinds = [
+        json.loads(path.read_text(encoding="utf-8"))["world"]["intersection"]["kind"]
+        for path in out.iterdir()
+    ]
+    assert sorted(kinds) == ["crossing", "crossing", "roundabout", "t_junction"]
+
+
+def test_a_report_says_beside_the_file_what_was_guessed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "world.geojson"
+    place = ["world", MAP, "--id", a_junction(), "--format", "geojson", "--out", str(out)]
+    assert run([*place, "--report"]) == 0
+    said = capsys.readouterr().out
+    told = json.loads((tmp_path / "world.geojson.report.json").read_text(encoding="utf-8"))
+    assert told["junctions"][0]["id"] == a_junction()
+    assert told["attribution"] in said
+    assert told["attribution"] in (tmp_path / "world.geojson.report.md").read_text("utf-8")
+
+
+def test_each_of_many_worlds_has_its_report(tmp_path: Path) -> None:
+    arguments = ["--route", str(EMBEDDED_ROUTE), "--format", "geojson", "--out", str(tmp_path)]
+    assert run(["world", MAP, *arguments, "--report"]) == 0
+    worlds = list(tmp_path.glob("*.geojson"))
+    assert len(worlds) == 4
+    for world in worlds:
+        assert world.with_name(f"{world.name}.report.md").exists()
+        assert world.with_name(f"{world.name}.report.json").exists()
+
+
+def test_one_bad_junction_does_not_stop_the_rest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opened = open_map(EMBEDDED_MAP)
+    bad = opened.junctions[1].summary.id
+
+    def build(junction: Junction) -> World:
+        if junction.summary.id == bad:
+            raise ZeroDivisionError("a road\nwithout length")
+        return build_world(opened.osm, opened.graph, junction)
+
+    def write(world: World, path: Path) -> None:
+        path.write_text(world.id, encoding="utf-8")
+
+    code = write_each(
+        opened.junctions[:3], build, write,
+        folder=tmp_path, suffix=".txt", attribution=opened.osm.attribution,
+    )  # fmt: skip
+    said = capsys.readouterr()
+    assert code == 3
+    assert "2 of 3 Worlds written" in said.out
+    assert f"{bad}: ZeroDivisionError: a road without length" in said.err
+    listed = (tmp_path / FAILURES_FILE).read_text(encoding="utf-8")
+    assert listed == f"{bad}: ZeroDivisionError: a road without length\n"
+    assert not (tmp_path / f"{bad}.txt").exists()
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_a_run_without_failures_leaves_no_list_of_an_earlier_one(tmp_path: Path) -> None:
+    (tmp_path / FAILURES_FILE).write_text("n1: KeyError: old\n", encoding="utf-8")
+    arguments = ["--route", str(EMBEDDED_ROUTE), "--format", "geojson", "--out", str(tmp_path)]
+    assert run(["world", MAP, *arguments]) == 0
+    assert not (tmp_path / FAILURES_FILE).exists()
+
+
+WRONG = [
+    ([], "exactly one of --at"),
+    (["--at", "45,-30", "--all"], "--at and --all"),
+    (["--at", "45"], "LAT,LON"),
+    (["--at", "north,west"], "LAT,LON"),
+    (["--at", "95,-30"], "latitude -90 to 90"),
+    (["--at", "nan,-30"], "LAT,LON"),
+    (["--at", "46,-30"], "nearest intersection"),
+    (["--id", "nowhere"], "nowhere"),
+    (["--bbox", "1,2,3"], "W,S,E,N"),
+    (["--bbox", "a,b,c,d"], "W,S,E,N"),
+    (["--bbox", "7,50,8,51"], "outside"),
+    (["--bbox", "-29.996,44.998,-30.004,45.002"], "west must be less than east"),
+    (["--bbox", "179.9,-17.1,-179.9,-16.9"], "antimeridian"),
+    (["--bbox", "-30.004,45.002,-29.996,44.998"], "south must be less than north"),
+    (["--bbox", "-30.004,44.998,-29.996,95"], "latitudes"),
+    (["--bbox", "-30.004,44.998,200,45"], "longitudes"),
+    (["--all", "--format", "stl"], "mjcf, sdf, opendrive, lanelet2, commonroad, geojson, svg, png"),
+    (["--all", "--radius", "5"], "20 to 2000"),
+    (["--all", "--radius", "nan"], "20 to 2000"),
+    (["--all", "--format", "opendrive", "--opendrive-version", "1.9"], "1.8, 1.4"),
+    (["--all", "--format", "sdf", "--simulator", "carla"], "classic, gazebo"),
+    (["--all", "--format", "sdf", "--vehicles", "ego:car"], "twin, shadow, ghost"),
+    (["--all", "--format", "sdf", "--vehicles", "a:twin,a:ghost"], "a name of its own"),
+    (["--all", "--format", "sdf", "--vehicle", "no.toml"], "no.toml"),
+    (["--route", "no.gpx"], "no.gpx"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "named"), WRONG, ids=[" ".join(a) for a, _ in WRONG])
+def test_what_cannot_be_meant_is_named_in_one_line(
+    arguments: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = run(["world", MAP, *arguments, "--out", str(tmp_path / "world")])
+    error = capsys.readouterr().err.strip()
+    assert code == 2, error
+    assert "\n" not in error
+    assert named in error
+
+
+def test_an_output_that_cannot_be_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    for arguments, named in (
+        (["--all", "--out", str(file)], "is a file"),
+        (["--at", "45,-30", "--out", str(tmp_path)], "is a folder"),
+        (["--at", "45,-30", "--out", str(tmp_path / "no" / "w.xml")], "does not exist"),
+    ):
+        assert run(["world", MAP, *arguments]) == 2
+        assert named in capsys.readouterr().err
+
+
+def test_help_needs_none_of_the_rooms() -> None:
+    code = (
+        "import sys\nfrom orchestrator.cli import run\nrun(['world', '--help'])\n"
+        "heavy = {'numpy', 'mujoco', 'shapely', 'osmium', 'lxml', 'zenoh', 'rerun'}\n"
+        "sys.exit(sorted(heavy & set(sys.modules)).__repr__() if heavy & set(sys.modules) else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "--bbox" in done.stdout
