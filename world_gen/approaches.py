@@ -19,7 +19,7 @@ BEFORE_CROSSING_M = 3.0
 """From a crossing's middle to the line before it: half its width and a metre (RMS 2)."""
 _SIGN_NEAR_M = 25.0
 _CROSSING_NEAR_M = 16.0
-_OPPOSITE_COS = -0.75
+_OPPOSITE_COS = math.cos(math.radians(135.0))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -37,6 +37,8 @@ class Approach:
     line_m: float | None
     signal_nodes: tuple[int, ...]
     standing: Standing
+    opposite: tuple[int, bool] | None
+    """Key of the approach that lies straight ahead."""
     lit_inside: bool = False
     """Its light stands on the way through the junction, past where a slip road may part."""
 
@@ -176,13 +178,17 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
     )
     lights_for_all = control == "signals" and kind not in RING_KINDS and _for_all(drafts)
     found = []
-    for d, rank in zip(drafts, ranks, strict=True):
+    for d, entry, rank in zip(drafts, entries, ranks, strict=True):
+        ahead = None if entry.opposite is None else drafts[entry.opposite].toward
         standing = rank
         entering = d.cluster.ring and not is_ring_edge(d.toward.edge)
         if (entering and ring_has_way) or kind == "mini_roundabout":
             source = "tagged" if d.sign or kind != "circular" else "inferred"
             standing = Standing(Rank.MINOR, "roundabout", source)  # type: ignore[arg-type]
-        found.append(_approach(d, standing, control == "signals", lights_for_all))
+        approach = _approach(d, standing, control == "signals", lights_for_all)
+        if ahead is not None:
+            approach.opposite = (ahead.edge.index, ahead.reverse)
+        found.append(approach)
     return found
 
 
@@ -225,14 +231,14 @@ def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> 
         word = Choice("signal", "tagged" if nodes else "inferred")
         return Approach(
             cluster=d.cluster, toward=d.toward, control=word, line_m=line, signal_nodes=nodes,
-            standing=standing, lit_inside=bool(d.lights) and not on_leg,
+            standing=standing, opposite=None, lit_inside=bool(d.lights) and not on_leg,
         )  # fmt: skip
     line = None
     if d.sign is not None and OWN_LINE_M < d.sign.distance_m <= _SIGN_NEAR_M:
         line = d.sign.distance_m
     return Approach(
         cluster=d.cluster, toward=d.toward, control=_word(standing), line_m=line,
-        signal_nodes=(), standing=standing,
+        signal_nodes=(), standing=standing, opposite=None,
     )  # fmt: skip
 
 

@@ -27,7 +27,8 @@ class Meetings:
 
     `merging` (M,) tells that both end in one lane; `points` (M, 2) is where their middles cross
     or come nearest, each of `areas` (N, 2) a counter-clockwise outline. `first_m` and
-    `second_m` (M,) are how far along each path the point lies.
+    `second_m` (M,) are how far along each path the point lies, `apart_m` (M,)
+    how far the middles stay from each other.
     """
 
     first: Indices
@@ -37,6 +38,7 @@ class Meetings:
     areas: tuple[Array, ...]
     first_m: Array
     second_m: Array
+    apart_m: Array
 
 
 def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
@@ -49,7 +51,7 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
         flat = np.zeros(0)
         return Meetings(
             first=none, second=none, merging=none.astype(bool), points=np.zeros((0, 2)), areas=(),
-            first_m=flat, second_m=flat,
+            first_m=flat, second_m=flat, apart_m=flat,
         )  # fmt: skip
     lines, swept = _swept(connections)
     a, b = shapely.STRtree(swept).query(swept)
@@ -68,7 +70,8 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
     order = np.lexsort((b, a))
     a, b, merging, shared = a[order], b[order], merging[order], shared[order]
     nearest = shapely.get_coordinates(shapely.shortest_line(lines[a], lines[b]))
-    middle = nearest.reshape(-1, 2, 2).mean(axis=1)
+    ends = nearest.reshape(-1, 2, 2)
+    middle = ends.mean(axis=1)
     points = np.round(middle, 3)
     at = shapely.points(middle)
     return Meetings(
@@ -79,6 +82,7 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
         areas=_outlines(shared, points),
         first_m=shapely.line_locate_point(lines[a], at),
         second_m=shapely.line_locate_point(lines[b], at),
+        apart_m=np.hypot(*(ends[:, 1] - ends[:, 0]).T),
     )
 
 

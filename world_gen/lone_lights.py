@@ -22,7 +22,7 @@ from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft, LaneSet
 from world_gen.met_on_the_way import NodeTags, faces, is_light
 from world_gen.polyline import direction_at, length, locate, points_at
-from world_gen.signal_heads import BESIDE_HEIGHT_M, beside
+from world_gen.signal_heads import BESIDE_HEIGHT_M, beside, nearest_kerb
 from world_gen.stop_lines import line_across
 
 DRIVING_S, WALKING_S = 40.0, 10.0
@@ -104,8 +104,8 @@ def _heads(
         roads.setdefault((lane.road_id, lane.key.reverse), []).append((lane, line))
     heads = []
     for mine in roads.values():
-        mine.sort(key=lambda item: item[0].key.number)
-        lane, line = mine[-1 if around.driving_side == "right" else 0]
+        outermost = nearest_kerb([lane for lane, _ in mine], around.driving_side)
+        lane, line = next(item for item in mine if item[0] is outermost)
         ahead = direction_at(lane.centerline, locate(lane.centerline, line.ends.mean(axis=0)))
         place = beside(line.ends, around.driving_side)
         heads.append(

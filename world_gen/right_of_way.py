@@ -13,12 +13,12 @@ Rules stand in the order in which they are asked:
    Code 180; UVC 11-402): signs count only where the lights are out.
 5. The standing of the roads: stop and give-way signs, priority roads, ways out of yards, roads of
    lower class (see `priority_roads.standings`), and signs on slip roads past which a path leads.
-6. Of equals who come towards each other, who turns across the other waits (§9 (3), (4)). Two
-   who both turn so pass in front of each other; where they have no room for that, the later id.
+6. Of equals whose roads lie opposite, who turns across the other waits (§9 (3), (4)). Two who
+   both turn so pass in front of each other; where they have no room for that, the later id.
 7. Of equals the one whose near side the other comes from: right before left where traffic
    keeps right (§8 (1); Code de la route R415-5; UVC 11-401, also at all-way stops), mirrored
    where it keeps left. British law knows no such rule (Highway Code 146): it is a default there.
-8. Roads that run together: who goes straighter (§18 (3)), then a fixed order.
+8. Roads that run together: who goes straighter (§18 (3)), then who has the shorter way.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from world_gen.met_on_the_way import NodeTags, met_inside, sign_of
 from world_gen.polyline import arc_lengths, locate
 from world_gen.priority_roads import Rank, Standing, has_priority, importance
 
-ONCOMING_RAD, ALONGSIDE_RAD = math.radians(135.0), math.radians(30.0)
+ALONGSIDE_RAD = math.radians(10.0)
 
 
 class Answer(NamedTuple):
@@ -62,7 +62,10 @@ class Way:
     heading: float
     bend_rad: float
     """How far it turns in all."""
+    length_m: float
     road: tuple[int, bool]
+    opposite: tuple[int, bool] | None
+    """The road into the junction that lies straight ahead."""
     on_ring: bool
     standing: Standing
     signalled: bool
@@ -96,12 +99,12 @@ def right_of_way(
     waiting: list[list[str]] = [[] for _ in ways]
     rows = zip(
         met.first.tolist(), met.second.tolist(), met.merging.tolist(), met.points, met.areas,
-        angle.tolist(), strict=True,
+        met.apart_m.tolist(), angle.tolist(), strict=True,
     )  # fmt: skip
-    for i, j, merging, point, area, from_first in rows:
+    for i, j, merging, point, area, apart_m, from_first in rows:
         a, b = ways[i], ways[j]
         standing = _standing_at(a, area), _standing_at(b, area)
-        answer = _answer(a, b, standing, from_first, driving_side)
+        answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side)
         loser, winner = (i, j) if answer.first_waits else (j, i)
         conflicting[i].append(b.id)
         conflicting[j].append(a.id)
@@ -157,7 +160,9 @@ def _ways(
                 on_the_spot=c.turn == "u_turn" and not c.movement.inside,
                 heading=start,
                 bend_rad=abs(math.remainder(end - start, math.tau)),
+                length_m=float(np.hypot(d[:, 0], d[:, 1]).sum()),
                 road=(toward.edge.index, toward.reverse),
+                opposite=None if mine is None else mine.opposite,
                 on_ring=c.start.role == "ring",
                 standing=plain if mine is None else mine.standing,
                 signalled=c.control == "signal",
@@ -195,9 +200,17 @@ def _runs_along_main(
 
 
 def _answer(
-    a: Way, b: Way, standing: tuple[Standing, Standing], angle: float, driving_side: DrivingSide
+    a: Way,
+    b: Way,
+    standing: tuple[Standing, Standing],
+    angle: float,
+    crossing: bool,
+    driving_side: DrivingSide,
 ) -> Answer:
-    """Return who of two waits; `angle` turns a's first heading into b's, positive to the left."""
+    """Return who of two waits; `angle` turns a's first heading into b's, positive to the left.
+
+    `crossing` tells that the middles of their paths cross.
+    """
     if a.on_the_spot != b.on_the_spot:
         return Answer(a.on_the_spot, "u_turn", "inferred")
     if a.on_ring != b.on_ring:
@@ -210,7 +223,9 @@ def _answer(
             return Answer(past_a, "roundabout", "tagged")
     if a.road == b.road or (a.on_ring and b.on_ring):
         return _beside(a, b)
-    oncoming = abs(angle) > ONCOMING_RAD
+    oncoming = a.opposite == b.road and b.opposite == a.road
+    if oncoming and a.turn_weight == b.turn_weight == 0 and crossing:
+        oncoming = False  # two bent roads that cross at a sharp angle
     if oncoming and a.signalled and b.signalled:
         return _across(a, b)
     first, second = standing
@@ -258,4 +273,6 @@ def _beside(a: Way, b: Way) -> Answer:
         return Answer(a.turn_weight > b.turn_weight, "merge_order", "inferred")
     if abs(a.bend_rad - b.bend_rad) > math.radians(1.0):
         return Answer(a.bend_rad > b.bend_rad, "merge_order", "inferred")
+    if abs(a.length_m - b.length_m) > 0.05:
+        return Answer(a.length_m > b.length_m, "merge_order", "default")
     return Answer(a.id > b.id, "merge_order", "default")

@@ -9,6 +9,7 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.world import DrivingSide, Provenance, Signal, StopLine
+from world_gen.lanes import LaneDraft
 from world_gen.signal_groups import LaneGroup
 
 BESIDE_HEIGHT_M, ABOVE_HEIGHT_M = 3.0, 5.5
@@ -26,24 +27,30 @@ def signal_heads(
     `lines` are by lane. The group next to the kerb has a head beside the road; one that is not,
     and any group of a wide road, a head above its lanes.
     """
-    by_road: dict[tuple[int, bool], list[int]] = {}
+    by_road: dict[tuple[int, bool], list[LaneDraft]] = {}
     for group in groups:
-        numbers = [lane.key.number for lane in group.lanes]
-        by_road.setdefault(group.approach.key, []).extend(numbers)
+        by_road.setdefault(group.approach.key, []).extend(group.lanes)
     heads: list[Signal] = []
     for group in groups:
-        numbers = by_road[group.approach.key]
-        outermost = max(numbers) if driving_side == "right" else min(numbers)
-        kerb_side = group.lanes[-1] if driving_side == "right" else group.lanes[0]
-        at_kerb = kerb_side.key.number == outermost
+        mine = by_road[group.approach.key]
+        kerb_side = nearest_kerb(group.lanes, driving_side)
+        at_kerb = kerb_side is nearest_kerb(mine, driving_side)
         if at_kerb:
             place = beside(lines[kerb_side.id].ends, driving_side)
             heads.append(_head(f"{kerb_side.id}:signal", group, place, BESIDE_HEIGHT_M))
-        if not at_kerb or len(numbers) >= WIDE_LANES:
+        if not at_kerb or len(mine) >= WIDE_LANES:
             ends = np.concatenate([lines[lane.id].ends for lane in group.lanes])
             name = f"{kerb_side.id}:signal-above"
             heads.append(_head(name, group, ends.mean(axis=0), ABOVE_HEIGHT_M))
     return tuple(heads)
+
+
+def nearest_kerb(lanes: Sequence[LaneDraft], driving_side: DrivingSide) -> LaneDraft:
+    """Return the lane of one direction that lies outermost on the side that traffic keeps."""
+    sign = 1.0 if driving_side == "right" else -1.0
+    return min(
+        lanes, key=lambda n: -sign * n.plan.left_m if n.key.reverse else sign * n.plan.left_m
+    )
 
 
 def beside(ends: Array, driving_side: DrivingSide) -> Array:

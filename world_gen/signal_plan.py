@@ -1,11 +1,11 @@
 """A fixed-time plan for each signalised junction: phases, greens, amber and clearing times.
 
-The map does not know the real plan. This one is a default after RiLSA 2015: a cycle of 90 s (2.7.3:
-30 s to 90 s, at most 120 s), amber 3 s up to 50 km/h, 4 s at 60, 5 s at 70 (2.4), at least 5 s of
-green (2.7.4), all red for as long as the last car needs to clear the ground it shares with the
-first one of the next phase (2.5): clearing 6 m of car and the way there at 10 m/s, entering at
-40 km/h. Who walks is let go in every phase whose cars stay clear; their own longer clearing time
-is not in the plan.
+The map does not know the real plan. This one is a default after RiLSA 2015: a cycle of 90 s, of
+120 s with more than three phases (2.7.3: at most 120 s), amber 3 s up to 50 km/h, 4 s at 60, 5 s
+at 70 (2.4), at least 5 s of green (2.7.4), all red for as long as the last car needs to clear the
+ground it shares with the first one of the next phase (2.5): clearing 6 m of car and the way there
+at 10 m/s, entering at 40 km/h. Who walks is let go in every phase whose cars stay clear; their
+own longer clearing time is not in the plan.
 """
 
 from __future__ import annotations
@@ -21,14 +21,13 @@ from world_gen.conflicts import Meetings
 from world_gen.connections import ConnectionDraft
 from world_gen.signal_groups import LaneGroup, WalkGroup
 
-CYCLE_S = 90.0
+CYCLE_S, LONG_CYCLE_S, MANY_PHASES = 90.0, 120.0, 4
 LEAST_GREEN_S = 5.0
 LEAST_ALL_RED_S = 1.0
 _AMBER_S = ((50.0, 3.0), (60.0, 4.0), (math.inf, 5.0))
 _CAR_M, _CLEARING_MPS, _ENTERING_MPS = 6.0, 10.0, 40.0 / 3.6
 _WALKING_MPS = 1.2
 _WAITS: tuple[YieldRule, ...] = ("turn_across", "u_turn")
-_ONCOMING_RAD = math.radians(135.0)
 
 
 class Between(NamedTuple):
@@ -70,8 +69,8 @@ def signal_plans(
 
 
 def oncoming(a: LaneGroup, b: LaneGroup) -> bool:
-    """Return whether two groups come towards each other."""
-    return abs(math.remainder(a.bearing_rad - b.bearing_rad, math.tau)) > _ONCOMING_RAD
+    """Return whether the roads of two groups lie opposite each other."""
+    return a.approach.opposite == b.approach.key and b.approach.opposite == a.approach.key
 
 
 def _clear_s(clearing_m: float, entering_m: float) -> float:
@@ -104,7 +103,8 @@ def _plan(
     clear_s = max((b.clear_s for b in _within(groups, pairs)), default=0.0)
     # Half seconds; amber is no time to enter, so it counts for clearing only from its end.
     all_red_s = max(LEAST_ALL_RED_S, math.ceil(2.0 * clear_s) / 2.0)
-    greens = share_green(weights, least, CYCLE_S - len(names) * (amber_s + all_red_s))
+    cycle_s = CYCLE_S if len(names) < MANY_PHASES else LONG_CYCLE_S
+    greens = share_green(weights, least, cycle_s - len(names) * (amber_s + all_red_s))
     return SignalPlan(
         groups=(*(group.finished() for group in groups), *(walk.finished() for walk in walks)),
         phases=tuple(
@@ -117,9 +117,7 @@ def _plan(
     )
 
 
-def _within(
-    groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]
-) -> list[Between]:
+def _within(groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]) -> list[Between]:
     names = sorted(group.id for group in groups)
     return [
         found
@@ -170,16 +168,18 @@ def _amber_s(groups: Sequence[LaneGroup]) -> float:
 
 
 def _walking_s(walk: WalkGroup) -> float:
-    return math.ceil(float(np.hypot(*(walk.crossing.line[1] - walk.crossing.line[0]))) / _WALKING_MPS)
+    return math.ceil(
+        float(np.hypot(*(walk.crossing.line[1] - walk.crossing.line[0]))) / _WALKING_MPS
+    )
 
 
 def share_green(weights: Sequence[float], least_s: Sequence[float], total_s: float) -> list[float]:
-    """Return whole seconds of green for each phase: its least, and its share of what is left.
+    """Return half seconds of green for each phase: its least, and its share of what is left.
 
     Where `total_s` is too short for all the least ones the cycle grows.
     """
     spare = max(total_s - sum(least_s), 0.0)
     whole = max(sum(weights), 1e-9)
-    ends = np.floor(np.cumsum([spare * weight / whole for weight in weights]) + 0.5)
+    ends = np.floor(2.0 * np.cumsum([spare * weight / whole for weight in weights]) + 0.5) / 2.0
     extra = np.diff(ends, prepend=0.0)
     return [float(least + more) for least, more in zip(least_s, extra, strict=True)]
