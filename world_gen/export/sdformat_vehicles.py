@@ -51,19 +51,29 @@ class SdfVehicle:
 def place_vehicles(
     world: World, named: Sequence[tuple[str, VehicleKind]], parameters: VehicleParameters
 ) -> tuple[SdfVehicle, ...]:
-    """Stand vehicles at the beginnings of the lanes towards the junction, the longest first."""
-    lanes = [lane for lane in world.lanes if lane.role == "approach" and lane.kind == "driving"]
-    lanes.sort(key=lambda lane: (-length(lane.centerline), lane.id))
+    """Stand vehicles on the lanes towards the junction: at their beginnings, then behind them.
+
+    Vehicles for which the lanes have no room stand in a row from the origin to the east.
+    """
+    into = {c.from_lane_id for c in world.connections if c.junction_id == world.intersection.id}
+    every = [lane for lane in world.lanes if lane.role == "approach" and lane.kind == "driving"]
+    lanes = [lane.centerline for lane in every if lane.id in into]
+    lanes = sorted(lanes or [lane.centerline for lane in every], key=length, reverse=True)
     behind = parameters.rear_overhang_m.value + 1.0
+    ahead = parameters.length_m.value - parameters.rear_overhang_m.value
+    room = [
+        (line, behind + row * _GAP_M)
+        for row in range(len(named))
+        for line in lanes
+        if behind + row * _GAP_M + ahead <= length(line)
+    ]
     vehicles = []
     for number, (name, kind) in enumerate(named):
-        row, column = divmod(number, max(len(lanes), 1))
-        x, y, yaw = row * _GAP_M, 0.0, 0.0
-        if lanes:
-            line = lanes[column].centerline
-            at = min(behind + row * _GAP_M, length(line))
-            (x, y), ahead = points_at(line, at), direction_at(line, at)
-            yaw = math.atan2(ahead[1], ahead[0])
+        x, y, yaw = number * _GAP_M, 0.0, 0.0
+        if number < len(room):
+            line, at = room[number]
+            (x, y), heading = points_at(line, at), direction_at(line, at)
+            yaw = math.atan2(heading[1], heading[0])
         vehicles.append(
             SdfVehicle(
                 name=name, kind=kind, parameters=parameters, x_m=float(x), y_m=float(y), yaw_rad=yaw
