@@ -13,14 +13,17 @@ import numpy as np
 import pytest
 
 from contracts.frames import local_from_geo
+from contracts.world import World
 from tests.world_gen.test_real_maps import MAPS
+from world_gen.build import build_region, build_world
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
-from world_gen.osm_map import OsmMap
+from world_gen.map_index import index_map
+from world_gen.osm_map import LatLonBounds, OsmMap
 from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
-from world_gen.traffic_lights import traffic_lights
+from world_gen.traffic_lights import TrafficLight, traffic_lights
 
 pytestmark = [pytest.mark.real_data, pytest.mark.judge]
 
@@ -89,3 +92,27 @@ def test_all_lights_on_car_roads_are_accounted_for(judged: Judged) -> None:
     roles = [light.role for light in lights]
     if judged.name in BETWEEN_JUNCTIONS:
         assert roles.count("road") == BETWEEN_JUNCTIONS[judged.name]
+
+
+def test_every_light_governs_lanes_in_some_world(judged: Judged) -> None:
+    if judged.name == "testfeld":
+        pytest.skip("main roads alone: one World for each of its junctions takes too long")
+    index = index_map(judged.osm, judged.graph, judged.junctions)
+    lit = [junction for junction in judged.junctions if junction.lights]
+    worlds = {j.summary.id: build_world(judged.osm, judged.graph, j, index=index) for j in lit}
+    lost = []
+    for light in traffic_lights(judged.osm, judged.junctions):
+        near = [worlds[junction_id] for junction_id in light.junction_ids]
+        if not near:
+            lat, lon = judged.osm.locations[light.osm_node]
+            box = LatLonBounds(lat - 0.0012, lon - 0.0012, lat + 0.0012, lon + 0.0012)
+            near = [build_region(judged.osm, judged.graph, box, index=index)]
+        lost += [(light, world.intersection.id) for world in near if not _governs(light, world)]
+    assert not lost
+
+
+def _governs(light: TrafficLight, world: World) -> bool:
+    return any(
+        light.osm_node in (signal.osm_node, *signal.osm_nodes) and signal.lane_ids
+        for signal in world.signals
+    )
