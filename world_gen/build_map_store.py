@@ -76,7 +76,9 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
         _place_relations(table, part / "relations.opl", batches, nodes.notes)
         box = batches.road_box(map_file)
         declared = stream.header.bounds
-        narrow = max(box.north - box.south, (box.east - box.west) % 360.0) <= WIDEST_FRAME_DEG
+        near_pole = max(abs(box.south), abs(box.north)) > 89.0
+        width_deg = 0.0 if near_pole else (box.east - box.west) % 360.0
+        narrow = max(box.north - box.south, width_deg) <= WIDEST_FRAME_DEG
         centre = centre_of(box)
         meta = MapMeta(
             sha256=stream.sha256,

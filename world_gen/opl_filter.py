@@ -13,7 +13,7 @@ import sys
 import osmium
 
 
-def main(form: str, options: str) -> int:
+def main(form: str, options: str) -> None:
     """Decode; the header goes as one line of JSON to standard error, a fault as plain text."""
     try:
         with osmium.io.Reader(osmium.io.File("-", form)) as reader:
@@ -27,11 +27,10 @@ def main(form: str, options: str) -> int:
             os.write(2, json.dumps(said).encode() + b"\n")
             with osmium.SimpleWriter(osmium.io.File("-", options)) as writer:
                 osmium.apply(reader, writer)
-    except (RuntimeError, ValueError) as error:
-        os.write(2, " ".join(str(error).split()).encode())
-        return 3
-    return 0
+    except (RuntimeError, ValueError, osmium.InvalidLocationError) as error:
+        os.write(2, " ".join(str(error).split()).encode(errors="replace"))
+        os._exit(3)  # a writer that has failed ends the process by itself when it is destroyed
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], sys.argv[2]))
+    main(sys.argv[1], sys.argv[2])

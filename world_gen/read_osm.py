@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import osmium
 
@@ -60,7 +62,7 @@ def read_map(path: Path) -> OsmMap:
     form = format_of(path, data[:HEAD_BYTES])
     try:
         header, text = _as_opl(data, form)
-    except (RuntimeError, ValueError) as error:
+    except (RuntimeError, ValueError, osmium.InvalidLocationError) as error:
         raise unreadable(path, error) from error
     objects = DecodedObjects()
     objects.add(text)
@@ -78,9 +80,24 @@ def _as_opl(data: bytes, form: str) -> tuple[MapHeader, bytes]:
         path = Path(folder) / "map.opl"
         with osmium.io.Reader(osmium.io.FileBuffer(data, form)) as reader:
             header = header_of(reader.header())
-            with osmium.SimpleWriter(osmium.io.File(path, OPL_OPTIONS)) as writer:
+            writer = osmium.SimpleWriter(osmium.io.File(path, OPL_OPTIONS))
+            try:
                 osmium.apply(reader, writer)
+            finally:
+                _close(writer)
         return header, path.read_bytes()
+
+
+def _close(writer: Any) -> None:
+    """Close a writer; one that has failed, on text that is no UTF-8, must never be destroyed.
+
+    Its destructor would try once more, fail, and with it end the whole process.
+    """
+    try:
+        writer.close()
+    except RuntimeError:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))
+        raise
 
 
 @dataclass(slots=True)

@@ -20,11 +20,14 @@ class Built(NamedTuple):
 
     osm: OsmMap
     worlds: tuple[World, ...]
+    index_notes: tuple[str, ...]
 
     @property
     def notes(self) -> str:
         """Everything that was said, line by line."""
-        return "\n".join([*self.osm.notes, *(note for w in self.worlds for note in w.notes)])
+        return "\n".join(
+            [*self.osm.notes, *self.index_notes, *(note for w in self.worlds for note in w.notes)]
+        )
 
 
 def build_all(path: Path, *, most: int = 20, radius_m: float = 100.0) -> Built:
@@ -38,4 +41,4 @@ def build_all(path: Path, *, most: int = 20, radius_m: float = 100.0) -> Built:
         world = build_world(osm, graph, junction, radius_m=radius_m, index=index)
         world_spec(world).compile()
         worlds.append(world)
-    return Built(osm, tuple(worlds))
+    return Built(osm, tuple(worlds), index.buildings.notes)
