@@ -21,7 +21,8 @@ from world_gen.legs import heading_out as heading_out
 from world_gen.legs import is_ring_edge as is_ring_edge
 from world_gen.map_index import MapIndex
 from world_gen.polyline import without_repeats
-from world_gen.road_graph import DirectedEdge, RoadEdge
+from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from world_gen.transitions import transition_shifts
 from world_gen.trims import trims
 
 
@@ -65,6 +66,8 @@ class Surroundings:
     trims_m: Mapping[tuple[int, bool], float]
     """Metres cut off an edge's lanes by (edge index, at its end node)."""
     ring_edges: frozenset[int]
+    shifts_m: Mapping[int, tuple[float, float]]
+    """How far left of their way roads in a transition begin and end, by edge index."""
 
     @property
     def inner_edges(self) -> frozenset[int]:
@@ -89,25 +92,39 @@ def world_frame(junction: Junction) -> LocalFrame:
 
 
 def surroundings(
-    index: MapIndex, frame: LocalFrame, extent: Extent, made_for: tuple[Junction, ...]
+    index: MapIndex,
+    frame: LocalFrame,
+    extent: Extent,
+    made_for: tuple[Junction, ...],
+    *,
+    extra_edges: frozenset[int] = frozenset(),
+    service_roads: bool = False,
 ) -> Surroundings:
     """Collect the roads within `extent` of the frame's origin and cluster their nodes.
 
-    Roads of the junctions in `made_for` are kept even where they lie beyond.
+    Roads of the junctions in `made_for` are kept even where they lie beyond. Service roads,
+    driveways and parking aisles get lanes and are joined to the roads where they are named in
+    `extra_edges` (indices of the graph's edges, such as those of a route) or, with
+    `service_roads`, everywhere; none of them makes a junction.
     """
     graph = index.graph
-    wanted = set(index.car_edges_in(in_map(extent, frame, graph.frame)))
+    area = in_map(extent, frame, graph.frame)
+    wanted = set(index.car_edges_in(area))
+    wanted.update(_minor_edges_in(graph, area, extra_edges, service_roads=service_roads))
     for junction in made_for:
         wanted.update(i for i in junction.inner if _drivable(graph.edges[i]))
         wanted.update(
             leg.edge.index for arm in junction.arms for leg in arm.outward if _drivable(leg.edge)
         )
-    edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
-    sections = {i: cross_section(edge, graph.driving_side) for i, edge in edges.items()}
+    edges = _in_frame(
+        [_opened(graph.edges[i], extra_edges) for i in sorted(wanted)], frame, graph.frame
+    )
+    sections = _sections(index, edges)
     clusters = _clusters(index, made_for, edges, extent)
     whole = {id(c.junction): c.junction for c in clusters if c.whole and c.junction is not None}
     inner = {i for junction in whole.values() for i in junction.inner}
     ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
+    shifts = transition_shifts(clusters, edges, sections)
     return Surroundings(
         frame=frame,
         junctions=tuple(whole.values()),
@@ -116,13 +133,66 @@ def surroundings(
         edges=edges,
         sections=sections,
         clusters=clusters,
-        trims_m=trims(clusters, edges, sections),
+        trims_m=trims(clusters, edges, sections, shifts),
+        shifts_m=shifts,
         ring_edges=ring_edges,
     )
 
 
 def _drivable(edge: RoadEdge) -> bool:
     return edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
+
+
+def _minor_edges_in(
+    graph: RoadGraph, area: shapely.Polygon, extra_edges: frozenset[int], *, service_roads: bool
+) -> list[int]:
+    """Return roads within an area that make no junction: those named, or all service roads."""
+    edges = [graph.edges[i] for i in sorted(extra_edges)]
+    if service_roads:
+        edges += [
+            edge
+            for edge in graph.edges
+            if edge.road_class == "service"
+            and (edge.forward or edge.backward)
+            and edge.index not in extra_edges
+        ]
+    edges = [edge for edge in edges if not edge.car and edge.length_m > 0.05]
+    if not edges:
+        return []
+    lines = shapely.linestrings(
+        np.concatenate([edge.xy_m for edge in edges]),
+        indices=np.repeat(np.arange(len(edges)), [len(edge.xy_m) for edge in edges]),
+    )
+    shapely.prepare(area)
+    return [edges[i].index for i in np.nonzero(shapely.intersects(area, lines))[0].tolist()]
+
+
+def _opened(edge: RoadEdge, extra_edges: frozenset[int]) -> RoadEdge:
+    """Return an edge that a route uses with lanes, even where the public may not drive."""
+    if edge.index not in extra_edges or edge.forward or edge.backward:
+        return edge
+    against = edge.tags.get("oneway") in ("-1", "reverse")
+    along = edge.tags.get("oneway") in ("yes", "true", "1")
+    return dataclasses.replace(edge, forward=not against, backward=not along)
+
+
+def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, CrossSection]:
+    """Return cross-sections by edge index; the edges of one way share theirs."""
+    known: dict[tuple[int, bool, bool, bool], CrossSection] = {}
+    found: dict[int, CrossSection] = {}
+    for i, edge in edges.items():
+        # A centre lane for turns is driven toward the junction, where there is one.
+        centre_reverse = (
+            edge.start_node in index.junction_of_node
+            and edge.end_node not in index.junction_of_node
+        )
+        key = (edge.way_id, edge.forward, edge.backward, centre_reverse)
+        section = known.get(key)
+        if section is None:
+            section = cross_section(edge, index.graph.driving_side, centre_reverse=centre_reverse)
+            known[key] = section
+        found[i] = section
+    return found
 
 
 def _in_frame(

@@ -79,12 +79,14 @@ def connect(
         toward = mine[0].toward
         plans = around.section(toward).driven(reverse=toward.reverse)
         starts = lanes.incoming(toward, plans)
+        middle = lanes.incoming(toward, around.section(toward).turning(reverse=toward.reverse))
         for movement in _by_tags(mine, starts):
             away = movement.away
             ends = lanes.outgoing(away, around.section(away).driven(reverse=away.reverse))
             if not starts or not ends:
                 continue
-            chosen = _starting_lanes(movement, starts, mine, len(ends))
+            chosen = [lane for lane in middle if movement.turn in lane.turns]
+            chosen = chosen or _starting_lanes(movement, starts, mine, len(ends))
             if not chosen and len(starts) < len(plans):
                 continue  # the lanes for it are beyond the World's edge
             if not chosen:
@@ -165,13 +167,38 @@ def _pairs(
     only_way: bool,
 ) -> list[tuple[LaneDraft, LaneDraft]]:
     """Pair lanes from the side to which the movement turns; surplus lanes merge into the last."""
-    ends = [lane for lane in ends if lane.kind == "driving"] or ends
+    buses = [lane for lane in starts if lane.kind == "bus"]
+    reserved = [lane for lane in ends if lane.kind == "bus"]
+    if buses and reserved and len(buses) < len(starts):
+        cars = [lane for lane in starts if lane.kind != "bus"]
+        return [
+            *_pairs(cars, ends, turn, driving_side, only_way),
+            *_pairs(buses, reserved, turn, driving_side, only_way),
+        ]
+    if turn == "u_turn":
+        return [(lane, _wide_enough(lane, ends)) for lane in starts]
+    if any(lane.kind != "bus" for lane in starts):
+        ends = [lane for lane in ends if lane.kind == "driving"] or ends
     from_right = turn == "right" or (turn == "straight" and driving_side == "left")
     a = starts[::-1] if from_right else starts
     b = ends[::-1] if from_right else ends
     if turn == "straight" and len(a) != len(b):
         return _pairs_by_position(starts, ends, only_way)
     return [(lane, b[min(i, len(b) - 1)]) for i, lane in enumerate(a)]
+
+
+def _wide_enough(start: LaneDraft, ends: list[LaneDraft]) -> LaneDraft:
+    """Return the first lane from the inside that can be reached by a half circle."""
+    cars = [lane for lane in ends if lane.kind == "driving"] or ends
+    at = start.centerline[-1]
+    ahead = unit(at - start.centerline[-2])
+    aside = [abs(_cross(ahead, lane.centerline[0] - at)) for lane in cars]
+    wide = [lane for lane, gap in zip(cars, aside, strict=True) if gap >= 2.0 * LEAST_RADIUS_M]
+    return wide[0] if wide else cars[-1]
+
+
+def _cross(a: Array, b: Array) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def _pairs_by_position(

@@ -20,7 +20,7 @@ Role = Literal["approach", "exit", "ring", "other"]
 
 
 class LaneKey(NamedTuple):
-    """A lane before it is cut to the World: edge index, direction, number from the left."""
+    """A lane before it is cut to the World: edge index, direction, number in its section."""
 
     edge: int
     reverse: bool
@@ -67,6 +67,8 @@ class LaneDraft:
             turns=self.turns,
             turns_source=self.plan.turns_source,
             direction_source=self.plan.direction_source,
+            change=self.plan.change,
+            change_source=self.plan.change_source,
             left_id=self.left_id,
             right_id=self.right_id,
             road_id=self.road_id,
@@ -129,8 +131,8 @@ def build_lanes(around: Surroundings) -> LaneSet:
             if len(points) < 2:
                 continue
             key = LaneKey(index, plan.reverse, plan.number)
-            name = f"{road}.{'b' if plan.reverse else 'f'}{plan.number}"
-            role = roles.get((index, plan.reverse), "other")
+            name = f"{road}.{plan.label}"
+            role = roles.get((index, plan.reverse), "other") if plan.number >= 0 else "other"
             points = points[::-1] if plan.reverse else points
             lanes[name] = LaneDraft(name, key, edge, plan, points, role, plan.turns, road)
             mine.append(name)
@@ -219,9 +221,11 @@ def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:
 
 
 def _join_neighbours(names: list[str], lanes: Mapping[str, LaneDraft]) -> None:
-    of_key = {lanes[name].key: lanes[name] for name in names}
-    for key, lane in of_key.items():
-        right = of_key.get(key._replace(number=key.number + 1))
+    """Tell lanes that cars drive the same way side by side of each other."""
+    mine = (lanes[name] for name in names)
+    of_number = {(lane.plan.reverse, lane.plan.number): lane for lane in mine if lane.plan.counted}
+    for (reverse, number), lane in of_number.items():
+        right = of_number.get((reverse, number + 1))
         if right is not None:
             lane.right_id, right.left_id = right.id, lane.id
 
@@ -236,6 +240,9 @@ def join_straight_on(cluster: Cluster, around: Surroundings, lanes: LaneSet) -> 
         toward = DirectedEdge(leg.edge, not leg.reverse)
         arriving = lanes.incoming(toward, around.section(leg).driven(reverse=toward.reverse))
         leaving = lanes.outgoing(other, around.section(other).driven(reverse=other.reverse))
+        arriving += lanes.incoming(toward, around.section(leg).cycled(reverse=toward.reverse))
+        leaving += lanes.outgoing(other, around.section(other).cycled(reverse=other.reverse))
         for a, b in zip(arriving, leaving, strict=False):
-            a.successors.append(b.id)
+            if a.kind == b.kind:
+                a.successors.append(b.id)
     return True

@@ -30,12 +30,14 @@ def heading_out(leg: DirectedEdge, look_m: float = 8.0) -> Array:
 
 
 def lateral_positions(
-    leg: DirectedEdge, section: CrossSection, *, outward: bool
+    leg: DirectedEdge, section: CrossSection, *, outward: bool, shift_m: float = 0.0
 ) -> list[tuple[float, bool]]:
-    """Return (metres left, driven that way) of lanes, seen along or against an outward leg."""
+    """Return (metres left, driven that way) of car lanes, seen along or against an outward leg."""
     flip = leg.reverse == outward
+    side = -1.0 if flip else 1.0
     found = [
-        (round(-lane.left_m if flip else lane.left_m, 2), lane.reverse == flip)
+        (round(side * (lane.left_m + shift_m), 2) + 0.0, lane.reverse == flip)
         for lane in section.lanes
+        if lane.kind in ("driving", "bus")
     ]
     return sorted(found)

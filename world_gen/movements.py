@@ -16,6 +16,7 @@ from world_gen.turn_restrictions import TurnRestrictions
 STRAIGHT_RAD = math.radians(45.0)
 FORK_RAD = math.radians(18.0)
 U_TURN_RAD = math.radians(150.0)
+_NOSE_COS = math.cos(math.radians(60.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +33,11 @@ class Movement:
 def movements(
     cluster: Cluster, around: Surroundings, restrictions: TurnRestrictions
 ) -> tuple[Movement, ...]:
-    """Return every movement that one-ways and turn restrictions allow, u-turns on a street not."""
+    """Return every movement that one-ways and turn restrictions allow.
+
+    Turning back into the street one comes from is none, unless a lane is marked for it, nor is
+    turning around the nose of the island where a street parts into two carriageways.
+    """
     inner: dict[int, list[DirectedEdge]] = {}
     for index in sorted(cluster.inner):
         edge = around.edges.get(index)
@@ -46,7 +51,13 @@ def movements(
         toward = DirectedEdge(leg.edge, not leg.reverse)
         if not toward.allowed:
             continue
-        ways = _ways_through(cluster, toward, inner, restrictions)
+        marked = any("u_turn" in lane.turns for lane in around.section(toward).lanes
+                     if lane.reverse == toward.reverse)  # fmt: skip
+        ways = [
+            way
+            for way in _ways_through(cluster, toward, inner, restrictions, back=marked)
+            if not _around_a_nose(cluster, toward, way[0])
+        ]
         found.extend(_with_turns(toward, ways, around.driving_side))
     return tuple(found)
 
@@ -56,6 +67,8 @@ def _ways_through(
     toward: DirectedEdge,
     inner: dict[int, list[DirectedEdge]],
     restrictions: TurnRestrictions,
+    *,
+    back: bool,
 ) -> list[tuple[DirectedEdge, tuple[DirectedEdge, ...]]]:
     """Return (leg, inner edges) by the shortest legal path to every leg, over pairs of edges."""
     exits: dict[int, list[DirectedEdge]] = {}
@@ -73,9 +86,10 @@ def _ways_through(
             continue
         done.add(state)
         for leg in exits.get(last.end_node, ()):
-            back = leg.edge.index == last.edge.index
             key = (leg.edge.index, leg.reverse)
-            if key in best or back or not restrictions.step_allowed(last, leg):
+            if key in best or not restrictions.step_allowed(last, leg):
+                continue
+            if leg.edge.index == toward.edge.index and not (back and not path):
                 continue
             if restrictions.path_allowed((toward, *path, leg)):
                 best[key] = (leg, path)
@@ -85,6 +99,17 @@ def _ways_through(
             count += 1
             heapq.heappush(queue, (cost + step.edge.length_m, count, step, (*path, step)))
     return [best[key] for key in sorted(best)]
+
+
+def _around_a_nose(cluster: Cluster, toward: DirectedEdge, away: DirectedEdge) -> bool:
+    """Return whether a way leads from one carriageway back into the other where they part."""
+    if len(cluster.legs) != 3 or len(cluster.nodes) != 1:
+        return False
+    one_way = [leg for leg in cluster.legs if leg.edge.forward != leg.edge.backward]
+    if {leg.edge.index for leg in one_way} != {toward.edge.index, away.edge.index}:
+        return False
+    outward = DirectedEdge(toward.edge, not toward.reverse)
+    return bool(heading_out(outward) @ heading_out(away) > _NOSE_COS)
 
 
 def _with_turns(
@@ -104,7 +129,9 @@ def _with_turns(
         turn = _turn(angle, straightest, angles)
         if is_ring_edge(toward.edge) or is_ring_edge(leg.edge):
             turn = _ring_turn(toward, leg, driving_side)
-        elif abs(angle) > U_TURN_RAD and (path or toward.end_node != leg.start_node):
+        elif toward.edge.index == leg.edge.index or (
+            abs(angle) > U_TURN_RAD and (path or toward.end_node != leg.start_node)
+        ):
             turn = "u_turn"
         found.append(Movement(toward=toward, away=leg, inside=path, turn=turn, angle_rad=angle))
     return found

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from world_gen.bends import rounded_through, thinned
+from world_gen.bends import Rounded, rounded_through, thinned
 from world_gen.clusters import Surroundings
 from world_gen.extent import stretches_inside
-from world_gen.polyline import cut
-from world_gen.polyline_batch import Polylines
+from world_gen.polyline import cut, left_of
+from world_gen.polyline_batch import Polylines, directions
 from world_gen.polyline_batch import cut as cut_all
 
 MIN_LANE_M = 0.05
@@ -61,7 +61,9 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
     indices = [edges[i].index for i in kept.tolist()]
     half_m = np.array([around.sections[i].half_width_m for i in indices])
     goes_on = _points_beyond(around, indices, pieces)
-    lines, befores, afters = rounded_through(pieces, half_m + INNER_RADIUS_M, *goes_on)
+    lines, befores, afters = _shifted(
+        rounded_through(pieces, half_m + INNER_RADIUS_M, *goes_on), indices, around
+    )
     outside = ~around.extent.holds(lines.xy_m)
     crosses = np.bincount(lines.line[outside], minlength=len(lines)) > 0
     found: list[Stretch] = []
@@ -82,6 +84,24 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
                 )
             )  # fmt: skip
     return found, notes
+
+
+def _shifted(rounded: Rounded, indices: list[int], around: Surroundings) -> Rounded:
+    """Return the lines, those of roads in a transition led from one place to the other."""
+    moving = [row for row, index in enumerate(indices) if index in around.shifts_m]
+    if not moving:
+        return rounded
+    lines = rounded.lines
+    xy = lines.xy_m.copy()
+    into, out = directions(lines)
+    normal = left_of(into + out)
+    normal /= np.maximum(np.hypot(normal[:, 0], normal[:, 1]), 1e-9)[:, None]
+    for row in moving:
+        piece = slice(lines.first[row], lines.first[row + 1])
+        begin, end = around.shifts_m[indices[row]]
+        share = lines.arc_m[piece] / max(float(lines.arc_m[piece][-1]), 1e-9)
+        xy[piece] += normal[piece] * (begin + (end - begin) * share)[:, None]
+    return rounded._replace(lines=Polylines(xy, lines.first))
 
 
 def _points_beyond(

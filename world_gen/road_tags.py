@@ -11,9 +11,11 @@ from contracts.world import Quantity
 CAR_CLASSES = frozenset({
     "motorway", "motorway_link", "trunk", "trunk_link", "primary", "primary_link", "secondary",
     "secondary_link", "tertiary", "tertiary_link", "unclassified", "residential", "living_street",
-    "road",
+    "road", "raceway",
 })  # fmt: skip
 OTHER_CLASSES = frozenset({"pedestrian", "service", "track", "busway"})
+_MOTOR_SPORTS = frozenset({"motor", "motor_sports", "motor_racing", "autocross", "rallycross"})
+"""What races on a track for cars; kart, horse, bicycle and motocross tracks are none."""
 RING_TAGS = frozenset({"roundabout", "circular"})
 
 _FORBIDDEN = frozenset({
@@ -25,6 +27,7 @@ _ACCESS_KEYS = ("motorcar", "motor_vehicle", "vehicle", "access")
 _DEFAULT_KMPH = {
     "motorway": 120.0, "motorway_link": 60.0, "trunk": 100.0, "trunk_link": 60.0,
     "residential": 30.0, "living_street": 10.0, "service": 10.0, "pedestrian": 7.0, "track": 20.0,
+    "raceway": 100.0,
 }  # fmt: skip
 _ZONE_KMPH = {
     "urban": 50.0, "rural": 100.0, "motorway": 130.0, "trunk": 120.0, "living_street": 10.0,
@@ -49,7 +52,10 @@ class Directions(NamedTuple):
 
 def is_car_road(tags: Mapping[str, str]) -> bool:
     """Tell whether the tags describe a public road for cars, closed to them or not."""
-    return tags.get("highway") in CAR_CLASSES and tags.get("area") != "yes"
+    highway = tags.get("highway")
+    if highway == "raceway" and tags.get("sport", "motor") not in _MOTOR_SPORTS:
+        return False
+    return highway in CAR_CLASSES and tags.get("area") != "yes"
 
 
 def is_kept_road(tags: Mapping[str, str]) -> bool:

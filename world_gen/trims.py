@@ -38,12 +38,13 @@ def trims(
     clusters: tuple[Cluster, ...],
     edges: Mapping[int, RoadEdge],
     sections: Mapping[int, CrossSection],
+    shifts_m: Mapping[int, tuple[float, float]],
 ) -> dict[tuple[int, bool], float]:
     """Return metres cut off an edge's lanes by (edge index, at its end node)."""
     found: dict[tuple[int, bool], float] = {}
     for cluster in clusters:
         if cluster.plain:
-            values = _plain_trims(cluster, sections)
+            values = _plain_trims(cluster, sections, shifts_m)
         elif len(cluster.nodes) == 1:
             values = _node_trims(cluster, sections)
         else:
@@ -60,11 +61,20 @@ def trims(
     return found
 
 
-def _plain_trims(cluster: Cluster, sections: Mapping[int, CrossSection]) -> list[float]:
+def _plain_trims(
+    cluster: Cluster,
+    sections: Mapping[int, CrossSection],
+    shifts_m: Mapping[int, tuple[float, float]],
+) -> list[float]:
     """Lanes of one road run on where they fit; where lanes change they get room for a taper."""
     a, b = (sections[leg.edge.index] for leg in cluster.legs)
     first, second = cluster.legs
-    fits = lateral_positions(first, a, outward=False) == lateral_positions(second, b, outward=True)
+    by_first, by_second = (
+        shifts_m.get(leg.edge.index, (0.0, 0.0))[int(leg.reverse)] for leg in cluster.legs
+    )
+    fits = lateral_positions(first, a, outward=False, shift_m=by_first) == lateral_positions(
+        second, b, outward=True, shift_m=by_second
+    )
     heads = np.array([heading_out(first), heading_out(second)])
     if fits and -heads[0] @ heads[1] > SHARPEST_BEND_COS:
         return [0.0, 0.0]

@@ -63,7 +63,7 @@ def _check(world: World, junction: Junction) -> None:
     assert len(connections) == len(world.connections)
     assert len(world.junctions[0].arms) == junction.summary.arms
     for lane in world.lanes:
-        assert lane.width_m.value >= 2.0
+        assert lane.width_m.value >= (0.8 if lane.kind == "bicycle" else 1.5)
         assert len(lane.centerline) >= 2
         assert np.isfinite(lane.centerline).all()
         assert set(lane.successor_ids) <= lanes.keys() | connections

@@ -1,0 +1,106 @@
+"""What a cross-section is made of: lanes with their kind, width, turns and place."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from contracts.world import LaneChange, LaneKind, Provenance, Quantity, Turn
+
+_NUMBER = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*(m|ft|')?\s*$")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LanePlan:
+    """One lane of a cross-section.
+
+    `number` counts from the left as its driver sees it, as `lanes` and `placement` do: lanes for
+    bicycles, parking and turns from both directions are `counted` not and have numbers below
+    0, each its own. `label` tells it from all
+    others of the road. `left_m` is how far its centre lies to the left of the way, looking along
+    the way's nodes; `reverse` lanes run against the nodes.
+    """
+
+    label: str
+    reverse: bool
+    number: int
+    kind: LaneKind
+    width_m: Quantity
+    left_m: float = 0.0
+    turns: tuple[Turn, ...] = ()
+    turns_source: Provenance = "inferred"
+    direction_source: Provenance = "inferred"
+    change: LaneChange = "both"
+    change_source: Provenance = "default"
+    counted: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrossSection:
+    """Lanes from left to right along the way's nodes, and the carriageway's edges.
+
+    `left_m` and `right_m` are the distances of the edges to the left of the way, so `right_m` is
+    usually negative.
+    """
+
+    lanes: tuple[LanePlan, ...]
+    left_m: float
+    right_m: float
+    notes: tuple[str, ...]
+
+    @property
+    def width_m(self) -> float:
+        """Width of the carriageway in metres."""
+        return self.left_m - self.right_m
+
+    @property
+    def half_width_m(self) -> float:
+        """The wider of both sides, measured from the way."""
+        return max(abs(self.left_m), abs(self.right_m))
+
+    def reach_m(self, reverse: bool) -> tuple[float, float]:
+        """Return how far the middles of the outermost lanes of one direction lie from the way.
+
+        To the left and to the right as their driver sees it; NaN where there are none.
+        """
+        side = -1.0 if reverse else 1.0
+        lefts = [
+            side * lane.left_m for lane in self.lanes if lane.reverse == reverse and lane.counted
+        ]
+        return (max(lefts), -min(lefts)) if lefts else (math.nan, math.nan)
+
+    def driven(self, *, reverse: bool) -> tuple[LanePlan, ...]:
+        """Return the counted lanes of one direction from the left as their driver sees them."""
+        lanes = (lane for lane in self.lanes if lane.reverse == reverse and lane.counted)
+        return tuple(sorted(lanes, key=lambda lane: lane.number))
+
+    def cycled(self, *, reverse: bool) -> tuple[LanePlan, ...]:
+        """Return the bicycle lanes of one direction, from left to right along the way."""
+        return tuple(p for p in self.lanes if p.kind == "bicycle" and p.reverse == reverse)
+
+    def turning(self, *, reverse: bool) -> tuple[LanePlan, ...]:
+        """Return the lanes in the middle from which both directions turn, of one direction."""
+        return tuple(
+            lane
+            for lane in self.lanes
+            if lane.reverse == reverse and not lane.counted and lane.kind == "driving"
+        )
+
+
+def metres(text: str | None) -> float | None:
+    """Return a length tag such as `3.5`, `3,5`, `3 m` or `12 ft` in metres, else None."""
+    found = _NUMBER.match(text or "")
+    if not found:
+        return None
+    value = float(found[1].replace(",", "."))
+    return value * 0.3048 if found[2] in ("ft", "'") else value
+
+
+def of_side(tags: Mapping[str, str], key: str, side: str, suffix: str = "") -> str | None:
+    """Return a tag of the left or right side of a road: of it, of both sides, or of the road."""
+    for name in (f"{key}:{side}{suffix}", f"{key}:both{suffix}", f"{key}{suffix}"):
+        if name in tags:
+            return tags[name]
+    return None
