@@ -6,14 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
 
 from contracts.arrays import Array
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
-from world_gen.map_store import MapStore, route_boxes
 from world_gen.osm_map import LatLonBounds, OsmMap
 from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
@@ -61,6 +58,12 @@ def open_map(
 
 
 def _clipped(file: Path, clip: Clip | LatLonBounds) -> OsmMap:
+    # Imported here: most maps are small, and commands on them are to start fast.
+    from rich.console import Console
+    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from world_gen.map_store import MapStore
+
     columns = TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(f"reading {file.name}", total=None)
@@ -76,6 +79,8 @@ def _clipped(file: Path, clip: Clip | LatLonBounds) -> OsmMap:
 
 
 def _widened(bounds: LatLonBounds) -> LatLonBounds:
+    from world_gen.map_store import route_boxes
+
     low, high = (
         route_boxes(np.array([corner]), CLIP_MARGIN_M)[0]
         for corner in ((bounds.south, bounds.west), (bounds.north, bounds.east))

@@ -10,12 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
 from contracts.world import World
 from world_gen.intersections import Junction
-from world_gen.report import note_kind, report_of
 
 PLAIN_PERIOD_S = 5.0
 """Between lines of progress where there is no terminal."""
@@ -39,6 +35,8 @@ def write_each(
     What goes wrong with one junction is said in a line and in the failures file of the folder,
     and does not stop the others.
     """
+    from world_gen.report import note_kind
+
     kinds: Counter[str] = Counter()
     failures: list[str] = []
     with _progress(len(junctions)) as (advance, say):
@@ -61,6 +59,8 @@ def write_each(
 
 def write_report(world: World, path: Path, *, show: bool) -> None:
     """Write what was tagged, inferred and a default beside a World's file; print it if asked to."""
+    from world_gen.report import report_of
+
     report = report_of(world)
     for ending, text in ((".report.md", report.as_markdown()), (".report.json", report.as_json())):
         path.with_name(path.name + ending).write_text(text, encoding="utf-8")
@@ -92,6 +92,15 @@ def _file_name(junction_id: str) -> str:
 @contextmanager
 def _progress(total: int) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
     """Give a function that counts one more and one that prints a line beside the bar."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
     console = Console(stderr=True, highlight=False)
 
     def say(text: str) -> None:
