@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from contracts.world import Choice, LineControl, YieldRule
 from world_gen.clusters import RING_KINDS, Cluster, Surroundings, heading_out, is_ring_edge
 from world_gen.connections import ConnectionDraft
@@ -157,8 +159,8 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
         if m.distance_m <= 0.1 and sign_of(m.tags) and not d.cluster.ring
     }
     entries = [
-        Entry(d.toward.edge, word, _opposite(i, drafts))
-        for i, (d, word) in enumerate(zip(drafts, words, strict=True))
+        Entry(d.toward.edge, word, ahead)
+        for d, word, ahead in zip(drafts, words, _opposites(drafts), strict=True)
     ]
     ranks = standings(entries, around.driving_side)
     if control == "all_way_stop":
@@ -192,17 +194,14 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
     return found
 
 
-def _opposite(i: int, drafts: list[_Draft]) -> int | None:
-    """Return the index of the road that lies straight ahead of another one."""
-    mine = heading_out(DirectedEdge(drafts[i].toward.edge, not drafts[i].toward.reverse), 15.0)
-    best, found = _OPPOSITE_COS, None
-    for j, d in enumerate(drafts):
-        if j != i:
-            other = heading_out(DirectedEdge(d.toward.edge, not d.toward.reverse), 15.0)
-            cos = float(mine @ other)
-            if cos < best:
-                best, found = cos, j
-    return found
+def _opposites(drafts: list[_Draft]) -> list[int | None]:
+    """Return for each road the index of the one that lies straight ahead."""
+    out = np.array(
+        [heading_out(DirectedEdge(d.toward.edge, not d.toward.reverse), 15.0) for d in drafts]
+    )
+    cos = out @ out.T
+    best = cos.argmin(axis=1)
+    return [int(j) if cos[i, j] < _OPPOSITE_COS else None for i, j in enumerate(best.tolist())]
 
 
 def _for_all(drafts: list[_Draft]) -> bool:

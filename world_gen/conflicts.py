@@ -17,6 +17,8 @@ SWEPT_HALF_WIDTH_M = 1.0
 """Half of what a car sweeps: 1.8 m of body and 0.1 m to each side, whatever the lane's width."""
 LEAST_AREA_M2 = 0.3
 """Paths that merely brush each other do not cross; those that end in one lane always meet."""
+PATH_TOLERANCE_M = 0.03
+"""Paths have a point each metre; where they meet is told to within this."""
 _MITRE_LIMIT = 2.0
 Indices = NDArray[np.int64]
 
@@ -141,10 +143,12 @@ def _swept(connections: Sequence[ConnectionDraft]) -> tuple[Array, Array]:
     Vertices move out along the mean normal of their two segments. Where a bend is too sharp for
     that the area is a buffer, which is slower.
     """
-    counts = np.array([len(c.centerline) for c in connections])
-    xy = np.concatenate([c.centerline for c in connections])
-    owner = np.repeat(np.arange(len(counts)), counts)
-    lines = shapely.linestrings(xy, indices=owner)
+    full = [len(c.centerline) for c in connections]
+    points = np.concatenate([c.centerline for c in connections])
+    lines = shapely.linestrings(points, indices=np.repeat(np.arange(len(full)), full))
+    lines = shapely.simplify(lines, PATH_TOLERANCE_M, preserve_topology=False)
+    xy, owner = shapely.get_coordinates(lines, return_index=True)
+    counts = np.bincount(owner, minlength=len(full))
     step = np.diff(xy, axis=0)
     step /= np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
     last = np.cumsum(counts) - 1

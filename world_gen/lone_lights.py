@@ -91,8 +91,8 @@ def _line(
         return None  # the lane begins here or does not come this way
     if "crossing" in tags[node]:
         at_m -= BEFORE_CROSSING_M
-    at_m = float(np.clip(at_m, min(0.5, 0.5 * length(lane.centerline)), length(lane.centerline)))
-    return line_across(lane, at_m, Choice("signal", "tagged"), f"light{node}")
+    back_m = length(lane.centerline) - at_m
+    return line_across(lane, back_m, Choice("signal", "tagged"), f"light{node}")
 
 
 def _heads(
