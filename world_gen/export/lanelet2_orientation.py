@@ -12,10 +12,12 @@ import numpy as np
 from contracts.arrays import Array
 from world_gen.export.lane_borders import Borders
 from world_gen.export.parallels import filled
-from world_gen.polyline import arc_lengths, points_at
+from world_gen.polyline import arc_lengths, left_of, points_at, unit
 
 _SHARES = (0.35, 0.65, 0.2, 0.8, 0.1, 0.9, 0.04, 0.96)
 """Where else on a line its middle point may lie, as shares of its length."""
+_SWING_M = 3.0
+"""How far a line swings out where the map turns a lane around on the spot."""
 
 
 def read_as_drawn(borders: Borders) -> bool:
@@ -42,13 +44,16 @@ def oriented(borders: Borders) -> Borders:
 
 
 def _variants(line: Array) -> list[Array]:
-    """Return the line with other middle points, and last a straight one with the same ends."""
+    """Return the line with other middle points, a straight one instead, and one that swings out."""
     straight = line[[0, -1]]
+    out = left_of(unit(straight[1] - straight[0])) * _SWING_M
+    middle = straight.mean(axis=0)
     return [
         line,
         *(_with_middle(line, share) for share in _SHARES),
         straight,
         *(_with_middle(straight, share) for share in _SHARES),
+        *(np.round([straight[0], middle + way, straight[1]], 3) for way in (out, -out)),
     ]
 
 
@@ -64,8 +69,9 @@ def _with_middle(line: Array, share: float) -> Array:
         return line
     at = share * s[-1]
     where = np.round(points_at(line, at), 3)
-    before = np.concatenate([line[s < at - 0.01], where[None]])
-    after = np.concatenate([where[None], line[s > at + 0.01]])
+    near = 0.1 * min(at, s[-1] - at)
+    before = np.concatenate([line[s < at - near], where[None]])
+    after = np.concatenate([where[None], line[s > at + near]])
     count = max(len(before), len(after))
     halves = filled(before, count)[:-1], filled(after, count)
     joined: Array = np.concatenate(halves)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -14,6 +15,8 @@ from contracts.frames import LocalFrame, geo_from_local
 from contracts.world import ATTRIBUTION, World
 
 Tags = Mapping[str, str]
+_NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""What an XML file cannot hold; names in a PBF map may."""
 LICENSE_URL = "https://opendatacommons.org/licenses/odbl/1-0/"
 
 
@@ -141,7 +144,7 @@ def _element(
     element = etree.Element(kind, {"id": str(number), "visible": "true", "version": "1", **place})
     element.extend(parts)
     for key, value in tags.items():
-        etree.SubElement(element, "tag", k=key, v=value)
+        etree.SubElement(element, "tag", k=key, v=_NOT_IN_XML.sub("", value))
     return element
 
 

@@ -30,6 +30,9 @@ PROBLEM = b"""<planningProblem id="999999999"><initialState>
 """The schema asks for a task; a map has none."""
 
 
+POLYGON = "its polygon is not valid"
+
+
 class Said(logging.Handler):
     """Counts what the reader logs, by its first words."""
 
@@ -81,7 +84,8 @@ def judged(path: str, schema: Any) -> dict[str, Any]:
         ),
         "lights": len(network.traffic_lights),
         "obstacles": len(scenario.obstacles),
-        "faults": faults,
+        "faults": [fault for fault in faults if not fault.endswith(POLYGON)],
+        "polygons": [fault for fault in faults if fault.endswith(POLYGON)],
         "schema": schema_errors(path, schema),
         "warnings": [str(w.message).splitlines()[0] for w in caught],
         "said": said.lines,
@@ -106,7 +110,7 @@ def faults_of(lanelet: Any, network: LaneletNetwork) -> list[str]:
     # What turns about one point touches itself there.
     closed = any(np.array_equal(line[0], line[-1]) for line in lines)
     if not (closed or lanelet.polygon.shapely_object.is_valid):
-        found.append(f"{lanelet.lanelet_id}: its polygon is not valid")
+        found.append(f"{lanelet.lanelet_id}: {POLYGON}")
     for number in lanelet.successor:
         other = network.find_lanelet_by_id(number)
         if lanelet.lanelet_id not in other.predecessor:

@@ -131,6 +131,14 @@ def test_the_projector_file_gives_back_the_local_coordinates(tmp_path: Path) -> 
         assert math.isfinite(float(node["ele"]))
 
 
+def test_a_name_that_xml_cannot_hold_loses_what_is_wrong_with_it(tmp_path: Path) -> None:
+    one, lanes = road("a", [(0.0, 0.0), (50.0, 0.0)], ahead=[3.0])
+    lanes = [msgspec.structs.replace(lanes[0], name="Bell\x07 <Street> & \x00Co")]
+    assert written(world((one, lanes)), tmp_path).lanelet("a.f0")[1]["road_name"] == (
+        "Bell <Street> & Co"
+    )
+
+
 def test_lanes_share_ways_side_by_side_and_nodes_one_after_another(tmp_path: Path) -> None:
     drawn = signalled_crossing()
     found = written(drawn, tmp_path)
@@ -311,7 +319,15 @@ FOLD = Borders(
 )
 
 
-@pytest.mark.parametrize("borders", [HAIRPIN, FOLD], ids=["hairpin", "fold"])
+TURNED_ON_THE_SPOT = Borders(
+    np.array([[123.482, 20.505], [124.282, 17.272]]),
+    np.array([[124.601, 17.189], [123.725, 20.727]]),
+)
+
+
+@pytest.mark.parametrize(
+    "borders", [HAIRPIN, FOLD, TURNED_ON_THE_SPOT], ids=["hairpin", "fold", "on the spot"]
+)
 def test_borders_are_drawn_so_that_lanelet2_keeps_their_direction(borders: Borders) -> None:
     assert not read_as_drawn(borders)
     better = oriented(borders)
