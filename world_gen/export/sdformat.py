@@ -30,6 +30,8 @@ from world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
 from world_gen.road_surface import RING_ISLAND
 
 SDF_VERSION = "1.7"
+NAMESPACE = "urn:foretwin:sdformat"
+"""Of our own elements, which SDFormat lets pass and keeps because they have a namespace."""
 ROAD_TOP_M, MARKING_TOP_M, SIDEWALK_TOP_M = 0.01, 0.02, 0.03
 RING_ISLAND_HEIGHT_M, TRAFFIC_ISLAND_HEIGHT_M = 1.0, 0.12
 BUILDING_TOLERANCE_M, AREA_TOLERANCE_M = 0.1, 0.02
@@ -68,6 +70,10 @@ def write_sdf(
     _check_names(vehicles)
     root = etree.Element("sdf", version=SDF_VERSION)
     element = child(root, "world", name=f"world_{world.id or 'unnamed'}")
+    attribution = etree.SubElement(
+        element, f"{{{NAMESPACE}}}attribution", nsmap={"foretwin": NAMESPACE}
+    )
+    attribution.text = world.attribution
     _surroundings(element, world, simulator)
     _road(element, world)
     _markings(element, world)
