@@ -81,8 +81,8 @@ def test_a_map_that_says_more_is_trusted_more():
     bare = report_of(world_of(crossing(street={"highway": "road"}, avenue={"highway": "road"})))
     told = {"highway": "tertiary", "name": "S", "lanes": "2", "lanes:forward": "1",
             "lanes:backward": "1", "maxspeed": "50", "oneway": "no",
-            "turn:lanes:forward": "through", "turn:lanes:backward": "through", "width:lanes:forward": "3.2",
-            "width:lanes:backward": "3.2"}  # fmt: skip
+            "turn:lanes:forward": "through", "turn:lanes:backward": "through",
+            "width:lanes:forward": "3.2", "width:lanes:backward": "3.2"}  # fmt: skip
     full = report_of(world_of(crossing(street=told, avenue=told)))
     assert full.junctions[0].confidence > bare.junctions[0].confidence + 0.1
 

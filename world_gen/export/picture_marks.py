@@ -1,139 +1,186 @@
-"""What explains a picture of a World: its colours, legend, scale bar, north arrow, notes."""
+"""What explains a picture of a World: legend, scale bar, north arrow, and a panel of text."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import textwrap
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from contracts.world import Provenance, Turn, World
+from contracts.world import World
+from world_gen.export.picture_style import (
+    BUS,
+    CROSSING_CONFLICT,
+    DASH,
+    DECK_EDGE,
+    HATCH,
+    HEIGHT_COLOURS,
+    HEIGHT_SCALE_M,
+    ISLAND,
+    ISLAND_EDGE,
+    LANE,
+    LINE_COLOUR,
+    MERGING_CONFLICT,
+    RING,
+    ROAD,
+    SIDEWALK,
+    SIGNAL,
+    TUNNEL,
+    TURN_COLOUR,
+    WAITS,
+    View,
+)
+from world_gen.report import JunctionReport, WorldReport
 
-GROUND, ROAD, JUNCTION, KERB = "#e9ece4", "#c9ccd1", "#b9bdc4", "#7c828a"
-LANE_EDGE, LANE, BUS, RING = "#ffffff", "#4c5560", "#a8326e", "#2b6f9e"
-ISLAND, ISLAND_EDGE = "#b7cfa1", "#6f8f56"
-TURN_COLOUR: Mapping[Turn, str] = {
-    "straight": "#2a7f3f",
-    "left": "#1f5fd0",
-    "right": "#d8781a",
-    "u_turn": "#8a3fb0",
-}
-LINE_COLOUR: Mapping[str, str] = {
-    "signal": "#d62728",
-    "stop": "#8b0000",
-    "give_way": "#e3a100",
-    "none": "#6b7280",
-}
-HATCH: Mapping[Provenance, str | None] = {"tagged": None, "inferred": "///", "default": "xxx"}
-HEIGHT_SCALE_M = Normalize(0.0, 40.0, clip=True)
-HEIGHT_COLOURS = "YlOrBr"
+_BUILDING = "#f3cf8e"
+_PANEL_COLUMNS, _PANEL_LINES = 84, 32
+_BOX = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 2.0}
 
 
-def scale_bar(axes: Axes, reach: float) -> None:
-    """Draw a bar of a round length at the lower left; `reach` is half the view in metres."""
-    size = next(s for s in (5, 10, 20, 50, 100, 200, 500) if s >= reach / 6 or s == 500)
-    x, y = -0.95 * reach, -0.94 * reach
+def scale_bar(axes: Axes, view: View) -> None:
+    """Draw a bar of a round length at the lower left."""
+    sizes = (5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
+    size = next((s for s in sizes if s >= view.width_m / 12), sizes[-1])
+    height = view.north_m - view.south_m
+    x, y = view.west_m + 0.025 * view.width_m, view.south_m + 0.03 * height
     axes.plot([x, x + size], [y, y], color="black", linewidth=4, solid_capstyle="butt", zorder=10)
     axes.text(
-        x + size / 2, y + 0.015 * reach, f"{size} m", ha="center", va="bottom", fontsize=12,
-        zorder=10,
-        bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.5},
+        x + size / 2, y + 0.008 * height, f"{size} m", ha="center", va="bottom", fontsize=11,
+        zorder=10, bbox=_BOX,
     )  # fmt: skip
 
 
 def north_arrow(axes: Axes) -> None:
     """Draw an arrow to the north at the upper right."""
     axes.annotate(
-        "N", xy=(0.965, 0.975), xytext=(0.965, 0.905), xycoords="axes fraction",
-        ha="center", va="center", fontsize=15, weight="bold", zorder=10,
-        arrowprops={"arrowstyle": "-|>", "lw": 2.5, "color": "black"},
-        bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 2.0},
+        "N", xy=(0.97, 0.975), xytext=(0.97, 0.905), xycoords="axes fraction",
+        ha="center", va="center", fontsize=14, weight="bold", zorder=10,
+        arrowprops={"arrowstyle": "-|>", "lw": 2.5, "color": "black"}, bbox=_BOX,
     )  # fmt: skip
 
 
-def draw_legend(figure: Figure, world: World) -> None:
-    """Explain every colour and pattern, and the scale of building heights."""
+def _line(colour: str, label: str, style: Any = "-", width: float = 2.0) -> Line2D:
+    return Line2D([], [], color=colour, linestyle=style, linewidth=width, label=label)
 
-    def line(colour: str, label: str, style: Any = "-", width: float = 2.0) -> Line2D:
-        return Line2D([], [], color=colour, linestyle=style, linewidth=width, label=label)
 
-    def dot(fill: str, label: str) -> Line2D:
-        return Line2D(
-            [],
-            [],
-            marker="o",
-            linestyle="",
-            color=fill,
-            markeredgecolor="#d62728",
-            markersize=9,
-            label=label,
-        )
+def _dot(marker: str, edge: str, fill: str, label: str, size: float = 8.0) -> Line2D:
+    return Line2D(
+        [], [], marker=marker, linestyle="", color=fill, markeredgecolor=edge, markersize=size,
+        markeredgewidth=1.4, label=label,
+    )  # fmt: skip
 
-    entries: list[Any] = [
-        line(colour, f"connection: {turn.replace('_', '-')}")
-        for turn, colour in TURN_COLOUR.items()
+
+def draw_legend(figure: Figure) -> None:
+    """Explain every colour, mark and pattern, in columns by subject."""
+    sources = [
+        _line("#222222", "tagged: said by the map"),
+        _line("#222222", "inferred: follows from other tags", DASH["inferred"]),
+        _line("#222222", "default: nothing says it", DASH["default"]),
+        _dot("^", LANE, LANE, "filled mark: tagged"),
+        _dot("^", LANE, "white", "hollow mark: inferred or default"),
     ]
-    entries += [
-        line(LANE, "lane, width tagged"),
-        line(LANE, "lane, width inferred", (0, (5, 3))),
-        line(RING, "ring lane", (0, (5, 3))),
-        line(BUS, "bus lane", (0, (5, 3))),
+    lanes = [
+        _line(LANE, "lane (dashes: where its number is from)"),
+        _line("#b9bdc4", "lane edge (dashes: its width)"),
+        _line(RING, "ring lane"),
+        _line(BUS, "bus lane"),
+        _dot("^", LANE, LANE, "driving direction", 7.0),
     ]
-    entries += [
-        line(
-            colour,
-            f"stop line: {'no control' if name == 'none' else name.replace('_', ' ')}",
-            "-",
-            4.0,
-        )
-        for name, colour in LINE_COLOUR.items()
+    turns = [_line(c, f"turn: {t.replace('_', '-')}") for t, c in TURN_COLOUR.items()]
+    turns.append(_dot("x", CROSSING_CONFLICT, CROSSING_CONFLICT, "paths cross", 6.0))
+    waits = [
+        *(
+            _line(LINE_COLOUR[name], f"stop line: {words}", width=4.0)
+            for name, words in (("signal", "signal"), ("stop", "stop"), ("give_way", "give way"))
+        ),
+        _line(LINE_COLOUR["none"], "stop line: no control", width=2.2),
+        _dot("+", MERGING_CONFLICT, MERGING_CONFLICT, "paths merge", 7.0),
     ]
-    entries += [
-        line("#555555", "control inferred", (0, (1.2, 0.7)), 4.0),
-        dot("#d62728", "signal tagged (with its group)"),
-        dot("white", "signal inferred"),
-        Patch(facecolor="white", edgecolor="#9097a0", hatch="|||", label="crossing"),
+    signs = [
+        _dot("v", WAITS, WAITS, "gives way by a sign"),
+        _dot("v", WAITS, "white", "gives way by a rule, no sign"),
+        _dot("8", LINE_COLOUR["stop"], LINE_COLOUR["stop"], "stops by a sign"),
+        _dot("D", WAITS, "white", "nobody first: near side goes", 7.0),
+        _dot("o", SIGNAL, SIGNAL, "signal head with its group", 9.0),
+    ]
+    ground: list[Any] = [
+        Patch(facecolor="white", edgecolor="#6f757d", hatch="|||",
+              label="crossing; frame: unmarked"),
         Patch(facecolor=ISLAND, edgecolor=ISLAND_EDGE, label="island"),
-        Patch(facecolor="#e8b96a", edgecolor="#5b4a3a", label="building, height tagged"),
-        Patch(facecolor="#e8b96a", edgecolor="#9a8a7a", hatch="///", label="height from levels"),
-        Patch(facecolor="#e8b96a", edgecolor="#9a8a7a", hatch="xxx", label="height default (6 m)"),
+        Patch(facecolor=SIDEWALK, edgecolor="none", label="sidewalk"),
+        Patch(facecolor=ROAD, edgecolor=DECK_EDGE, linewidth=1.6, label="bridge, above"),
+        Patch(facecolor=TUNNEL, alpha=0.4, label="tunnel, below"),
     ]  # fmt: skip
-    legend = figure.legend(
-        handles=entries, loc="lower left", bbox_to_anchor=(0.012, 0.002), ncols=5, fontsize=10,
-        frameon=False, columnspacing=1.6, handlelength=2.4,
+    heights = [
+        Patch(facecolor=_BUILDING, edgecolor="#3f3226", linewidth=1.4, label="height tagged"),
+        Patch(facecolor=_BUILDING, edgecolor="#75634f", hatch=HATCH["inferred"],
+              label="height from levels"),
+        Patch(facecolor=_BUILDING, edgecolor="#75634f", hatch=HATCH["default"],
+              label="height default"),
+        Patch(facecolor=_BUILDING, alpha=0.35, linestyle=":", edgecolor="#75634f",
+              label="open below"),
+        Patch(facecolor="none", edgecolor="none", label=""),
+    ]  # fmt: skip
+    columns: list[list[Any]] = [sources, lanes, turns, waits, signs, ground, heights]
+    figure.legend(
+        handles=[entry for column in columns for entry in column], loc="lower left",
+        bbox_to_anchor=(0.008, 0.022), ncols=len(columns), fontsize=9.2, frameon=False,
+        columnspacing=1.3, handlelength=2.2, handletextpad=0.6, labelcolor="#222222",
     )  # fmt: skip
-    for text in legend.get_texts():
-        text.set_color("#222222")
-    bar = figure.add_axes((0.6, 0.295, 0.2, 0.013))
-    figure.colorbar(
-        ScalarMappable(HEIGHT_SCALE_M, HEIGHT_COLOURS), cax=bar, orientation="horizontal"
-    )
-    bar.set_xlabel("building height in m", fontsize=10)
 
 
-def draw_notes(figure: Figure, world: World) -> None:
-    """List the arms, how much was guessed, and the World's notes."""
-    guessed = sum(lane.width_m.source != "tagged" for lane in world.lanes)
-    heights = [b.height_m.source for b in world.buildings]
-    lines = [
-        f"arm {arm.id}: {arm.name or 'unnamed'}, {arm.lanes_in} in, {arm.lanes_out} out"
-        for arm in world.junctions[0].arms[:8]
-    ]
+def draw_height_scale(figure: Figure, box: tuple[float, float, float, float]) -> None:
+    """Draw the scale of building heights."""
+    bar = figure.add_axes(box)
+    scale = ScalarMappable(HEIGHT_SCALE_M, HEIGHT_COLOURS)
+    figure.colorbar(scale, cax=bar, orientation="horizontal")
+    bar.set_xlabel("building height in m (40 and more: darkest)", fontsize=9)
+    bar.tick_params(labelsize=8)
+
+
+def draw_panel(figure: Figure, world: World, report: WorldReport, *, top: float) -> None:
+    """List the arms, what was guessed by subject, and the World's notes."""
+    lines: list[str] = []
+    if world.junctions:
+        junction = world.junctions[0]
+        lines += [
+            f"{arm.id:4} {arm.name or 'unnamed'}: {arm.lanes_in} in, {arm.lanes_out} out"
+            for arm in junction.arms[:8]
+        ]
+        lines += ["", *_table(report.junctions[0])]
+    b = report.buildings
     lines += [
         "",
-        f"lane widths inferred: {guessed} of {len(world.lanes)}",
-        f"building heights tagged {heights.count('tagged')}, "
-        f"from levels {heights.count('inferred')}, "
-        f"default {heights.count('default')}",
+        f"buildings: height tagged {b.tagged}, from levels {b.inferred}, default {b.default}",
     ]
-    lines += [f"note: {note[:88]}" for note in world.notes[:5]]
-    if len(world.notes) > 5:
-        lines.append(f"... and {len(world.notes) - 5} more notes")
+    if len(report.junctions) > 1:
+        known = [j.confidence for j in report.junctions if j.confidence is not None]
+        lines.append(
+            f"{len(report.junctions)} junctions in all, confidence "
+            f"{min(known, default=0.0):.2f} to {max(known, default=0.0):.2f}"
+        )
+    for note in report.notes:
+        lines += textwrap.wrap(
+            f"{note.kind} ({note.count})", _PANEL_COLUMNS, initial_indent="note: ",
+            subsequent_indent="      ",
+        )  # fmt: skip
+    if len(lines) > _PANEL_LINES:
+        lines = [*lines[: _PANEL_LINES - 1], "… more notes in the report"]
     figure.text(
-        0.6, 0.245, "\n".join(lines), fontsize=10, va="top", color="#222222", linespacing=1.35
-    )
+        0.612, top, "\n".join(lines), fontsize=9.6, va="top", color="#222222", linespacing=1.3,
+        family="monospace",
+    )  # fmt: skip
+
+
+def _table(junction: JunctionReport) -> list[str]:
+    return [
+        f"{'this junction':16}{'tagged':>8}{'inferred':>10}{'default':>9}{'confidence':>12}",
+        *(
+            f"{s.subject:16}{s.tagged:8}{s.inferred:10}{s.default:9}{s.confidence:12.2f}"
+            for s in junction.subjects
+        ),
+    ]

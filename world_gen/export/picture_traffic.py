@@ -1,0 +1,257 @@
+"""The traffic of a World's picture: lanes, turns, connections, lines, signals, who waits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+
+from contracts.arrays import Array
+from contracts.world import Conflict, Connection, Lane, Provenance, StopLine, Turn, World, YieldRule
+from world_gen.export.picture_style import (
+    BICYCLE,
+    BUS,
+    CROSSING_CONFLICT,
+    DASH,
+    LANE,
+    LANE_EDGE,
+    LINE_COLOUR,
+    MERGING_CONFLICT,
+    RING,
+    SIGNAL,
+    TRAM,
+    TURN_COLOUR,
+    WAITS,
+    View,
+)
+from world_gen.polyline import direction_at, left_of, length, offset, points_at
+
+ARROW_SPACING_M = 24.0
+_KIND_COLOUR: Mapping[str, str] = {"bus": BUS, "bicycle": BICYCLE, "tram": TRAM}
+_TURN_DEG: Mapping[Turn, float] = {"straight": 0.0, "left": 75.0, "right": -75.0, "u_turn": 160.0}
+_GENERAL: frozenset[YieldRule] = frozenset(("near_side", "order", "merge_order"))
+"""Rules under which two roads wait for each other: neither has priority."""
+_ACROSS: frozenset[YieldRule] = frozenset(("turn_across", "u_turn"))
+Above = dict[bool, float]
+
+
+def draw_traffic(axes: Axes, world: World, view: View) -> None:
+    """Draw lanes, then what leads across junctions, then what tells who goes first."""
+    _draw_lanes(axes, world, view)
+    _draw_connections(axes, world, view)
+    _draw_stop_lines(axes, world, view)
+    if view.close:
+        _draw_conflicts(axes, world, view)
+        _draw_who_waits(axes, world, view)
+    _draw_signals(axes, world, view)
+
+
+def _lines(axes: Axes, lines: list[Array], **style: Any) -> None:
+    if lines:
+        axes.add_collection(LineCollection(lines, **style))
+
+
+def _order(layer: int) -> float:
+    """Return how far above the ground's marks those of a bridge are drawn."""
+    return 2.0 if layer > 0 else 0.0
+
+
+def _draw_lanes(axes: Axes, world: World, view: View) -> None:
+    counted = {road.id: road.lane_count_source for road in world.roads}
+    near = [lane for lane in world.lanes if view.meets(lane.centerline)]
+    groups: dict[tuple[bool, bool, Provenance], list[Array]] = {}
+    middles: dict[tuple[bool, bool, str, Provenance], list[Array]] = {}
+    for lane in near:
+        half, up, down = lane.width_m.value / 2, lane.layer > 0, lane.layer < 0
+        borders = groups.setdefault((up, down, lane.width_m.source), [])
+        borders += [offset(lane.centerline, half), offset(lane.centerline, -half)]
+        key = up, down, _colour(lane), counted.get(lane.road_id, "inferred")
+        middles.setdefault(key, []).append(lane.centerline)
+    for (up, down, source), lines in groups.items():
+        _lines(
+            axes, lines, colors=LANE_EDGE, linestyles=DASH[source], alpha=0.45 if down else 1.0,
+            linewidths=1.2 if view.close else 0.5, zorder=4.5 + _order(up),
+        )  # fmt: skip
+    for (up, down, colour, source), lines in middles.items():
+        _lines(
+            axes, lines, colors=colour, linestyles=DASH[source], alpha=0.45 if down else 1.0,
+            linewidths=1.0 if view.close else 0.5, zorder=5.0 + _order(up),
+        )  # fmt: skip
+    if view.close:
+        _draw_arrows(axes, near, view)
+
+
+def _colour(lane: Lane) -> str:
+    return _KIND_COLOUR.get(lane.kind, RING if lane.role == "ring" else LANE)
+
+
+def _draw_arrows(axes: Axes, lanes: Iterable[Lane], view: View) -> None:
+    size = min(max(view.width_m / 90.0, 0.7), 1.25)
+    for lane in lanes:
+        total = length(lane.centerline)
+        if total < 4.0:
+            continue
+        colour, fade = _colour(lane), 0.5 if lane.layer < 0 else 1.0
+        heads: list[Array] = []
+        for at in np.arange(min(7.0, total / 2), total - 2.0, ARROW_SPACING_M):
+            s = float(total - at if lane.role == "approach" else at)
+            tip, ahead = points_at(lane.centerline, s), direction_at(lane.centerline, s - 0.1)
+            if not view.holds(tip):
+                continue
+            if lane.turns and at < 8.0 and lane.role in ("approach", "ring"):
+                _draw_turns(axes, lane, tip, ahead, size)
+            else:
+                heads.append(_head(tip, ahead, size))
+        if heads:
+            axes.add_collection(
+                PolyCollection(
+                    heads,
+                    facecolors=colour if lane.direction_source == "tagged" else "white",
+                    edgecolors=colour,
+                    linewidths=0.9,
+                    alpha=fade,
+                    zorder=6.0 + _order(lane.layer),
+                )
+            )
+
+
+def _head(tip: Array, ahead: Array, size: float) -> Array:
+    side = 0.5 * size * left_of(ahead)
+    return np.array([tip, tip - 1.4 * size * ahead + side, tip - 1.4 * size * ahead - side])
+
+
+def _draw_turns(axes: Axes, lane: Lane, at: Array, ahead: Array, size: float) -> None:
+    """Draw one arrow for each turn, within the lane, as it would be painted there."""
+    tagged = lane.turns_source == "tagged"
+    foot, fork = at - 4.6 * size * ahead, at - 2.2 * size * ahead
+    reach = dict.fromkeys(lane.turns, 1.5 * size) | {"straight": 2.6 * size}
+    for turn in lane.turns:
+        a = math.radians(_TURN_DEG[turn])
+        cos, sin = math.cos(a), math.sin(a)
+        way = np.array([cos * ahead[0] - sin * ahead[1], sin * ahead[0] + cos * ahead[1]])
+        tip = fork + reach[turn] * way
+        colour, order = TURN_COLOUR[turn], 6.3 + _order(lane.layer)
+        axes.add_collection(
+            LineCollection(
+                [np.array([foot, fork, tip - 0.7 * size * way])], colors=colour, zorder=order,
+                linewidths=1.6, linestyles=DASH["tagged"] if tagged else (0, (2, 1)),
+            )
+        )  # fmt: skip
+        axes.add_collection(
+            PolyCollection(
+                [_head(tip, way, 0.75 * size)], facecolors=colour if tagged else "white",
+                edgecolors=colour, linewidths=1.0, zorder=order + 0.1,
+            )
+        )  # fmt: skip
+
+
+def _draw_connections(axes: Axes, world: World, view: View) -> None:
+    source = {lane.id: lane.turns_source for lane in world.lanes}
+    groups: dict[tuple[bool, Turn, bool, bool], list[Array]] = {}
+    for connection in world.connections:
+        if view.meets(connection.centerline):
+            key = (
+                connection.layer > 0, connection.turn, bool(connection.junction_id),
+                source.get(connection.from_lane_id) == "tagged",
+            )  # fmt: skip
+            groups.setdefault(key, []).append(connection.centerline)
+    for (up, turn, in_junction, tagged), lines in groups.items():
+        _lines(
+            axes, lines, colors=TURN_COLOUR[turn],
+            linestyles=DASH["tagged" if tagged else "inferred"],
+            alpha=0.9 if in_junction else 0.5, zorder=5.5 + _order(up),
+            linewidths=(1.8 if tagged else 1.3) * (1.0 if view.close else 0.45),
+        )  # fmt: skip
+
+
+def _draw_stop_lines(axes: Axes, world: World, view: View) -> None:
+    groups: dict[tuple[str, Provenance], list[Array]] = {}
+    for line in world.stop_lines:
+        if view.holds(line.ends):
+            groups.setdefault((line.control.value, line.control.source), []).append(line.ends)
+    for (control, source), lines in groups.items():
+        _lines(
+            axes, lines, colors=LINE_COLOUR.get(control, LINE_COLOUR["none"]),
+            linestyles=DASH[source], capstyle="butt", zorder=6.0,
+            linewidths=(4.0 if control != "none" else 2.2) * (1.0 if view.close else 0.4),
+        )  # fmt: skip
+
+
+def _draw_conflicts(axes: Axes, world: World, view: View) -> None:
+    for kind, marker, colour in (
+        ("crossing", "x", CROSSING_CONFLICT), ("merging", "+", MERGING_CONFLICT),
+    ):  # fmt: skip
+        points = [c.point for c in world.conflicts if c.kind == kind and view.holds(c.point)]
+        if points:
+            axes.plot(
+                *np.array(points).T, marker, color=colour, markersize=4.0, markeredgewidth=0.9,
+                linestyle="", zorder=7.5, alpha=0.85,
+            )  # fmt: skip
+
+
+def _draw_who_waits(axes: Axes, world: World, view: View) -> None:
+    """Draw at the end of each lane why its drivers wait: a sign, a lesser road, the near side."""
+    line_of = {line.lane_id: line for line in world.stop_lines}
+    rules = _rules_by_lane(world.connections, world.conflicts)
+    for lane in world.lanes:
+        found, line = rules.get(lane.id, {}), line_of.get(lane.id)
+        mark = _mark(found, line)
+        end = lane.centerline[-1]
+        if mark is None or not view.holds(end):
+            continue
+        shape, source = mark
+        back = end - 1.6 * direction_at(lane.centerline, length(lane.centerline))
+        colour = LINE_COLOUR["stop"] if shape == "8" else WAITS
+        axes.plot(
+            *back, marker=shape, markersize=9.0, color=colour if source == "tagged" else "white",
+            markeredgecolor=colour, markeredgewidth=1.4, linestyle="", zorder=7.8,
+        )  # fmt: skip
+
+
+def _rules_by_lane(
+    connections: Iterable[Connection], conflicts: Iterable[Conflict]
+) -> dict[str, dict[YieldRule, Provenance]]:
+    """Return for lanes the rules under which their connections wait."""
+    start = {c.id: c.from_lane_id for c in connections}
+    found: dict[str, dict[YieldRule, Provenance]] = {}
+    for conflict in conflicts:
+        found.setdefault(start[conflict.yields_id], {})[conflict.rule] = conflict.source
+    return found
+
+
+def _mark(
+    rules: Mapping[YieldRule, Provenance], line: StopLine | None
+) -> tuple[str, Provenance] | None:
+    """Return the marker of the strongest reason to wait, and where it came from."""
+    control = None if line is None else line.control
+    if control is not None and control.value == "signal":
+        return None
+    if control is not None and control.value in ("stop", "give_way"):
+        return ("8" if control.value == "stop" else "v"), control.source
+    firm = [source for rule, source in rules.items() if rule not in _GENERAL | _ACROSS]
+    if firm:
+        return "v", "inferred"
+    if any(rule in _GENERAL for rule in rules):
+        return "D", "default"
+    return None
+
+
+def _draw_signals(axes: Axes, world: World, view: View) -> None:
+    for signal in world.signals:
+        x, y = signal.position[:2]
+        if not view.holds(signal.position[:2]):
+            continue
+        tagged = signal.source == "tagged"
+        axes.plot(
+            x, y, "o", markersize=12 if view.close else 3.5, color=SIGNAL if tagged else "white",
+            markeredgecolor=SIGNAL, markeredgewidth=1.6, zorder=8.6,
+        )  # fmt: skip
+        if view.close:
+            axes.annotate(
+                signal.group_id.rpartition(":")[2], (x, y), ha="center", va="center", zorder=9.0,
+                fontsize=6.5, color="white" if tagged else SIGNAL, annotation_clip=True,
+            )  # fmt: skip
