@@ -53,7 +53,7 @@ def proj_of(frame: LocalFrame) -> str:
     """Return the PROJ string of a local frame (see `contracts.frames`)."""
     return (
         f"+proj=tmerc +lat_0={frame.origin.lat_deg!r} +lon_0={frame.origin.lon_deg!r} "
-        "+k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m +no_defs"
+        "+k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"
     )
 
 
