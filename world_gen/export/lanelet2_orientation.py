@@ -46,14 +46,15 @@ def oriented(borders: Borders) -> Borders:
 def _variants(line: Array) -> list[Array]:
     """Return the line with other middle points, a straight one instead, and one that swings out."""
     straight = line[[0, -1]]
-    out = left_of(unit(straight[1] - straight[0])) * _SWING_M
-    middle = straight.mean(axis=0)
+    along = unit(straight[1] - straight[0]) * _SWING_M
+    out, middle = left_of(along), straight.mean(axis=0)
+    swings = [side + shift for shift in (0.0 * along, along, -along) for side in (out, -out)]
     return [
         line,
         *(_with_middle(line, share) for share in _SHARES),
         straight,
         *(_with_middle(straight, share) for share in _SHARES),
-        *(np.round([straight[0], middle + way, straight[1]], 3) for way in (out, -out)),
+        *(np.round([straight[0], middle + way, straight[1]], 3) for way in swings),
     ]
 
 
