@@ -8,7 +8,7 @@ from lxml import etree
 
 from contracts.frames import LocalFrame
 from contracts.world import ATTRIBUTION, World
-from world_gen.export.opendrive_elements import Version, number, road_element
+from world_gen.export.opendrive_elements import Version, number, road_element, text
 from world_gen.export.opendrive_junctions import junction_elements, ring_elements
 from world_gen.export.opendrive_objects import add_objects
 from world_gen.export.opendrive_places import network_of
@@ -33,7 +33,9 @@ def opendrive_element(world: World, *, version: Version = "1.8") -> etree._Eleme
     if not network.roads:
         raise ValueError(f"world {world.id}: no road with lanes to write as OpenDRIVE")
     root = etree.Element("OpenDRIVE")
-    root.append(etree.Comment(f" Made by foretwin from map data: {world.attribution} "))
+    root.append(
+        etree.Comment(f" Made by foretwin from map data: {_in_comment(world.attribution)} ")
+    )
     root.append(_header(world, version))
     elements = {
         road.id: road_element(road, side=network.side, version=version) for road in network.roads
@@ -67,7 +69,7 @@ def _header(world: World, version: Version) -> etree._Element:
         "header",
         revMajor="1",
         revMinor=version.partition(".")[2],
-        name=world.intersection.name or world.intersection.id,
+        name=text(world.intersection.name or world.intersection.id),
         version="1.00",
         north=number(north),
         south=number(south),
@@ -86,9 +88,13 @@ def _header(world: World, version: Version) -> etree._Element:
             resource="https://www.openstreetmap.org/copyright",
         )
     for code, value in (
-        ("attribution", world.attribution),
+        ("attribution", text(world.attribution)),
         ("foretwin_world", world.id),
         ("map_sha256", world.map_sha256),
     ):
         etree.SubElement(header, "userData", code=code, value=value)
     return header
+
+
+def _in_comment(words: str) -> str:
+    return text(words).replace("--", "- -").rstrip("-")

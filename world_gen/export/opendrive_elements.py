@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Literal
 
 from lxml import etree
@@ -44,6 +45,14 @@ LINE_M = 0.12
 """Width of a lane marking."""
 
 
+_UNFIT = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def text(words: str) -> str:
+    """Return words from a map with what XML 1.0 cannot hold as question marks."""
+    return _UNFIT.sub("?", words)
+
+
 def number(value: float) -> str:
     """Return a number with as many digits as a nanometre over a kilometre needs."""
     return f"{value + 0.0:.12g}"
@@ -51,7 +60,7 @@ def number(value: float) -> str:
 
 def road_element(road: OdrRoad, *, side: DrivingSide, version: Version) -> etree._Element:
     """Return a `<road>` without objects and signals."""
-    element = etree.Element("road", name=road.name, length=number(road.curve.length_m))
+    element = etree.Element("road", name=text(road.name), length=number(road.curve.length_m))
     element.set("id", str(road.id))
     element.set("junction", str(road.junction))
     if version == "1.8" or side == "left":

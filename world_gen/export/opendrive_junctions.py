@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from lxml import etree
 
 from contracts.world import World
-from world_gen.export.opendrive_elements import Version
+from world_gen.export.opendrive_elements import Version, text
 from world_gen.export.opendrive_places import OdrJunction, OdrNetwork
 from world_gen.export.opendrive_signals import Controller
 
@@ -54,7 +54,7 @@ def _element(
     controllers: Sequence[int],
     version: Version,
 ) -> etree._Element:
-    element = etree.Element("junction", name=name)
+    element = etree.Element("junction", name=text(name))
     element.set("id", str(junction.id))
     if version == "1.8":
         element.set("type", "default")

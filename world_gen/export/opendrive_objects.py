@@ -15,7 +15,7 @@ from lxml import etree
 
 from contracts.arrays import Array
 from contracts.world import Crossing, StopLine, World
-from world_gen.export.opendrive_elements import Version, number
+from world_gen.export.opendrive_elements import Version, number, text
 from world_gen.export.opendrive_places import OdrNetwork
 from world_gen.export.opendrive_roads import OdrRoad
 from world_gen.polyline import left_of, unit
@@ -175,7 +175,7 @@ def _add_structure(group: etree._Element, road: OdrRoad, own: int) -> None:
         "tunnel" if source.tunnel else "bridge",
         s="0",
         length=number(road.curve.length_m),
-        name=road.name,
+        name=text(road.name),
         type="standard" if source.tunnel else "concrete",
     )
     item.set("id", str(own))

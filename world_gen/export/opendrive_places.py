@@ -200,6 +200,8 @@ def _junction(
         b = End(road_of[to.id], to.reverse)
         road = _connecting_road(connection, number + i, a, b, start, to, side)
         road.junction = number
+        for end in (a, b):
+            end.road.link(at_end=end.at_end, to=("junction", number, False))
         made.append(
             OdrConnection(
                 connection=connection,

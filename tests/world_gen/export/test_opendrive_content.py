@@ -214,3 +214,14 @@ def test_lanes_that_may_be_changed_have_a_broken_line(tmp_path: Path) -> None:
 def test_a_world_without_roads_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="no road with lanes"):
         write_opendrive(drawn_world.world(), tmp_path / "empty.xodr")
+
+
+def test_names_that_xml_cannot_hold_are_written_all_the_same(tmp_path: Path) -> None:
+    world = plain()
+    odd = "A\x00B\x0b<\ud800&\"'"
+    roads = tuple(msgspec.structs.replace(road, name=odd) for road in world.roads)
+    world = msgspec.structs.replace(world, roads=roads, attribution="made -- by us -")
+    file = written(world, tmp_path)
+    assert {r.element.get("name") for r in file.roads.values()} == {"A?B?<?&\"'"}
+    told = {u.get("code"): u.get("value") for u in file.root.find("header").findall("userData")}
+    assert told["attribution"] == "made -- by us -"
