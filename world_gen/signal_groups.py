@@ -80,7 +80,7 @@ def lane_groups(
                 )
     of_lane: dict[str, LaneGroup] = {}
     for name, groups in by_junction.items():
-        groups.sort(key=lambda g: (round(g.bearing_rad % math.tau, 3), g.turning, g.lanes[0].id))
+        groups.sort(key=lambda g: (round(g.bearing_rad, 3) % math.tau, g.turning, g.lanes[0].id))
         for i, group in enumerate(groups):
             group.id = f"{name}:g{i}"
             of_lane.update((lane.id, group) for lane in group.lanes)
