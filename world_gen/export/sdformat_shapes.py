@@ -16,8 +16,8 @@ from contracts.arrays import Array
 Rgba = tuple[float, float, float, float]
 Element = etree._Element
 
-SAME_POINT_M = 0.002
-"""Gazebo triangulates extrusions after joining points this near: they must not be in the file."""
+GRID_M = 0.001
+"""Points lie on this grid, as they are written, so that outlines in the file are valid."""
 LEAST_AREA_M2 = 0.05
 _MANY_POINTS = 400
 """Outlines with more are halved: triangulating grows faster than the number of points."""
@@ -164,11 +164,17 @@ def extrusions(
         shape = shape.simplify(tolerance_m)
     if not shape.is_valid:
         shape = shapely.make_valid(shape)
-    rings: list[Array | None] = []
-    for part in shapely.get_parts(shape):
-        if isinstance(part, Polygon):
-            rings.extend(_ring(piece) for piece in _without_holes(part))
-    return [ring for ring in rings if ring is not None]
+    pieces = [
+        piece
+        for part in shapely.get_parts(shape)
+        if isinstance(part, Polygon)
+        for piece in _without_holes(part)
+    ]
+    return [
+        shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:-1]
+        for part in shapely.get_parts(shapely.set_precision(pieces, GRID_M))
+        if isinstance(part, Polygon) and part.area > LEAST_AREA_M2
+    ]
 
 
 def _without_holes(polygon: Polygon) -> list[Polygon]:
@@ -195,12 +201,3 @@ def _without_holes(polygon: Polygon) -> list[Polygon]:
             if isinstance(part, Polygon):
                 pieces.extend(_without_holes(part))
     return pieces
-
-
-def _ring(polygon: Polygon) -> Array | None:
-    ring: Array = np.round(shapely.get_coordinates(shapely.orient_polygons(polygon).exterior), 3)[
-        :-1
-    ]
-    apart = np.hypot(*(ring - np.roll(ring, 1, axis=0)).T) > SAME_POINT_M
-    ring = ring[apart]
-    return ring if len(ring) >= 3 else None

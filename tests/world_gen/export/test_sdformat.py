@@ -243,6 +243,12 @@ def test_extrusions_cover_a_polygon_and_none_of_its_holes(
     assert sum(piece.area for piece in pieces) == pytest.approx(wanted.area, rel=0.01)
 
 
+def test_extrusions_of_what_is_no_area_and_of_a_bow_tie() -> None:
+    assert extrusions(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])) == []
+    bow_tie = np.array([[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0]])
+    assert sorted(Polygon(ring).area for ring in extrusions(bow_tie)) == [1.0, 1.0]
+
+
 # --- judged by libsdformat ---
 
 
