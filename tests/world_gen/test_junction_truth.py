@@ -16,12 +16,12 @@ from tests.world_gen.truth_sheet import FOLDER, TrueJunction, true_maps
 AT_LEAST = {
     "kind": 1.0,
     "control": 1.0,
-    "arms": 0.98,
-    "lanes": 0.90,
-    "movements": 0.95,
-    "turns": 0.95,
+    "arms": 1.0,
+    "lanes": 0.99,
+    "movements": 0.99,
+    "turns": 0.99,
     "ring": 1.0,
-    "yields": 0.98,
+    "yields": 1.0,
 }
 
 
@@ -41,8 +41,21 @@ def test_worlds_agree_with_the_truth(scores: dict[str, Score]) -> None:
 
 def test_there_are_forty_maps_and_enough_to_ask(scores: dict[str, Score]) -> None:
     assert len(scores) >= 40
-    assert sum(found.asked["yields"] for found in scores.values()) > 500
+    assert sum(found.asked["yields"] for found in scores.values()) > 600
     assert sum(found.asked["ring"] for found in scores.values()) >= 6
+
+
+def test_the_world_misses_no_conflict_but_where_two_lanes_lead_out(
+    scores: dict[str, Score],
+) -> None:
+    missed = {
+        name: words
+        for name, found in scores.items()
+        if (words := [word for word in found.unlisted if word.endswith("(truth)")])
+    }
+    two_lanes_out = {"06_dual_and_single", "07_dual_and_dual", "32_restriction_via_way",
+                     "49_left_hand_dual"}  # fmt: skip
+    assert missed.keys() <= two_lanes_out, missed
 
 
 def test_the_maps_are_what_the_drawings_say(tmp_path: Path) -> None:
