@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -200,26 +199,10 @@ def _score_ring(truth: TrueJunction, world: World, seen: Seen, result: Score) ->
     result.ask("ring", way == truth.ring, f"the ring runs {way}, not {truth.ring}")
 
 
-class Meeting(NamedTuple):
-    """Two connections that meet, and which of them waits by what rule."""
-
-    first_id: str
-    second_id: str
-    yields_id: str
-    rule: str
-
-
-def _meetings(world: World) -> list[Meeting]:
-    """Return the World's conflicts, or what its connections say where it lists none."""
-    if world.conflicts:
-        return [Meeting(c.first_id, c.second_id, c.yields_id, c.rule) for c in world.conflicts]
-    return [Meeting(c.id, other, c.id, "") for c in world.connections for other in c.yields_to]
-
-
 def _score_entries(truth: TrueJunction, world: World, seen: Seen, result: Score) -> None:
     """Ask at each arm whether who enters waits for the ring, at every meeting of the two."""
     answers: dict[str, list[bool]] = defaultdict(list)
-    for conflict in _meetings(world):
+    for conflict in world.conflicts:
         pair = [seen.connections.get(key) for key in (conflict.first_id, conflict.second_id)]
         for entry, other in (pair, pair[::-1]):
             if entry is None or other is None:
@@ -238,7 +221,7 @@ def _score_entries(truth: TrueJunction, world: World, seen: Seen, result: Score)
 def _score_yields(truth: TrueJunction, world: World, seen: Seen, result: Score) -> None:
     answers: dict[frozenset[str], set[str]] = defaultdict(set)
     rules: dict[frozenset[str], set[str]] = defaultdict(set)
-    for conflict in _meetings(world):
+    for conflict in world.conflicts:
         if conflict.first_id not in seen.connections or conflict.second_id not in seen.connections:
             continue
         for first in seen.movements_of[conflict.first_id]:
