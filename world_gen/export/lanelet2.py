@@ -17,7 +17,7 @@ from world_gen.export.lanelet2_markings import VIRTUAL, border_tags
 from world_gen.export.lanelet2_orientation import oriented
 from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
 from world_gen.export.lanelet2_rules import LaneletRules, add_rules
-from world_gen.export.lanelet2_surroundings import add_surroundings
+from world_gen.export.lanelet2_surroundings import add_intersection_areas, add_surroundings
 from world_gen.export.road_heights import RoadHeights
 from world_gen.polyline import left_of, unit
 
@@ -62,12 +62,15 @@ def lanelet2_map(world: World, *, crosswalk_rules: bool = False) -> Lanelet2Map:
     crosswalks = {c.id: _crosswalk(c, drawn) for c in world.crossings}
     ids = {name: drawn.new_id() for name in members}
     rules = add_rules(world, ids, crosswalks if crosswalk_rules else {}, drawn)
+    areas = add_intersection_areas(world, drawn)
     lanes = {lane.id: lane for lane in world.lanes}
     for lane in world.lanes:
         _add_lanelet(lane.id, _lane_tags(lane), members, ids, rules, drawn)
     for connection in world.connections:
         if connection.id in members:
             tags = _connection_tags(connection, lanes, world)
+            if connection.junction_id in areas:
+                tags["intersection_area"] = str(areas[connection.junction_id])
             _add_lanelet(connection.id, tags, members, ids, rules, drawn)
     add_surroundings(world, drawn)
     return drawn

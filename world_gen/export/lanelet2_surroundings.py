@@ -37,6 +37,20 @@ def add_surroundings(world: World, drawn: Lanelet2Map) -> None:
         _add_area(sidewalk.outline, sidewalk.holes, tags, drawn, edge=edge)
 
 
+def add_intersection_areas(world: World, drawn: Lanelet2Map) -> dict[str, int]:
+    """Draw the ground of each junction, as Autoware wants it, and return its way by junction."""
+    found: dict[str, int] = {}
+    for junction in world.junctions:
+        area = junction.area
+        if area is None or len(area.outline) < 3 or not Polygon(area.outline).is_valid:
+            continue
+        nodes = tuple(drawn.node(x, y, 0.0) for x, y in area.outline.tolist())
+        name = junction.summary.id
+        tags = {"type": "intersection_area", "area": "yes", "foretwin:id": name}
+        found[name] = drawn.way(nodes, tags)
+    return found
+
+
 def _add_area(
     outline: Array, holes: Sequence[Array], tags: Tags, drawn: Lanelet2Map, *, edge: Tags
 ) -> None:

@@ -1,0 +1,116 @@
+"""Regulatory elements of Lanelet2 maps: lights, who waits for whom, stops and crosswalks."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from contracts.world import (
+    Choice,
+    Crossing,
+    Quantity,
+    Signal,
+    WorldJunction,
+)
+from tests.world_gen.drawn_maps import crossing, world_of
+from tests.world_gen.export.drawn_world import road, world
+from tests.world_gen.export.lanelet2_file import written
+from tests.world_gen.export.signalled import signalled_crossing
+
+
+def test_lights_stand_at_height_and_name_their_stop_line(tmp_path: Path) -> None:
+    drawn = signalled_crossing()
+    found = written(drawn, tmp_path)
+    rules = found.rules("traffic_light")
+    assert len(rules) == 4
+    named = [ref for members, _ in found.relations.values() for _, ref, role in members
+             if role == "regulatory_element"]  # fmt: skip
+    for rule, members, _ in rules:
+        roles = {role: ref for _, ref, role in members}
+        light, tags = found.ways[roles["refers"]]
+        assert float(tags["height"]) == 0.9
+        assert [float(found.nodes[n]["ele"]) for n in light] == [2.55, 2.55]
+        bulbs = [found.nodes[n] for n in found.ways[roles["light_bulbs"]][0]]
+        assert [b["color"] for b in bulbs] == ["red", "yellow", "green"]
+        assert found.ways[roles["ref_line"]][1]["type"] == "stop_line"
+        assert named.count(rule) == 4  # the lane before the line and its three movements
+
+
+def test_a_light_lies_from_left_to_right_as_its_driver_sees_it(tmp_path: Path) -> None:
+    head = Signal(
+        id="s", osm_node=None, group_id="g", lane_ids=("a.f0",),
+        position=np.array([50.0, -5.0, 3.0]), yaw_rad=math.pi, source="inferred",
+    )  # fmt: skip
+    drawn = world(road("a", [(0.0, 0.0), (49.0, 0.0)], ahead=[3.0]), signals=(head,))
+    found = written(drawn, tmp_path)
+    edge = next(nodes for nodes, tags in found.ways.values() if tags["type"] == "traffic_light")
+    left, right = (float(found.nodes[n]["local_y"]) for n in edge)
+    assert left > right  # who drives east has the north at the left hand
+
+
+def test_who_waits_is_told_once_and_is_a_fallback_where_lights_part_the_two(
+    tmp_path: Path,
+) -> None:
+    drawn = signalled_crossing()
+    found = written(drawn, tmp_path)
+    told: dict[tuple[int, int], bool] = {}
+    for rule, members, tags in found.rules("right_of_way"):
+        (loser,) = [ref for _, ref, role in members if role == "yield"]
+        winners = [ref for _, ref, role in members if role == "right_of_way"]
+        for ref in (loser, *winners):
+            assert ("relation", rule, "regulatory_element") in found.relations[ref][0]
+        for winner in winners:
+            assert (loser, winner) not in told
+            told[loser, winner] = tags.get("fallback") == "yes"
+    group = {found.id_of(c.id): c.signal_group_id for c in drawn.connections}
+    assert told == {
+        (found.id_of(c.yields_id), found.id_of(c.second_id)): (
+            group[found.id_of(c.first_id)] != group[found.id_of(c.second_id)]
+        )
+        for c in drawn.conflicts
+    }
+
+
+def test_an_all_way_stop_lists_a_line_for_each_lane(tmp_path: Path) -> None:
+    drawn = world_of(crossing(node_tags={0: {"highway": "stop", "stop": "all"}}))
+    junction = drawn.intersection
+    assert junction.control == "all_way_stop"
+    drawn = msgspec.structs.replace(
+        drawn,
+        connections=tuple(
+            msgspec.structs.replace(c, junction_id=junction.id) for c in drawn.connections
+        ),
+        junctions=(WorldJunction(summary=junction, arms=(), area=None),),
+    )
+    found = written(drawn, tmp_path)
+    ((rule, members, _),) = found.rules("all_way_stop")
+    waiting = [ref for _, ref, role in members if role == "yield"]
+    lines = [ref for _, ref, role in members if role == "ref_line"]
+    assert len(waiting) == len(lines) == 4
+    for lanelet in waiting:
+        assert ("relation", rule, "regulatory_element") in found.relations[lanelet][0]
+    assert not found.rules("right_of_way")
+
+
+def test_a_crosswalk_is_a_lanelet_as_wide_as_it_is(tmp_path: Path) -> None:
+    zebra = Crossing(
+        id="x", line=np.array([[20.0, -3.0], [20.0, 3.0]]), width_m=Quantity(4.0, "default"),
+        kind=Choice("zebra", "tagged"),
+    )  # fmt: skip
+    one = road("a", [(0.0, 0.0), (50.0, 0.0)], ahead=[3.0], against=[3.0])
+    drawn = world(one, crossings=(zebra,))
+    found = written(drawn, tmp_path)
+    members, tags = found.lanelet("x")
+    assert tags["subtype"] == "crosswalk"
+    assert tags["participant:pedestrian"] == "yes"
+    assert tags["one_way"] == "no"
+    xs = [{float(found.nodes[n]["local_x"]) for n in found.ways[ref][0]} for _, ref, _ in members]
+    assert xs == [{18.0}, {22.0}]  # walking north, the left side lies in the west
+    assert not found.rules("crosswalk")  # the Lanelet2 library knows none
+    with_rules = written(drawn, tmp_path, crosswalk_rules=True)
+    ((rule, _, _),) = with_rules.rules("crosswalk")
+    for lane in ("a.f0", "a.b0"):
+        assert ("relation", rule, "regulatory_element") in with_rules.lanelet(lane)[0]
