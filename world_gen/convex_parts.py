@@ -59,7 +59,7 @@ def convex_cover(
     Self-crossing outlines are mended.
     """
     share_m = tolerance_m / 3
-    shapes, owner = _sound(_polygons(outlines))
+    shapes, owner = _sound(polygons_from(outlines))
     simple = shapely.simplify(shapes, share_m, preserve_topology=True)
     worse = ~shapely.is_valid(simple) | shapely.is_empty(simple)
     simple[worse] = shapes[worse]
@@ -75,7 +75,7 @@ def convex_cover(
 _POLYGON = 3
 
 
-def _polygons(outlines: Sequence[tuple[Array, tuple[Array, ...]]]) -> Geometries:
+def polygons_from(outlines: Sequence[tuple[Array, tuple[Array, ...]]]) -> Geometries:
     """Return polygons of outlines and holes, made from one array of coordinates."""
     rings = [ring for outline, holes in outlines for ring in (outline, *holes)]
     if not rings:

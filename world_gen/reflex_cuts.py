@@ -17,6 +17,7 @@ _SNAP_M = 1e-6
 _TO_CORNER_M = 0.06
 """A cut that ends this near a corner ends there, lest a sliver be left beside it."""
 _MIN_AREA_M2 = 1e-4
+_EQUAL_M2, _SURE_M2 = 1e-6, 0.01
 _DENSIFY = 0.1
 _POLYGON = 3
 _INTO_HOLE_M = 0.002
@@ -48,14 +49,19 @@ def cut_at_reflex_corners(polygons: Geometries, tolerance_m: float) -> tuple[Geo
 def nearly_the_same(
     shapes: Geometries, others: Geometries, tolerance_m: float
 ) -> npt.NDArray[np.bool_]:
-    """Return which polygons' edges lie within `tolerance_m` of the edges of their counterparts."""
-    a, b = shapely.get_exterior_ring(shapes), shapely.get_exterior_ring(others)
-    near: npt.NDArray[np.bool_] = shapely.hausdorff_distance(a, b) <= tolerance_m
+    """Return which polygons' edges lie within `tolerance_m` of the edges of those they hold."""
+    missing = np.abs(shapely.area(shapes) - shapely.area(others))
+    near: npt.NDArray[np.bool_] = missing <= _EQUAL_M2
+    # A strip along the edge is no wider than this only where it has no more area than that.
+    at = np.flatnonzero(~near & (missing <= tolerance_m * shapely.length(shapes)))
+    a, b = shapely.get_exterior_ring(shapes[at]), shapely.get_exterior_ring(others[at])
+    at_corners = shapely.hausdorff_distance(a, b) <= tolerance_m
+    at, a, b = at[at_corners], a[at_corners], b[at_corners]
     # The corners alone miss a pocket behind a spike: look along the edges too.
-    doubtful = np.flatnonzero(near & (np.abs(shapely.area(shapes) - shapely.area(others)) > 0.01))
-    near[doubtful] = (
-        shapely.hausdorff_distance(a[doubtful], b[doubtful], densify=_DENSIFY) <= tolerance_m
-    )
+    doubtful = missing[at] > _SURE_M2
+    along = shapely.hausdorff_distance(a[doubtful], b[doubtful], densify=_DENSIFY) <= tolerance_m
+    near[at[~doubtful]] = True
+    near[at[doubtful][along]] = True
     return near
 
 

@@ -20,6 +20,7 @@ BENCHMARKS = (
     "futures_closed_loop_20hz",
     "futures_full_scene",
     "world_from_open_map",
+    "world_stages",
     "world_cutout_vs_netconvert",
     "world_monaco_vs_netconvert",
     "world_liechtenstein_vs_netconvert",

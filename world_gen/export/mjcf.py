@@ -12,13 +12,15 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 import shapely
 from shapely.geometry import Polygon
 
 from contracts.arrays import Array
 from contracts.world import Building, World
-from world_gen.convex_parts import convex_cover
+from world_gen.convex_parts import convex_cover, polygons_from
 from world_gen.islands import RING_ISLAND
+from world_gen.reflex_cuts import polygons_of
 
 STATIC = 1
 """Contype of buildings and islands; their conaffinity is VEHICLE."""
@@ -102,7 +104,7 @@ def _near_road(world: World) -> list[Building]:
     roads = [Polygon(area.outline).simplify(1.0) for area in world.road_surface]
     reach = shapely.union_all(shapely.buffer(roads, WORKER_REACH_M, quad_segs=2))
     shapely.prepare(reach)
-    outlines = np.array([Polygon(b.outline) for b in world.buildings], dtype=object)
+    outlines = polygons_from([(b.outline, ()) for b in world.buildings])
     near = shapely.intersects(reach, outlines).tolist()
     return [b for b, is_near in zip(world.buildings, near, strict=True) if is_near]
 
@@ -185,16 +187,22 @@ def _prism_faces(n: int) -> list[int]:
     return faces
 
 
+def _valid(shapes: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
+    bad = ~shapely.is_valid(shapes)
+    shapes[bad] = shapely.make_valid(shapes[bad])
+    return shapes
+
+
 def _add_road(spec: mujoco.MjSpec, world: World) -> None:
     """Add the road surface as a mesh that is seen and never touched."""
-    triangles: list[Array] = []
-    for area in world.road_surface:
-        shape = shapely.make_valid(Polygon(area.outline, area.holes))
-        found = shapely.constrained_delaunay_triangles(shape)
-        triangles.extend(shapely.get_coordinates(t)[:3] for t in found.geoms if t.area > 1e-4)
-    if not triangles:
+    shapes = polygons_from([(area.outline, area.holes) for area in world.road_surface])
+    sound, _ = polygons_of(_valid(shapes), np.arange(len(shapes)))
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(sound))
+    triangles = triangles[shapely.area(triangles) > 1e-4]
+    if not len(triangles):
         return
-    corners, rows = np.unique(np.round(np.concatenate(triangles), 4), axis=0, return_inverse=True)
+    points = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
+    corners, rows = np.unique(np.round(points, 4), axis=0, return_inverse=True)
     faces = rows.reshape(-1, 3)
     a, b, c = (corners[faces[:, k]] for k in range(3))
     cross = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
