@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -26,6 +26,8 @@ from world_gen.polyline import unit
 MIN_ROAD_M = 0.005
 """Where two lanes meet in one point a connecting road has this length: too short for a gap."""
 _MEET_M = 0.005
+_ASIDE_M = 0.05
+"""Lanes of joined roads whose ends lie farther apart are not linked: a file must not jump."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,17 +128,20 @@ def _goes_on(place: _Place, lanes: Mapping[str, Lane]) -> bool:
     a, b = place.ends
     if math.hypot(*(_tip(a) - _tip(b))) > _MEET_M:
         return False
-    return bool(_pairs(a.road, b.road, lanes) or _pairs(b.road, a.road, lanes))
+    first, second = a.road.lane_ids, b.road.lane_ids
+    return bool(_pairs(first, second, lanes) or _pairs(second, first, lanes))
 
 
-def _pairs(start: Road, to: Road, lanes: Mapping[str, Lane]) -> list[tuple[Lane, Lane]]:
-    ahead = set(to.lane_ids)
+def _pairs(
+    start: Iterable[str], to: Collection[str], lanes: Mapping[str, Lane]
+) -> list[tuple[Lane, Lane]]:
+    """Return which lanes of one road, by id, lead straight into which of another."""
     return [
         (lanes[i], lanes[j])
-        for i in start.lane_ids
+        for i in start
         if i in lanes
         for j in lanes[i].successor_ids
-        if j in ahead and j in lanes
+        if j in to and j in lanes
     ]
 
 
@@ -165,11 +170,15 @@ def _join(a: End, b: End, lanes: Mapping[str, Lane]) -> None:
     """Link two roads and those of their lanes that go on."""
     a.road.link(at_end=a.at_end, to=("road", b.road.id, b.at_end))
     b.road.link(at_end=b.at_end, to=("road", a.road.id, a.at_end))
-    assert a.road.road is not None
-    assert b.road.road is not None
     for start, to in ((a, b), (b, a)):
-        for one, other in _pairs(start.road.road, to.road.road, lanes):  # type: ignore[arg-type]
-            if one.reverse == (not start.at_end) and other.reverse == to.at_end:
+        for one, other in _pairs(start.road.numbers, to.road.numbers, lanes):
+            if one.reverse == start.at_end or other.reverse != to.at_end:
+                continue
+            gap = (
+                start.road.end_of(one, at_end=start.at_end).point
+                - to.road.end_of(other, at_end=to.at_end).point
+            )
+            if math.hypot(*gap) <= _ASIDE_M:
                 _link_lanes(start, start.road.numbers[one.id], to, to.road.numbers[other.id])
 
 

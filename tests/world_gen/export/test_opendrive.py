@@ -21,7 +21,12 @@ from tests.world_gen.drawn_maps import (
     world_of,
 )
 from tests.world_gen.export.read_opendrive import OpenDriveFile, bend_rad, gap_m
+from world_gen.build import build_world
+from world_gen.build_graph import build_road_graph
 from world_gen.export.opendrive import write_opendrive
+from world_gen.find_intersections import find_intersections
+from world_gen.map_index import index_map
+from world_gen.read_osm import read_map
 
 PRIMARY = {"highway": "primary", "name": "Avenue", "lanes": "4"}
 
@@ -227,3 +232,25 @@ def test_any_star_of_roads_closes(
     file = written(world_of(osm), tmp_path_factory.mktemp("star"))
     check_closed(file)
     check_links(file)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    ("map_file", "node"),
+    [
+        ("osm-berlin-moritzplatz/berlin-moritzplatz.osm", 29215047),  # a roundabout
+        ("osm-kingsway/kingsway_junction.osm", 21653578),  # slip roads, left-hand, signals
+    ],
+)
+def test_real_junctions_close(data_dir: Path, tmp_path: Path, map_file: str, node: int) -> None:
+    osm = read_map(data_dir / map_file)
+    graph = build_road_graph(osm)
+    junctions = find_intersections(osm, graph)
+    junction = next(j for j in junctions if node in j.nodes)
+    index = index_map(osm, graph, junctions)
+    world = build_world(osm, graph, junction, index=index)
+    file = written(world, tmp_path)
+    check_closed(file)
+    check_links(file)
+    assert len(list(file.root.iter("object"))) >= len(world.buildings)
+    assert len(list(file.root.iter("controller"))) >= len({s.group_id for s in world.signals})

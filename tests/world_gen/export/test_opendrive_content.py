@@ -225,3 +225,18 @@ def test_names_that_xml_cannot_hold_are_written_all_the_same(tmp_path: Path) -> 
     assert {r.element.get("name") for r in file.roads.values()} == {"A?B?<?&\"'"}
     told = {u.get("code"): u.get("value") for u in file.root.find("header").findall("userData")}
     assert told["attribution"] == "made -- by us -"
+
+
+def test_lanes_that_would_jump_aside_are_not_linked(tmp_path: Path) -> None:
+    wide, narrow = (
+        drawn_world.road("wide", [[0, 0], [50, 0]], ahead=[3.0, 3.0]),
+        drawn_world.road("narrow", [[50, 0], [90, 0]], ahead=[3.0]),
+    )
+    lanes = drawn_world.leading_to(wide[1], {"wide.f0": "narrow.f0", "wide.f1": "narrow.f0"})
+    roads = [
+        (msgspec.structs.replace(wide[0], to_place="p"), lanes),
+        (msgspec.structs.replace(narrow[0], from_place="p"), narrow[1]),
+    ]
+    file = written(drawn_world.world(*roads), tmp_path)
+    check_closed(file)
+    assert [(a[2], b[2]) for a, b in file.joints()] == [(-1, -1), (-1, -1)]
