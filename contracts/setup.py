@@ -79,6 +79,9 @@ class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     """
 
     map: str
+    near_deg: tuple[tuple[float, float], ...] = ()
+    """Of a large map, what lies within `margin_m` of this line of degrees; empty: all of it."""
+    margin_m: float = 0.0
     added_roads: tuple[int, ...] = ()
     worlds_dir: str
     cache_dir: str

@@ -20,17 +20,16 @@ from orchestrator.config import ConfigError, DriveConfig
 from orchestrator.doctor import has_display
 from orchestrator.endpoints import free_endpoint
 from orchestrator.line_matching import match_line
+from orchestrator.map_opening import Clip, open_map
 from orchestrator.road_index import RoadIndex
 from orchestrator.route import Route
 from orchestrator.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import load_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line
-from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
-from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
 from world_gen.service_roads import with_roads
 
@@ -41,12 +40,18 @@ NEAR_ROAD_M = 50.0
 """A log none of whose positions lies this near to a road was not driven in this map."""
 
 
+CORRIDOR_M = 2000.0
+"""Of a large map, what lies within this distance of a given route or drive is read."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class DriveInputs:
     """Everything read: nothing here has touched the folder of runs yet."""
 
     config: DriveConfig
     map_file: Path
+    clip: Clip | None
+    """What of a large map is read: the surroundings of the way known beforehand."""
     osm: OsmMap
     graph: RoadGraph
     index: RoadIndex
@@ -105,23 +110,27 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         raise ConfigError(str(error)) from error
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
     map_file = Path(config.map) if config.map else EMBEDDED_MAP
-    osm = read_map(map_file)
-    graph = build_road_graph(osm)
-    index = RoadIndex(graph)
-    junctions = find_intersections(osm, graph)
     source = config.resolved_source
     info, positions, log_file = None, None, None
     if source == "log":
         log_file = Path(config.log or "")
-        info, positions = _read_log(config, log_file, index, map_file)
-    routes, route_source = _routes(config, graph, index, positions)
+        info, positions = _read_log(config, log_file)
+    given = _given_line(config, positions)
+    near = positions if positions is not None else given
+    clip = None if near is None else Clip(near, CORRIDOR_M)
+    opened = open_map(map_file, clip=clip)
+    osm, graph, junctions = opened.osm, opened.graph, opened.junctions
+    index = RoadIndex(graph)
+    if positions is not None and log_file is not None:
+        _check_in_map(positions, log_file, index, map_file)
+    routes, route_source = _routes(config, graph, index, given)
     added = _service_roads(config, graph, routes)
     if added:
         # Only now is it known where the route leaves the streets; what it meets there counts.
         graph = with_roads(graph, added)
         index = RoadIndex(graph)
         junctions = find_intersections(osm, graph)
-        routes, route_source = _routes(config, graph, index, positions)
+        routes, route_source = _routes(config, graph, index, given)
     standin = None
     if source == "standin":
         standin = standin_path(osm, graph, routes[0])
@@ -134,6 +143,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     return DriveInputs(
         config=config,
         map_file=map_file,
+        clip=clip,
         osm=osm,
         graph=graph,
         index=index,
@@ -149,9 +159,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     )
 
 
-def _read_log(
-    config: DriveConfig, log_file: Path, index: RoadIndex, map_file: Path
-) -> tuple[VehicleInfo, Array]:
+def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
     """Return what the log says of itself and its positions (N, 2) between start and end."""
     if not log_file.exists():
         raise FileNotFoundError(f"recorded drive {log_file}: no such file or folder")
@@ -161,7 +169,10 @@ def _read_log(
     except LogError as error:
         end = "its end" if config.end_s is None else f"--end {config.end_s:g}"
         raise UserError(f"{log_file} from --start {config.start_s:g} to {end}: {error}") from error
-    positions = np.stack([line.lat_deg, line.lon_deg], axis=-1)
+    return log.info, np.stack([line.lat_deg, line.lon_deg], axis=-1)
+
+
+def _check_in_map(positions: Array, log_file: Path, index: RoadIndex, map_file: Path) -> None:
     xy = local_from_geo(index.graph.frame, positions[:, 0], positions[:, 1])
     every = max(1, len(xy) // 500)
     if not any(index.near(point, NEAR_ROAD_M) for point in xy[::every]):
@@ -170,7 +181,6 @@ def _read_log(
             f"{positions[0, 0]:.5f}, {positions[0, 1]:.5f}); the map covers "
             f"{_bounds_text(index.graph)}"
         )
-    return log.info, positions
 
 
 def _bounds_text(graph: RoadGraph) -> str:
@@ -179,23 +189,33 @@ def _bounds_text(graph: RoadGraph) -> str:
     return f"{low[0]:.4f},{low[1]:.4f} to {high[0]:.4f},{high[1]:.4f}"
 
 
-def _routes(
-    config: DriveConfig, graph: RoadGraph, index: RoadIndex, positions: Array | None
-) -> tuple[tuple[Route, ...], str]:
-    """Return the given routes, none where the route is predicted, and where they came from."""
+def _given_line(config: DriveConfig, positions: Array | None) -> Array | None:
+    """Return the line (N, 2) of degrees that the route shall follow; None: it is predicted."""
     if config.route == "from-log":
-        assert positions is not None  # checked with the configuration
-        name = f"--route from-log of {config.log}"
-        return match_line(graph, positions, name=name, index=index).routes, "from-log"
+        return positions
     route_file = config.route
     if route_file is None and config.map is None:
         route_file = str(EMBEDDED_ROUTE)
     if route_file is None:
-        return (), "predicted"
+        return None
     line = read_line(Path(route_file))
-    lat_lon = np.stack([line.lat_deg, line.lon_deg], axis=-1)
-    name = f"--route {route_file}"
-    return match_line(graph, lat_lon, name=name, index=index).routes, "given"
+    return np.stack([line.lat_deg, line.lon_deg], axis=-1)
+
+
+def _routes(
+    config: DriveConfig, graph: RoadGraph, index: RoadIndex, given: Array | None
+) -> tuple[tuple[Route, ...], str]:
+    """Return the given routes, none where the route is predicted, and where they came from."""
+    if given is None:
+        return (), "predicted"
+    from_log = config.route == "from-log"
+    name = (
+        f"--route from-log of {config.log}"
+        if from_log
+        else f"--route {config.route or EMBEDDED_ROUTE}"
+    )
+    source = "from-log" if from_log else "given"
+    return match_line(graph, given, name=f"--route {what}", index=index).routes, source
 
 
 def _service_roads(

@@ -67,9 +67,13 @@ def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
 
 
 def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    clip = plan.clip
+    near_deg = () if clip is None else tuple((lat, lon) for lat, lon in clip.line_deg.tolist())
     return BuilderSetup(
         **_base(plan, process_id),  # type: ignore[arg-type]
         map=str(plan.map_file),
+        near_deg=near_deg,
+        margin_m=0.0 if clip is None else clip.margin_m,
         added_roads=plan.added_roads,
         worlds_dir=str(plan.worlds_dir),
         cache_dir=str(plan.config.worlds_cache),

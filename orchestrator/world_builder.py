@@ -6,14 +6,15 @@ import logging
 import time
 from pathlib import Path
 
+import numpy as np
+
 from contracts.bus import Bus, Mailbox, Request
 from contracts.process import ProcessLife, run_process
 from contracts.setup import BuilderSetup
 from contracts.simulation import BuildReply
-from world_gen.build_graph import build_road_graph
+from orchestrator.map_opening import Clip, open_map
 from world_gen.find_intersections import find_intersections
 from world_gen.map_index import index_map
-from world_gen.read_osm import read_map
 from world_gen.service_roads import with_roads
 from world_gen.world_store import WorldStore, cached_build
 
@@ -22,9 +23,11 @@ log = logging.getLogger("builder")
 
 def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     """Read the map once, then answer build requests until the run ends."""
-    osm = read_map(Path(setup.map))
-    graph = with_roads(build_road_graph(osm), setup.added_roads)
-    junctions = {j.summary.id: j for j in find_intersections(osm, graph)}
+    near = np.array(setup.near_deg, dtype=np.float64).reshape(-1, 2)
+    opened = open_map(Path(setup.map), clip=Clip(near, setup.margin_m) if len(near) else None)
+    osm, graph = opened.osm, with_roads(opened.graph, setup.added_roads)
+    found = opened.junctions if not setup.added_roads else find_intersections(osm, graph)
+    junctions = {j.summary.id: j for j in found}
     index = index_map(osm, graph, junctions.values())
     cache, run_worlds = WorldStore(Path(setup.cache_dir)), WorldStore(Path(setup.worlds_dir))
     mailbox = Mailbox(256)

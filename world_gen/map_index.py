@@ -31,8 +31,13 @@ class MapIndex:
     @property
     def map_key(self) -> str:
         """The map's SHA-256, and which roads count as car roads beyond what it says."""
-        added = [i for i in self.car_edges if self.graph.edges[i].road_class in OTHER_CLASSES]
-        return self.osm.sha256 if not added else f"{self.osm.sha256} with {added}"
+        edges = (self.graph.edges[i] for i in self.car_edges)
+        added = [
+            f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
+            for edge in edges
+            if edge.road_class in OTHER_CLASSES
+        ]
+        return self.osm.sha256 if not added else f"{self.osm.sha256} with {' '.join(added)}"
 
     def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:
         """Return indices of car roads that touch an area in the map's frame."""

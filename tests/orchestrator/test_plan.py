@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,11 @@ from contracts.errors import UserError
 from contracts.frames import geo_from_local, local_from_geo
 from orchestrator.config import ConfigError, DriveConfig
 from orchestrator.embedded import MAP_FILE
+from orchestrator.map_opening import open_map
 from orchestrator.plan import make_plan, read_inputs
 from tests.orchestrator.trip import NOW, town, town_line, town_plan
 from tests.world_gen.sketch import Sketch
+from world_gen.route_junctions import junctions_on_route
 
 
 def inputs_for(folder: Path, **settings: object) -> object:
@@ -167,3 +170,34 @@ def test_by_choice_every_driveway_makes_a_junction(tmp_path: Path) -> None:
     inputs = inputs_for(tmp_path, map=map_file, route=route, service_roads=True)
 
     assert [j.summary.id for j in inputs.junctions] == ["n2", "n5"]  # type: ignore[attr-defined]
+
+
+@pytest.mark.real_data
+def test_of_a_large_map_the_surroundings_of_the_drive_are_read(
+    data_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = {
+        "map": str(data_dir / "osm-badhersfeld" / "badhersfeld.osm.xml.gz"),
+        "route": str(_way_through_badhersfeld(tmp_path)),
+    }
+    whole = inputs_for(tmp_path, **settings)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("orchestrator.plan.open_map", partial(open_map, large_bytes=1))
+    monkeypatch.setattr("orchestrator.plan.CORRIDOR_M", 300.0)
+
+    part = inputs_for(tmp_path, **settings)
+
+    assert len(part.osm.ways) < 0.7 * len(whole.osm.ways)  # type: ignore[attr-defined]
+    passed = [
+        [passage.junction.summary for passage in junctions_on_route(i.junctions, i.routes[0].edges)]  # type: ignore[attr-defined]
+        for i in (whole, part)
+    ]
+    assert len(passed[0]) == 2
+    assert passed[0] == passed[1]
+
+
+def _way_through_badhersfeld(folder: Path) -> Path:
+    line = [[9.7126, 50.8701], [9.7155, 50.8706]]
+    path = folder / "through.geojson"
+    path.write_text(json.dumps({"type": "LineString", "coordinates": line}), encoding="utf-8")
+    return path
