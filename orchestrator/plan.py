@@ -209,11 +209,7 @@ def _routes(
     if given is None:
         return (), "predicted"
     from_log = config.route == "from-log"
-    name = (
-        f"--route from-log of {config.log}"
-        if from_log
-        else f"--route {config.route or EMBEDDED_ROUTE}"
-    )
+    what = f"from-log of {config.log}" if from_log else config.route or EMBEDDED_ROUTE
     source = "from-log" if from_log else "given"
     return match_line(graph, given, name=f"--route {what}", index=index).routes, source
 
