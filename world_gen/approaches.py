@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contracts.arrays import Array
 from contracts.world import Choice, LineControl, YieldRule
 from world_gen.clusters import RING_KINDS, Cluster, Surroundings, heading_out, is_ring_edge
 from world_gen.connections import ConnectionDraft
 from world_gen.met_on_the_way import Met, NodeTags, is_light, met_inside, met_toward, sign_of
+from world_gen.polyline import arc_lengths
 from world_gen.priority_roads import Entry, Rank, Standing, standings
 from world_gen.road_graph import DirectedEdge
 
@@ -19,6 +21,7 @@ OWN_LINE_M = 3.0
 """A sign or signal farther than this from the junction's node stands at the stop line."""
 BEFORE_CROSSING_M = 3.0
 """From a crossing's middle to the line before it: half its width and a metre (RMS 2)."""
+LIGHT_NEAR_M = 25.0
 _SIGN_NEAR_M = 25.0
 _CROSSING_NEAR_M = 16.0
 _OPPOSITE_COS = math.cos(math.radians(135.0))
@@ -87,13 +90,22 @@ def approaches(
         for leg in cluster.legs
     }
     drafts: dict[str, list[_Draft]] = {}
+    behind: dict[str, list[tuple[int, DirectedEdge]]] = {}
+    everyone = (c.junction.lights for c in around.clusters if c.junction is not None)
+    named = frozenset().union(*everyone)
     for cluster in around.clusters:
         junction = cluster.junction
         if not cluster.whole or junction is None:
             continue
+        signalled = junction.summary.control == "signals" and not cluster.ring
         for leg in cluster.legs:
             toward = DirectedEdge(leg.edge, not leg.reverse)
             if not toward.allowed:
+                if signalled:
+                    found_behind = [
+                        (n, leg) for n in _lights_near(leg, node_tags) if n not in named
+                    ]
+                    behind.setdefault(junction.summary.id, []).extend(found_behind)
                 continue
             on_ring = cluster.ring and is_ring_edge(leg.edge)
             if not on_ring and not cluster.ring and leg.edge.index in junction.inner:
@@ -104,6 +116,13 @@ def approaches(
                 continue
             passed = inside.get((toward.edge.index, toward.reverse), [])
             lights = lights or [m for m in passed if is_light(m.tags)]
+            if signalled and not lights:
+                # A light on a crossing that the finder took for one of walkers alone.
+                lights = [
+                    m
+                    for m in met
+                    if is_light(m.tags) and m.distance_m <= LIGHT_NEAR_M and m.node not in named
+                ]
             drafts.setdefault(junction.summary.id, []).append(
                 _Draft(
                     cluster=cluster,
@@ -116,15 +135,27 @@ def approaches(
     found: list[Approach] = []
     for items in drafts.values():
         mine = _compared(items, around)
-        _claim_the_rest(mine)
+        _claim_the_rest(mine, behind.get(mine[0].junction_id, []))
         found.extend(mine)
     return tuple(found)
 
 
-def _claim_the_rest(mine: list[Approach]) -> None:
-    """Give each light of the junction that no road met first to the road it stands nearest to.
+def _lights_near(leg: DirectedEdge, node_tags: NodeTags) -> list[int]:
+    """Return the lights on a road out of a junction before which no car would stop by itself."""
+    nodes = leg.edge.node_ids[::-1] if leg.reverse else leg.edge.node_ids
+    along = arc_lengths(leg.xy_m)
+    return [
+        node
+        for node, at in zip(nodes, along, strict=False)
+        if is_light(node_tags.get(node, {})) and 0.1 < at <= LIGHT_NEAR_M
+    ]
 
-    These are repeaters in a median or behind the junction, or lights on the way through it.
+
+def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]) -> None:
+    """Name the junction's other lights with the heads that show the same.
+
+    Lights on the way through go with the nearest road in; those on a one-way road out stop
+    nobody there, but go with the road in that leads straight to them.
     """
     junction = mine[0].cluster.junction
     lit = [approach for approach in mine if approach.control.value == "signal"]
@@ -135,6 +166,15 @@ def _claim_the_rest(mine: list[Approach]) -> None:
         on_road = [item for item in lit if node in item.toward.edge.node_ids]
         nearest = (on_road or lit)[0]
         nearest.signal_nodes = (*nearest.signal_nodes, node)
+    for node, leg in behind:
+        out = heading_out(leg, 15.0)
+        ahead = min(lit, key=lambda item: float(out @ _out(item.toward)))
+        ahead.signal_nodes = (*ahead.signal_nodes, node)
+
+
+def _out(toward: DirectedEdge) -> Array:
+    """Return the unit direction (2,) in which a road in leaves the junction."""
+    return heading_out(DirectedEdge(toward.edge, not toward.reverse), 15.0)
 
 
 def _own_sign(met: list[Met], cluster: Cluster) -> Met | None:
@@ -196,9 +236,7 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
 
 def _opposites(drafts: list[_Draft]) -> list[int | None]:
     """Return for each road the index of the one that lies straight ahead."""
-    out = np.array(
-        [heading_out(DirectedEdge(d.toward.edge, not d.toward.reverse), 15.0) for d in drafts]
-    )
+    out = np.array([_out(d.toward) for d in drafts])
     cos = out @ out.T
     best = cos.argmin(axis=1)
     return [int(j) if cos[i, j] < _OPPOSITE_COS else None for i, j in enumerate(best.tolist())]

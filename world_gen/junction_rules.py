@@ -51,8 +51,9 @@ def junction_rules(
     conflicts, met = right_of_way(ruled, found, node_tags, around.driving_side)
     groups = lane_groups(found, around, lanes, ruled)
     walks = walk_groups(groups, crossings, around)
-    heads = signal_heads(groups, {line.lane_id: line for line in lines}, around.driving_side)
-    lone = lone_lights(around, node_tags, lanes, crossings)
+    heads = signal_heads(groups, {line.lane_id: line for line in lines}, around)
+    known = {node for approach in found for node in approach.signal_nodes}
+    lone = lone_lights(around, node_tags, lanes, crossings, known)
     return JunctionRules(
         stop_lines=(*lines, *lone.stop_lines),
         signals=(*heads, *lone.signals),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft, LaneSet
 from world_gen.met_on_the_way import NodeTags, faces, is_light
 from world_gen.polyline import direction_at, length, locate, points_at
-from world_gen.signal_heads import BESIDE_HEIGHT_M, beside, nearest_kerb
+from world_gen.signal_heads import BESIDE_HEIGHT_M, beside, nearest_kerb, to_kerb_m
 from world_gen.stop_lines import line_across
 
 DRIVING_S, WALKING_S = 40.0, 10.0
@@ -40,14 +40,19 @@ class LoneLights(NamedTuple):
 
 
 def lone_lights(
-    around: Surroundings, node_tags: NodeTags, lanes: LaneSet, crossings: Sequence[Crossing]
+    around: Surroundings,
+    node_tags: NodeTags,
+    lanes: LaneSet,
+    crossings: Sequence[Crossing],
+    known: Collection[int],
 ) -> LoneLights:
     """Return what governs the lanes at each light that belongs to no junction.
 
+    `known` are the map's nodes of the lights at junctions.
     Where the light does not say whom it faces it stops both directions; its plan lets cars drive
     for most of the time, and those on foot after them.
     """
-    taken: set[int] = set()
+    taken = set(known)
     inner: set[int] = set()
     for cluster in around.clusters:
         inner |= cluster.inner
@@ -107,7 +112,7 @@ def _heads(
         outermost = nearest_kerb([lane for lane, _ in mine], around.driving_side)
         lane, line = next(item for item in mine if item[0] is outermost)
         ahead = direction_at(lane.centerline, locate(lane.centerline, line.ends.mean(axis=0)))
-        place = beside(line.ends, around.driving_side)
+        place = beside(line.ends, to_kerb_m(lane, around), around.driving_side)
         heads.append(
             Signal(
                 id=f"{lane.id}:light{node}",

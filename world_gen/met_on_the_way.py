@@ -78,7 +78,10 @@ def met_toward(
 
 
 def met_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[Met]:
-    """Return lights and signs met between a junction's nodes, in driving order."""
+    """Return lights and signs met between a junction's nodes, in driving order.
+
+    A sign on a node where roads meet counts only where it says whom it faces.
+    """
     found = []
     for part in inside:
         nodes = part.edge.node_ids[::-1] if part.reverse else part.edge.node_ids
@@ -87,7 +90,9 @@ def met_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[Met]
             if not tags or not (is_light(tags) or sign_of(tags)):
                 continue
             # Who drives along the nodes meets what faces forward.
-            if faces(tags, not part.reverse) is not False:
+            facing = faces(tags, not part.reverse)
+            at_end = node in (nodes[0], nodes[-1])
+            if facing or (facing is None and (is_light(tags) or not at_end)):
                 found.append(Met(node, math.inf, tags))
     return found
 

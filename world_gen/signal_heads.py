@@ -9,6 +9,7 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.world import DrivingSide, Provenance, Signal, StopLine
+from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft
 from world_gen.signal_groups import LaneGroup
 
@@ -20,13 +21,14 @@ WIDE_LANES = 3
 
 
 def signal_heads(
-    groups: Sequence[LaneGroup], lines: Mapping[str, StopLine], driving_side: DrivingSide
+    groups: Sequence[LaneGroup], lines: Mapping[str, StopLine], around: Surroundings
 ) -> tuple[Signal, ...]:
     """Return the heads of every lane group, at its stop line.
 
     `lines` are by lane. The group next to the kerb has a head beside the road; one that is not,
     and any group of a wide road, a head above its lanes.
     """
+    driving_side = around.driving_side
     by_road: dict[tuple[int, bool], list[LaneDraft]] = {}
     for group in groups:
         by_road.setdefault(group.approach.key, []).extend(group.lanes)
@@ -36,7 +38,7 @@ def signal_heads(
         kerb_side = nearest_kerb(group.lanes, driving_side)
         at_kerb = kerb_side is nearest_kerb(mine, driving_side)
         if at_kerb:
-            place = beside(lines[kerb_side.id].ends, driving_side)
+            place = beside(lines[kerb_side.id].ends, to_kerb_m(kerb_side, around), driving_side)
             heads.append(_head(f"{kerb_side.id}:signal", group, place, BESIDE_HEIGHT_M))
         if not at_kerb or len(mine) >= WIDE_LANES:
             ends = np.concatenate([lines[lane.id].ends for lane in group.lanes])
@@ -53,11 +55,20 @@ def nearest_kerb(lanes: Sequence[LaneDraft], driving_side: DrivingSide) -> LaneD
     )
 
 
-def beside(ends: Array, driving_side: DrivingSide) -> Array:
-    """Return the place (2,) beside a stop line's kerb end."""
-    kerb, middle = (ends[1], ends[0]) if driving_side == "right" else (ends[0], ends[1])
-    gap = kerb - middle
-    place: Array = kerb + gap / max(math.hypot(*gap), 1e-6) * BESIDE_M
+def to_kerb_m(lane: LaneDraft, around: Surroundings) -> float:
+    """Return how far a lane's outer edge lies from the carriageway's, on the side kept to."""
+    section = around.sections[lane.key.edge]
+    half_m = lane.width_m.value / 2.0
+    if (around.driving_side == "right") != lane.key.reverse:
+        return max(lane.plan.left_m - half_m - section.right_m, 0.0)
+    return max(section.left_m - lane.plan.left_m - half_m, 0.0)
+
+
+def beside(ends: Array, to_kerb_m: float, driving_side: DrivingSide) -> Array:
+    """Return the place (2,) beside the road at a stop line."""
+    outer, inner = (ends[1], ends[0]) if driving_side == "right" else (ends[0], ends[1])
+    gap = outer - inner
+    place: Array = outer + gap / max(math.hypot(*gap), 1e-6) * (to_kerb_m + BESIDE_M)
     return place
 
 

@@ -115,6 +115,27 @@ def test_a_stop_sign_on_the_very_node_is_for_the_lesser_road():
     assert waits(world, "Avenue>Avenue", "Street>Street") == ("Avenue>Avenue", "stop", "inferred")
 
 
+def test_a_sign_on_a_node_of_a_dual_carriageway_is_not_for_those_who_drive_through():
+    nodes = {
+        0: (0.0, 0.0), 6: (0.0, 14.0), 1: (90.0, 0.0), 3: (-90.0, 0.0), 4: (0.0, -90.0),
+        2: (0.0, 104.0), 7: (90.0, 14.0), 8: (-90.0, 14.0),
+    }  # fmt: skip
+    one_way = {**MAIN, "oneway": "yes"}
+    ways = [
+        (11, [3, 0, 1], one_way),
+        (12, [7, 6, 8], one_way),
+        (13, [4, 0], AVENUE),
+        (14, [0, 6], AVENUE),
+        (15, [6, 2], AVENUE),
+    ]
+    world = world_of(drawn_map(nodes, ways, node_tags={0: {"highway": "stop"}}))
+    minor = {lane.id for lane in world.lanes if lane.name == "Avenue"}
+    by_id = {c.id: c for c in world.connections}
+    crossed = [c for c in world.conflicts if c.rule == "stop"]
+    assert crossed
+    assert all(by_id[c.yields_id].from_lane_id in minor for c in crossed)
+
+
 def test_at_an_all_way_stop_the_right_goes_first():
     world = world_of(crossing(node_tags={0: {"highway": "stop", "stop": "all"}}))
     assert {line.control.value for line in world.stop_lines} == {"stop"}

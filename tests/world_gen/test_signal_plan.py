@@ -218,6 +218,47 @@ def test_a_light_for_those_on_foot_away_from_junctions_stops_both_ways():
     assert "signal" not in {c.control for c in world.connections}
 
 
+def test_a_walkers_light_before_a_signalled_junction_is_the_light_of_its_road():
+    """At 22 m it is too far for the junction by itself, but cars stop once and not twice."""
+    nodes = {5: (-22.0, 0.0), 6: (12.0, 0.0), 7: (0.0, 12.0), 8: (0.0, -12.0)}
+    facing = LIGHT | {"traffic_signals:direction": "forward"}
+    osm = drawn_map(
+        CROSS | nodes,
+        [
+            (11, [1, 6, 0], STREET),
+            (12, [2, 7, 0], AVENUE),
+            (13, [3, 5, 0], STREET),
+            (14, [4, 8, 0], AVENUE),
+        ],
+        node_tags={5: LIGHT | {"crossing": "traffic_signals"}, 6: facing, 7: facing, 8: facing},
+    )
+    world = world_of(osm)
+    check_plans(world)
+    assert world.crossing_plans == ()
+    assert {signal.osm_nodes for signal in world.signals} == {(5,), (6,), (7,), (8,)}
+    line = next(line for line in world.stop_lines if "w13" in line.lane_id)
+    assert line.ends[0, 0] == pytest.approx(-25.0, abs=0.3)
+
+
+def test_a_light_on_the_one_way_road_out_stops_nobody_behind_the_junction():
+    one_way = {**STREET, "oneway": "yes"}
+    osm = drawn_map(
+        CROSS | {5: (9.0, 0.0)},
+        [
+            (11, [0, 5, 1], one_way),
+            (12, [0, 2], AVENUE),
+            (13, [3, 0], one_way),
+            (14, [4, 0], AVENUE),
+        ],
+        node_tags={0: LIGHT, 5: LIGHT | {"crossing": "traffic_signals"}},
+    )
+    world = world_of(osm)
+    check_plans(world)
+    assert world.crossing_plans == ()
+    (straight,) = [signal for signal in world.signals if 5 in signal.osm_nodes]
+    assert all("w13" in lane for lane in straight.lane_ids)
+
+
 @given(
     parts=st.lists(st.tuples(st.integers(0, 6), st.floats(5.0, 12.0)), min_size=1, max_size=7),
     total_s=st.floats(0.0, 120.0),
