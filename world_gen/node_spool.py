@@ -112,4 +112,5 @@ class NodeSpool:
 def _distinct(values: IntArray) -> IntArray:
     """Return the values ascending, each once; sorting is quicker here than numpy's hashing."""
     ordered = np.sort(values)
-    return ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
+    distinct: IntArray = ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
+    return distinct
