@@ -68,20 +68,23 @@ def slip_ends(roads: CarRoads) -> dict[int, frozenset[int]]:
     neighbours an end belongs.
     """
     found: dict[int, set[int]] = {}
-    for chains in roads.chains_from.values():
-        for slip in chains:
-            if not (slip.link and slip.one_way and slip.outward and slip.length_m <= RAMP_SLIP_M):
-                continue
-            limit_m = max(SLIP_M, slip.length_m)
-            onward = {c.end for c in roads.chains_from[slip.start]
-                      if c.outward and c.key != slip.key and c.length_m <= limit_m}  # fmt: skip
-            back = {c.end for c in roads.chains_from[slip.end]
-                    if c.inward and c.key != slip.key and c.length_m <= limit_m}  # fmt: skip
-            for corner in (onward & back) - {slip.start, slip.end}:
-                if max(_angle_leaving(slip, roads), _angle_joining(slip, roads)) > SMOOTH_RAD:
-                    continue
-                found.setdefault(slip.start, set()).update((corner, slip.end))
-                found.setdefault(slip.end, set()).update((corner, slip.start))
+    for slip in (chain for chains in roads.chains_from.values() for chain in chains):
+        if not (slip.link and slip.one_way and slip.outward and slip.length_m <= RAMP_SLIP_M):
+            continue
+        if max(_angle_leaving(slip, roads), _angle_joining(slip, roads)) > SMOOTH_RAD:
+            continue
+        limit_m = max(SLIP_M, slip.length_m)
+        sides = [
+            (c, c.outward if node == slip.start else c.inward)
+            for node in (slip.start, slip.end)
+            for c in roads.chains_from[node]
+            if c.key != slip.key and c.length_m <= limit_m
+        ]
+        onward = {c.end for c, drivable in sides if c.start == slip.start and drivable}
+        back = {c.end for c, drivable in sides if c.start == slip.end and drivable}
+        for corner in (onward & back) - {slip.start, slip.end}:
+            found.setdefault(slip.start, set()).update((corner, slip.end))
+            found.setdefault(slip.end, set()).update((corner, slip.start))
     return {node: frozenset(others) for node, others in found.items()}
 
 

@@ -67,6 +67,17 @@ def test_the_maps_are_what_the_drawings_say(tmp_path: Path) -> None:
     assert {Path(name).stem for name in kept} == {truth.name for truth in true_maps()}
 
 
+def test_each_pair_that_conflicts_has_one_answer() -> None:
+    for truth in true_maps():
+        for world in worlds_of(truth):
+            pairs = [frozenset((c.first_id, c.second_id)) for c in world.conflicts]
+            assert len(set(pairs)) == len(pairs)
+            assert all(c.yields_id in (c.first_id, c.second_id) for c in world.conflicts)
+            waits = {(c.yields_id, *({c.first_id, c.second_id} - {c.yields_id}))
+                     for c in world.conflicts}  # fmt: skip
+            assert waits == {(c.id, other) for c in world.connections for other in c.yields_to}
+
+
 def test_mirrored_maps_give_mirrored_worlds(tmp_path: Path, scores: dict[str, Score]) -> None:
     files = mirrored_drawings(tmp_path)
     images = {t.name: score_map(mirrored_truth(t, files[t.name])) for t in true_maps()}
