@@ -13,6 +13,7 @@ from contracts.arrays import Array
 from contracts.codec import content_bytes
 from contracts.frames import GeoPoint, LocalFrame, local_from_geo, target_from_source
 from contracts.world import Arm, IntersectionSummary, World, WorldJunction
+from world_gen.beside_roads import beside_roads
 from world_gen.buildings import Footprint, buildings_in_frame
 from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
 from world_gen.connections import ConnectionDraft, connect, draw_paths
@@ -23,12 +24,15 @@ from world_gen.intersections import Junction
 from world_gen.junction_rules import junction_rules
 from world_gen.lanes import LaneSet, build_lanes, join_straight_on
 from world_gen.map_index import MapIndex, index_map
+from world_gen.map_islands import mapped_islands
 from world_gen.movements import movements
 from world_gen.osm_map import LatLonBounds, MapError, OsmMap
 from world_gen.road_graph import RoadGraph
 from world_gen.road_surface import areas
+from world_gen.sidewalks import sidewalk_areas
+from world_gen.tram_tracks import tram_tracks
 
-GENERATOR_VERSION = 3
+GENERATOR_VERSION = 4
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 
@@ -111,9 +115,11 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
     notes: list[str] = []
     lanes = build_lanes(around)
     connections = _connections(index, around, lanes, notes)
-    crossed = crossings(around, osm.node_tags)
+    beside = beside_roads(osm)
+    crossed = crossings(around, osm.node_tags, beside)
     rules = junction_rules(around, osm.node_tags, lanes, connections, crossed)
     surface = areas(around, lanes, connections)
+    tracks = tram_tracks(around, osm, beside)
     near = index.buildings_in(in_map(extent, around.frame, index.graph.frame))
     free = _driven_beside(surface.driven, near, around.frame, index.graph.frame)
     buildings, cut = buildings_in_frame(near, around.frame, index.graph.frame, free)
@@ -133,19 +139,20 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
             )
             for junction in around.junctions
         ),
-        roads=lanes.roads,
-        lanes=tuple(lane.finished() for lane in lanes.lanes.values()),
+        roads=(*lanes.roads, *tracks.roads),
+        lanes=(*(lane.finished() for lane in lanes.lanes.values()), *tracks.lanes),
         connections=tuple(c.finished() for c in connections),
         conflicts=rules.conflicts,
         stop_lines=rules.stop_lines,
         crossings=crossed,
         crossing_plans=rules.crossing_plans,
         signals=rules.signals,
-        islands=surface.islands,
+        islands=(*surface.islands, *mapped_islands(around, osm, beside, surface.driven)),
         kerbs=surface.kerbs,
         road_surface=surface.road_surface,
+        sidewalks=sidewalk_areas(around, lanes, surface.road_surface, osm, beside),
         buildings=buildings,
-        notes=tuple(dict.fromkeys((*lanes.notes, *notes, *cut))),
+        notes=tuple(dict.fromkeys((*lanes.notes, *notes, *tracks.notes, *cut))),
         attribution=osm.attribution,
     )
     return with_id(world)

@@ -86,7 +86,9 @@ def connect(
             if not starts or not ends:
                 continue
             chosen = [lane for lane in middle if movement.turn in lane.turns]
-            chosen = chosen or _starting_lanes(movement, starts, mine, len(ends))
+            chosen = chosen or _starting_lanes(
+                movement, starts, mine, len(ends), around.driving_side
+            )
             if not chosen and len(starts) < len(plans):
                 continue  # the lanes for it are beyond the World's edge
             if not chosen:
@@ -133,30 +135,38 @@ def _free_name(movement: Movement, tagged: set[Turn], have: set[Turn]) -> Turn:
 
 
 def _starting_lanes(
-    movement: Movement, starts: list[LaneDraft], ways: list[Movement], room: int
+    movement: Movement,
+    starts: list[LaneDraft],
+    ways: list[Movement],
+    room: int,
+    driving_side: DrivingSide,
 ) -> list[LaneDraft]:
     """Return the lanes, from the left, from which this movement begins."""
     turn = movement.turn
+    far: Turn = "left" if driving_side == "right" else "right"
     if any(lane.plan.turns_source == "tagged" for lane in starts):
-        wanted = {turn, "left"} if turn == "u_turn" else {turn}
+        wanted = {turn, far} if turn == "u_turn" else {turn}
         fits = [
             lane
             for lane in starts
             if wanted & set(lane.plan.turns) or (lane.plan.turns_source != "tagged")
         ]
-        return fits[:1] if turn == "u_turn" else fits
+        return _outermost(fits, far) if turn == "u_turn" else fits
     cars = [lane for lane in starts if lane.kind == "driving"] or starts
-    if turn in ("left", "u_turn"):
-        return cars[:1]
-    if turn == "right":
-        return cars[-1:]
+    if turn != "straight":
+        return _outermost(cars, far if turn == "u_turn" else turn)
     have = {m.turn for m in ways}
     straight = list(starts)
-    if len(straight) > max(room, 1) and "left" in have:
-        straight = straight[1:]
-    if len(straight) > max(room, 1) and "right" in have:
-        straight = straight[:-1]
+    # The lane on the far side, from which drivers turn across the road, is the first to be lost.
+    sides: list[Turn] = ["left", "right"] if driving_side == "right" else ["right", "left"]
+    for side in sides:
+        if len(straight) > max(room, 1) and side in have:
+            straight = straight[1:] if side == "left" else straight[:-1]
     return straight
+
+
+def _outermost(lanes: list[LaneDraft], side: Turn) -> list[LaneDraft]:
+    return lanes[:1] if side == "left" else lanes[-1:]
 
 
 def _pairs(
@@ -176,14 +186,17 @@ def _pairs(
             *_pairs(buses, reserved, turn, driving_side, only_way),
         ]
     if turn == "u_turn":
-        return [(lane, _wide_enough(lane, ends)) for lane in starts]
+        return [
+            (lane, _wide_enough(lane, ends[:: 1 if driving_side == "right" else -1]))
+            for lane in starts
+        ]
     if any(lane.kind != "bus" for lane in starts):
         ends = [lane for lane in ends if lane.kind == "driving"] or ends
     from_right = turn == "right" or (turn == "straight" and driving_side == "left")
     a = starts[::-1] if from_right else starts
     b = ends[::-1] if from_right else ends
     if turn == "straight" and len(a) != len(b):
-        return _pairs_by_position(starts, ends, only_way)
+        return _pairs_by_position(a, b, only_way)
     return [(lane, b[min(i, len(b) - 1)]) for i, lane in enumerate(a)]
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from contracts.world import Choice, Crossing, Quantity
+from world_gen.beside_roads import BesideRoads
 from world_gen.clusters import Surroundings
 from world_gen.polyline import arc_lengths, direction_at, left_of
 
@@ -15,22 +16,33 @@ _MARKED = ("zebra", "marked", "uncontrolled", "traffic_signals")
 
 
 def crossings(
-    around: Surroundings, node_tags: Mapping[int, Mapping[str, str]]
+    around: Surroundings,
+    node_tags: Mapping[int, Mapping[str, str]],
+    beside: BesideRoads | None = None,
 ) -> tuple[Crossing, ...]:
-    """Return each crossing node on a car road within the World's radius, once."""
+    """Return each crossing node on a car road within the World, once.
+
+    A node is one by its own tags, or since a way tagged as a crossing (`beside`) meets the road.
+    """
     found: dict[int, Crossing] = {}
+    drawn = beside.crossed_at if beside is not None else {}
+    amid = {n for c in around.clusters if len(c.legs) > 2 for n in c.nodes} if drawn else set()
     for index, edge in sorted(around.edges.items()):
-        section = around.sections[index]
-        along = arc_lengths(edge.xy_m)
-        for i, node in enumerate(edge.node_ids):
-            tags = node_tags.get(node, {})
-            crosses = tags.get("highway") == "crossing" or "crossing" in tags
-            at = edge.xy_m[i] if i < len(edge.xy_m) else None
-            if not crosses or tags.get("crossing") == "no" or at is None or node in found:
+        for i, node in enumerate(edge.node_ids[: len(edge.xy_m)]):
+            tags = node_tags.get(node)
+            if tags is None or not (tags.get("highway") == "crossing" or "crossing" in tags):
+                way = drawn.get(node)
+                if way is None or node in amid:
+                    continue
+                tags = {**way.tags, **(tags or {})}
+            at = edge.xy_m[i]
+            if tags.get("crossing") == "no" or node in found:
                 continue
             if not around.extent.holds(at[None])[0]:
                 continue
-            left = left_of(direction_at(edge.xy_m, float(along[i])))
+            section = around.sections[index]
+            along = float(arc_lengths(edge.xy_m)[i])
+            left = left_of(direction_at(edge.xy_m, along))
             line = np.stack([at + left * section.left_m, at + left * section.right_m])
             found[node] = Crossing(
                 id=f"n{node}",
@@ -38,6 +50,7 @@ def crossings(
                 width_m=Quantity(CROSSING_WIDTH_M, "default"),
                 kind=_kind(tags),
                 osm_node=node,
+                island=tags.get("crossing:island") == "yes",
             )
     return tuple(found[node] for node in sorted(found))
 
