@@ -89,6 +89,8 @@ def test_a_region_is_drawn_whole(world, tmp_path):
     texts = _texts(tmp_path / "region.svg")
     assert any("240 m by 180 m" in text for text in texts)
     assert any("1 junctions" in text for text in texts)
+    assert "1" in texts  # the junction's number on the ground
+    assert any(re.match(r" +1 0\.\d\d +crossing +uncontrolled", text) for text in texts)
 
 
 def test_a_world_without_names_and_buildings_can_be_drawn(tmp_path):

@@ -20,6 +20,7 @@ from world_gen.export.picture_marks import (
     draw_legend,
     draw_panel,
     north_arrow,
+    number_junctions,
     scale_bar,
 )
 from world_gen.export.picture_style import View, view_around
@@ -63,7 +64,9 @@ def _figure(world: World, report: WorldReport) -> Figure:
     figure = Figure(figsize=_SIZE_IN, dpi=_DPI, facecolor="white")
     main = figure.add_axes(_MAIN_BOX)
     if world.bounds_m is not None:
-        _draw(main, world, _all_of(world, _aspect(_MAIN_BOX)))
+        view = _all_of(world, _aspect(_MAIN_BOX))
+        _draw(main, world, view)
+        number_junctions(main, world, view)
         top = 0.93
     else:
         _draw(main, world, _close_view(world))
@@ -104,7 +107,8 @@ def _subtitle(world: World) -> str:
         west, south, east, north = world.bounds_m
         reach = f"{east - west:.0f} m by {north - south:.0f} m"
     return (
-        f"intersection {place.id}   world {world.id}   {place.lat:.6f}, {place.lon:.6f}   "
+        f"{'' if world.bounds_m else 'intersection '}{place.id}   world {world.id}   "
+        f"{place.lat:.6f}, {place.lon:.6f}   "
         f"{reach}   {len(world.lanes)} lanes, {len(world.connections)} connections, "
         f"{len(world.conflicts)} conflicts, {len(world.buildings)} buildings"
     )

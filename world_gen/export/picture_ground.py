@@ -92,7 +92,7 @@ def _buildings(axes: Axes, world: World, view: View) -> None:
             PathCollection(
                 [_outline(b.outline, b.holes) for b in buildings],
                 facecolors=colours.to_rgba(heights, alpha=0.3 if overhang else 0.9),
-                edgecolors="#3f3226" if source == "tagged" else "#75634f",
+                edgecolors="#3f3226" if source == "tagged" else "#8a7762",
                 hatch=HATCH[source] if view.close and not overhang else None,
                 linewidths=1.4 if source == "tagged" else 0.7,
                 linestyles=":" if overhang else DASH[source],
@@ -104,25 +104,26 @@ def _buildings(axes: Axes, world: World, view: View) -> None:
 def _tunnels_and_decks(axes: Axes, world: World, view: View) -> None:
     """Draw roads on bridges over all that lies on the ground, and roads in tunnels faintly."""
     near = [road for road in world.roads if view.meets(road.reference_line)]
-    below = [_carriageway(road) for road in near if road.tunnel or road.layer < 0]
-    above = [_carriageway(road) for road in near if not road.tunnel and road.layer > 0]
-    if below:
-        axes.add_collection(
-            PolyCollection(
-                below, facecolors=TUNNEL, edgecolors=TUNNEL, alpha=0.35, linestyles="--",
-                linewidths=1.0, zorder=2.2,
+    below = [_edges(road) for road in near if road.tunnel or road.layer < 0]
+    above = [_edges(road) for road in near if not road.tunnel and road.layer > 0]
+    for roads, fill, edge, alpha, order in (
+        (below, TUNNEL, TUNNEL, 0.35, 2.2), (above, ROAD, DECK_EDGE, 1.0, 6.6),
+    ):  # fmt: skip
+        if roads:
+            decks = [np.concatenate([left, right[::-1]]) for left, right in roads]
+            axes.add_collection(
+                PolyCollection(decks, facecolors=fill, edgecolors="none", alpha=alpha, zorder=order)
             )
-        )  # fmt: skip
-    if above:
-        axes.add_collection(
-            PolyCollection(above, facecolors=ROAD, edgecolors=DECK_EDGE, linewidths=1.6, zorder=6.6)
-        )
+            axes.add_collection(
+                LineCollection(
+                    [line for sides in roads for line in sides], colors=edge, linewidths=1.6,
+                    linestyles="-" if alpha == 1.0 else "--", zorder=order + 0.05,
+                )
+            )  # fmt: skip
 
 
-def _carriageway(road: Road) -> Array:
-    left = offset(road.reference_line, road.left_m)
-    right = offset(road.reference_line, road.right_m)
-    return np.concatenate([left, right[::-1]])
+def _edges(road: Road) -> tuple[Array, Array]:
+    return offset(road.reference_line, road.left_m), offset(road.reference_line, road.right_m)
 
 
 def _crossings(axes: Axes, world: World, view: View) -> None:
