@@ -79,7 +79,7 @@ def _roads(world: World, lanes: Mapping[str, Lane]) -> dict[str, _RoadDraft]:
     for road in world.roads:
         mine = [lanes[name] for name in road.lane_ids if name in lanes]
         line = _distinct(road.reference_line)
-        if mine and len(line) >= 2:
+        if mine:
             found[road.id] = _road(line, mine)
     placed = {name for road in found.values() for name in road.sides}
     for lane in world.lanes:
@@ -96,7 +96,7 @@ def _distinct(line: Array) -> Array:
     steps = np.hypot(*np.diff(line, axis=0).T)
     kept: Array = line[np.concatenate([[True], steps > _COINCIDENT_M])]
     kept[-1] = line[-1]
-    return kept
+    return kept if len(kept) > 1 else line[[0, -1]]
 
 
 def _road(line: Array, lanes: Sequence[Lane]) -> _RoadDraft:

@@ -1,8 +1,9 @@
 """Runs in the judges' interpreter, which has lanelet2: load maps and ask for their routes.
 
 Reads from standard input a JSON list of maps, each with `path`, `lat`, `lon`, `connections`
-(connection, from-lane, to-lane), `successions` (lane, next lane) and `positions` (World's id of
-a lane, x, y of its left border's first point); writes a JSON object of what it found for each.
+(connection, from-lane, to-lane), `successions` (lane, next lane), `waits` (connection that waits,
+connection that goes first), `lights` (connection, its group) and `positions` (World's id of a
+lane, x, y of its left border's first point); writes a JSON object of what it found for each.
 """
 
 from __future__ import annotations
@@ -51,6 +52,12 @@ def judged(task: dict[str, Any]) -> dict[str, Any]:
         "rules": Counter(r.attributes["subtype"] for r in found.regulatoryElementLayer),
         "missing_routes": missing,
         "stray_routes": strays,
+        "other_waits": sorted(waits_of(lanelets) ^ {(a, b) for a, b in task["waits"]}),
+        "other_lights": [
+            [name, group]
+            for name, group in task["lights"]
+            if group not in groups_of(lanelets[name])
+        ],
         "off_m": off_m,
         "graph_faults": faults,
         "speeds": {
@@ -59,6 +66,24 @@ def judged(task: dict[str, Any]) -> dict[str, Any]:
             if "speed_limit" in ll.attributes
         },
     }
+
+
+def groups_of(lanelet: Any) -> set[str]:
+    return {rule.attributes["foretwin:group"] for rule in lanelet.trafficLights()}
+
+
+def waits_of(lanelets: dict[str, Any]) -> set[tuple[str, str]]:
+    """Return who waits for whom, as each of both says of itself."""
+    found = set()
+    maneuver = lanelet2.core.ManeuverType
+    for name, lanelet in lanelets.items():
+        for rule in lanelet.rightOfWay():
+            if rule.getManeuver(lanelet) != maneuver.Yield:
+                continue
+            for other in rule.rightOfWayLanelets():
+                if rule.getManeuver(other) == maneuver.RightOfWay:
+                    found.add((name, other.attributes["foretwin:id"]))
+    return found
 
 
 def rules_for(who: str) -> Any:

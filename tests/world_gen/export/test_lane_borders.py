@@ -159,6 +159,18 @@ def test_repeated_points_of_a_road_do_no_harm() -> None:
     assert borders.right[[0, -1]].tolist() == [[0.0, -3.0], [40.0, -3.0]]
 
 
+def test_roads_and_connections_without_length_do_no_harm() -> None:
+    spot = np.zeros((2, 2))
+    drawn = world(
+        road("r", spot, ahead=[3.0]),
+        road("s", STRAIGHT, ahead=[3.0]),
+        connections=[connection("r.f0", "s.f0", spot)],
+    )
+    borders = lane_borders(drawn)
+    assert_successors_share(drawn, borders)
+    assert all(np.isfinite(line).all() for pair in borders.values() for line in pair)
+
+
 @pytest.mark.parametrize("drawn", [world_of(crossing_map()), world_of(roundabout())])
 def test_borders_of_a_junction_are_shared(drawn: World) -> None:
     borders = lane_borders(drawn)

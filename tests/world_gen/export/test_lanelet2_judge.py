@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from contracts.world import World
+from contracts.world import Conflict, Connection, World
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.judges import ask_judge, judges_python
@@ -25,8 +25,29 @@ def routes_asked(drawn: World, path: Path) -> dict[str, Any]:
         "lon": drawn.frame.origin.lon_deg,
         "connections": [[c.id, c.from_lane_id, c.to_lane_id] for c in drawn.connections],
         "successions": [[a.id, b] for a in drawn.lanes for b in a.successor_ids if b in lanes],
+        "waits": [[c.yields_id, _other(c)] for c in drawn.conflicts if not _all_stop(drawn, c)],
+        "lights": [[c.id, c.signal_group_id] for c in drawn.connections if _lit(drawn, c)],
         "positions": [[lane.id, *borders[lane.id].left[0].tolist()] for lane in drawn.lanes],
     }
+
+
+def _other(conflict: Conflict) -> str:
+    return conflict.second_id if conflict.yields_id == conflict.first_id else conflict.first_id
+
+
+def _all_stop(drawn: World, conflict: Conflict) -> bool:
+    """Return whether the two meet where all stop, and go in order of arrival."""
+    junction_of = {c.id: c.junction_id for c in drawn.connections}
+    stops = {j.summary.id for j in drawn.junctions if j.summary.control == "all_way_stop"}
+    return junction_of[conflict.yields_id] in stops
+
+
+def _lit(drawn: World, connection: Connection) -> bool:
+    """Return whether a head of the connection's group stands at its lane."""
+    return any(
+        head.group_id == connection.signal_group_id and connection.from_lane_id in head.lane_ids
+        for head in drawn.signals
+    )
 
 
 def assert_accepted(tasks: list[dict[str, Any]], worlds: list[World]) -> None:
@@ -37,6 +58,8 @@ def assert_accepted(tasks: list[dict[str, Any]], worlds: list[World]) -> None:
         assert verdict["missing_routes"] == []
         assert verdict["stray_routes"] == []
         assert verdict["graph_faults"] == []
+        assert verdict["other_waits"] == []
+        assert verdict["other_lights"] == []
         assert verdict["off_m"] < 0.01
         roads = sum(n for kind, n in verdict["lanelets"].items() if kind != "crosswalk")
         assert roads == len(drawn.lanes) + len(drawn.connections)
