@@ -72,19 +72,6 @@ def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> tuple[Junc
     )
 
 
-def check_bounds(opened: OpenMap, bbox: str, bounds: LatLonBounds) -> None:
-    """Raise UserError where a map does not reach into the bounds."""
-    have = opened.osm.bounds
-    if (
-        bounds.east <= have.west or bounds.west >= have.east
-        or bounds.north <= have.south or bounds.south >= have.north
-    ):  # fmt: skip
-        raise UserError(
-            f"--bbox {bbox}: outside {opened.file}, which spans {have.west:.5f},{have.south:.5f},"
-            f"{have.east:.5f},{have.north:.5f}"
-        )
-
-
 def parse_bbox(option: str, bbox: str) -> LatLonBounds:
     """Return bounds from W,S,E,N in degrees; UserError where they enclose nothing."""
     west, south, east, north = _degrees(option, bbox, "four numbers, W,S,E,N in degrees", 4)

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from contracts.arrays import Array
+from contracts.errors import UserError
+from contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
@@ -19,6 +21,8 @@ LARGE_MAP_BYTES = 64_000_000
 """Of larger files, what is needed is clipped from an index on disk, made on first use."""
 CLIP_MARGIN_M = 600.0
 """Beyond what is asked for: junctions at the edge must be whole, and know their neighbours."""
+MAX_REGION_M = 50_000.0
+"""A plane of this size is true to 8 parts in a million at its edges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +61,37 @@ def open_map(
     return OpenMap(file, osm, graph, find_intersections(osm, graph))
 
 
+def region_on_map(file: Path, have: LatLonBounds, wanted: LatLonBounds) -> LatLonBounds:
+    """Return what of the wanted bounds lies within those of a map; UserError where nothing does.
+
+    A World lies in one plane about its middle, so bounds far larger than the map would bend it,
+    and those of more than `MAX_REGION_M` a side are refused.
+    """
+    part = LatLonBounds(
+        south=max(wanted.south, have.south), west=max(wanted.west, have.west),
+        north=min(wanted.north, have.north), east=min(wanted.east, have.east),
+    )  # fmt: skip
+    if part.west >= part.east or part.south >= part.north:
+        raise UserError(f"--bbox {_words(wanted)}: outside {file}, which spans {_words(have)}")
+    middle = LocalFrame(GeoPoint((part.south + part.north) / 2, (part.west + part.east) / 2))
+    corners = local_from_geo(
+        middle, np.array([part.south, part.north]), np.array([part.west, part.east])
+    )
+    side_m = float(np.ptp(corners, axis=0).max())
+    if not side_m <= MAX_REGION_M:
+        raise UserError(
+            f"--bbox {_words(wanted)}: {side_m / 1000:.0f} km a side; at most "
+            f"{MAX_REGION_M / 1000:.0f} km"
+        )
+    return part
+
+
+def _words(bounds: LatLonBounds) -> str:
+    return ",".join(
+        f"{angle:.6g}" for angle in (bounds.west, bounds.south, bounds.east, bounds.north)
+    )
+
+
 def _clipped(file: Path, clip: Clip | LatLonBounds) -> OsmMap:
     # Imported here: most maps are small, and commands on them are to start fast.
     from rich.console import Console
@@ -73,7 +108,7 @@ def _clipped(file: Path, clip: Clip | LatLonBounds) -> OsmMap:
     try:
         if isinstance(clip, Clip):
             return store.clip_route(clip.line_deg, clip.margin_m + CLIP_MARGIN_M)
-        return store.clip(_widened(clip))
+        return store.clip(_widened(region_on_map(file, store.bounds, clip)))
     finally:
         store.close()
 

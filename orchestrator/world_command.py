@@ -13,7 +13,6 @@ from contracts.errors import UserError
 from contracts.world import World
 from orchestrator.map_choice import (
     FARTHEST_M,
-    check_bounds,
     junction_by_id,
     junctions_along,
     nearest_junction,
@@ -21,7 +20,7 @@ from orchestrator.map_choice import (
     parse_place,
     read_route,
 )
-from orchestrator.map_opening import Clip, OpenMap, open_map
+from orchestrator.map_opening import Clip, OpenMap, open_map, region_on_map
 from orchestrator.world_files import write_each, write_report
 from world_gen.build import build_region, build_world
 from world_gen.export.formats import (
@@ -68,7 +67,7 @@ def write_worlds(request: WorldRequest) -> int:
     format_ = _format(request)
     options = _options(request)
     many = request.everything or request.route is not None
-    _check_out(request.out, many=many)
+    _check_out(request.out, format_, many=many)
     if request.bbox is not None:
         return _region(request, format_, options)
     if request.at is not None:
@@ -94,11 +93,10 @@ def write_worlds(request: WorldRequest) -> int:
 
 
 def _region(request: WorldRequest, format_: Format, options: ExportOptions) -> int:
-    bbox = request.bbox or ""
-    bounds = parse_bbox("--bbox", bbox)
+    bounds = parse_bbox("--bbox", request.bbox or "")
     opened = open_map(request.map_file, clip=bounds)
-    check_bounds(opened, bbox, bounds)
-    world = build_region(opened.osm, opened.graph, bounds, index=_index(opened))
+    part = region_on_map(opened.file, opened.osm.bounds, bounds)
+    world = build_region(opened.osm, opened.graph, part, index=_index(opened))
     return _write_one(world, request, format_, options)
 
 
@@ -219,7 +217,7 @@ def _vehicles(text: str) -> tuple[tuple[str, VehicleKind], ...]:
     return tuple(pairs)
 
 
-def _check_out(out: Path, *, many: bool) -> None:
+def _check_out(out: Path, format_: Format, *, many: bool) -> None:
     if many:
         if out.exists() and not out.is_dir():
             raise UserError(f"--out {out}: is a file; --all and --route write into a folder")
@@ -228,3 +226,5 @@ def _check_out(out: Path, *, many: bool) -> None:
         raise UserError(f"--out {out}: is a folder; name the file to write")
     elif not out.parent.is_dir():
         raise UserError(f"--out {out}: folder {out.parent} does not exist")
+    elif format_.told_by_suffix and out.suffix.lower() != format_.suffix:
+        raise UserError(f"--out {out}: a file of --format {format_.name} ends in {format_.suffix}")

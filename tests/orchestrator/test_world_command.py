@@ -11,14 +11,16 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from contracts.errors import UserError
 from contracts.world import World
 from orchestrator.cli import run
-from orchestrator.map_opening import Clip, open_map
+from orchestrator.map_opening import Clip, open_map, region_on_map
 from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
 from orchestrator.world_files import FAILURES_FILE, write_each
 from world_gen.build import build_world
 from world_gen.export.formats import FORMATS
 from world_gen.intersections import Junction
+from world_gen.osm_map import LatLonBounds
 
 MAP = str(EMBEDDED_MAP)
 TOWN = "-30.004,44.998,-29.996,45.002"
@@ -76,6 +78,23 @@ def test_bounds_make_one_world_of_a_region(tmp_path: Path) -> None:
     assert collection["world"]["intersection"]["kind"] == "region"
     kinds = [feature["properties"]["kind"] for feature in collection["features"]]
     assert kinds.count("junction") > 1
+
+
+def test_bounds_beyond_the_map_end_where_it_ends(tmp_path: Path) -> None:
+    out = tmp_path / "town.geojson"
+    wide = ["--bbox", "-40,44,-29.99,60", "--format", "geojson", "--out", str(out)]
+    assert run(["world", MAP, *wide]) == 0
+    lon, lat = json.loads(out.read_text(encoding="utf-8"))["world"]["origin"]
+    assert abs(lat - 45.0) < 0.02
+    assert abs(lon + 30.0) < 0.02
+
+
+def test_a_region_is_no_larger_than_a_plane_can_be() -> None:
+    country = LatLonBounds(south=47.0, west=6.0, north=55.0, east=15.0)
+    town = LatLonBounds(south=50.0, west=9.0, north=50.2, east=9.2)
+    assert region_on_map(EMBEDDED_MAP, country, town) == town
+    with pytest.raises(UserError, match="at most 50 km"):
+        region_on_map(EMBEDDED_MAP, country, country)
 
 
 def test_all_junctions_are_written_by_their_ids(
@@ -206,6 +225,7 @@ def test_an_output_that_cannot_be_is_named(
         (["--all", "--out", str(file)], "is a file"),
         (["--at", "45,-30", "--out", str(tmp_path)], "is a folder"),
         (["--at", "45,-30", "--out", str(tmp_path / "no" / "w.xml")], "does not exist"),
+        (["--at", "45,-30", "--format", "svg", "--out", str(tmp_path / "w.png")], "ends in .svg"),
     ):
         assert run(["world", MAP, *arguments]) == 2
         assert named in capsys.readouterr().err

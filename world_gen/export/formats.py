@@ -37,6 +37,8 @@ class Format:
     suffix: str
     read_by: str
     write: Callable[[World, Path, ExportOptions], None]
+    told_by_suffix: bool = False
+    """Whether the writer goes by the file's suffix."""
 
 
 # Writers are imported when they are used: each needs libraries that the others do not.
@@ -93,7 +95,7 @@ FORMATS: dict[str, Format] = {
         Format("lanelet2", ".osm", "Lanelet2 and Autoware", _lanelet2),
         Format("commonroad", ".xml", "commonroad-io and CommonRoad's tools", _commonroad),
         Format("geojson", ".geojson", "QGIS and other maps (RFC 7946)", _geojson),
-        Format("svg", ".svg", "browsers: the top-down picture", _picture),
-        Format("png", ".png", "everyone: the top-down picture", _picture),
+        Format("svg", ".svg", "browsers: the top-down picture", _picture, True),
+        Format("png", ".png", "everyone: the top-down picture", _picture, True),
     )
 }  # fmt: skip
