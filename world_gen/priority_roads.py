@@ -15,8 +15,9 @@ _IMPORTANCE: Mapping[str, float] = {
     "living_street": 1.0, "pedestrian": 1.0, "service": 1.0, "track": 0.5,
 }  # fmt: skip
 _YARD = 1.0
-_NUMBERED = 4.0
-"""From tertiary up a road of higher class is usually signed as the one with priority."""
+_NUMBERED, _CLASSIFIED = 4.0, 5.0
+"""From tertiary up a road of higher class is usually signed as the one with priority; from
+secondary up every junction has signs."""
 
 
 class Rank(IntEnum):
@@ -71,8 +72,9 @@ def standings(entries: list[Entry], driving_side: DrivingSide) -> list[Standing]
     out of a yard, a track or a living street (§10); a sign on the road opposite, since a road that
     is crossed has them on both sides; a road of lower class where one is tertiary or more, since
     the higher one then is signed with priority (VwV-StVO zu §8 (1) III), but not within a 30 zone
-    (§45 (1c) 4); a link road that joins a street (§18 (3)); the stem of a T whose other arms share
-    one name (VwV-StVO zu §8 (1) IV), or, where traffic keeps left, any stem (UK Highway Code 170,
+    (§45 (1c) 4); a link road that joins a street (§18 (3)); of numbered roads who leaves the one
+    whose number or name goes on; the stem of a T of classified roads, which have signs everywhere
+    (VwV-StVO zu §8 (1) III, IV), or, where traffic keeps left, of any roads (UK Highway Code 170,
     172). The rest are equals, among whom the near side goes first.
     """
     found: list[Standing | None] = [_by_tags(entry) for entry in entries]
@@ -85,8 +87,8 @@ def standings(entries: list[Entry], driving_side: DrivingSide) -> list[Standing]
             if importance(entry.edge) <= importance(entries[j].edge) and _others(found, i, j):
                 found[i] = Standing(Rank.MINOR, entries[j].sign or "give_way", "inferred")
     _lesser(entries, found)
-    if len(entries) == 3 and sum(s is None for s in found) == 3:
-        _stem(entries, found, driving_side)
+    if len(entries) >= 3 and not any(found):
+        _through(entries, found, driving_side)
     plain = Standing(Rank.PLAIN, "near_side", "default")
     return [plain if standing is None else standing for standing in found]
 
@@ -122,18 +124,23 @@ def _lesser(entries: list[Entry], found: list[Standing | None]) -> None:
             found[i] = Standing(Rank.MINOR, "lesser_road", "inferred")
 
 
-def _stem(entries: list[Entry], found: list[Standing | None], driving_side: DrivingSide) -> None:
-    for i in range(3):
-        one, two = (entry for n, entry in enumerate(entries) if n != i)
-        named = (
-            one.edge.name == two.edge.name != entries[i].edge.name
-            and one.edge.name != ""
-            and importance(one.edge) >= _NUMBERED
-        )
-        through = one.opposite is not None and entries[i].opposite is None
-        if named or (through and driving_side == "left"):
-            found[i] = Standing(Rank.MINOR, "lesser_road", "inferred")
-            return
+def _through(entries: list[Entry], found: list[Standing | None], driving_side: DrivingSide) -> None:
+    """Let the road that goes on through the junction go first, where one road does."""
+    mine = [_known_as(entry.edge) for entry in entries]
+    classes = [importance(entry.edge) for entry in entries]
+    shared = {name for name in mine if name and mine.count(name) > 1}
+    lesser: list[int] = []
+    if len(shared) == 1 and min(classes) >= _NUMBERED:
+        lesser = [i for i, name in enumerate(mine) if name not in shared]
+    if not lesser and len(entries) == 3 and (driving_side == "left" or min(classes) >= _CLASSIFIED):
+        stems = [i for i, entry in enumerate(entries) if entry.opposite is None]
+        lesser = stems if len(stems) == 1 else []
+    for i in lesser:
+        found[i] = Standing(Rank.MINOR, "lesser_road", "inferred")
+
+
+def _known_as(edge: RoadEdge) -> str:
+    return edge.tags.get("ref") or edge.name
 
 
 def _in_zone(tags: Mapping[str, str]) -> bool:

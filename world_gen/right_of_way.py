@@ -39,7 +39,9 @@ from world_gen.met_on_the_way import NodeTags, met_inside, sign_of
 from world_gen.polyline import arc_lengths, locate
 from world_gen.priority_roads import Rank, Standing, has_priority, importance
 
-ALONGSIDE_RAD = math.radians(10.0)
+ALONGSIDE_RAD, FAST_ALONGSIDE_RAD = math.radians(10.0), math.radians(50.0)
+"""Roads that meet at less run together; on motorways and trunk roads they merge at more."""
+_FAST = ("motorway", "motorway_link", "trunk", "trunk_link")
 
 
 class Answer(NamedTuple):
@@ -76,6 +78,7 @@ class Way:
     on_main: bool
     """Has run along the main road between the two mouths of a staggered junction."""
     mini: bool
+    fast: bool
     exit_heading: float
 
 
@@ -170,6 +173,7 @@ def _ways(
                 sign_m=sign_m,
                 centerline=c.centerline,
                 on_main=kind == "staggered" and _runs_along_main(c, tops, classes, name),
+                fast=toward.edge.road_class in _FAST,
                 mini=kind == "mini_roundabout",
                 exit_heading=end,
             )
@@ -237,7 +241,7 @@ def _answer(
         return Answer(b.on_main, first.rule if b.on_main else second.rule, "inferred")
     if oncoming:
         return _across(a, b)
-    if abs(angle) > ALONGSIDE_RAD:
+    if abs(angle) > (FAST_ALONGSIDE_RAD if a.fast and b.fast else ALONGSIDE_RAD):
         # Who is seen to the right comes with a heading turned to the left.
         return Answer((angle > 0.0) == (driving_side == "right"), "near_side", "default")
     return _beside(a, b)

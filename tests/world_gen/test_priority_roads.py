@@ -110,6 +110,36 @@ def test_roads_of_one_name_go_on_round_the_bend_of_a_t():
     assert waits(world, "Side>Street", "Street>Side") == ("Side>Street", "lesser_road", "inferred")
 
 
+def test_the_numbered_road_goes_on_through_a_crossing_of_equals():
+    numbered = {"highway": "secondary", "ref": "L 3159"}
+    plain = {"highway": "secondary"}
+    world = world_of(drawn_map(CROSS, sides(E=numbered, W=numbered, N=plain, S=plain)))
+    assert waits(world, "S>N", "W>E") == ("S>N", "lesser_road", "inferred")
+
+
+@pytest.mark.parametrize("highway", ["secondary", "tertiary"])
+def test_the_stem_of_a_t_of_classified_roads_waits(highway):
+    tags = {"highway": highway}
+    world = world_of(drawn_map(CROSS, sides(E=tags, W=tags, S=tags)))
+    assert waits(world, "S>E", "W>E")[0] == ("S>E" if highway == "secondary" else "W>E")
+    assert waits(world, "S>W", "E>S")[0] == ("S>W" if highway == "secondary" else "E>S")
+
+
+@pytest.mark.parametrize(
+    ("highway", "rule"), [("motorway", "merge_order"), ("tertiary", "near_side")]
+)
+def test_where_motorways_merge_the_straighter_one_goes_first(highway, rule):
+    one_way = {"highway": highway, "oneway": "yes"}
+    nodes = {0: (0.0, 0.0), 1: (90.0, 0.0), 3: (-90.0, 0.0), 4: (-80.0, -40.0)}
+    ways = [
+        (11, [0, 1], one_way | {"name": "E"}),
+        (13, [3, 0], one_way | {"name": "W"}),
+        (14, [4, 0], one_way | {"name": "S"}),
+    ]
+    told = waits(world_of(drawn_map(nodes, ways)), "W>E", "S>E")
+    assert told[:2] == (("S>E" if highway == "motorway" else "W>E"), rule)
+
+
 def test_a_stop_sign_on_the_very_node_is_for_the_lesser_road():
     world = world_of(crossing(street=MAIN, node_tags={0: {"highway": "stop", "stop": "minor"}}))
     assert waits(world, "Avenue>Avenue", "Street>Street") == ("Avenue>Avenue", "stop", "inferred")
