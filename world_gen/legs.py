@@ -8,7 +8,6 @@ import numpy as np
 
 from contracts.arrays import Array
 from world_gen.cross_section import CrossSection
-from world_gen.polyline import direction_at, unit, without_repeats
 from world_gen.road_graph import DirectedEdge, RoadEdge
 
 RING_KINDS = ("roundabout", "circular")
@@ -21,12 +20,25 @@ def is_ring_edge(edge: RoadEdge) -> bool:
 
 def heading_out(leg: DirectedEdge, look_m: float = 8.0) -> Array:
     """Return the unit direction (2,) in which a leg leaves, averaged over `look_m`."""
-    xy = without_repeats(leg.xy_m)
-    steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
-    reach = min(look_m, float(steps[-1]))
-    target = np.array([np.interp(reach, steps, xy[:, 0]), np.interp(reach, steps, xy[:, 1])])
-    gap = target - xy[0]
-    return unit(gap) if math.hypot(*gap) > 0.1 else direction_at(xy, 0.0)
+    xy = leg.xy_m
+    x0, y0 = x, y = xy[0].tolist()
+    ahead, gone_m = None, 0.0
+    # Most legs need one or two points: plain floats are faster here than arrays.
+    for i in range(1, len(xy)):
+        nx, ny = xy[i].tolist()
+        step_m = math.hypot(nx - x, ny - y)
+        if step_m <= 0.01:
+            continue
+        ahead = ahead or ((nx - x) / step_m, (ny - y) / step_m)
+        share = min((look_m - gone_m) / step_m, 1.0)
+        x, y = x + share * (nx - x), y + share * (ny - y)
+        gone_m += step_m
+        if gone_m >= look_m:
+            break
+    span_m = math.hypot(x - x0, y - y0)
+    if span_m > 0.1:
+        ahead = ((x - x0) / span_m, (y - y0) / span_m)
+    return np.array(ahead or (1.0, 0.0))
 
 
 def lateral_positions(

@@ -117,12 +117,11 @@ def _with_turns(
     ways: list[tuple[DirectedEdge, tuple[DirectedEdge, ...]]],
     driving_side: DrivingSide,
 ) -> list[Movement]:
-    heading = -heading_out(DirectedEdge(toward.edge, not toward.reverse))
+    x, y = heading_out(DirectedEdge(toward.edge, not toward.reverse)).tolist()
     angles = []
     for leg, _ in ways:
-        out = heading_out(leg)
-        cross = float(heading[0] * out[1] - heading[1] * out[0])
-        angles.append(math.atan2(cross, float(heading @ out)))
+        u, v = heading_out(leg).tolist()
+        angles.append(math.atan2(y * u - x * v, -x * u - y * v))
     straightest = min((abs(a) for a in angles), default=0.0)
     found = []
     for (leg, path), angle in zip(ways, angles, strict=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
@@ -14,8 +14,10 @@ from contracts.arrays import Array
 from world_gen.cross_section import CrossSection
 from world_gen.legs import heading_out, is_ring_edge, lateral_positions
 from world_gen.polyline import without_repeats
-from world_gen.road_graph import DirectedEdge, RoadEdge
+from world_gen.road_graph import RoadEdge
 from world_gen.turn_curves import LEAD_M, WANTED_RADIUS_M
+
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 if TYPE_CHECKING:
     from world_gen.clusters import Cluster
@@ -34,6 +36,18 @@ SHARPEST_ARC_RAD = math.radians(140.0)
 """Sharper turns begin with a swing to the other side instead of farther back."""
 
 
+class _Legs(NamedTuple):
+    """The legs of K clusters that have n legs each; (K, n) or (K, n, 2) arrays."""
+
+    heads: Array
+    starts_m: Array
+    half_m: Array
+    into_m: Array
+    """How far the outermost lanes toward the place lie to their drivers' left and right."""
+    out_m: Array
+    on_ring: Flags
+
+
 def trims(
     clusters: tuple[Cluster, ...],
     edges: Mapping[int, RoadEdge],
@@ -42,15 +56,21 @@ def trims(
 ) -> dict[tuple[int, bool], float]:
     """Return metres cut off an edge's lanes by (edge index, at its end node)."""
     found: dict[tuple[int, bool], float] = {}
+    by_size: dict[int, list[Cluster]] = {}
     for cluster in clusters:
-        if cluster.plain:
-            values = _plain_trims(cluster, sections, shifts_m)
-        elif len(cluster.nodes) == 1:
-            values = _node_trims(cluster, sections)
-        else:
-            values = _area_trims(cluster, edges, sections)
-        for leg, value in zip(cluster.legs, values, strict=True):
-            found[leg.edge.index, leg.reverse] = min(value, MAX_TRIM_M)
+        by_size.setdefault(len(cluster.legs), []).append(cluster)
+    for alike in by_size.values():
+        legs = _legs_of(alike, sections)
+        turning, at_node = _turning_trims(legs), _node_trims(legs)
+        for k, cluster in enumerate(alike):
+            if cluster.plain:
+                values = _plain_trims(cluster, legs.heads[k], turning[k], sections, shifts_m)
+            elif len(cluster.nodes) == 1:
+                values = np.maximum(at_node[k], turning[k])
+            else:
+                values = np.maximum(_area_trims(cluster, edges, sections), turning[k])
+            for leg, value in zip(cluster.legs, values.tolist(), strict=True):
+                found[leg.edge.index, leg.reverse] = min(value, MAX_TRIM_M)
     for index, edge in edges.items():
         start, end = found.get((index, False), 0.0), found.get((index, True), 0.0)
         room = 0.8 * edge.length_m
@@ -61,77 +81,84 @@ def trims(
     return found
 
 
+def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection]) -> _Legs:
+    legs = [leg for cluster in clusters for leg in cluster.legs]
+    mine = [sections[leg.edge.index] for leg in legs]
+    shape = (len(clusters), len(clusters[0].legs))
+    into = [s.reach_m(not leg.reverse) for s, leg in zip(mine, legs, strict=True)]
+    out = [s.reach_m(leg.reverse) for s, leg in zip(mine, legs, strict=True)]
+    return _Legs(
+        heads=np.array([heading_out(leg) for leg in legs]).reshape(*shape, 2),
+        starts_m=np.array([leg.edge.xy_m[-1 if leg.reverse else 0] for leg in legs]).reshape(
+            *shape, 2
+        ),
+        half_m=np.array([section.half_width_m for section in mine]).reshape(shape),
+        into_m=np.array(into).reshape(*shape, 2),
+        out_m=np.array(out).reshape(*shape, 2),
+        on_ring=np.array([is_ring_edge(leg.edge) for leg in legs]).reshape(shape),
+    )
+
+
 def _plain_trims(
     cluster: Cluster,
+    heads: Array,
+    turning: Array,
     sections: Mapping[int, CrossSection],
     shifts_m: Mapping[int, tuple[float, float]],
-) -> list[float]:
+) -> Array:
     """Lanes of one road run on where they fit; where lanes change they get room for a taper."""
-    a, b = (sections[leg.edge.index] for leg in cluster.legs)
     first, second = cluster.legs
+    a, b = sections[first.edge.index], sections[second.edge.index]
     by_first, by_second = (
         shifts_m.get(leg.edge.index, (0.0, 0.0))[int(leg.reverse)] for leg in cluster.legs
     )
     fits = lateral_positions(first, a, outward=False, shift_m=by_first) == lateral_positions(
         second, b, outward=True, shift_m=by_second
     )
-    heads = np.array([heading_out(first), heading_out(second)])
     if fits and -heads[0] @ heads[1] > SHARPEST_BEND_COS:
-        return [0.0, 0.0]
+        return np.zeros(2)
     room = [0.0 if fits else min(TAPER_M, 0.3 * leg.edge.length_m) for leg in cluster.legs]
-    turning = _turning_trims(cluster.legs, heads, sections)
-    return [max(a, float(b)) for a, b in zip(room, turning, strict=True)]
+    return np.maximum(room, turning)
 
 
-def _node_trims(cluster: Cluster, sections: Mapping[int, CrossSection]) -> list[float]:
+def _node_trims(legs: _Legs) -> Array:
     """Cut each leg where the kerbs of straight legs from one point cross, and a corner more."""
-    heads = np.array([heading_out(leg) for leg in cluster.legs])
-    half = np.array([sections[leg.edge.index].half_width_m for leg in cluster.legs])
-    on_ring = np.array([is_ring_edge(leg.edge) for leg in cluster.legs])
-    cos = np.clip(heads @ heads.T, -1.0, 1.0)
+    cos = np.clip(legs.heads @ legs.heads.transpose(0, 2, 1), -1.0, 1.0)
     sin = np.sqrt(1.0 - cos * cos)
-    reach = (half[None, :] + half[:, None] * cos) / np.maximum(sin, 0.2)
-    reach = np.where(cos < -0.94, 0.0, reach)  # the road goes straight on
-    np.fill_diagonal(reach, 0.0)
-    corner = np.where(on_ring, RING_CORNER_M, CORNER_M)
-    trims = np.maximum(reach.max(axis=1), 0.0) + corner
-    return [float(v) for v in np.maximum(trims, _turning_trims(cluster.legs, heads, sections))]
+    half = legs.half_m
+    reach = (half[:, None, :] + half[:, :, None] * cos) / np.maximum(sin, 0.2)
+    # Where the road goes straight on, and with itself, nothing crosses.
+    reach = np.where((cos < -0.94) | np.eye(half.shape[1], dtype=bool), 0.0, reach)
+    corner = np.where(legs.on_ring, RING_CORNER_M, CORNER_M)
+    return np.asarray(np.maximum(reach.max(axis=2), 0.0) + corner)
 
 
-def _turning_trims(
-    legs: tuple[DirectedEdge, ...], heads: Array, sections: Mapping[int, CrossSection]
-) -> Array:
-    """Return (legs,) how far from their node lanes must end for every turn to have its radius.
+def _turning_trims(legs: _Legs) -> Array:
+    """Return (K, n) how far from their node lanes must end for every turn to have its radius.
 
     A turn by an angle with radius R ends R tan(angle / 2) from where the lanes' lines cross.
     """
-    into = np.full((len(legs), 2), np.nan)
-    out = into.copy()
-    for row, leg in enumerate(legs):
-        section = sections[leg.edge.index]
-        into[row], out[row] = section.reach_m(not leg.reverse), section.reach_m(leg.reverse)
     # From leg i into leg j; an angle above 0 is a turn to the left.
-    cos = np.clip(heads @ heads.T, -1.0, 1.0)
-    sin = np.outer(heads[:, 1], heads[:, 0]) - np.outer(heads[:, 0], heads[:, 1])
+    x, y = legs.heads[..., 0], legs.heads[..., 1]
+    cos = np.clip(legs.heads @ legs.heads.transpose(0, 2, 1), -1.0, 1.0)
+    sin = y[:, :, None] * x[:, None, :] - x[:, :, None] * y[:, None, :]
     angle = np.arctan2(sin, -cos)
     size = np.abs(angle)
     left = angle > 0.0
-    start = np.where(left, -into[:, None, 0], into[:, None, 1])
-    end = np.where(left, -out[None, :, 0], out[None, :, 1])
-    # To the right of who drives in, and of who drives out.
-    right_in = np.stack([-heads[:, 1], heads[:, 0]], axis=-1)
-    at = np.array([leg.xy_m[0] for leg in legs])
-    gap = at[None, :] - at[:, None]
-    gap = gap - end[..., None] * right_in[None, :] - start[..., None] * right_in[:, None]
+    start = np.where(left, -legs.into_m[:, :, None, 0], legs.into_m[:, :, None, 1])
+    end = np.where(left, -legs.out_m[:, None, :, 0], legs.out_m[:, None, :, 1])
+    # To the right of who drives in, and to the left of who drives out.
+    aside = np.stack([-y, x], axis=-1)
+    gap = legs.starts_m[:, None, :] - legs.starts_m[:, :, None]
+    gap = gap - end[..., None] * aside[:, None, :] - start[..., None] * aside[:, :, None]
     across = np.where(np.abs(sin) < 0.2, np.copysign(0.2, sin), sin)
-    x, y = heads[:, 0], heads[:, 1]
-    from_start = (gap[..., 1] * x[None, :] - gap[..., 0] * y[None, :]) / across
-    from_end = (gap[..., 1] * x[:, None] - gap[..., 0] * y[:, None]) / across
+    from_start = (gap[..., 1] * x[:, None, :] - gap[..., 0] * y[:, None, :]) / across
+    from_end = (gap[..., 1] * x[:, :, None] - gap[..., 0] * y[:, :, None]) / across
     room = WANTED_RADIUS_M * np.tan(np.minimum(size, SHARPEST_ARC_RAD) / 2.0) + LEAD_M
     turns = (size > SOFTEST_TURN_RAD) & (size < SHARPEST_TURN_RAD)
     from_start = np.where(turns & np.isfinite(from_start), from_start + room, 0.0)
     from_end = np.where(turns & np.isfinite(from_end), from_end + room, 0.0)
-    return np.asarray(np.maximum(from_start.max(axis=1), from_end.max(axis=0)))
+    return np.asarray(np.maximum(from_start.max(axis=2), from_end.max(axis=1)))
 
 
 def _area_trims(
@@ -169,7 +196,4 @@ def _area_trims(
                 )
                 reach = max(reach, float(at.max()))
         values.append(reach + CORNER_M)
-    turning = _turning_trims(
-        cluster.legs, np.array([heading_out(leg) for leg in cluster.legs]), sections
-    )
-    return [float(v) for v in np.maximum(values, turning)]
+    return values
