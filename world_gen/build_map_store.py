@@ -28,6 +28,7 @@ from world_gen.opl import (
     NodePositions,
     TagReader,
     WayLines,
+    any_key,
     read_nodes,
     read_relations,
     sections,
@@ -36,8 +37,9 @@ from world_gen.opl import (
 )
 from world_gen.opl_stream import OplStream, Progress
 from world_gen.osm_map import LatLonBounds, MapError
-from world_gen.read_osm import WANTED_NODES, WANTED_WAYS, is_kept_relation
+from world_gen.read_osm import NODE_KEYS, WAY_KEYS, is_kept_relation
 
+WANTED_WAYS, WANTED_NODES = any_key(WAY_KEYS), any_key(NODE_KEYS)
 BATCH_BYTES = 24 << 20
 """Text of ways that is looked at in one go; some 2 million nodes of ways."""
 _LINES_BYTES = 4 << 20
@@ -62,7 +64,7 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
             for block in stream.blocks():
                 for letter, section in sections(block):
                     if letter == "n":
-                        found = read_nodes(section, WANTED_NODES)
+                        found = read_nodes(section, WANTED_NODES.search)
                         nodes.add(found.positions)
                         _add_tagged(table, found)
                     elif letter == "w":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate, pairwise
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -60,15 +60,19 @@ def assemble_map(
     is_road = np.array(["highway" in tags for tags in objects.way_tags], dtype=bool)
     sound = sound_ways(objects.way_ids, is_road, objects.way_nodes, table)
     notes = [*objects.notes, *(text for _, text in sound.notes)]
-    nodes = sound.nodes.nodes.tolist()
-    ends = list(accumulate(sound.nodes.counts.tolist(), initial=0))
-    picked = sound.picked.tolist()
-    ways: dict[int, OsmWay] = {}
-    for k in sorted(range(len(picked)), key=lambda k: objects.way_ids[picked[k]]):
-        way_id, tags = objects.way_ids[picked[k]], objects.way_tags[picked[k]]
-        if way_id in ways:
-            notes.append(f"way {way_id}: stands in the file more than once; the last is used")
-        ways[way_id] = OsmWay(way_id, tuple(nodes[ends[k] : ends[k + 1]]), tags)
+    nodes = tuple(sound.nodes.nodes.tolist())
+    cuts = [0, *np.cumsum(sound.nodes.counts).tolist()]
+    ids = np.array(objects.way_ids, dtype=np.int64)[sound.picked]
+    order = np.argsort(ids, kind="stable")
+    notes.extend(
+        f"way {way}: stands in the file more than once; the last is used"
+        for way in ids[order][1:][np.diff(ids[order]) == 0].tolist()
+    )
+    places = zip(order.tolist(), sound.picked[order].tolist(), strict=True)
+    ways = {
+        way: OsmWay(way, nodes[cuts[k] : cuts[k + 1]], objects.way_tags[i])
+        for way, (k, i) in zip(ids[order].tolist(), places, strict=True)
+    }
     relations = {}
     for key, relation in objects.relations.items():
         if any(m.kind == "w" and m.ref in ways for m in relation.members):

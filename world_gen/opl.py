@@ -65,13 +65,38 @@ class TagReader:
         """Return the tags of a T field without its letter."""
         known = self._known.get(text)
         if known is None:
-            pairs = [item.split("=", 1) for item in text.split(",")]
-            if "%" in text:
-                known = {_plain(key): _plain(value) for key, value in pairs}
-            else:
-                known = {key: value for key, value in pairs}  # noqa: C416
-            self._known[text] = known
+            known = self._known[text] = _tags(text)
         return known
+
+
+class WantedTags(dict[str, Mapping[str, str] | None]):
+    """The tags of each T field that has one of the wanted keys, None for those that have none."""
+
+    def __init__(self, keys: Iterable[str], tags_of: TagReader) -> None:
+        super().__init__()
+        self._keys = frozenset(keys)
+        self._words = tuple(f"{key}=" for key in self._keys)
+        self._tags_of = tags_of
+
+    def __missing__(self, text: str) -> Mapping[str, str] | None:
+        found = None
+        for word in self._words:
+            if word in text:
+                tags = self._tags_of(text)
+                found = None if self._keys.isdisjoint(tags) else tags
+                break
+        self[text] = found
+        return found
+
+
+def _tags(text: str) -> dict[str, str]:
+    escaped = text.count("%")
+    if escaped and escaped == 2 * text.count("%20%"):  # spaces alone: by far the most frequent
+        text, escaped = text.replace("%20%", " "), 0
+    pairs = [item.split("=", 1) for item in text.split(",")]
+    if escaped:
+        return {_plain(key): _plain(value) for key, value in pairs}
+    return dict(pairs)
 
 
 def sections(text: bytes) -> Iterator[tuple[str, bytes]]:
@@ -91,8 +116,8 @@ def any_key(keys: Iterable[str]) -> re.Pattern[str]:
     return re.compile(f"(?:^|,)(?:{'|'.join(re.escape(key) for key in keys)})=")
 
 
-def read_nodes(section: bytes, wanted: re.Pattern[str]) -> NodeObjects:
-    """Read lines such as `n1 Thighway=stop x8.5 y53.25`; `wanted` is from `any_key`."""
+def read_nodes(section: bytes, wanted: Callable[[str], object]) -> NodeObjects:
+    """Read lines such as `n1 Thighway=stop x8.5 y53.25`; `wanted` tells by their tags."""
     section, texts = _without_tags(section, wanted)
     if b" x " in section or b" y\n" in section:
         section = section.replace(b" x ", b" x999 ").replace(b" y\n", b" y999\n")
@@ -102,7 +127,7 @@ def read_nodes(section: bytes, wanted: re.Pattern[str]) -> NodeObjects:
     return NodeObjects(NodePositions(numbers[:, 0], scaled[:, 1], scaled[:, 0]), texts)
 
 
-def _without_tags(section: bytes, wanted: re.Pattern[str]) -> tuple[bytes, dict[int, str]]:
+def _without_tags(section: bytes, wanted: Callable[[str], object]) -> tuple[bytes, dict[int, str]]:
     """Cut the tags out of lines of nodes; spaces in tags are escaped, so " T" begins a field."""
     letters = np.frombuffer(section, dtype=np.uint8)
     begins = np.flatnonzero((letters[:-2] == 32) & (letters[1:-1] == 84) & (letters[2:] != 32))
@@ -114,7 +139,7 @@ def _without_tags(section: bytes, wanted: re.Pattern[str]) -> tuple[bytes, dict[
         text = _text(section[begin + 2 : end])
         pieces.append(section[done : begin + 2])
         done = end
-        if wanted.search(text):
+        if wanted(text):
             found[int(section[section.rfind(b"n", 0, begin) + 1 : begin])] = text
     if not pieces:
         return section, found
@@ -144,15 +169,13 @@ def _missing_decimals(section: bytes) -> IntArray:
 
 
 def way_lines(section: bytes) -> WayLines:
-    """Split lines such as `w10 Thighway=residential Nn1,n2`."""
-    lines = WayLines([], [], [])
-    for line in _text(section).split("\n"):
-        if line:
-            head, tags, nodes = line.split(" ")
-            lines.ids.append(int(head[1:]))
-            lines.tag_texts.append(tags[1:])
-            lines.node_texts.append(nodes[1:])
-    return lines
+    """Split lines such as `w10 Thighway=residential Nn1,n2`; other spaces are escaped."""
+    fields = _text(section).replace("\n", " ").split(" ")
+    return WayLines(
+        [int(head[1:]) for head in fields[0:-1:3]],
+        [tags[1:] for tags in fields[1::3]],
+        [nodes[1:] for nodes in fields[2::3]],
+    )
 
 
 def way_nodes(node_texts: Sequence[str]) -> WayNodes:
@@ -195,6 +218,4 @@ def _member(text: str) -> OsmMember:
 
 
 def _plain(text: str) -> str:
-    if text.count("%") == 2 * text.count("%20%"):
-        return text.replace("%20%", " ")  # nearly always, and much quicker
     return _ESCAPE.sub(lambda match: chr(int(match[1], 16)), text)

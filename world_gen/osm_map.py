@@ -19,8 +19,7 @@ class MapError(UserError):
     """A map that cannot be used; the message names the file and what is wrong."""
 
 
-@dataclass(frozen=True, slots=True)
-class OsmWay:
+class OsmWay(NamedTuple):
     """One way: its id, its nodes in order, its tags."""
 
     id: int

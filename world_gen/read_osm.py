@@ -6,7 +6,7 @@ import ctypes
 import hashlib
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,8 @@ from world_gen.opl import (
     OPL_OPTIONS,
     NodePositions,
     TagReader,
+    WantedTags,
     WayLines,
-    any_key,
     read_nodes,
     read_relations,
     sections,
@@ -35,13 +35,11 @@ from world_gen.opl import (
 )
 from world_gen.osm_map import OsmMap, OsmRelation
 
-WANTED_WAYS = any_key(
-    ("highway", "railway", "building", "building:part", "area:highway", "barrier")
-)
-WANTED_NODES = any_key((
+WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
+NODE_KEYS = (
     "highway", "railway", "barrier", "crossing", "traffic_calming", "traffic_sign",
     "traffic_signals", "junction", "stop", "give_way", "kerb", "driving_side",
-))  # fmt: skip
+)  # fmt: skip
 
 
 def read_map(path: Path) -> OsmMap:
@@ -100,49 +98,52 @@ def _close(writer: Any) -> None:
         raise
 
 
-@dataclass(slots=True)
 class DecodedObjects:
     """What of a map's objects may matter to a driver, as they come in."""
 
-    tags_of: TagReader = field(default_factory=TagReader)
-    positions: list[NodePositions] = field(default_factory=list)
-    node_tags: dict[int, Mapping[str, str]] = field(default_factory=dict)
-    ways: WayLines = field(default_factory=lambda: WayLines([], [], []))
-    relations: dict[int, OsmRelation] = field(default_factory=dict)
+    def __init__(self) -> None:
+        self._tags_of = TagReader()
+        self._wanted_nodes = WantedTags(NODE_KEYS, self._tags_of)
+        self._positions: list[NodePositions] = []
+        self._node_tags: dict[int, Mapping[str, str]] = {}
+        self._ways = WayLines([], [], [])
+        self._relations: dict[int, OsmRelation] = {}
 
     def add(self, text: bytes) -> None:
         """Add whole lines of OPL."""
         for letter, section in sections(text):
             if letter == "n":
-                nodes = read_nodes(section, WANTED_NODES)
-                self.positions.append(nodes.positions)
-                self.node_tags.update((n, self.tags_of(t)) for n, t in nodes.tag_texts.items())
+                nodes = read_nodes(section, self._wanted_nodes.__getitem__)
+                self._positions.append(nodes.positions)
+                self._node_tags.update((n, self._tags_of(t)) for n, t in nodes.tag_texts.items())
             elif letter == "w":
                 more = way_lines(section)
-                self.ways.ids.extend(more.ids)
-                self.ways.tag_texts.extend(more.tag_texts)
-                self.ways.node_texts.extend(more.node_texts)
+                self._ways.ids.extend(more.ids)
+                self._ways.tag_texts.extend(more.tag_texts)
+                self._ways.node_texts.extend(more.node_texts)
             else:
-                self.relations.update(read_relations(section, is_kept_relation, self.tags_of))
+                self._relations.update(read_relations(section, is_kept_relation, self._tags_of))
 
     def for_map(self) -> MapObjects:
         """Return the ways for drivers, the outlines that kept relations name, and their nodes."""
         notes: list[str] = []
+        wanted = WantedTags(WAY_KEYS, self._tags_of)
+        ways = self._ways
+        tags = [wanted[text] for text in ways.tag_texts]
         # Outlines of buildings with courtyards carry their tags on the relation alone.
-        members = {m.ref for r in self.relations.values() for m in r.members if m.kind == "w"}
-        ids, tags, texts = [], [], []
-        for way, tag_text, node_text in zip(*self.ways, strict=True):
-            if way in members or WANTED_WAYS.search(tag_text):
-                ids.append(way)
-                tags.append(self.tags_of(tag_text))
-                texts.append(node_text)
+        members = {m.ref for r in self._relations.values() for m in r.members if m.kind == "w"}
+        if members:
+            for i, way in enumerate(ways.ids):
+                if way in members and tags[i] is None:
+                    tags[i] = self._tags_of(ways.tag_texts[i])
+        kept = [of_way is not None for of_way in tags]
         return MapObjects(
-            way_ids=ids,
-            way_tags=tags,
-            way_nodes=way_nodes(texts),
-            positions=sorted_positions(self.positions, notes),
-            node_tags=self.node_tags,
-            relations=dict(sorted(self.relations.items())),
+            way_ids=list(compress(ways.ids, kept)),
+            way_tags=[of_way for of_way in tags if of_way is not None],
+            way_nodes=way_nodes(list(compress(ways.node_texts, kept))),
+            positions=sorted_positions(self._positions, notes),
+            node_tags=self._node_tags,
+            relations=dict(sorted(self._relations.items())),
             notes=notes,
         )
 
