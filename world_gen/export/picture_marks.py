@@ -29,6 +29,7 @@ from world_gen.export.picture_style import (
     LANE,
     LINE_COLOUR,
     MERGING_CONFLICT,
+    PARKING,
     RING,
     ROAD,
     SIDEWALK,
@@ -147,7 +148,8 @@ def draw_legend(figure: Figure) -> None:
         Patch(facecolor=_BUILDING, alpha=0.35, linestyle=":", edgecolor=_GUESSED,
               label="open below"),
     ]  # fmt: skip
-    heights += [Patch(facecolor="none", edgecolor="none", label="") for _ in range(2)]
+    heights.insert(0, Patch(facecolor=PARKING, label="parking lane"))
+    heights.append(Patch(facecolor="none", edgecolor="none", label=""))
     columns: list[list[Any]] = [sources, lanes, turns, waits, signs, ground, heights]
     figure.legend(
         handles=[entry for column in columns for entry in column], loc="lower left",

@@ -18,7 +18,7 @@ LANE_EDGE, LANE, BUS, BICYCLE, TRAM, RING = (
     "#ffffff", "#4c5560", "#a8326e", "#00857a", "#6d4c41", "#2b6f9e",
 )  # fmt: skip
 ISLAND, ISLAND_EDGE = "#b7cfa1", "#6f8f56"
-DECK_EDGE, TUNNEL = "#20262d", "#8d7fa8"
+DECK_EDGE, TUNNEL, PARKING = "#20262d", "#8d7fa8", "#aebfd4"
 TURN_COLOUR: Mapping[Turn, str] = {
     "straight": "#2a7f3f",
     "left": "#1f5fd0",

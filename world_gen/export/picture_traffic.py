@@ -21,6 +21,7 @@ from world_gen.export.picture_style import (
     LANE_EDGE,
     LINE_COLOUR,
     MERGING_CONFLICT,
+    PARKING,
     RING,
     SIGNAL,
     TRAM,
@@ -63,12 +64,19 @@ def _order(layer: int) -> float:
 def _draw_lanes(axes: Axes, world: World, view: View) -> None:
     counted = {road.id: road.lane_count_source for road in world.roads}
     near = [lane for lane in world.lanes if view.meets(lane.centerline)]
+    parked = [lane for lane in near if lane.kind == "parking"]
+    if parked:
+        axes.add_collection(
+            PolyCollection([_strip(lane) for lane in parked], facecolors=PARKING, zorder=1.3)
+        )
     groups: dict[tuple[bool, bool, Provenance], list[Array]] = {}
     middles: dict[tuple[bool, bool, str, Provenance], list[Array]] = {}
     for lane in near:
         half, up, down = lane.width_m.value / 2, lane.layer > 0, lane.layer < 0
         borders = groups.setdefault((up, down, lane.width_m.source), [])
         borders += [offset(lane.centerline, half), offset(lane.centerline, -half)]
+        if lane.kind == "parking":
+            continue
         key = up, down, _colour(lane), counted.get(lane.road_id, "inferred")
         middles.setdefault(key, []).append(lane.centerline)
     for (up, down, source), lines in groups.items():
@@ -82,7 +90,13 @@ def _draw_lanes(axes: Axes, world: World, view: View) -> None:
             linewidths=1.0 if view.close else 0.5, zorder=5.0 + _order(up),
         )  # fmt: skip
     if view.close:
-        _draw_arrows(axes, near, view)
+        _draw_arrows(axes, (lane for lane in near if lane.kind != "parking"), view)
+
+
+def _strip(lane: Lane) -> Array:
+    half = lane.width_m.value / 2
+    left, right = offset(lane.centerline, half), offset(lane.centerline, -half)
+    return np.concatenate([left, right[::-1]])
 
 
 def _colour(lane: Lane) -> str:
@@ -98,7 +112,7 @@ def _draw_arrows(axes: Axes, lanes: Iterable[Lane], view: View) -> None:
         colour, fade = _colour(lane), 0.5 if lane.layer < 0 else 1.0
         heads: list[Array] = []
         for at in np.arange(min(7.0, total / 2), total - 2.0, ARROW_SPACING_M):
-            s = float(total - at if lane.role == "approach" else at)
+            s = float(total - at if lane.role in ("approach", "ring") else at)
             tip, ahead = points_at(lane.centerline, s), direction_at(lane.centerline, s - 0.1)
             if not view.holds(tip):
                 continue
