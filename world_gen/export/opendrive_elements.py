@@ -165,7 +165,8 @@ def _add_lanes(
 def _add_lane(
     group: etree._Element, lane: OdrLane, beyond: OdrLane | None, road: OdrRoad, version: Version
 ) -> None:
-    kind = "none" if lane.lane is None else LANE_TYPE[version][lane.lane.kind]
+    kind = "sidewalk" if lane.sidewalk else "none"
+    kind = kind if lane.lane is None else LANE_TYPE[version][lane.lane.kind]
     item = etree.SubElement(group, "lane", type=kind, level="false")
     item.set("id", str(lane.number))
     if lane.reversed and version == "1.8":

@@ -78,7 +78,7 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
         yield _Thing(
             "trafficIsland", "", area.id, (area.outline, *area.holes), 0.0, ISLAND_HEIGHT_M
         )
-    for area in world.sidewalks:
+    for area in network.areas_on_foot:
         yield _Thing("none", "sidewalk", area.id, (area.outline, *area.holes), lane_type="sidewalk")
     for crossing in world.crossings:
         kind = _CROSSWALKS.get(crossing.kind.value, "pedestrian")

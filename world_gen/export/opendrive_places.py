@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.world import Connection, DrivingSide, Lane, Road, World
+from contracts.world import Area, Connection, DrivingSide, Lane, Road, World
 from world_gen.export.opendrive_curve import curve_between, fit_curve
 from world_gen.export.opendrive_roads import (
     Cubic,
@@ -20,12 +20,14 @@ from world_gen.export.opendrive_roads import (
     roads_of,
     runs_along,
 )
+from world_gen.export.opendrive_sidewalks import sidewalks_of
 from world_gen.export.opendrive_tapers import taper
 from world_gen.polyline import unit
 
 MIN_ROAD_M = 0.005
 """Where two lanes meet in one point a connecting road has this length: too short for a gap."""
 _MEET_M = 0.005
+_SAME_EDGE_M = 0.001
 _ASIDE_M = 0.05
 """Lanes of joined roads whose ends lie farther apart are not linked: a file must not jump."""
 
@@ -60,6 +62,8 @@ class OdrNetwork:
     roads: tuple[OdrRoad, ...]
     junctions: tuple[OdrJunction, ...]
     road_of: Mapping[str, OdrRoad]
+    areas_on_foot: tuple[Area, ...]
+    """Sidewalks that are not lanes of a road."""
 
 
 class _PlainEnd(NamedTuple):
@@ -83,7 +87,8 @@ def network_of(world: World) -> OdrNetwork:
     lanes = {lane.id: lane for lane in world.lanes}
     places = _places(world, lanes)
     joined = [place for place in places.values() if _goes_on(place, lanes)]
-    roads = roads_of(world, lanes, _headings(joined))
+    sidewalks = sidewalks_of(world)
+    roads = roads_of(world, lanes, _headings(joined), sidewalks.beside)
     by_source = {road.source: road for road in roads}
     road_of = {lane: road for road in roads for lane in road.numbers}
     for place in joined:
@@ -105,7 +110,13 @@ def network_of(world: World) -> OdrNetwork:
         junctions.append(junction)
         roads.extend(item.road for item in junction.connections)
         number += 1 + len(known)
-    return OdrNetwork(side=side, roads=tuple(roads), junctions=tuple(junctions), road_of=road_of)
+    return OdrNetwork(
+        side=side,
+        roads=tuple(roads),
+        junctions=tuple(junctions),
+        road_of=road_of,
+        areas_on_foot=sidewalks.others,
+    )
 
 
 def _places(world: World, lanes: Mapping[str, Lane]) -> dict[str, _Place]:
@@ -180,6 +191,21 @@ def _join(a: End, b: End, lanes: Mapping[str, Lane]) -> None:
             )
             if math.hypot(*gap) <= _ASIDE_M:
                 _link_lanes(start, start.road.numbers[one.id], to, to.road.numbers[other.id])
+    same_way = 1 if a.at_end != b.at_end else -1
+    for mine in (lane.number for lane in a.road.lanes if lane.sidewalk):
+        for theirs in (lane.number for lane in b.road.lanes if lane.sidewalk):
+            if mine * theirs * same_way > 0 and _same_strip(a, mine, b, theirs, same_way):
+                _link_lanes(a, mine, b, theirs)
+
+
+def _same_strip(a: End, mine: int, b: End, theirs: int, same_way: int) -> bool:
+    """Return whether two strips that are not driven on meet edge to edge."""
+    inner = mine - (1 if mine > 0 else -1), theirs - (1 if theirs > 0 else -1)
+    return all(
+        abs(a.road.edge_m(m, at_end=a.at_end) - same_way * b.road.edge_m(n, at_end=b.at_end))
+        < _SAME_EDGE_M
+        for m, n in ((mine, theirs), inner)
+    )
 
 
 def _link_lanes(a: End, number: int, b: End, other: int) -> None:

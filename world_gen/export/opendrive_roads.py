@@ -12,6 +12,7 @@ from contracts.arrays import Array
 from contracts.world import DrivingSide, Lane, Road, World
 from world_gen.export.opendrive_curve import Curve, fit_curve
 from world_gen.export.opendrive_heights import heights_of, node_of
+from world_gen.export.opendrive_sidewalks import Sidewalk
 
 GAP_M = 0.01
 """Lanes farther apart than this have a strip without traffic between them."""
@@ -56,7 +57,7 @@ class End(NamedTuple):
 class OdrLane:
     """A lane of an OpenDRIVE road; `number` is positive to the left of lane 0.
 
-    `lane` is None for a strip that is not driven on.
+    `lane` is None for a strip that is not driven on, which is a `sidewalk` or nothing.
     """
 
     number: int
@@ -66,6 +67,7 @@ class OdrLane:
     """Driven against what its side of the road says."""
     predecessor: int | None = None
     successor: int | None = None
+    sidewalk: bool = False
 
 
 @dataclass(slots=True, kw_only=True)
@@ -121,12 +123,16 @@ class OdrRoad:
 
 
 def roads_of(
-    world: World, lanes: Mapping[str, Lane], headings: Mapping[tuple[str, bool], Array]
+    world: World,
+    lanes: Mapping[str, Lane],
+    headings: Mapping[tuple[str, bool], Array],
+    sidewalks: Mapping[str, Sequence[Sidewalk]],
 ) -> list[OdrRoad]:
     """Return the World's roads, numbered from 1.
 
     `headings` holds the unit direction (2,) along the reference line that a road must have at
     its start or, True, its end, where it is joined to another; elsewhere its own line decides.
+    `sidewalks` are by road.
     Roads without lanes are left out.
     """
     side = world.intersection.driving_side
@@ -142,6 +148,7 @@ def roads_of(
             end=headings.get((road.id, True)),
         )
         strips, centre_m = _strips(mine, side)
+        strips = _with_sidewalks(strips, centre_m, road, sidewalks.get(road.id, ()))
         found.append(
             OdrRoad(
                 id=len(found) + 1,
@@ -197,6 +204,25 @@ def _strips(lanes: Sequence[Lane], side: DrivingSide) -> tuple[list[OdrLane], fl
         )
         for number, (lane, width) in numbered
     ], zero_m
+
+
+def _with_sidewalks(
+    strips: list[OdrLane], centre_m: float, road: Road, sidewalks: Sequence[Sidewalk]
+) -> list[OdrLane]:
+    """Add sidewalks at the outer edges, and what lies between them and the outermost lane."""
+    found = list(strips)
+    for sidewalk in sidewalks:
+        step = 1 if sidewalk.left else -1
+        mine = [strip for strip in strips if strip.number * step > 0]
+        outer = centre_m + step * sum(strip.width.a for strip in mine)
+        gap = step * ((road.left_m if sidewalk.left else road.right_m) - outer)
+        more = [OdrLane(number=0, width=Cubic(sidewalk.width_m), lane=None, sidewalk=True)]
+        if gap > GAP_M:
+            more.insert(0, OdrLane(number=0, width=Cubic(gap), lane=None))
+        for i, strip in enumerate(more, start=len(mine) + 1):
+            strip.number = i * step
+        found = [*reversed(more), *found] if sidewalk.left else [*found, *more]
+    return found
 
 
 def _add(

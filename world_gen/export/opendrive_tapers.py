@@ -69,6 +69,8 @@ def _section(end: End, *, facing: bool) -> Section | None:
     flip = -1.0 if end.at_end != facing else 1.0
     found: Section = []
     for item in end.road.lanes:
+        if item.sidewalk:
+            continue
         if item.lane is None or item.reversed:
             return None
         inner = item.number - (1 if item.number > 0 else -1)

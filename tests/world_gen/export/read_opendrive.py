@@ -34,6 +34,11 @@ class FileRoad:
         return str(self.element.get("junction"))
 
     @property
+    def source(self) -> str:
+        """The id of the World's road or connection that it was written from."""
+        return str(self.element.find("userData").get("value"))
+
+    @property
     def length_m(self) -> float:
         return float(self.element.get("length"))
 

@@ -60,12 +60,14 @@ def left_hand_ring() -> World:
 
 def bent_and_widened() -> World:
     """East of the crossing a road bends by 60°, then gets wider, then has more lanes."""
-    wide = {**STREET, "width": "8"}
+    street = {**STREET, "sidewalk": "both"}
+    wide = {**street, "width": "8"}
     return world_of(
         crossing(
+            street=street,
             extra_nodes={5: (130.0, 50.0), 6: (155.0, 85.0), 7: (180.0, 115.0), 8: (190.0, 140.0)},
             extra_ways=[
-                (15, [1, 5, 6], STREET),
+                (15, [1, 5, 6], street),
                 (16, [6, 7], wide),
                 (17, [7, 8], {**wide, "lanes": "4"}),
             ],
@@ -136,7 +138,7 @@ def test_every_connection_is_driven_in_the_world_s_direction(
     world, file = drawn
     along = "-1" if world.intersection.driving_side == "right" else "1"
     lanes = {lane.id: lane for lane in world.lanes}
-    made = {r.element.find("userData").get("value"): r for r in file.roads.values()}
+    made = {r.source: r for r in file.roads.values()}
     connecting = [c for c in world.connections if c.id in made]
     assert connecting
     for c in connecting:
@@ -150,7 +152,7 @@ def test_every_connection_is_driven_in_the_world_s_direction(
 
 def test_lanes_lie_where_the_world_has_them(drawn: tuple[World, OpenDriveFile]) -> None:
     world, file = drawn
-    made = {r.element.find("userData").get("value"): r for r in file.roads.values()}
+    made = {r.source: r for r in file.roads.values()}
     checked = 0
     for lane in world.lanes:
         road = made[lane.road_id]
@@ -194,7 +196,9 @@ def test_a_road_that_bends_or_widens_goes_on_as_a_road(tmp_path: Path) -> None:
     file = written(bent_and_widened(), tmp_path)
     assert len(file.root.findall("junction")) == 2  # the crossing; 2 lanes become 4
     plain_roads = [r for r in file.roads.values() if r.junction == "-1"]
-    short = [r for r in plain_roads if r.element.find("userData").get("value").isdigit()]
+    short = [r for r in plain_roads if r.source.isdigit()]
+    linked = [a[0].lanes[a[2]].get("type") for a, _ in file.joints()]
+    assert linked.count("sidewalk") == 4  # on both sides of one joint, said by both roads
     (wider,) = short
     assert [to.get("elementType") for to in wider.element.find("link")] == ["road", "road"]
     for number in wider.lanes:

@@ -29,7 +29,7 @@ from world_gen.export.opendrive import proj_of, write_opendrive
 def test_who_waits_is_written_for_every_conflict(tmp_path: Path) -> None:
     world = plain()
     file = written(world, tmp_path)
-    made = {r.element.find("userData").get("value"): r.id for r in file.roads.values()}
+    made = {r.source: r.id for r in file.roads.values()}
     said = {(p.get("high"), p.get("low")) for p in file.root.iterfind("junction/priority")}
     wanted = set()
     for c in world.conflicts:
@@ -148,7 +148,7 @@ def test_ramps_lead_up_to_a_bridge(tmp_path: Path) -> None:
         roads.append((placed, drawn_world.leading_to(lanes, follow)))
     file = written(drawn_world.world(*roads), tmp_path)
     check_closed(file)
-    made = {r.element.find("userData").get("value"): r for r in file.roads.values()}
+    made = {r.source: r for r in file.roads.values()}
     assert made["deck"].height_m(40.0) == 5.0
     # 6 % over 50 m are 3 m; the last 2 m come down within 100 m.
     assert made["ramp"].height_m(50.0) == pytest.approx(2.0)
@@ -203,7 +203,7 @@ def test_lanes_that_may_be_changed_have_a_broken_line(tmp_path: Path) -> None:
     lanes = {lane.id: lane for lane in world.lanes}
     road = next(r for r in file.roads.values() if len(r.lanes) == 3 and r.junction == "-1")
     marks = {n: lane.find("roadMark") for n, lane in road.lanes.items()}
-    source = next(r for r in world.roads if r.id == road.element.find("userData").get("value"))
+    source = next(r for r in world.roads if r.id == road.source)
     assert [lanes[i].change for i in source.lane_ids][1:] == ["both", "both"]
     assert (marks[-2].get("type"), marks[-2].get("laneChange")) == ("broken", "both")
     assert (marks[-3].get("type"), marks[-3].get("laneChange")) == ("solid", "none")
@@ -240,3 +240,28 @@ def test_lanes_that_would_jump_aside_are_not_linked(tmp_path: Path) -> None:
     file = written(drawn_world.world(*roads), tmp_path)
     check_closed(file)
     assert [(a[2], b[2]) for a, b in file.joints()] == [(-1, -1), (-1, -1)]
+
+
+@pytest.mark.parametrize("origin", [None, ENGLAND])
+def test_a_sidewalk_along_a_road_is_a_lane_of_it(tmp_path: Path, origin) -> None:
+    more = {} if origin is None else {"origin": origin}
+    world = world_of(crossing(street={**STREET, "sidewalk": "left"}, **more))
+    square = Area(id="square", outline=np.array([[30.0, 30.0], [40.0, 30.0], [40.0, 40.0]]))
+    world = msgspec.structs.replace(world, sidewalks=(*world.sidewalks, square))
+    file = written(world, tmp_path)
+    check_closed(file)
+    found = 0
+    for road in file.roads.values():
+        walks = [n for n, lane in road.lanes.items() if lane.get("type") == "sidewalk"]
+        source = next((r for r in world.roads if r.id == road.source), None)
+        if source is None or source.name != "Street":
+            assert not walks
+            continue
+        found += 1
+        assert walks == [max(road.lanes)]
+        inner, outer = road.edges_m(walks[0], 5.0)
+        assert inner == pytest.approx(source.left_m, abs=1e-6)
+        assert outer - inner == pytest.approx(2.0, abs=0.06)
+    assert found == 2
+    (left_over,) = (o for o in file.root.iter("object") if o.get("subtype") == "sidewalk")
+    assert left_over.get("name") == "square"
