@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from lxml import etree
 
 from contracts.arrays import Array
 from contracts.frames import LocalFrame, geo_from_local
@@ -98,56 +98,52 @@ class Lanelet2Map:
         return number
 
     def write(self, world: World, path: Path) -> None:
-        """Write the map as OSM XML, one primitive after another."""
-        xyz = np.array(self._xyz, dtype=np.float64).reshape(-1, 3)
-        lat_lon = _lat_lon(world.frame, xyz)
+        """Write the map as OSM XML, one primitive to a line."""
         root = {"version": "0.6", "generator": "foretwin", "attribution": world.attribution}
         if world.attribution == ATTRIBUTION:
             root["license"] = LICENSE_URL
-        with etree.xmlfile(str(path), encoding="utf-8") as xml:
-            xml.write_declaration()
-            with xml.element("osm", root):
-                xml.write("\n")
-                note = f"{world.attribution}; world {world.id}".replace("--", "- ")
-                _put(xml, etree.Comment(note))
-                _put(xml, etree.Element("MetaInfo", format_version="1", map_version=world.id))
-                for node, (lat, lon), (x, y, z) in zip(
-                    self._node_ids, lat_lon, xyz.tolist(), strict=True
-                ):
-                    place = {"lat": f"{lat:.11f}", "lon": f"{lon:.11f}"}
-                    local = {"local_x": f"{x:.3f}", "local_y": f"{y:.3f}", "ele": f"{z:.3f}"}
-                    _put(xml, _element("node", node, place, (), local | dict(self._tags(node))))
-                for way, nodes, tags in self._ways:
-                    parts = [etree.Element("nd", ref=str(node)) for node in nodes]
-                    _put(xml, _element("way", way, {}, parts, tags))
-                for relation in self._relations:
-                    parts = [
-                        etree.Element("member", type=m.kind, ref=str(m.ref), role=m.role)
-                        for m in relation.members
-                    ]
-                    _put(xml, _element("relation", relation.id, {}, parts, relation.tags))
+        note = f"{world.attribution}; world {world.id}".replace("--", "- ")
+        with path.open("w", encoding="utf-8", newline="\n") as file:
+            file.write('<?xml version="1.0" encoding="utf-8"?>\n')
+            file.write(f"<osm{_attributes(root)}>\n<!-- {_legal(note)} -->\n")
+            meta = {"format_version": "1", "map_version": world.id}
+            file.write(f"<MetaInfo{_attributes(meta)}/>\n")
+            file.writelines(self._node_lines(world.frame))
+            for way, nodes, tags in self._ways:
+                refs = "".join([f'<nd ref="{node}"/>' for node in nodes])
+                file.write(_line("way", way, refs + _tags(tags)))
+            for relation in self._relations:
+                members = "".join(
+                    f'<member type="{m.kind}" ref="{m.ref}" role="{m.role}"/>'
+                    for m in relation.members
+                )
+                file.write(_line("relation", relation.id, members + _tags(relation.tags)))
+            file.write("</osm>\n")
 
-    def _tags(self, node: int) -> Tags:
-        return self._node_tags.get(node, {})
-
-
-def _lat_lon(frame: LocalFrame, xyz: Array) -> list[list[float]]:
-    if not len(xyz):
-        return []
-    found: list[list[float]] = geo_from_local(frame, xyz[:, :2]).tolist()
-    return found
+    def _node_lines(self, frame: LocalFrame) -> Iterator[str]:
+        if not self._xyz:
+            return
+        xyz = np.array(self._xyz, dtype=np.float64)
+        lat_lon = geo_from_local(frame, xyz[:, :2]).tolist()
+        for node, (lat, lon), (x, y, z) in zip(self._node_ids, lat_lon, xyz.tolist(), strict=True):
+            yield (
+                f'<node id="{node}" visible="true" version="1" lat="{lat:.11f}" lon="{lon:.11f}">'
+                f'<tag k="local_x" v="{x:.3f}"/><tag k="local_y" v="{y:.3f}"/>'
+                f'<tag k="ele" v="{z:.3f}"/>{_tags(self._node_tags.get(node, {}))}</node>\n'
+            )
 
 
-def _element(
-    kind: str, number: int, place: dict[str, str], parts: Iterable[Any], tags: Tags
-) -> Any:
-    element = etree.Element(kind, {"id": str(number), "visible": "true", "version": "1", **place})
-    element.extend(parts)
-    for key, value in tags.items():
-        etree.SubElement(element, "tag", k=key, v=_NOT_IN_XML.sub("", value))
-    return element
+def _line(kind: str, number: int, content: str) -> str:
+    return f'<{kind} id="{number}" visible="true" version="1">{content}</{kind}>\n'
 
 
-def _put(xml: Any, element: Any) -> None:
-    element.tail = "\n"
-    xml.write(element)
+def _tags(tags: Tags) -> str:
+    return "".join([f"<tag{_attributes({'k': key, 'v': value})}/>" for key, value in tags.items()])
+
+
+def _attributes(values: Mapping[str, str]) -> str:
+    return "".join([f" {name}={quoteattr(_legal(value))}" for name, value in values.items()])
+
+
+def _legal(value: str) -> str:
+    return _NOT_IN_XML.sub("", value)
