@@ -35,7 +35,7 @@ def as_text(report: WorldReport) -> str:
     for note in report.notes:
         lines += _wrapped(f"{note.count:5}  {note.kind}", " " * 7)
         for example in note.examples:
-            lines += _wrapped(f"       {example}", " " * 9)
+            lines += _wrapped(f"       {_shortened(example, 2 * COLUMNS)}", " " * 9)
     lines += ["", report.attribution]
     return "\n".join(lines) + "\n"
 
@@ -107,8 +107,8 @@ def _wrapped(text: str, indent: str) -> list[str]:
     )
 
 
-def _shortened(text: str) -> str:
-    return text if len(text) <= COLUMNS else text[: COLUMNS - 1] + "…"
+def _shortened(text: str, most: int = COLUMNS) -> str:
+    return text if len(text) <= most else text[: most - 1] + "…"
 
 
 def _escaped(text: str) -> str:

@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from contracts.world import Quantity
-from world_gen.building_tags import building_extent, height_in_m, is_part, stands_above_ground
+from world_gen.building_tags import (
+    HEIGHT_KEYS,
+    building_extent,
+    height_in_m,
+    is_part,
+    stands_above_ground,
+)
 
 
 @pytest.mark.parametrize(
@@ -95,3 +103,19 @@ def test_a_part_is_what_is_no_building_itself():
     assert is_part({"building:part": "yes"})
     assert is_part({"building:part": "yes", "building": "no"})
     assert not is_part({"building:part": "yes", "building": "yes"})
+
+
+_KEYS = [*sorted(HEIGHT_KEYS), "building", "building:part", "layer", "location", "tunnel", "wall",
+         "bridge"]  # fmt: skip
+_VALUES = st.one_of(
+    st.sampled_from(["yes", "no", "roof", "carport", "bridge", "-1", "--1", "-x", "0", "3;4"]),
+    st.floats(-10.0, 1e6).map(str),
+    st.text(max_size=6),
+)
+
+
+@given(st.dictionaries(st.sampled_from(_KEYS), _VALUES, max_size=6))
+def test_any_tags_give_a_block_that_stands_above_its_underside(tags):
+    assert stands_above_ground(tags) in (True, False)
+    extent = building_extent(tags)
+    assert 0.0 <= extent.min_height_m < extent.height_m.value < 2000.0
