@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import shutil
 import sqlite3
 import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,6 +27,7 @@ from world_gen.osm_map import LatLonBounds, MapError, OsmMap
 FRAME_GRID_DEG = 0.5
 """Maps too wide for one frame have one at each point of this grid."""
 STRETCH_M = 1000.0
+LEFTOVER_AGE_S = 24.0 * 3600.0
 METRES_PER_DEG = 111_195.0
 
 
@@ -55,6 +58,7 @@ class MapStore:
                     return cls(map_file, path)
                 except (sqlite3.DatabaseError, msgspec.DecodeError, TypeError):
                     path.unlink(missing_ok=True)  # damaged on disk: build it anew
+        _remove_leftovers(folder)
         with tempfile.TemporaryDirectory(prefix="building-", dir=folder) as name:
             part = Path(name)
             built = part / "index.sqlite"
@@ -159,15 +163,14 @@ def _digest_note(map_file: Path, folder: Path) -> Path:
 
 
 def _known_digest(map_file: Path, folder: Path) -> str | None:
+    """Return the map's SHA-256 if an index may be there for it; reading it all costs time."""
     note = _digest_note(map_file, folder)
     if note.exists():
         return note.read_text(encoding="ascii").strip()
+    if not any(folder.glob(f"*-v{FORMAT_VERSION}.mapindex")):
+        return None
     with map_file.open("rb") as file:
-        return (
-            hashlib.file_digest(file, "sha256").hexdigest()
-            if any(folder.glob(f"*-v{FORMAT_VERSION}.mapindex"))
-            else None
-        )
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _remember_digest(map_file: Path, folder: Path, digest: str) -> None:
@@ -177,7 +180,11 @@ def _remember_digest(map_file: Path, folder: Path, digest: str) -> None:
     partial.replace(note)
 
 
-def remove_leftovers(folder: Path) -> None:
-    """Remove what builds that were cut short left behind."""
+def _remove_leftovers(folder: Path) -> None:
+    """Remove what builds left behind that were ended by force, at least a day ago."""
+    limit_s = time.time() - LEFTOVER_AGE_S
     for part in folder.glob("building-*"):
-        shutil.rmtree(part, ignore_errors=True)
+        # Another process may finish, or clear away, its folder at any moment.
+        with contextlib.suppress(FileNotFoundError):
+            if max(path.stat().st_mtime for path in (part, *part.iterdir())) < limit_s:
+                shutil.rmtree(part, ignore_errors=True)
