@@ -13,8 +13,8 @@ from contracts.arrays import Array
 from world_gen.bends import Rounded, rounded_through, thinned
 from world_gen.clusters import Surroundings
 from world_gen.extent import stretches_inside
-from world_gen.polyline import cut, left_of
-from world_gen.polyline_batch import Polylines, directions
+from world_gen.polyline import cut, left_of, length, points_at
+from world_gen.polyline_batch import Polylines
 from world_gen.polyline_batch import cut as cut_all
 
 MIN_LANE_M = 0.05
@@ -87,21 +87,21 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
 
 
 def _shifted(rounded: Rounded, indices: list[int], around: Surroundings) -> Rounded:
-    """Return the lines, those of roads in a transition led from one place to the other."""
+    """Return the lines, those of roads in a transition led smoothly from one place to the other."""
     moving = [row for row, index in enumerate(indices) if index in around.shifts_m]
     if not moving:
         return rounded
-    lines = rounded.lines
-    xy = lines.xy_m.copy()
-    into, out = directions(lines)
-    normal = left_of(into + out)
-    normal /= np.maximum(np.hypot(normal[:, 0], normal[:, 1]), 1e-9)[:, None]
+    lines = rounded.lines.split()
     for row in moving:
-        piece = slice(lines.first[row], lines.first[row + 1])
         begin, end = around.shifts_m[indices[row]]
-        share = lines.arc_m[piece] / max(float(lines.arc_m[piece][-1]), 1e-9)
-        xy[piece] += normal[piece] * (begin + (end - begin) * share)[:, None]
-    return rounded._replace(lines=Polylines(xy, lines.first))
+        total = length(lines[row])
+        share = np.linspace(0.0, 1.0, max(int(total), 2) + 1)
+        line = points_at(lines[row], share * total)
+        shift = begin + (end - begin) * share * share * (3.0 - 2.0 * share)
+        ahead = np.gradient(line, axis=0)
+        norm = np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)
+        lines[row] = line + left_of(ahead) * (shift / norm)[:, None]
+    return rounded._replace(lines=Polylines.of(lines))
 
 
 def _points_beyond(

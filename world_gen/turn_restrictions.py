@@ -9,13 +9,17 @@ from typing import NamedTuple
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import DirectedEdge
 
+_KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehicle", "restriction")
+"""The most specific word holds; one for lorries or buses alone does not, nor one at times."""
+_CARS = frozenset({"motorcar", "motor_vehicle", "vehicle"})
+
 
 class NodeRule(NamedTuple):
-    """A restriction at one node; `only` means: from there nowhere but to `to_way`."""
+    """A restriction at one node; `only` means: from there nowhere but to `to_ways`."""
 
     relation: int
     from_way: int
-    to_way: int
+    to_ways: frozenset[int]
     only: bool
     u_turn: bool
 
@@ -26,7 +30,7 @@ class WayRule(NamedTuple):
     relation: int
     from_way: int
     via_ways: tuple[int, ...]
-    to_way: int
+    to_ways: frozenset[int]
     only: bool
 
 
@@ -43,8 +47,8 @@ class TurnRestrictions:
         for rule in self.at_node.get(before.end_node, ()):
             if rule.from_way != before.edge.way_id:
                 continue
-            meant = after.edge.way_id == rule.to_way
-            if rule.from_way == rule.to_way:
+            meant = after.edge.way_id in rule.to_ways
+            if meant and rule.from_way == after.edge.way_id:
                 # A way that goes on beyond the node: only the word tells straight on from back.
                 meant = meant and turns_back == rule.u_turn
             if meant != rule.only:
@@ -61,7 +65,7 @@ class TurnRestrictions:
             start = (rule.from_way, *rule.via_ways)
             n = len(start)
             for i in range(len(ways) - n):
-                if tuple(ways[i : i + n]) == start and (ways[i + n] == rule.to_way) != rule.only:
+                if tuple(ways[i : i + n]) == start and (ways[i + n] in rule.to_ways) != rule.only:
                     return False
         return True
 
@@ -74,9 +78,9 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
         tags = relation.tags
         if tags.get("type") != "restriction":
             continue
-        word = tags.get("restriction") or tags.get("restriction:motorcar") or ""
+        word = next((tags[key] for key in _KEYS if key in tags), "")
         exempt = {part.strip() for part in tags.get("except", "").split(";")}
-        if not word.startswith(("no_", "only_")) or exempt & {"motorcar", "motor_vehicle"}:
+        if not word.startswith(("no_", "only_")) or exempt & _CARS:
             continue
         role = {
             name: [m for m in relation.members if m.role == name] for name in ("from", "to", "via")
@@ -84,11 +88,13 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
         only = word.startswith("only_")
         via_ways = tuple(m.ref for m in role["via"] if m.kind == "w")
         via_nodes = [m.ref for m in role["via"] if m.kind == "n"]
+        ends = frozenset(m.ref for m in role["to"] if m.kind == "w")
+        if not ends:
+            continue
         for start in (m.ref for m in role["from"] if m.kind == "w"):
-            for end in (m.ref for m in role["to"] if m.kind == "w"):
-                if via_ways:
-                    over_ways.append(WayRule(relation.id, start, via_ways, end, only))
-                for node in via_nodes:
-                    rule = NodeRule(relation.id, start, end, only, word.endswith("u_turn"))
-                    at_node.setdefault(node, []).append(rule)
+            if via_ways:
+                over_ways.append(WayRule(relation.id, start, via_ways, ends, only))
+            for node in via_nodes:
+                rule = NodeRule(relation.id, start, ends, only, word.endswith("u_turn"))
+                at_node.setdefault(node, []).append(rule)
     return TurnRestrictions({k: tuple(v) for k, v in at_node.items()}, tuple(over_ways))

@@ -1,0 +1,39 @@
+"""A straight stretch of road with tags, for tests of what tags mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from contracts.world import Quantity
+from world_gen.road_graph import RoadEdge
+
+
+def road(
+    tags: Mapping[str, str] | None = None,
+    *,
+    forward: int = 1,
+    backward: int = 1,
+    road_class: str = "residential",
+) -> RoadEdge:
+    """Return an edge of way 7 with so many lanes each way."""
+    return RoadEdge(
+        index=0,
+        way_id=7,
+        start_node=1,
+        end_node=2,
+        node_ids=(1, 2),
+        xy_m=np.array([[0.0, 0.0], [50.0, 0.0]]),
+        length_m=50.0,
+        forward=forward > 0,
+        backward=backward > 0,
+        car=True,
+        road_class=road_class,
+        name="",
+        speed_limit_mps=Quantity(8.3, "default"),
+        lanes_forward=Quantity(forward, "tagged"),
+        lanes_backward=Quantity(backward, "tagged"),
+        layer=0,
+        tags=tags or {},
+    )
