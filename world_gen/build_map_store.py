@@ -42,7 +42,7 @@ from world_gen.read_osm import NODE_KEYS, WAY_KEYS, is_kept_relation
 WANTED_WAYS, WANTED_NODES = any_key(WAY_KEYS), any_key(NODE_KEYS)
 BATCH_BYTES = 24 << 20
 """Text of ways that is looked at in one go; some 2 million nodes of ways."""
-_LINES_BYTES = 4 << 20
+LINES_BYTES = 4 << 20
 WIDEST_FRAME_DEG = 2.0
 """Up to this width a map has one frame, the same as when it is read as a whole."""
 MOST_NOTES = 1000
@@ -136,7 +136,7 @@ def _batches(path: Path, members: IntArray) -> Iterator[WayLines]:
     wanted = set(members.tolist())
     batch, size = WayLines([], [], []), 0
     with path.open("rb") as file:
-        while lines := file.readlines(_LINES_BYTES):
+        while lines := file.readlines(LINES_BYTES):
             some = way_lines(b"".join(lines))
             for way, tags, nodes in zip(*some, strict=True):
                 if way in wanted or WANTED_WAYS.search(tags):
@@ -262,7 +262,7 @@ def _by_cell(cells: IntArray, held: IntArray) -> Iterator[tuple[int, IntArray]]:
 def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: list[str]) -> None:
     tags_of = TagReader()
     with path.open("rb") as file:
-        while lines := file.readlines(_LINES_BYTES):
+        while lines := file.readlines(LINES_BYTES):
             of_cell: dict[int, list[str]] = {}
             for line in lines:
                 (relation,) = read_relations(line, is_kept_relation, tags_of).values()
