@@ -167,6 +167,8 @@ def _add_lane(
 ) -> None:
     kind = "sidewalk" if lane.sidewalk else "none"
     kind = kind if lane.lane is None else LANE_TYPE[version][lane.lane.kind]
+    if lane.reversed and version == "1.4":
+        kind = "restricted"  # 1.4 cannot tell that it is driven the other way
     item = etree.SubElement(group, "lane", type=kind, level="false")
     item.set("id", str(lane.number))
     if lane.reversed and version == "1.8":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from contracts.world import Connection, DrivingSide, Lane
 from world_gen.export.opendrive_curve import Curve, curve_between
@@ -33,6 +33,7 @@ def taper(
     first, second = _section(a, facing=True), _section(b, facing=False)
     if first is None or second is None or a.road is b.road:
         return None
+    first, second = _driven_on(first, across.keys()), _driven_on(second, across.values())
     if [across.get(lane.id) for lane, _, _ in first] != [lane.id for lane, _, _ in second]:
         return None
     along = [lane.reverse != a.at_end for lane, _, _ in first]
@@ -59,6 +60,12 @@ def taper(
 
 Section = list[tuple[Lane, float, float]]
 """Lanes from left to right with their left and right edges, in metres to the left."""
+
+
+def _driven_on(section: Section, through: Collection[str]) -> Section:
+    """Return a section without lanes at its edges that end here, such as those for parking."""
+    inner = [i for i, (lane, _, _) in enumerate(section) if lane.id in through]
+    return section[inner[0] : inner[-1] + 1] if inner else section
 
 
 def _section(end: End, *, facing: bool) -> Section | None:

@@ -265,3 +265,21 @@ def test_a_sidewalk_along_a_road_is_a_lane_of_it(tmp_path: Path, origin) -> None
     assert found == 2
     (left_over,) = (o for o in file.root.iter("object") if o.get("subtype") == "sidewalk")
     assert left_over.get("name") == "square"
+
+
+def test_a_lane_on_the_wrong_side_is_said_to_run_against_it(tmp_path: Path) -> None:
+    drawn, (against, ahead) = drawn_world.road(
+        "street", [[0, 0], [80, 0]], ahead=[3.0], against=[3.25]
+    )
+    # A bus lane the other way at the right kerb of a one-way street.
+    bus = msgspec.structs.replace(against, kind="bus", left_of_reference_m=-4.625)
+    world = drawn_world.world((drawn, [ahead, bus]))
+    new, old = written(world, tmp_path), written(world, tmp_path, "1.4")
+    (road,), (in_old,) = new.roads.values(), old.roads.values()
+    assert [(n, lane.get("type"), lane.get("direction")) for n, lane in road.lanes.items()] == [
+        (-2, "bus", "reversed"),
+        (-1, "driving", None),
+    ]
+    assert road.edges_m(-2, 0.0) == pytest.approx((-3.0, -6.25))
+    # 1.4 cannot say so: nobody may take it for a lane of the other direction.
+    assert in_old.lanes[-2].get("type") == "restricted"

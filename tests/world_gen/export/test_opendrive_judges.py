@@ -14,6 +14,7 @@ import pytest
 
 from contracts.world import World
 from tests.world_gen.export.judged_sample import sample_worlds
+from tests.world_gen.export.read_opendrive import OpenDriveFile
 from world_gen.export.opendrive import write_opendrive
 
 pytestmark = [pytest.mark.judge, pytest.mark.real_data, pytest.mark.timeout(3600)]
@@ -49,20 +50,34 @@ def judge(script: Path, file: Path) -> Judgement:
     return Judgement(int(issues[1]), found[1] == "0", ast.literal_eval(found[3] or "{}"))
 
 
-def arms_of(world: World) -> dict[int, int]:
+def arms_of(world: World, file: Path) -> dict[int, int]:
     """Return how many places have how many arms, where they have three and more.
 
-    Told from the World's roads alone: an arm of a place is another place, or a free end at the
-    World's edge, to which a road leads from it. Two roads between the same two places are thus
-    one arm, which is how the judge counts in SUMO's network.
+    Told from the World's roads: an arm of a place is another place, or a free end at the World's
+    edge, to which a road leads from it. Two roads between the same two places are thus one arm,
+    which is how the judge counts in SUMO's network. A place of two roads through which no lane
+    leads is the World's edge. Only of the file it is asked at which places a short road bridges
+    the gap between two roads: SUMO has a node at each of its ends.
     """
+    roads = [road for road in world.roads if road.lane_ids]
+    ends = Counter(end for road in roads for end in (road.from_place, road.to_place))
+    through = {c.place_id for c in world.connections}
+    road_of = {lane: road for road in roads for lane in road.lane_ids}
+    for lane in world.lanes:
+        for following in lane.successor_ids:
+            if following in road_of and lane.id in road_of:
+                a, b = road_of[lane.id], road_of[following]
+                through |= {a.from_place, a.to_place} & {b.from_place, b.to_place}
+    bridged = {road.source for road in OpenDriveFile.read(file).roads.values()}
+    parted = {None} | {p for p in ends if p in bridged or (p not in through and ends[p] < 3)}
     beside: defaultdict[object, set[object]] = defaultdict(set)
-    for road in world.roads:
-        if road.lane_ids:
-            start = road.from_place or (road.id, "start")
-            end = road.to_place or (road.id, "end")
-            beside[start].add(end)
-            beside[end].add(start)
+    for road in roads:
+        start, end = (
+            (road.id, at) if place in parted else place
+            for at, place in (("start", road.from_place), ("end", road.to_place))
+        )
+        beside[start].add(end)
+        beside[end].add(start)
     return dict(Counter(len(others) for others in beside.values() if len(others) >= 3))
 
 
@@ -76,8 +91,9 @@ def test_judges_find_no_fault_and_the_world_s_own_junctions(
         write_opendrive(world, file)
         found = judge(script, file)
         count += 1
-        if found != Judgement(0, True, arms_of(world)):
-            failures.append(f"{name}: {found}, the World has {arms_of(world)}")
+        arms = arms_of(world, file)
+        if found != Judgement(0, True, arms):
+            failures.append(f"{name}: {found}, the World has {arms}")
     assert count == 60
     assert not failures, "\n".join(failures)
 
@@ -93,7 +109,7 @@ def test_judges_read_version_1_4_too(script: Path, data_dir: Path, tmp_path: Pat
         write_opendrive(world, file, version="1.4")
         found = judge(script, file)
         assert found.imported
-        assert found.arms == arms_of(world)
+        assert found.arms == arms_of(world, file)
         # Its schema lacks `rule`, without which a reader would drive on the wrong side.
         if world.intersection.driving_side == "right":
             assert found.issues == 0, name
