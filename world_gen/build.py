@@ -16,7 +16,8 @@ from contracts.world import Arm, IntersectionSummary, World, WorldJunction
 from world_gen.beside_roads import beside_roads
 from world_gen.buildings import Footprint, buildings_in_frame
 from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
-from world_gen.connections import ConnectionDraft, connect, draw_paths
+from world_gen.connection_paths import draw_paths
+from world_gen.connections import ConnectionDraft, connect
 from world_gen.crossings import crossings
 from world_gen.extent import Disc, Rectangle
 from world_gen.find_intersections import find_intersections

@@ -6,18 +6,15 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
 from contracts.arrays import Array
 from contracts.world import Connection, DrivingSide, LineControl, Quantity, Turn
 from world_gen.clusters import Cluster, Surroundings
 from world_gen.lanes import LaneDraft, LaneSet
 from world_gen.movements import Movement
-from world_gen.polyline import offset, rounded, unit, without_repeats
-from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
+from world_gen.polyline import unit
+from world_gen.turn_curves import LEAST_RADIUS_M
 
-_LONG_PATH_M = 25.0
-_MAX_DETOUR_M = 9.0
 _UNDRAWN = np.zeros((0, 2))
 _FROM_LEFT: tuple[Turn, ...] = ("left", "straight", "right")
 
@@ -230,39 +227,6 @@ def _pairs_by_position(
     return [(starts[i], ends[j]) for i, j in sorted(pairs)]
 
 
-def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
-    """Lay the path of every connection, and name those that the map makes tighter than 4 m."""
-    if not connections:
-        return
-    begins = np.array([c.start.centerline[-1] for c in connections])
-    ends = np.array([c.end.centerline[0] for c in connections])
-    headings = _units(begins - np.array([c.start.centerline[-2] for c in connections]))
-    end_headings = _units(np.array([c.end.centerline[1] for c in connections]) - ends)
-    turns = turn_curves(begins, headings, ends, end_headings)
-    for i, (c, path) in enumerate(zip(connections, turns.lines.split(), strict=True)):
-        c.centerline = path
-        radius_m = float(turns.radius_m[i])
-        if sum(part.edge.length_m for part in c.movement.inside) > _LONG_PATH_M:
-            guided = _along_path(
-                begins[i], headings[i], ends[i], end_headings[i], c.movement, around
-            )
-            far = shapely.hausdorff_distance(shapely.LineString(path), shapely.LineString(guided))
-            if far > _MAX_DETOUR_M:
-                c.centerline = np.round(guided, 3)
-                c.centerline[0], c.centerline[-1] = begins[i], ends[i]
-                continue
-        if radius_m < LEAST_RADIUS_M:
-            notes.append(
-                f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
-                f"into way {c.end.edge.way_id} ({c.turn})"
-            )
-
-
-def _units(vectors: Array) -> Array:
-    norm = np.hypot(vectors[:, 0], vectors[:, 1])
-    return np.asarray(vectors / np.maximum(norm, 1e-9)[:, None])
-
-
 def _drafted(
     start: LaneDraft, end: LaneDraft, movement: Movement, cluster: Cluster
 ) -> ConnectionDraft:
@@ -276,27 +240,3 @@ def _drafted(
         cluster=cluster,
         movement=movement,
     )
-
-
-def _along_path(
-    begin: Array,
-    heading: Array,
-    finish: Array,
-    end_heading: Array,
-    movement: Movement,
-    around: Surroundings,
-) -> Array:
-    """Return a path that follows the inner edges on the driver's side of them."""
-    points = [begin, begin + 2.0 * heading]
-    for part in movement.inside:
-        lanes = around.section(part).driven(reverse=part.reverse)
-        middle = lanes[len(lanes) // 2].left_m if lanes else 0.0
-        line = offset(without_repeats(part.xy_m), -middle if part.reverse else middle)
-        keep = line[1:-1] if len(line) > 3 else (line[:1] + line[-1:]) / 2.0
-        points.extend(
-            p
-            for p in keep
-            if (p - points[-1]) @ (p - begin) > 0.0 and np.hypot(*(p - points[-1])) > 3.0
-        )
-    points.extend([finish - 2.0 * end_heading, finish])
-    return rounded(without_repeats(np.array(points)), deviation_m=3.0)

@@ -2,36 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from contracts.world import Quantity
+from tests.world_gen.road_edges import road as _road
 from world_gen.cross_section import cross_section, metres
-from world_gen.road_graph import RoadEdge
-
-
-def _road(tags=None, *, forward=1, backward=1, road_class="residential") -> RoadEdge:
-    return RoadEdge(
-        index=0,
-        way_id=7,
-        start_node=1,
-        end_node=2,
-        node_ids=(1, 2),
-        xy_m=np.array([[0.0, 0.0], [50.0, 0.0]]),
-        length_m=50.0,
-        forward=forward > 0,
-        backward=backward > 0,
-        car=True,
-        road_class=road_class,
-        name="",
-        speed_limit_mps=Quantity(8.3, "default"),
-        lanes_forward=Quantity(forward, "tagged"),
-        lanes_backward=Quantity(backward, "tagged"),
-        layer=0,
-        tags=tags or {},
-    )
 
 
 def test_two_way_road_keeps_right_around_its_way():

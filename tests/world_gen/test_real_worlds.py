@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from shapely.geometry import LineString
 
 from contracts.codec import content_bytes, decode, encode
 from contracts.world import World
+from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
 from world_gen.build import build_world
 from world_gen.build_graph import build_road_graph
 from world_gen.export.mjcf import world_spec
@@ -20,6 +22,7 @@ from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
 from world_gen.map_index import MapIndex, index_map
 from world_gen.read_osm import read_map
+from world_gen.turn_curves import LEAST_RADIUS_M
 
 MAPS = {
     "berlin": "osm-berlin-mitte/berlin-mitte.osm",
@@ -62,6 +65,11 @@ def _check(world: World, junction: Junction) -> None:
     assert len(lanes) == len(world.lanes)
     assert len(connections) == len(world.connections)
     assert len(world.junctions[0].arms) == junction.summary.arms
+    tight = {
+        (int(found[1]), int(found[2]))
+        for note in world.notes
+        if (found := re.match(r"way (\d+): room for a radius of .* into way (\d+) ", note))
+    }
     for lane in world.lanes:
         assert lane.width_m.value >= (0.8 if lane.kind == "bicycle" else 1.5)
         assert len(lane.centerline) >= 2
@@ -69,10 +77,10 @@ def _check(world: World, junction: Junction) -> None:
         assert set(lane.successor_ids) <= lanes.keys() | connections
     for c in world.connections:
         a, b = lanes[c.from_lane_id].centerline, lanes[c.to_lane_id].centerline
-        assert np.hypot(*(a[-1] - c.centerline[0])) < 0.5
-        assert np.hypot(*(b[0] - c.centerline[-1])) < 0.5
-        assert _bend(a[-1] - a[-2], c.centerline[1] - c.centerline[0]) < math.radians(15)
-        assert _bend(c.centerline[-1] - c.centerline[-2], b[1] - b[0]) < math.radians(15)
+        np.testing.assert_array_equal(c.centerline[[0, -1]], [a[-1], b[0]])
+        assert max(end_bends_rad(a, c.centerline, b)) < math.radians(1.0)
+        ways = lanes[c.from_lane_id].osm_way, lanes[c.to_lane_id].osm_way
+        assert ways in tight or tightest_radius_m(c.centerline) > 0.93 * LEAST_RADIUS_M
         assert set(c.yields_to) <= set(c.conflicts_with) <= connections
     for line in world.stop_lines:
         assert LineString(line.ends).intersects(LineString(lanes[line.lane_id].centerline))
@@ -84,10 +92,6 @@ def _check(world: World, junction: Junction) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data)
     assert data.time > 0.0
-
-
-def _bend(u: np.ndarray, v: np.ndarray) -> float:
-    return abs(math.atan2(u[0] * v[1] - u[1] * v[0], float(u @ v)))
 
 
 @pytest.mark.real_data

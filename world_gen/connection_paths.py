@@ -1,0 +1,114 @@
+"""The paths of connections: as wide as the place allows, along its inner roads where these lead."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
+from world_gen.bends import rounded_through
+from world_gen.clusters import Surroundings
+from world_gen.connections import ConnectionDraft
+from world_gen.polyline import offset, without_repeats
+from world_gen.polyline_batch import Polylines
+from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
+
+_LONG_PATH_M = 25.0
+_MAX_DETOUR_M = 9.0
+_GUIDED_RADIUS_M = 12.0
+
+
+def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
+    """Lay the path of every connection, and name those that the map makes tighter than 4 m."""
+    if not connections:
+        return
+    begins = np.array([c.start.centerline[-1] for c in connections])
+    ends = np.array([c.end.centerline[0] for c in connections])
+    headings = _units(begins - np.array([c.start.centerline[-2] for c in connections]))
+    end_headings = _units(np.array([c.end.centerline[1] for c in connections]) - ends)
+    turns = turn_curves(begins, headings, ends, end_headings)
+    radii_m = turns.radius_m.tolist()
+    for c, path in zip(connections, turns.lines.split(), strict=True):
+        c.centerline = path
+    long = [i for i, c in enumerate(connections) if _inner_m(c) > _LONG_PATH_M]
+    guided = _guided(
+        [
+            _along_path(begins[i], headings[i], ends[i], end_headings[i], connections[i], around)
+            for i in long
+        ]
+    )
+    far = shapely.hausdorff_distance(
+        np.array([shapely.LineString(connections[i].centerline) for i in long], dtype=object),
+        np.array([shapely.LineString(path) for path in guided], dtype=object),
+    )
+    for i, path, detour_m in zip(long, guided, far.tolist(), strict=True):
+        if detour_m > _MAX_DETOUR_M:
+            connections[i].centerline = path
+            radii_m[i] = tightest_radius_m(path)
+    for c, radius_m in zip(connections, radii_m, strict=True):
+        if radius_m < LEAST_RADIUS_M:
+            notes.append(
+                f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
+                f"into way {c.end.edge.way_id} ({c.turn})"
+            )
+
+
+def tightest_radius_m(path: Array) -> float:
+    """Return the least radius of circles through three points in a row of a path (N, 2)."""
+    a, b, c = path[:-2], path[1:-1], path[2:]
+    if not len(a):
+        return float("inf")
+    u, v, w = b - a, c - b, c - a
+    product = np.hypot(*u.T) * np.hypot(*v.T) * np.hypot(*w.T)
+    bent = 2.0 * np.abs(u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / np.maximum(product, 1e-12)
+    return float(1.0 / max(float(bent.max()), 1e-9))
+
+
+def _inner_m(connection: ConnectionDraft) -> float:
+    return sum(part.edge.length_m for part in connection.movement.inside)
+
+
+def _units(vectors: Array) -> Array:
+    norm = np.hypot(vectors[:, 0], vectors[:, 1])
+    return np.asarray(vectors / np.maximum(norm, 1e-9)[:, None])
+
+
+def _guided(lines: list[Array]) -> list[Array]:
+    """Return lines with their corners rounded, on the millimetre grid but for their ends."""
+    if not lines:
+        return []
+    nothing = np.full((len(lines), 2), np.nan)
+    wide = np.full(len(lines), _GUIDED_RADIUS_M)
+    found = []
+    for line, path in zip(
+        lines, rounded_through(Polylines.of(lines), wide, nothing, nothing).lines.split(),
+        strict=True,
+    ):  # fmt: skip
+        path = np.round(path, 3)
+        path[0], path[-1] = line[0], line[-1]
+        found.append(path)
+    return found
+
+
+def _along_path(
+    begin: Array,
+    heading: Array,
+    finish: Array,
+    end_heading: Array,
+    connection: ConnectionDraft,
+    around: Surroundings,
+) -> Array:
+    """Return a path that follows the inner edges on the driver's side of them."""
+    points = [begin, begin + 2.0 * heading]
+    for part in connection.movement.inside:
+        lanes = around.section(part).driven(reverse=part.reverse)
+        middle = lanes[len(lanes) // 2].left_m if lanes else 0.0
+        line = offset(without_repeats(part.xy_m), -middle if part.reverse else middle)
+        keep = line[1:-1] if len(line) > 3 else (line[:1] + line[-1:]) / 2.0
+        points.extend(
+            p
+            for p in keep
+            if (p - points[-1]) @ (p - begin) > 0.0 and np.hypot(*(p - points[-1])) > 3.0
+        )
+    points.extend([finish - 2.0 * end_heading, finish])
+    return without_repeats(np.array(points))
