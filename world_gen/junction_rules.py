@@ -55,7 +55,8 @@ def junction_rules(
     known = {node for approach in found for node in approach.signal_nodes}
     lone = lone_lights(around, node_tags, lanes, crossings, known)
     return JunctionRules(
-        stop_lines=(*lines, *lone.stop_lines),
+        # Where a lane has two lines the one at the junction stands last, so that it wins by lane.
+        stop_lines=(*lone.stop_lines, *lines),
         signals=(*heads, *lone.signals),
         conflicts=conflicts,
         plans=signal_plans(groups, walks, ruled, conflicts, met),

@@ -21,8 +21,14 @@ from world_gen.approaches import BEFORE_CROSSING_M
 from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft, LaneSet
 from world_gen.met_on_the_way import NodeTags, faces, is_light
-from world_gen.polyline import direction_at, length, locate, points_at
-from world_gen.signal_heads import BESIDE_HEIGHT_M, beside, nearest_kerb, to_kerb_m
+from world_gen.polyline import length, locate, points_at
+from world_gen.signal_heads import (
+    BESIDE_HEIGHT_M,
+    beside,
+    nearest_kerb,
+    to_kerb_m,
+    towards_drivers_rad,
+)
 from world_gen.stop_lines import line_across
 
 DRIVING_S, WALKING_S = 40.0, 10.0
@@ -111,7 +117,6 @@ def _heads(
     for mine in roads.values():
         outermost = nearest_kerb([lane for lane, _ in mine], around.driving_side)
         lane, line = next(item for item in mine if item[0] is outermost)
-        ahead = direction_at(lane.centerline, locate(lane.centerline, line.ends.mean(axis=0)))
         place = beside(line.ends, to_kerb_m(lane, around), around.driving_side)
         heads.append(
             Signal(
@@ -120,7 +125,7 @@ def _heads(
                 group_id=f"n{node}:g0",
                 lane_ids=tuple(item.id for item, _ in mine),
                 position=np.round(np.array([place[0], place[1], BESIDE_HEIGHT_M]), 3),
-                yaw_rad=round(math.atan2(-ahead[1], -ahead[0]), 4),
+                yaw_rad=towards_drivers_rad(line.ends),
                 source="tagged",
                 osm_nodes=(node,),
             )

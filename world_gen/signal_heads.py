@@ -37,13 +37,14 @@ def signal_heads(
         mine = by_road[group.approach.key]
         kerb_side = nearest_kerb(group.lanes, driving_side)
         at_kerb = kerb_side is nearest_kerb(mine, driving_side)
+        yaw_rad = towards_drivers_rad(lines[kerb_side.id].ends)
         if at_kerb:
             place = beside(lines[kerb_side.id].ends, to_kerb_m(kerb_side, around), driving_side)
-            heads.append(_head(f"{kerb_side.id}:signal", group, place, BESIDE_HEIGHT_M))
+            heads.append(_head(f"{kerb_side.id}:signal", group, place, BESIDE_HEIGHT_M, yaw_rad))
         if not at_kerb or len(mine) >= WIDE_LANES:
             ends = np.concatenate([lines[lane.id].ends for lane in group.lanes])
             name = f"{kerb_side.id}:signal-above"
-            heads.append(_head(name, group, ends.mean(axis=0), ABOVE_HEIGHT_M))
+            heads.append(_head(name, group, ends.mean(axis=0), ABOVE_HEIGHT_M, yaw_rad))
     return tuple(heads)
 
 
@@ -72,7 +73,13 @@ def beside(ends: Array, to_kerb_m: float, driving_side: DrivingSide) -> Array:
     return place
 
 
-def _head(name: str, group: LaneGroup, place: Array, height_m: float) -> Signal:
+def towards_drivers_rad(ends: Array) -> float:
+    """Return where a head at a stop line faces; `ends` (2, 2) stand from left to right."""
+    right = ends[1] - ends[0]
+    return round(math.atan2(-right[0], right[1]) + 0.0, 4)
+
+
+def _head(name: str, group: LaneGroup, place: Array, height_m: float, yaw_rad: float) -> Signal:
     nodes = group.approach.signal_nodes
     source: Provenance = group.approach.control.source
     return Signal(
@@ -81,7 +88,7 @@ def _head(name: str, group: LaneGroup, place: Array, height_m: float) -> Signal:
         group_id=group.id,
         lane_ids=tuple(lane.id for lane in group.lanes),
         position=np.round(np.array([place[0], place[1], height_m]), 3),
-        yaw_rad=round(group.bearing_rad, 4),
+        yaw_rad=yaw_rad,
         source=source,
         osm_nodes=nodes,
     )

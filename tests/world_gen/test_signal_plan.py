@@ -98,6 +98,11 @@ def test_roads_that_face_each_other_drive_together():
     assert sum(phase.green_s + plan.amber_s + plan.all_red_s for phase in plan.phases) == 90.0
     assert plan.source == "default"
     assert all(signal.osm_nodes == (0,) for signal in world.signals)
+    for signal in world.signals:
+        # It looks away from the junction, and hangs beside the road out there.
+        facing = np.array([np.cos(signal.yaw_rad), np.sin(signal.yaw_rad)])
+        assert signal.position[:2] @ facing > 4.0
+        assert 3.0 < signal.position[:2] @ [-facing[1], facing[0]] < 5.0
 
 
 def test_a_busier_road_is_green_for_longer():
