@@ -30,25 +30,19 @@ def island_areas(
             if place is not None:
                 roads_at.setdefault(place, []).append(i)
     edge_of = {lane.road_id: lane.key.edge for lane in lanes.lanes.values()}
+    places_of: dict[str, list[int]] = {}
+    for k, cluster in enumerate(paved.place_of):
+        if cluster.junction is not None:
+            places_of.setdefault(cluster.junction.summary.id, []).append(k)
     islands: list[Area] = []
     middles: list[Polygon] = []
     for junction in around.junctions:
-        places = [k for k, c in enumerate(paved.place_of) if c.junction is junction]
-        ring = [
-            i for i in {r for k in places for r in roads_at.get(paved.place_of[k].key, ())}
-            if edge_of.get(lanes.roads[i].id) in around.ring_edges
-        ]  # fmt: skip
-        if len(junction.nodes) < 2:
+        places = places_of.get(junction.summary.id, [])
+        if len(junction.nodes) < 2 or not places:
             continue
         beside = sorted({r for k in places for r in roads_at.get(paved.place_of[k].key, ())})
-        shape = shapely.union_all([*paved.places[places], *paved.roads[beside]], grid_size=GRID_M)
-        holes = [
-            Polygon(hole)
-            for part in shapely.get_parts(shape)
-            if isinstance(part, Polygon)
-            for hole in part.interiors
-        ]
-        holes = [h for h in holes if h.area >= MIN_ISLAND_M2]
+        holes = _holes([*paved.places[places], *paved.roads[beside]])
+        ring = any(edge_of.get(lanes.roads[i].id) in around.ring_edges for i in beside)
         middle = max(holes, key=lambda h: h.area) if ring and holes else None
         if middle is not None:
             middles.append(middle)
@@ -61,3 +55,15 @@ def island_areas(
             area_of(f"island:traffic:{junction.summary.id}:{i}", h) for i, h in enumerate(rest)
         )
     return tuple(islands), np.array(middles, dtype=object)
+
+
+def _holes(pieces: list[Polygon]) -> list[Polygon]:
+    """Return what a joined surface encloses, on the World's grid."""
+    rings = [
+        shapely.polygons(hole)
+        for part in shapely.get_parts(shapely.union_all(pieces))
+        if isinstance(part, Polygon)
+        for hole in part.interiors
+    ]
+    holes = shapely.set_precision(np.array(rings, dtype=object), GRID_M)
+    return [h for h in holes if isinstance(h, Polygon) and h.area >= MIN_ISLAND_M2]

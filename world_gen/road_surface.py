@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
@@ -53,11 +54,12 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
         # Where a turn sweeps over a roundabout's middle, the middle stays.
         hit, which = shapely.STRtree(middles).query(places, predicate="intersects")
         for place, middle in zip(hit, which, strict=True):
-            places[place] = shapely.difference(places[place], middles[middle])
+            places[place] = shapely.difference(places[place], middles[middle], grid_size=GRID_M)
     paved = Paved(roads, places, clusters)
+    of_road, of_place = _surface(paved, lanes)
     return Areas(
-        road_surface=_surface(paved, lanes),
-        junction_areas=_junction_areas(around, lanes, paved),
+        road_surface=(*of_road, *(area for found in of_place for area in found)),
+        junction_areas=_junction_areas(around, lanes, paved, of_place),
         islands=islands,
         kerbs=kerb_lines(lanes, paved),
         driven=np.concatenate([swept_lanes, swept]),
@@ -179,23 +181,33 @@ def _node_discs(around: Surroundings) -> np.ndarray:
     return discs
 
 
-def _surface(paved: Paved, lanes: LaneSet) -> tuple[Area, ...]:
-    found: list[Area] = []
-    for road, shape in zip(lanes.roads, shapely.set_precision(paved.roads, GRID_M), strict=True):
-        found.extend(_areas(f"road:{road.layer}:{road.id}", shape))
-    for cluster, shape in zip(paved.place_of, shapely.set_precision(paved.places, GRID_M),
-                              strict=True):  # fmt: skip
-        layer = max(leg.edge.layer for leg in cluster.legs)
-        found.extend(_areas(f"road:{layer}:{cluster.key}", shape))
-    return tuple(found)
+def _surface(paved: Paved, lanes: LaneSet) -> tuple[list[Area], list[list[Area]]]:
+    """Return the areas of all roads, and those of each place."""
+    of_road = [
+        area
+        for road, shape in zip(lanes.roads, paved.roads, strict=True)
+        for area in _areas(f"road:{road.layer}:{road.id}", shape)
+    ]
+    of_place = [
+        _areas(f"road:{max(leg.edge.layer for leg in cluster.legs)}:{cluster.key}", shape)
+        for cluster, shape in zip(paved.place_of, paved.places, strict=True)
+    ]
+    return of_road, of_place
 
 
-def _junction_areas(around: Surroundings, lanes: LaneSet, paved: Paved) -> dict[str, Area]:
+def _junction_areas(
+    around: Surroundings, lanes: LaneSet, paved: Paved, of_place: list[list[Area]]
+) -> dict[str, Area]:
     """Return for each whole junction its places, and the ring between them, as one area."""
+    found: dict[str, Area] = {}
     pieces: dict[str, list[Polygon]] = {}
-    for cluster, shape in zip(paved.place_of, paved.places, strict=True):
-        if cluster.whole and cluster.junction is not None:
-            pieces.setdefault(cluster.junction.summary.id, []).append(shape)
+    for cluster, shape, areas_there in zip(paved.place_of, paved.places, of_place, strict=True):
+        if cluster.whole and cluster.junction is not None and areas_there:
+            name = cluster.junction.summary.id
+            if not cluster.ring and len(cluster.nodes) == len(cluster.junction.nodes):
+                found[name] = msgspec.structs.replace(areas_there[0], id=f"junction:{name}")
+            else:
+                pieces.setdefault(name, []).append(shape)
     ring_of: dict[int, Junction] = {
         i: junction for junction in around.junctions for i in junction.inner
         if i in around.ring_edges
@@ -205,10 +217,10 @@ def _junction_areas(around: Surroundings, lanes: LaneSet, paved: Paved) -> dict[
         junction = ring_of.get(edge_of.get(road.id, -1))
         if junction is not None:
             pieces.setdefault(junction.summary.id, []).append(shape)
-    found: dict[str, Area] = {}
-    for name, shapes in pieces.items():
-        whole = shapes[0] if len(shapes) == 1 else shapely.union_all(shapes, grid_size=GRID_M)
-        parts = _areas(f"junction:{name}", shapely.set_precision(whole, GRID_M))
+    names = list(pieces)
+    whole = np.array([shapely.union_all(pieces[name]) for name in names], dtype=object)
+    for name, shape in zip(names, shapely.set_precision(whole, GRID_M), strict=True):
+        parts = _areas(f"junction:{name}", shape)
         if parts:
             found[name] = parts[0]
     return found
