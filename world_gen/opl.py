@@ -218,4 +218,10 @@ def _member(text: str) -> OsmMember:
 
 
 def _plain(text: str) -> str:
-    return _ESCAPE.sub(lambda match: chr(int(match[1], 16)), text)
+    return _ESCAPE.sub(_character, text)
+
+
+def _character(match: re.Match[str]) -> str:
+    code = int(match[1], 16)
+    stands_for_one = code < 0xD800 or 0xE000 <= code <= 0x10FFFF
+    return chr(code) if stands_for_one else "\ufffd"

@@ -27,7 +27,7 @@ def main(form: str, options: str) -> None:
             os.write(2, json.dumps(said).encode() + b"\n")
             with osmium.SimpleWriter(osmium.io.File("-", options)) as writer:
                 osmium.apply(reader, writer)
-    except (RuntimeError, ValueError, osmium.InvalidLocationError) as error:
+    except Exception as error:
         os.write(2, " ".join(str(error).split()).encode(errors="replace"))
         os._exit(3)  # a writer that has failed ends the process by itself when it is destroyed
 

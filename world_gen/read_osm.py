@@ -42,6 +42,12 @@ NODE_KEYS = (
 )  # fmt: skip
 
 
+DECODE_ERRORS = (
+    RuntimeError, ValueError, IndexError, MemoryError, osmium.InvalidLocationError,
+)  # fmt: skip
+"""All that osmium raises for a file that is damaged."""
+
+
 def read_map(path: Path) -> OsmMap:
     """Read what matters to a driver from a .osm, .osm.gz, .osm.bz2 or .osm.pbf file.
 
@@ -60,7 +66,7 @@ def read_map(path: Path) -> OsmMap:
     form = format_of(path, data[:HEAD_BYTES])
     try:
         header, text = _as_opl(data, form)
-    except (RuntimeError, ValueError, osmium.InvalidLocationError) as error:
+    except DECODE_ERRORS as error:
         raise unreadable(path, error) from error
     objects = DecodedObjects()
     objects.add(text)
@@ -93,7 +99,7 @@ def _close(writer: Any) -> None:
     """
     try:
         writer.close()
-    except RuntimeError:
+    except BaseException:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))
         raise
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import bz2
+import contextlib
 import gzip
 import math
+import tempfile
 import time
 from pathlib import Path
 
 import osmium
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from contracts.frames import GeoPoint
 from tests.world_gen.chain import build_all
@@ -76,6 +80,35 @@ def test_a_truncated_file_is_refused(tmp_path: Path, packing: str, part: float) 
     data = pbf_of(plain) if data is None else data
     path = file_of(tmp_path, data[: int(part * len(data))], "cut")
     refused(path, tmp_path, "not a readable OSM file|not an OSM file")
+
+
+DAMAGE = st.lists(
+    st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.sampled_from("sdi"), st.binary(max_size=9)),
+    min_size=1,
+    max_size=9,
+)
+
+
+@settings(max_examples=150, derandomize=True)
+@given(st.sampled_from(["xml", "gz", "pbf", "loose pbf"]), DAMAGE)
+def test_a_damaged_file_is_read_or_refused(
+    packing: str, damage: list[tuple[float, str, bytes]]
+) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        plain = file_of(Path(name), crossing())
+        text = plain.read_bytes()
+        if packing in ("xml", "gz"):
+            data = gzip.compress(text) if packing == "gz" else text
+        else:
+            data = pbf_of(plain, "pbf" if packing == "pbf" else "pbf,pbf_compression=none")
+        for where, how, what in damage:
+            at = int(where * len(data))
+            end = at + len(what) if how in "sd" else at
+            data = data[:at] + (b"" if how == "d" else what) + data[end:]
+        path = file_of(Path(name), data, "damaged")
+        # Osmium ends the whole process where its writer has failed and is destroyed.
+        with contextlib.suppress(MapError):
+            read_map(path)
 
 
 def test_an_empty_file_is_no_map(tmp_path: Path) -> None:
