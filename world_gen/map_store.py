@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import os
 import shutil
 import sqlite3
 import tempfile
 import time
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,6 +26,7 @@ from world_gen.map_tables import FORMAT_VERSION, MapMeta, TableReader
 from world_gen.opl_stream import Progress
 from world_gen.osm_map import LatLonBounds, MapError, OsmMap
 
+DAMAGED = (sqlite3.DatabaseError, msgspec.MsgspecError, zlib.error, TypeError)
 FRAME_GRID_DEG = 0.5
 """Maps too wide for one frame have one at each point of this grid."""
 STRETCH_M = 1000.0
@@ -56,13 +59,20 @@ class MapStore:
             if path.exists():
                 try:
                     return cls(map_file, path)
-                except (sqlite3.DatabaseError, msgspec.DecodeError, TypeError):
+                except DAMAGED:
                     path.unlink(missing_ok=True)  # damaged on disk: build it anew
         _remove_leftovers(folder)
         with tempfile.TemporaryDirectory(prefix="building-", dir=folder) as name:
             part = Path(name)
             built = part / "index.sqlite"
-            digest = build_map_store(map_file, part, built, progress)
+            try:
+                digest = build_map_store(map_file, part, built, progress)
+            except sqlite3.OperationalError as error:
+                raise MapError(f"{folder}: the map index cannot be written: {error}") from error
+            except OSError as error:
+                if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+                    raise
+                raise MapError(f"{folder}: no room for the map index: {error.strerror}") from error
             built.replace(index_path(folder, digest))
         _remember_digest(map_file, folder, digest)
         return cls(map_file, index_path(folder, digest))
@@ -90,9 +100,12 @@ class MapStore:
 
     def _clip(self, areas: Sequence[LatLonBounds]) -> OsmMap:
         box = _around(areas)
-        return clip_map(
-            self._tables, areas, box, file=str(self.map_file), frame=self._frame_for(box)
-        )
+        try:
+            return clip_map(
+                self._tables, areas, box, file=str(self.map_file), frame=self._frame_for(box)
+            )
+        except DAMAGED as error:
+            raise MapError(f"{self.path}: the map index is damaged; remove it: {error}") from error
 
     def _frame_for(self, box: LatLonBounds) -> LocalFrame:
         if self.meta.origin is not None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -123,6 +125,16 @@ def test_a_damaged_index_is_built_anew(tmp_path: Path) -> None:
     store.close()
     store.path.write_bytes(store.path.read_bytes()[:1000])
     assert_same(MapStore.open(path, folder).clip(EVERYWHERE), read_map(path))
+
+
+def test_a_cell_that_is_damaged_is_named(tmp_path: Path) -> None:
+    path, folder = town(tmp_path), tmp_path / "index"
+    store = MapStore.open(path, folder)
+    store.close()
+    with contextlib.closing(sqlite3.connect(store.path, isolation_level=None)) as database:
+        database.execute("UPDATE piece SET body = x'00112233'")
+    with pytest.raises(MapError, match="map index is damaged; remove it"):
+        MapStore.open(path, folder).clip(EVERYWHERE)
 
 
 def test_what_a_killed_build_left_behind_goes_after_a_day(tmp_path: Path) -> None:
