@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 
 from contracts.world import Crossing, SignalGroup
 from world_gen.approaches import Approach
-from world_gen.clusters import Surroundings, heading_out
+from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.lanes import LaneDraft, LaneSet
-from world_gen.road_graph import DirectedEdge
 from world_gen.stop_lines import entering
 
 CROSSING_WITHIN_M = 25.0
@@ -19,10 +18,7 @@ CROSSING_WITHIN_M = 25.0
 
 @dataclass(slots=True, kw_only=True)
 class LaneGroup:
-    """Lanes of one approach with lights of their own; `turning` ones turn across alone.
-
-    `out` is the unit direction (2,) away from the junction.
-    """
+    """Lanes of one approach with lights of their own; `turning` ones turn across alone."""
 
     id: str
     approach: Approach
@@ -34,12 +30,10 @@ class LaneGroup:
         """Return the group as the World holds it."""
         return SignalGroup(id=self.id, connection_ids=tuple(sorted(c.id for c in self.connections)))
 
-    @property
-    def bearing_rad(self) -> float:
-        """Where its road lies, counter-clockwise from east."""
+    def order(self) -> tuple[int, int, bool, str]:
+        """Return what the group is numbered by: its way, its road's end, turning lanes last."""
         toward = self.approach.toward
-        out = heading_out(DirectedEdge(toward.edge, not toward.reverse), 15.0)
-        return math.atan2(out[1], out[0])
+        return toward.edge.way_id, toward.end_node, self.turning, self.lanes[0].id
 
 
 def lane_groups(
@@ -51,7 +45,8 @@ def lane_groups(
     """Return the groups of all signalled approaches; connections learn their group.
 
     Lanes that the map tags for the turn across oncoming traffic alone have lights of their own.
-    Groups of a junction are numbered by where their roads lie, counter-clockwise from east.
+    Groups of a junction are numbered in the order of their ways, so that every World that holds
+    the junction, and every map of the same place, has the same ids.
     """
     across = "left" if around.driving_side == "right" else "right"
     by_junction: dict[str, list[LaneGroup]] = {}
@@ -80,7 +75,7 @@ def lane_groups(
                 )
     of_lane: dict[str, LaneGroup] = {}
     for name, groups in by_junction.items():
-        groups.sort(key=lambda g: (round(g.bearing_rad, 3) % math.tau, g.turning, g.lanes[0].id))
+        groups.sort(key=LaneGroup.order)
         for i, group in enumerate(groups):
             group.id = f"{name}:g{i}"
             of_lane.update((lane.id, group) for lane in group.lanes)
