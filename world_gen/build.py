@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 
 import msgspec
 import numpy as np
-import shapely
 
-from contracts.arrays import Array
 from contracts.codec import content_bytes
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo, target_from_source
+from contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from contracts.world import Arm, IntersectionSummary, World, WorldJunction
 from world_gen.beside_roads import beside_roads
-from world_gen.buildings import Footprint, buildings_in_frame
+from world_gen.buildings import buildings_in_frame
 from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
 from world_gen.connection_paths import draw_paths
 from world_gen.connections import ConnectionDraft, connect
@@ -122,8 +119,7 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
     surface = areas(around, lanes, connections)
     tracks = tram_tracks(around, osm, beside)
     near = index.buildings_in(in_map(extent, around.frame, index.graph.frame))
-    free = _driven_beside(surface.driven, near, around.frame, index.graph.frame)
-    buildings, cut = buildings_in_frame(near, around.frame, index.graph.frame, free)
+    buildings, cut = buildings_in_frame(near, around.frame, index.graph.frame, surface.driven)
     world = World(
         id="",
         intersection=summary,
@@ -164,18 +160,6 @@ def with_id(world: World) -> World:
     nameless = msgspec.structs.replace(world, id="")
     digest = hashlib.sha256(content_bytes(nameless)).hexdigest()
     return msgspec.structs.replace(nameless, id=digest[:16])
-
-
-def _driven_beside(
-    driven: Array, near: Sequence[Footprint], frame: LocalFrame, map_frame: LocalFrame
-) -> shapely.Geometry:
-    """Return the ground that cars drive on where buildings stand, in the World's frame."""
-    if not near or not len(driven):
-        return shapely.Polygon()
-    shapes = np.array([f.polygon for f in near], dtype=object)
-    moved = shapely.transform(shapes, lambda xy: target_from_source(frame, map_frame, xy, 0.0).xy_m)
-    hit = shapely.STRtree(driven).query(moved, predicate="intersects")[1]
-    return shapely.union_all(driven[np.unique(hit)])
 
 
 def _connections(

@@ -13,6 +13,7 @@ from contracts.arrays import Array
 from contracts.frames import LocalFrame, geo_from_local, target_from_source
 from contracts.world import Building
 from world_gen.building_outlines import (
+    MIN_PIECE_M2,
     Indices,
     OutlineTable,
     outline_table,
@@ -32,6 +33,9 @@ FOOTPRINT_TOLERANCE_M = 0.05
 """The share of it that footprints take; convex parts take the rest."""
 HEADROOM_M = 2.5
 """What begins higher stands in no car's way."""
+
+
+Polygons = npt.NDArray[np.object_]
 
 
 class BuildingIndex:
@@ -156,9 +160,9 @@ def footprints(osm: OsmMap, notes: list[str]) -> tuple[Footprint, ...]:
 
 
 def buildings_in_frame(
-    near: Sequence[Footprint], frame: LocalFrame, map_frame: LocalFrame, keep_free: shapely.Geometry
+    near: Sequence[Footprint], frame: LocalFrame, map_frame: LocalFrame, driven: Polygons
 ) -> tuple[tuple[Building, ...], tuple[str, ...]]:
-    """Return buildings in the World's frame, cut back where they stand on `keep_free`.
+    """Return buildings in the World's frame, cut back where they stand on what is `driven`.
 
     Outlines are simplified by `FOOTPRINT_TOLERANCE_M` and written in millimetres. Lanes run
     through passages and under overhangs, and inferred lane widths can reach into a facade: a car
@@ -170,36 +174,63 @@ def buildings_in_frame(
     shapes = np.array([f.polygon for f in near], dtype=object)
     moved = shapely.transform(shapes, lambda xy: target_from_source(frame, map_frame, xy, 0.0).xy_m)
     moved = shapely.simplify(moved, FOOTPRINT_TOLERANCE_M - GRID_M, preserve_topology=True)
-    moved = shapely.transform(moved, lambda xy: np.round(xy, 3))
-    shapely.prepare(keep_free)
-    blocked = shapely.intersects(keep_free, moved)
-    blocked &= np.array([f.min_height_m < HEADROOM_M for f in near])
-    free = moved.copy()
-    free[blocked] = shapely.difference(moved[blocked], keep_free, grid_size=GRID_M)
-    odd = blocked | ~shapely.is_valid(free) | (shapely.get_type_id(free) != _POLYGON)
-    pieces: list[shapely.Polygon] = []
-    owners: list[int] = []
-    for k, (shape, is_odd) in enumerate(zip(free.tolist(), odd.tolist(), strict=True)):
-        mine = _on_grid(shape) if is_odd else [shape]
-        pieces.extend(mine)
-        owners.extend([k] * len(mine))
-    buildings = _buildings([near[k] for k in owners], np.array(pieces, dtype=object))
+    low = np.flatnonzero([f.min_height_m < HEADROOM_M for f in near])
+    blocked = low[_cut_back(moved, low, driven)]
+    whole = shapely.get_type_id(moved) == _POLYGON
+    owners, pieces = np.arange(len(near)), moved
+    if not whole.all():
+        pieces, owners = shapely.get_parts(moved, return_index=True)
+    pieces = shapely.transform(pieces, lambda xy: np.round(xy, 3))
+    sound = shapely.is_valid(pieces) & (shapely.get_type_id(pieces) == _POLYGON)
+    sound &= (shapely.area(pieces) >= MIN_PIECE_M2) | ~np.isin(owners, blocked)
+    if not sound.all():
+        pieces, owners = _mended(pieces, owners, sound)
+    buildings = _buildings([near[k] for k in owners.tolist()], pieces)
     notes = list(dict.fromkeys(f.note for f in near if f.note))
-    if blocked.any():
-        cut = ", ".join(dict.fromkeys(near[k].id for k in np.flatnonzero(blocked).tolist()))
+    if len(blocked):
+        cut = ", ".join(dict.fromkeys(near[k].id for k in blocked.tolist()))
         notes.append(f"buildings cut back where a lane passes: {cut}")
     return buildings, tuple(notes)
+
+
+def _cut_back(shapes: Polygons, chosen: Indices, driven: Polygons) -> Indices:
+    """Take what is driven out of the chosen shapes, and return which of those it touched."""
+    if not len(driven):
+        return np.zeros(0, dtype=np.intp)
+    building, lane = shapely.STRtree(driven).query(shapes[chosen], predicate="intersects")
+    touched, first = np.unique(building, return_index=True)
+    if not len(touched):
+        return touched
+    for k, lanes in zip(touched.tolist(), np.split(lane, first[1:]), strict=True):
+        row = chosen[k]
+        shape = shapes[row] if shapes[row].is_valid else shapely.make_valid(shapes[row])
+        shapes[row] = shapely.difference(shape, shapely.union_all(driven[lanes]))
+    return touched
 
 
 _POLYGON = 3
 
 
-def _on_grid(shape: shapely.Geometry) -> list[shapely.Polygon]:
-    """Return a shape's polygons, valid also when written in millimetres."""
-    found = []
-    for piece in valid_polygons(shape):
-        found.extend(valid_polygons(shapely.set_precision(piece, GRID_M)))
-    return found
+def _mended(
+    pieces: Polygons, owners: Indices, sound: npt.NDArray[np.bool_]
+) -> tuple[Polygons, Indices]:
+    """Return pieces as polygons that are valid also when written in millimetres."""
+    found: list[shapely.Polygon] = []
+    of: list[int] = []
+    for piece, owner, is_sound in zip(
+        pieces.tolist(), owners.tolist(), sound.tolist(), strict=True
+    ):
+        if is_sound:
+            mine = [piece]
+        else:
+            mine = [
+                part
+                for polygon in valid_polygons(piece)
+                for part in valid_polygons(shapely.set_precision(polygon, GRID_M))
+            ]
+        found.extend(mine)
+        of.extend([owner] * len(mine))
+    return np.array(found, dtype=object), np.array(of, dtype=np.intp)
 
 
 def _buildings(of: Sequence[Footprint], pieces: npt.NDArray[np.object_]) -> tuple[Building, ...]:

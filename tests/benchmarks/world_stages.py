@@ -99,7 +99,7 @@ def _make(stages: _Stages, index: MapIndex, junction: Junction, radius_m: float)
     stages.taken_s.setdefault("whole_cpu", []).append(time.process_time() - cpu_start)
     # Again, alone: what of the above went into buildings.
     near = index.buildings.within(_disc(junction, radius_m))
-    nowhere = shapely.Polygon()
+    nowhere = np.zeros(0, dtype=object)
     stages.time("footprints", lambda: buildings_in_frame(near, world.frame, graph.frame, nowhere))
     rings = [(b.outline, b.holes) for b in world.buildings]
     stages.time("convex_parts", lambda: convex_cover(rings))

@@ -26,7 +26,7 @@ SQUARE = {1: (0.0, 0.0), 2: (20.0, 0.0), 3: (20.0, 20.0), 4: (0.0, 20.0)}
 YARD = {5: (5.0, 5.0), 6: (15.0, 5.0), 7: (15.0, 15.0), 8: (5.0, 15.0)}
 HALVES = SQUARE | {9: (10.0, 0.0), 10: (10.0, 20.0)}
 OUTLINE = (20, [1, 2, 3, 4, 1], {"building": "yes", "height": "10"})
-NOWHERE = Polygon()
+NOWHERE = np.zeros(0, dtype=object)
 FRAME = LocalFrame(GeoPoint(52.0, 10.0))
 
 
@@ -175,8 +175,10 @@ def test_asking_by_place_gives_what_asking_for_all_gives():
 def test_a_building_is_cut_back_where_a_lane_passes():
     house = Footprint("w1", shapely.box(0.0, 0.0, 10.0, 10.0), Quantity(6.0, "default"), 0.0, False)
     arch = house._replace(id="w2", min_height_m=4.0)
+    aside = shapely.box(50.0, -5.0, 53.0, 15.0)
+    assert buildings_in_frame([house], FRAME, FRAME, np.array([aside]))[1] == ()
     lane = shapely.box(4.0, -5.0, 7.0, 15.0)
-    buildings, notes = buildings_in_frame([house, arch], FRAME, FRAME, lane)
+    buildings, notes = buildings_in_frame([house, arch], FRAME, FRAME, np.array([lane]))
     assert [b.id for b in buildings] == ["w1", "w1-1", "w2"]
     assert sum(_polygon(b).area for b in buildings[:2]) == pytest.approx(70.0)
     assert _polygon(buildings[2]).area == pytest.approx(100.0)

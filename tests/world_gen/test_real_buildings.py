@@ -46,7 +46,7 @@ def test_the_silhouette_of_every_building_is_kept(
     osm = read_map(data_dir / file)
     found = BuildingIndex(osm).all()
     assert len(found) >= buildings
-    built, _ = buildings_in_frame(found, osm.frame, osm.frame, shapely.Polygon())
+    built, _ = buildings_in_frame(found, osm.frame, osm.frame, np.zeros(0, dtype=object))
     parts = convex_cover([(b.outline, b.holes) for b in built])
     row = {f.id: k for k, f in enumerate(found)}
     of_building = np.array([row[_footprint_id(b.id, row)] for b in built])
