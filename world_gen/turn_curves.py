@@ -17,7 +17,7 @@ LEAD_M = 0.4
 """Straight before the first and behind the last arc, so that paths leave along their lanes."""
 _STEP_RAD, _STEP_M = math.radians(8.0), 0.5
 _REPEAT_M = 0.02
-_TIGHTNESS = 6.0
+_TIGHTNESS = 8.0
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 

@@ -1,53 +1,75 @@
-"""Driveways and parking aisles make junctions where a route uses them, or by choice."""
+"""Service roads and driveways: left alone, unless a route uses them or they are asked for."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from tests.world_gen.truth_sheet import FOLDER
-from world_gen.build import build_world
+from tests.world_gen.drawn_maps import AVENUE, STREET, drawn_map
 from world_gen.build_graph import build_road_graph
+from world_gen.clusters import surroundings, world_frame
+from world_gen.connections import connect
+from world_gen.extent import Disc
 from world_gen.find_intersections import find_intersections
-from world_gen.osm_map import OsmMap
-from world_gen.read_osm import read_map
-from world_gen.road_graph import RoadGraph
-from world_gen.service_roads import with_roads, with_service_roads
+from world_gen.lanes import build_lanes
+from world_gen.map_index import index_map
+from world_gen.movements import movements
 
-MAP = FOLDER / "36_service_roads.osm"
-
-
-@pytest.fixture(scope="module")
-def drawn() -> tuple[OsmMap, RoadGraph]:
-    osm = read_map(Path(MAP))
-    return osm, build_road_graph(osm)
+DRIVEWAY = {"highway": "service", "service": "driveway", "access": "private"}
 
 
-def test_by_default_they_make_no_junction(drawn: tuple[OsmMap, RoadGraph]) -> None:
-    osm, graph = drawn
-    assert len(find_intersections(osm, graph)) == 1
-    assert with_roads(graph, []) is graph
+@pytest.fixture
+def place():
+    osm = drawn_map(
+        {0: (0.0, 0.0), 1: (90.0, 0.0), 2: (0.0, 90.0), 3: (-90.0, 0.0), 5: (50.0, 0.0),
+         6: (50.0, 30.0), 7: (-50.0, 0.0), 8: (-50.0, 30.0)},
+        [
+            (11, [0, 5, 1], STREET),
+            (12, [0, 2], AVENUE),
+            (13, [3, 7, 0], STREET),
+            (20, [5, 6], DRIVEWAY),
+            (21, [7, 8], {"highway": "service", "service": "parking_aisle", "oneway": "yes"}),
+        ],
+    )  # fmt: skip
+    graph = build_road_graph(osm)
+    (junction,) = find_intersections(osm, graph)
+    return index_map(osm, graph, (junction,)), junction
 
 
-def test_by_choice_all_of_them_do_and_ids_stay(drawn: tuple[OsmMap, RoadGraph]) -> None:
-    osm, graph = drawn
-    before = {j.summary.id: j.summary for j in find_intersections(osm, graph)}
-    after = {j.summary.id: j.summary for j in find_intersections(osm, with_service_roads(graph))}
-    assert len(after) == 3
-    assert before.items() <= after.items()
-    assert {summary.kind for summary in after.values()} == {"t_junction"}
+def _around(place, **options):
+    index, junction = place
+    return surroundings(index, world_frame(junction), Disc(150.0), (junction,), **options)
 
 
-def test_one_that_a_route_uses_has_lanes_in_its_world(drawn: tuple[OsmMap, RoadGraph]) -> None:
-    osm, graph = drawn
-    driveway = next(e for e in graph.edges if e.tags.get("service") == "driveway")
-    opened = with_roads(graph, [driveway.index])
-    found = find_intersections(osm, opened)
-    assert len(found) == 2
-    junction = next(j for j in found if driveway.start_node in j.nodes)
-    world = build_world(osm, opened, junction)
-    assert len(world.junctions[0].arms) == 3
-    assert driveway.way_id in {lane.osm_way for lane in world.lanes}
-    turns = sorted(c.turn for c in world.connections if c.junction_id == junction.summary.id)
-    assert turns == ["left", "left", "right", "right", "straight", "straight"]
+def _ways(around) -> set[int]:
+    return {lane.edge.way_id for lane in build_lanes(around).lanes.values()}
+
+
+def test_they_have_no_lanes_unless_asked_for(place):
+    assert _ways(_around(place)) == {11, 12, 13}
+    # Where the public may not drive there are none even then.
+    assert _ways(_around(place, service_roads=True)) == {11, 12, 13, 21}
+
+
+def test_a_route_opens_the_driveway_that_it_uses(place):
+    index, _ = place
+    (driveway,) = (edge.index for edge in index.graph.edges if edge.way_id == 20)
+    around = _around(place, extra_edges=frozenset({driveway}))
+    lanes = build_lanes(around)
+    assert _ways(around) == {11, 12, 13, 20}
+    assert len([lane for lane in lanes.lanes.values() if lane.edge.way_id == 20]) == 2
+    (gate,) = (c for c in around.clusters if c.nodes == {5})
+    assert gate.junction is None
+    found = connect(gate, movements(gate, around, index.restrictions), around, lanes, [])
+    into = {c.turn for c in found if c.end.edge.way_id == 20}
+    assert into == {"left", "right"}
+    assert len(found) == 6
+
+
+def test_a_one_way_aisle_is_only_entered(place):
+    index, _ = place
+    around = _around(place, service_roads=True)
+    lanes = build_lanes(around)
+    (gate,) = (c for c in around.clusters if c.nodes == {7})
+    found = connect(gate, movements(gate, around, index.restrictions), around, lanes, [])
+    assert len([c for c in found if c.end.edge.way_id == 21]) == 2
+    assert not [c for c in found if c.start.edge.way_id == 21]
