@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
+
+import numpy as np
 import pytest
 
+from contracts.frames import geo_from_local
 from contracts.world import World
-from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, crossing, drawn_map, world_of
+from tests.world_gen.drawn_maps import (
+    AVENUE,
+    CROSS,
+    STREET,
+    crossing,
+    drawn_map,
+    roundabout,
+    world_of,
+)
+from tests.world_gen.junction_truth import worlds_of
 from tests.world_gen.test_conflicts import conflict_of
+from tests.world_gen.truth_sheet import true_maps
+from world_gen.osm_map import OsmMap
 
 MAIN = {"highway": "tertiary", "name": "Street"}
 
@@ -195,3 +210,44 @@ def test_lanes_that_merge_let_the_straight_one_go_first():
     world = world_of(drawn_map(CROSS, ways))
     (merging,) = [c for c in world.conflicts if c.kind == "merging"]
     assert merging.rule == "merge_order"
+
+
+def test_a_circular_place_with_signs_at_its_entries_is_driven_like_a_roundabout():
+    osm = roundabout()
+    ring = osm.ways[10]
+    nodes = {**osm.locations, 9: local_to_geo(osm, 25.0, 0.0)}
+    osm = dataclasses.replace(
+        osm,
+        locations=nodes,
+        ways={
+            **osm.ways,
+            10: ring._replace(tags={**ring.tags, "junction": "circular", "oneway": "yes"}),
+            11: osm.ways[11]._replace(nodes=(100, 9, 1)),
+        },
+        node_tags={9: {"highway": "give_way", "direction": "backward"}},
+    )
+    world = world_of(osm)
+    role = {lane.id: lane.role for lane in world.lanes}
+    by_id = {c.id: c for c in world.connections}
+    answers = {(role[by_id[c.yields_id].from_lane_id], c.rule, c.source) for c in world.conflicts}
+    assert answers == {("approach", "roundabout", "tagged"), ("approach", "roundabout", "inferred")}
+
+
+def test_a_slip_road_with_its_own_sign_is_not_under_the_lights():
+    (world,) = worlds_of(next(t for t in true_maps() if t.name == "10_slip_lane_gives_way"))
+    slip = [c for c in world.connections if c.control == "give_way"]
+    assert len(slip) == 1
+    assert slip[0].turn == "right"
+    assert slip[0].signal_group_id is None
+    others = [
+        c for c in world.connections if c.from_lane_id == slip[0].from_lane_id and c not in slip
+    ]
+    assert others
+    assert all(c.control == "signal" and c.signal_group_id for c in others)
+    waiting = [c for c in world.conflicts if c.yields_id == slip[0].id]
+    assert {(c.rule, c.source) for c in waiting} == {("give_way", "tagged")}
+
+
+def local_to_geo(osm: OsmMap, x_m: float, y_m: float) -> tuple[float, float]:
+    lat, lon = geo_from_local(osm.frame, np.array([x_m, y_m])).tolist()
+    return lat, lon
