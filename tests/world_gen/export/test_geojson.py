@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+import shapely
 
 from contracts.frames import GeoPoint, local_from_geo
 from contracts.world import (
@@ -124,6 +125,15 @@ def test_rings_are_closed_and_follow_the_right_hand_rule(tmp_path: Path) -> None
             doubled_area = (x[:-1] * y[1:] - x[1:] * y[:-1]).sum()
             assert (doubled_area > 0.0) == (number == 0)
     assert any(len(rings) == 2 for rings in polygons)
+
+
+@pytest.mark.parametrize("origin", [None, FIJI])
+def test_another_reader_takes_every_geometry(origin: GeoPoint | None, tmp_path: Path) -> None:
+    features(built(origin), tmp_path)
+    read = shapely.from_geojson((tmp_path / "world.geojson").read_text(encoding="utf-8"))
+    geometries = shapely.get_parts(read)
+    assert len(geometries) > 20
+    assert all(geometry.is_valid and not geometry.is_empty for geometry in geometries)
 
 
 def test_values_say_where_they_come_from(tmp_path: Path) -> None:
