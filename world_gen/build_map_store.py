@@ -15,6 +15,7 @@ from world_gen.map_assembly import (
     NO_WAYS,
     UNITS_PER_DEG,
     BoolArray,
+    WayNote,
     bounds_of,
     centre_of,
     sound_ways,
@@ -169,6 +170,7 @@ class _WayBatches:
         positions = self._nodes.find(nodes.nodes)
         is_road = np.array([_is_road(text) for text in lines.tag_texts], dtype=bool)
         sound = sound_ways(lines.ids, is_road, nodes, positions)
+        self._note(sound.notes, positions)
         if not len(sound.picked):
             return
         counts = sound.nodes.counts
@@ -192,7 +194,6 @@ class _WayBatches:
             )
             self._table.add(cell, WAYS, content)
         self._remember(ids, boxes, placed.cells[: len(ids)])
-        self._note(sound.notes, lines.ids, nodes.nodes, nodes.counts, positions)
         roads = np.repeat(is_road[sound.picked], counts)
         self._road_extremes.append(_extremes(lat[roads], lon[roads]))
         self.count += len(ids)
@@ -207,19 +208,15 @@ class _WayBatches:
         self.member_placed[rows[named]] = True
         self._table.add_members(zip(ids[named].tolist(), cells[named].tolist(), strict=True))
 
-    def _note(
-        self, notes: Sequence[tuple[int, str]], ids: Sequence[int], nodes: IntArray,
-        counts: IntArray, positions: NodePositions,
-    ) -> None:  # fmt: skip
+    def _note(self, notes: Sequence[WayNote], positions: NodePositions) -> None:
         """Put what is said of a way where its first known node is."""
-        ends = np.cumsum(counts)
-        for way, text in notes:
-            own = nodes[ends[way] - counts[way] : ends[way]]
-            known = np.flatnonzero(np.isin(positions.ids, own))
-            if len(known):
-                lat, lon = (column[known[:1]] for column in positions[1:])
+        for text, row in notes:
+            if row is not None:
+                lat, lon = positions.lat_1e7[[row]], positions.lon_1e7[[row]]
                 cell = int(place(Boxes(lat, lon, lat, lon)).cells[0])
-                self._table.add(cell, NOTES, text)
+                self._table.add(cell, NOTES, f"{lat[0]} {lon[0]} {text}")
+            else:
+                self._nodes.notes.append(text)
 
     def road_box(self, map_file: Path) -> LatLonBounds:
         """Return the box around all roads."""

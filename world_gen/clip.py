@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.frames import LocalFrame
-from world_gen.map_assembly import BoolArray, MapObjects, assemble_map
+from world_gen.map_assembly import UNITS_PER_DEG, BoolArray, MapObjects, assemble_map
 from world_gen.map_cells import Boxes, CellNodes, CellWays, cell_ranges, sums, touches, unpack
 from world_gen.map_tables import NODES, NOTES, RELATIONS, WAYS, TableReader
 from world_gen.opl import IntArray, NodePositions, TagReader, WayNodes, read_relations
@@ -47,7 +47,7 @@ class _Cells(NamedTuple):
     nodes: NodePositions
     node_texts: list[str]
     relations: dict[int, OsmRelation]
-    notes: list[str]
+    note_places: dict[str, tuple[float, float]]
 
 
 def clip_map(
@@ -88,7 +88,8 @@ def clip_map(
         positions=table,
         node_tags=node_tags,
         relations=relations,
-        notes=cells.notes,
+        notes=list(cells.note_places),
+        note_places=cells.note_places,
     )
     meta = tables.meta
     return assemble_map(
@@ -102,7 +103,7 @@ def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagRe
     nodes: list[NodePositions] = []
     node_texts: list[str] = []
     relations: dict[int, OsmRelation] = {}
-    notes: list[str] = []
+    note_places: dict[str, tuple[float, float]] = {}
     for kind, body in tables.pieces(ranges):
         if kind == WAYS:
             w = unpack(body, CellWays)
@@ -119,8 +120,11 @@ def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagRe
             text = unpack(body, str).encode()
             relations.update(read_relations(text, is_kept_relation, tags_of))
         elif kind == NOTES:
-            notes.append(unpack(body, str))
-    return _Cells(_joined(ways), NodePositions(*_columns(nodes, 3)), node_texts, relations, notes)
+            lat, lon, words = unpack(body, str).split(" ", 2)
+            note_places[words] = (int(lat) / UNITS_PER_DEG, int(lon) / UNITS_PER_DEG)
+    return _Cells(
+        _joined(ways), NodePositions(*_columns(nodes, 3)), node_texts, relations, note_places
+    )
 
 
 def _joined(parts: Sequence[_Ways]) -> _Ways:

@@ -41,6 +41,7 @@ class MapObjects:
     node_tags: Mapping[int, Mapping[str, str]]
     relations: Mapping[int, OsmRelation]
     notes: list[str] = field(default_factory=list)
+    note_places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def assemble_map(
@@ -59,7 +60,12 @@ def assemble_map(
     table = objects.positions
     is_road = np.array(["highway" in tags for tags in objects.way_tags], dtype=bool)
     sound = sound_ways(objects.way_ids, is_road, objects.way_nodes, table)
-    notes = [*objects.notes, *(text for _, text in sound.notes)]
+    notes = [*objects.notes, *(text for text, _ in sound.notes)]
+    note_places = dict(objects.note_places)
+    for text, row in sound.notes:
+        if row is not None:
+            lat, lon = table.lat_1e7[row], table.lon_1e7[row]
+            note_places[text] = (float(lat) / UNITS_PER_DEG, float(lon) / UNITS_PER_DEG)
     nodes = tuple(sound.nodes.nodes.tolist())
     cuts = [0, *np.cumsum(sound.nodes.counts).tolist()]
     ids = np.array(objects.way_ids, dtype=np.int64)[sound.picked]
@@ -95,7 +101,7 @@ def assemble_map(
     return OsmMap(
         file=file, sha256=sha256, attribution=attribution, bounds=bounds, frame=frame,
         locations=locations, node_tags=objects.node_tags, ways=ways, relations=relations,
-        notes=tuple(dict.fromkeys(notes)),
+        notes=tuple(dict.fromkeys(notes)), note_places=note_places,
     )  # fmt: skip
 
 
@@ -131,6 +137,13 @@ def _rows_of(table: NodePositions, nodes: IntArray) -> tuple[IntArray, BoolArray
     return rows, table.ids[rows] == nodes
 
 
+class WayNote(NamedTuple):
+    """What is said of a way, and which of the positions is its first; None where it has none."""
+
+    text: str
+    row: int | None
+
+
 class SoundWays(NamedTuple):
     """The ways that can be used, and what was left out or mended."""
 
@@ -139,8 +152,7 @@ class SoundWays(NamedTuple):
     nodes: WayNodes
     rows: IntArray
     """Where each of their nodes (M,) stands among the positions."""
-    notes: list[tuple[int, str]]
-    """The way's place among those given, and the words."""
+    notes: list[WayNote]
 
 
 def sound_ways(
@@ -152,7 +164,13 @@ def sound_ways(
     faulty = _faulty(counts, rows, placed, positions)
     begins = np.cumsum(counts) - counts
     kept = np.repeat(~faulty, counts)
-    notes: list[tuple[int, str]] = []
+    notes: list[WayNote] = []
+
+    def note(i: int, words: str) -> None:
+        known = np.flatnonzero(placed[begins[i] : begins[i] + counts[i]])
+        row = int(rows[begins[i] + known[0]]) if len(known) else None
+        notes.append(WayNote(f"way {way_ids[i]}: {words}", row))
+
     for i in np.flatnonzero(faulty).tolist():
         at = slice(int(begins[i]), int(begins[i] + counts[i]))
         spots = (
@@ -160,13 +178,13 @@ def sound_ways(
         )
         mended = _mended(nodes[at], placed[at], spots)
         if mended.words:
-            notes.append((i, f"way {way_ids[i]}: {mended.words}"))
+            note(i, mended.words)
         if mended.part is not None:
             kept[at][mended.part] = True
     for i in np.flatnonzero(is_road & (counts > MOST_VISITS)).tolist():
         at = slice(int(begins[i]), int(begins[i] + counts[i]))
         if words := _turns_on_itself(nodes[at].tolist()):
-            notes.append((i, f"way {way_ids[i]}: {words}; left out"))
+            note(i, f"{words}; left out")
             kept[at] = False
     of_way = np.repeat(np.arange(len(counts)), counts)[kept]
     left = np.bincount(of_way, minlength=len(counts))

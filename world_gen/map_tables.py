@@ -11,7 +11,7 @@ import msgspec
 from world_gen.map_cells import CellNodes, CellWays, pack
 from world_gen.osm_map import LatLonBounds
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 """Counts changes of the format and of what is kept; part of an index's name."""
 WAYS, NODES, RELATIONS, NOTES = range(4)
 _SCHEMA = """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -75,6 +75,17 @@ class OsmMap:
     ways: Mapping[int, OsmWay]
     relations: Mapping[int, OsmRelation]
     notes: tuple[str, ...] = ()
+    note_places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """(lat, lon) of those notes that are about a place."""
+
+    def notes_within(self, bounds: LatLonBounds) -> tuple[str, ...]:
+        """Return the notes about places in a box, the same whether or not the map is a clip."""
+        near = (
+            note
+            for note, (lat, lon) in self.note_places.items()
+            if bounds.south <= lat <= bounds.north and bounds.west <= lon <= bounds.east
+        )
+        return tuple(sorted(near))
 
     def lat_lon_deg(self, nodes: Sequence[int] | npt.NDArray[np.int64]) -> Array:
         """Return (N, 2) degrees of many nodes at once; KeyError names one without a position."""

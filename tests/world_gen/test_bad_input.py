@@ -165,6 +165,8 @@ def test_nodes_that_are_missing_are_named(tmp_path: Path) -> None:
         "way 202: the map lacks its nodes 903, 904, 905 and 1 more; left out",
     )
     assert osm.ways[200].nodes == (3, 4)
+    assert osm.notes_within(LatLonBounds(53.4, 8.0, 53.6, 8.2)) == osm.notes
+    assert not osm.notes_within(LatLonBounds(53.6, 8.0, 53.7, 8.2))
     assert build_all(tmp_path / "map.osm").worlds
 
 

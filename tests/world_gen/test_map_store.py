@@ -67,6 +67,7 @@ def test_all_of_it_is_the_map_read_whole(tmp_path: Path, shuffled: bool) -> None
     store = MapStore.open(path, tmp_path / "index")
     whole = read_map(path)
     assert_same(store.clip(EVERYWHERE), whole)
+    assert store.clip(EVERYWHERE).note_places == whole.note_places
     assert store.clip(EVERYWHERE).notes == tuple(n for n in whole.notes if n.startswith("way 53"))
     assert store.meta.notes == tuple(n for n in whole.notes if n.startswith("relation 61"))
 
