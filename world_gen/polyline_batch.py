@@ -6,7 +6,6 @@ times the arithmetic.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +18,6 @@ from contracts.arrays import Array
 from world_gen.polyline import left_of
 
 _MITRE_LIMIT = 2.0
-_STEP_RAD = math.radians(7.0)
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 
 
@@ -199,35 +197,3 @@ def _without_backward_runs(shifted: Polylines, lines: Polylines) -> Polylines:
     keep[1:] &= forward[:-1] | lines.is_last[:-1]
     keep[lines.first[:-1]] = keep[lines.first[1:] - 1] = True
     return shifted.keep(keep | ~folded[lines.line])
-
-
-def rounded(lines: Polylines, *, deviation_m: float = 0.35, share: float = 0.45) -> Polylines:
-    """Replace bends by arcs that stay within `deviation_m`, as `polyline.rounded` does."""
-    into, out = directions(lines)
-    length = lines.steps[1]
-    cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-    angle = np.abs(np.arctan2(cross, (into * out).sum(axis=1)))
-    bend = (angle >= math.radians(2.0)) & (angle <= math.radians(150.0))
-    bend[lines.first[:-1]] = bend[lines.first[1:] - 1] = False
-    half = np.where(bend, angle / 2, 1.0)
-    tangent = deviation_m * np.sin(half) / (1.0 - np.cos(half))
-    shorter = np.minimum(np.concatenate([[0.0], length[:-1]]), length)
-    tangent = np.minimum(tangent, share * shorter)
-    steps = np.where(bend, np.clip(np.ceil(angle / _STEP_RAD), 2, 24), 0).astype(np.int64)
-    counts = steps + 1
-    first = _starts(counts)
-    source = np.repeat(np.arange(len(lines.xy_m)), counts)
-    t = (np.arange(first[-1]) - first[:-1][source]) / np.maximum(steps, 1)[source]
-    # A Bézier arc whose control points lie k of the tangent's length from its ends.
-    k = np.where(bend, (4.0 / 3.0) * np.tan(half / 2) / np.tan(half), 0.0)
-    corner, d0, d1 = lines.xy_m[source], into[source], out[source]
-    reach = np.where(bend, tangent, 0.0)[source][:, None]
-    inner = reach * (1.0 - k[source][:, None])
-    s, t = (1.0 - t)[:, None], t[:, None]
-    xy = (
-        s**3 * (corner - d0 * reach)
-        + 3 * s * s * t * (corner - d0 * inner)
-        + 3 * s * t * t * (corner + d1 * inner)
-        + t**3 * (corner + d1 * reach)
-    )
-    return Polylines(xy, first[lines.first])

@@ -1,10 +1,14 @@
-"""How smooth paths are: bends where they meet, and the radius of their tightest arc."""
+"""How smooth paths are: bends where they meet, the radius of their tightest arc; smooth ones."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+
+from world_gen.bends import rounded_through
+from world_gen.polyline_batch import Polylines
+from world_gen.turn_curves import turn_curves
 
 
 def bend_rad(u: np.ndarray, v: np.ndarray) -> float:
@@ -29,3 +33,18 @@ def tightest_radius_m(path: np.ndarray) -> float:
     twice = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     bent = 2.0 * twice / np.maximum(ab * bc * ac, 1e-12)
     return float(1.0 / max(float(bent.max()), 1e-9))
+
+
+def turn_curve(
+    start: np.ndarray, heading: np.ndarray, end: np.ndarray, end_heading: np.ndarray
+) -> np.ndarray:
+    """Return the path (N, 2) of one turn; all are (2,)."""
+    (path,) = turn_curves(start[None], heading[None], end[None], end_heading[None]).lines.split()
+    return path
+
+
+def rounded(xy_m: np.ndarray) -> np.ndarray:
+    """Return a line (N, 2) with its corners rounded."""
+    nothing = np.full((1, 2), np.nan)
+    (path,) = rounded_through(Polylines.of([xy_m]), np.array([0.0]), nothing, nothing).lines.split()
+    return path

@@ -1,4 +1,4 @@
-"""Polylines: turns are smooth, offsets keep their distance, cuts keep their length."""
+"""Polylines: offsets keep their distance, cuts keep their length."""
 
 from __future__ import annotations
 
@@ -15,42 +15,7 @@ from world_gen.polyline import (
     locate,
     offset,
     points_at,
-    rounded,
-    turn_curve,
 )
-
-angles = st.floats(-math.pi, math.pi)
-metres = st.floats(3.0, 40.0)
-
-
-def _heading(angle: float) -> np.ndarray:
-    return np.array([math.cos(angle), math.sin(angle)])
-
-
-@given(turn=st.floats(-2.6, 2.6), ahead=metres, beyond=metres, yaw=angles)
-def test_a_turn_leaves_and_arrives_along_its_lanes(turn, ahead, beyond, yaw):
-    start, heading, out = np.array([3.0, -7.0]), _heading(yaw), _heading(yaw + turn)
-    end = start + ahead * heading + beyond * out
-    path = turn_curve(start, heading, end, out)
-    np.testing.assert_allclose(path[0], start, atol=1e-9)
-    np.testing.assert_allclose(path[-1], end, atol=1e-9)
-    first, last = path[1] - path[0], path[-1] - path[-2]
-    assert first @ heading / np.hypot(*first) > math.cos(math.radians(6.0))
-    assert last @ out / np.hypot(*last) > math.cos(math.radians(6.0))
-    steps = np.diff(path, axis=0)
-    bends = np.arctan2(
-        steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0],
-        (steps[:-1] * steps[1:]).sum(axis=1),
-    )
-    assert np.abs(bends).max() < math.radians(35.0)
-
-
-@given(ahead=st.floats(6.0, 40.0), sign=st.sampled_from([-1, 1]))
-def test_a_right_angle_is_turned_with_the_widest_arc_that_fits(ahead, sign):
-    out = np.array([0.0, float(sign)])
-    path = turn_curve(np.zeros(2), np.array([1.0, 0.0]), np.array([ahead, sign * ahead]), out)
-    from_centre = np.hypot(*(path - np.array([0.0, sign * ahead])).T)
-    np.testing.assert_allclose(from_centre, ahead, rtol=2e-3)
 
 
 @given(left=st.floats(-6.0, 6.0), bend=st.floats(-1.0, 1.0))
@@ -82,12 +47,3 @@ def test_an_offset_to_the_inside_of_a_tight_bend_never_runs_backwards():
 def test_a_cut_has_the_length_asked_for(begin, span):
     line = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 30.0], [50.0, 30.0]])
     assert length(cut(line, begin, begin + span)) == pytest.approx(span, abs=1e-6)
-
-
-def test_rounding_stays_near_the_line_and_keeps_its_ends():
-    line = np.array([[0.0, 0.0], [20.0, 0.0], [30.0, 17.0], [60.0, 17.0]])
-    smooth = rounded(line, deviation_m=0.35)
-    np.testing.assert_array_equal(smooth[[0, -1]], line[[0, -1]])
-    gaps = [np.hypot(*(p - points_at(line, locate(line, p)))) for p in smooth]
-    assert max(gaps) <= 0.36
-    assert len(smooth) > len(line)

@@ -73,11 +73,6 @@ def test_offsets_of_roads_that_go_on(some):
 
 
 @given(lines)
-def test_rounding(some):
-    same(batch.rounded(Polylines.of(some)), [polyline.rounded(xy) for xy in some])
-
-
-@given(lines)
 def test_repeats_are_dropped(some):
     doubled = [np.repeat(xy, 2, axis=0) for xy in some]
     same(batch.without_repeats(Polylines.of(doubled)), some)
