@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import pytest
 import shapely
 
+from tests.world_gen.drawn_maps import crossing, world_of
 from world_gen.buildings import (
     SILHOUETTE_TOLERANCE_M,
     BuildingIndex,
     buildings_in_frame,
 )
 from world_gen.convex_parts import convex_cover
+from world_gen.export.mjcf import world_spec
 from world_gen.read_osm import read_map
 
 pytestmark = pytest.mark.real_data
 
+CHUNK = 1_500
 SLOT_M = 0.2
 """Slots in a wall that are narrower are no silhouette, nor are cracks between convex parts."""
 
@@ -29,23 +33,43 @@ def _without_slots(shapes: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
     return closed
 
 
-@pytest.mark.parametrize(
-    ("file", "buildings"),
-    [
-        ("osm-badhersfeld/badhersfeld.osm.xml.gz", 11_000),
-        ("osm-liechtenstein/liechtenstein-latest.osm.pbf", 8_900),
-        ("osm-monaco/monaco.osm.gz", 900),
-        ("osm-berlin-mitte/berlin-mitte.osm", 400),
-        ("osm-berlin-moritzplatz/berlin-moritzplatz.osm", 300),
-        ("osm-kingsway/kingsway_junction.osm", 10),
-    ],
-)
-def test_the_silhouette_of_every_building_is_kept(
+BIG = {
+    "osm-badhersfeld/badhersfeld.osm.xml.gz": 11_000,
+    "osm-liechtenstein/liechtenstein-latest.osm.pbf": 8_900,
+}
+SMALL = {
+    "osm-monaco/monaco.osm.gz": 900,
+    "osm-berlin-mitte/berlin-mitte.osm": 400,
+    "osm-berlin-moritzplatz/berlin-moritzplatz.osm": 300,
+    "osm-kingsway/kingsway_junction.osm": 10,
+}
+
+
+@pytest.mark.parametrize(("file", "buildings"), SMALL.items())
+def test_silhouettes_are_kept_and_every_part_compiles(
     data_dir: Path, file: str, buildings: int
 ) -> None:
-    osm = read_map(data_dir / file)
+    _check(data_dir / file, buildings, every=1)
+
+
+@pytest.mark.parametrize(("file", "buildings"), BIG.items())
+def test_silhouettes_are_kept_in_a_sample_of_large_maps(
+    data_dir: Path, file: str, buildings: int
+) -> None:
+    _check(data_dir / file, buildings, every=5)
+
+
+@pytest.mark.judge
+@pytest.mark.parametrize(("file", "buildings"), BIG.items())
+def test_silhouettes_are_kept_in_large_maps(data_dir: Path, file: str, buildings: int) -> None:
+    _check(data_dir / file, buildings, every=1)
+
+
+def _check(map_file: Path, buildings: int, *, every: int) -> None:
+    osm = read_map(map_file)
     found = BuildingIndex(osm).all()
     assert len(found) >= buildings
+    found = found[::every]
     built, _ = buildings_in_frame(found, osm.frame, osm.frame, np.zeros(0, dtype=object))
     parts = convex_cover([(b.outline, b.holes) for b in built])
     row = {f.id: k for k, f in enumerate(found)}
@@ -60,6 +84,11 @@ def test_the_silhouette_of_every_building_is_kept(
     moved = shapely.hausdorff_distance(shapely.boundary(before), shapely.boundary(kept))
     worst = int(np.argmax(moved))
     assert moved[worst] <= SILHOUETTE_TOLERANCE_M, (found[worst].id, moved[worst])
+
+    empty = world_of(crossing())
+    for begin in range(0, len(built), CHUNK):
+        world = msgspec.structs.replace(empty, buildings=built[begin : begin + CHUNK])
+        assert world_spec(world).compile().ngeom > 1
 
 
 def _footprint_id(building: str, known: dict[str, int]) -> str:
