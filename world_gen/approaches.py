@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +12,15 @@ from contracts.arrays import Array
 from contracts.world import Choice, LineControl, YieldRule
 from world_gen.clusters import RING_KINDS, Cluster, Surroundings, heading_out, is_ring_edge
 from world_gen.connections import ConnectionDraft
-from world_gen.met_on_the_way import Met, NodeTags, is_light, met_inside, met_toward, sign_of
-from world_gen.polyline import arc_lengths
+from world_gen.met_on_the_way import (
+    Met,
+    NodeTags,
+    is_light,
+    lights_behind,
+    met_inside,
+    met_toward,
+    sign_of,
+)
 from world_gen.priority_roads import Entry, Rank, Standing, standings
 from world_gen.road_graph import DirectedEdge
 
@@ -71,10 +78,14 @@ class _Draft:
 
 
 def approaches(
-    around: Surroundings, node_tags: NodeTags, connections: Sequence[ConnectionDraft]
+    around: Surroundings,
+    node_tags: NodeTags,
+    connections: Sequence[ConnectionDraft],
+    junction_lights: Collection[int],
 ) -> tuple[Approach, ...]:
     """Return every approach to a whole junction with its control.
 
+    `junction_lights` are the nodes of the lights that are known to govern some junction.
     Roads of a ring are approaches only where a light stands on them.
     """
     inside: dict[tuple[int, bool], list[Met]] = {}
@@ -91,8 +102,6 @@ def approaches(
     }
     drafts: dict[str, list[_Draft]] = {}
     behind: dict[str, list[tuple[int, DirectedEdge]]] = {}
-    everyone = (c.junction.lights for c in around.clusters if c.junction is not None)
-    named = frozenset().union(*everyone)
     for cluster in around.clusters:
         junction = cluster.junction
         if not cluster.whole or junction is None:
@@ -103,7 +112,9 @@ def approaches(
             if not toward.allowed:
                 if signalled:
                     found_behind = [
-                        (n, leg) for n in _lights_near(leg, node_tags) if n not in named
+                        (n, leg)
+                        for n in lights_behind(leg, node_tags, LIGHT_NEAR_M)
+                        if n not in junction_lights
                     ]
                     behind.setdefault(junction.summary.id, []).extend(found_behind)
                 continue
@@ -121,7 +132,9 @@ def approaches(
                 lights = [
                     m
                     for m in met
-                    if is_light(m.tags) and m.distance_m <= LIGHT_NEAR_M and m.node not in named
+                    if is_light(m.tags)
+                    and m.distance_m <= LIGHT_NEAR_M
+                    and m.node not in junction_lights
                 ]
             drafts.setdefault(junction.summary.id, []).append(
                 _Draft(
@@ -138,17 +151,6 @@ def approaches(
         _claim_the_rest(mine, behind.get(mine[0].junction_id, []))
         found.extend(mine)
     return tuple(found)
-
-
-def _lights_near(leg: DirectedEdge, node_tags: NodeTags) -> list[int]:
-    """Return the lights on a road out of a junction before which no car would stop by itself."""
-    nodes = leg.edge.node_ids[::-1] if leg.reverse else leg.edge.node_ids
-    along = arc_lengths(leg.xy_m)
-    return [
-        node
-        for node, at in zip(nodes, along, strict=False)
-        if is_light(node_tags.get(node, {})) and 0.1 < at <= LIGHT_NEAR_M
-    ]
 
 
 def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]) -> None:

@@ -115,7 +115,9 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
     connections = _connections(index, around, lanes, notes)
     beside = beside_roads(osm)
     crossed = crossings(around, osm.node_tags, beside)
-    rules = junction_rules(around, osm.node_tags, lanes, connections, crossed)
+    rules = junction_rules(
+        around, osm.node_tags, lanes, connections, crossed, index.junction_lights
+    )
     surface = areas(around, lanes, connections)
     tracks = tram_tracks(around, osm, beside)
     near = index.buildings_in(in_map(extent, around.frame, index.graph.frame))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from contracts.world import Conflict, Crossing, Signal, SignalPlan, StopLine
@@ -38,12 +38,14 @@ def junction_rules(
     lanes: LaneSet,
     connections: Sequence[ConnectionDraft],
     crossings: Sequence[Crossing],
+    junction_lights: Collection[int],
 ) -> JunctionRules:
     """Return the rules of every whole junction, and of every light away from one.
 
+    `junction_lights` are the nodes of the lights of all junctions of the map.
     Connections learn their control, their signal group and their conflicts.
     """
-    found = approaches(around, node_tags, connections)
+    found = approaches(around, node_tags, connections, junction_lights)
     lines = stop_lines(found, around, lanes)
     _control(connections, found, lines, node_tags, around)
     whole = {id(junction) for junction in around.junctions}
@@ -52,7 +54,7 @@ def junction_rules(
     groups = lane_groups(found, around, lanes, ruled)
     walks = walk_groups(groups, crossings, around)
     heads = signal_heads(groups, {line.lane_id: line for line in lines}, around)
-    known = {node for approach in found for node in approach.signal_nodes}
+    known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
     lone = lone_lights(around, node_tags, lanes, crossings, known)
     return JunctionRules(
         # Where a lane has two lines the one at the junction stands last, so that it wins by lane.

@@ -27,6 +27,8 @@ class MapIndex:
     buildings: BuildingIndex
     restrictions: TurnRestrictions
     junction_of_node: Mapping[int, Junction]
+    junction_lights: frozenset[int]
+    """Nodes of the lights that govern junctions."""
 
     @property
     def map_key(self) -> str:
@@ -56,6 +58,7 @@ def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ())
         for edge in graph.edges
         if edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
     )
+    known = tuple(junctions)
     lines = [shapely.LineString(graph.edges[i].xy_m) for i in car]
     return MapIndex(
         osm=osm,
@@ -64,5 +67,6 @@ def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ())
         car_edge_tree=shapely.STRtree(lines),
         buildings=BuildingIndex(osm),
         restrictions=read_turn_restrictions(osm),
-        junction_of_node={node: j for j in junctions for node in sorted(j.nodes)},
+        junction_of_node={node: j for j in known for node in sorted(j.nodes)},
+        junction_lights=frozenset().union(*(junction.lights for junction in known)),
     )

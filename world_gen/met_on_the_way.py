@@ -97,6 +97,17 @@ def met_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[Met]
     return found
 
 
+def lights_behind(leg: DirectedEdge, node_tags: NodeTags, within_m: float) -> list[int]:
+    """Return the lights on a road out of a junction, no farther than `within_m` from it."""
+    nodes = leg.edge.node_ids[::-1] if leg.reverse else leg.edge.node_ids
+    along = arc_lengths(leg.xy_m)
+    return [
+        node
+        for node, at in zip(nodes, along, strict=False)
+        if is_light(node_tags.get(node, {})) and 0.1 < at <= within_m
+    ]
+
+
 def faces(tags: Mapping[str, str], against_outward: bool) -> bool | None:
     """Return whether a sign or light is for those who drive along (true) the way's nodes.
 

@@ -266,6 +266,29 @@ def test_a_light_on_the_one_way_road_out_stops_nobody_behind_the_junction():
     assert all("w13" in lane for lane in straight.lane_ids)
 
 
+def test_the_light_of_a_junction_beyond_the_edge_is_not_one_for_walkers():
+    far = {5: (-140.0, 0.0), 6: (-170.0, 0.0), 7: (-170.0, 90.0), 8: (-260.0, 0.0)}
+    osm = drawn_map(
+        CROSS | far,
+        [
+            (11, [0, 1], STREET),
+            (12, [0, 2], AVENUE),
+            (13, [6, 5, 3, 0], STREET),
+            (14, [4, 0], AVENUE),
+            (15, [7, 6], AVENUE),
+            (16, [8, 6], STREET),
+        ],
+        node_tags={5: LIGHT | {"traffic_signals:direction": "backward"}},
+    )
+    graph = build_road_graph(osm)
+    near, beyond = sorted(find_intersections(osm, graph), key=lambda found: min(found.nodes))
+    assert beyond.lights == {5}
+    index = index_map(osm, graph, (near, beyond))
+    world = build_world(osm, graph, near, index=index)
+    assert world.signals == ()
+    assert world.crossing_plans == ()
+
+
 @given(
     parts=st.lists(st.tuples(st.integers(0, 6), st.floats(5.0, 12.0)), min_size=1, max_size=7),
     total_s=st.floats(0.0, 120.0),
