@@ -17,6 +17,8 @@ SWEPT_HALF_WIDTH_M = 1.0
 """Half of what a car sweeps: 1.8 m of body and 0.1 m to each side, whatever the lane's width."""
 LEAST_AREA_M2 = 0.3
 """Paths that merely brush each other do not cross; those that end in one lane always meet."""
+BESIDE_M = 1.0
+"""Neighbouring lanes are drawn no nearer where neither driver leaves the own one."""
 PATH_TOLERANCE_M = 0.03
 """Paths have a point each metre; where they meet is told to within this."""
 _MITRE_LIMIT = 2.0
@@ -47,6 +49,7 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
     """Return every pair of connections of one junction and one level whose swept areas overlap.
 
     Two that begin in one lane part and do not meet; of two that follow each other neither waits.
+    Two out of lanes of one road whose middles stay a metre apart keep beside each other.
     """
     if not connections:
         none = np.zeros(0, dtype=np.int64)
@@ -68,6 +71,10 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
     shared = shapely.intersection(swept[a], swept[b])
     meet = merging | (shapely.area(shared) >= LEAST_AREA_M2)
     meet[meet] = _on_one_level(connections, a[meet], b[meet])
+    road = np.array([c.start.key.edge for c in connections])
+    beside = meet & ~merging & (road[a] == road[b])
+    apart_m = shapely.distance(lines[a[beside]], lines[b[beside]])
+    meet[beside] = apart_m < BESIDE_M
     a, b, merging, shared = a[meet], b[meet], merging[meet], shared[meet]
     order = np.lexsort((b, a))
     a, b, merging, shared = a[order], b[order], merging[order], shared[order]
