@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import msgspec
 import numpy as np
@@ -15,7 +14,6 @@ from contracts.world import (
     Connection,
     Crossing,
     Lane,
-    Provenance,
     Road,
     Signal,
     StopLine,
@@ -24,32 +22,12 @@ from contracts.world import (
     WorldJunction,
     YieldRule,
 )
+from world_gen.report_values import SubjectReport, Value, subject_report
 
-SOURCE_CONFIDENCE: Mapping[Provenance, float] = {"tagged": 1.0, "inferred": 0.7, "default": 0.3}
-"""What a value is worth by where it came from: a convention to compare junctions by.
-
-What the map says outright counts in full. What follows from other tags is usually right, and a
-default is right where a place is ordinary; the two figures say no more than that.
-"""
-SUBJECT_WEIGHT: Mapping[str, float] = {
-    "kind": 2.0,
-    "lane counts": 3.0,
-    "lane widths": 1.0,
-    "turns": 2.0,
-    "directions": 2.0,
-    "speed limits": 1.0,
-    "control": 3.0,
-    "signals": 2.0,
-    "right of way": 3.0,
-    "crossings": 1.0,
-    "building heights": 1.0,
-}
-"""How much a subject counts in a junction: most, what would hurt a driver if it were wrong."""
 CROSSING_REACH_M = 40.0
 """A crossing counts for the nearest junction within this."""
 _FROM_LEFT: tuple[Turn, ...] = ("u_turn", "left", "straight", "right")
 _MPS_TO_KMPH = 3.6
-_SOURCES: tuple[Provenance, ...] = ("tagged", "inferred", "default")
 _RULES: Mapping[YieldRule, str] = {
     "stop": "stop sign",
     "give_way": "give-way sign",
@@ -62,51 +40,6 @@ _RULES: Mapping[YieldRule, str] = {
     "merge_order": "merging lanes",
     "order": "no rule says; a fixed order",
 }
-
-
-class SubjectReport(msgspec.Struct, frozen=True, kw_only=True):
-    """How many values of one subject came from where, and in words those that were guessed.
-
-    `confidence` is the mean of `SOURCE_CONFIDENCE` over the values; None where there are none.
-    """
-
-    subject: str
-    tagged: int
-    inferred: int
-    default: int
-    confidence: float | None
-    guessed: tuple[str, ...]
-    """One sentence for each road and value that the map does not say outright."""
-
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    """One value of a subject: of which road, what it is, where it came from."""
-
-    of: str
-    words: str
-    source: Provenance
-
-
-def subject_report(subject: str, values: Iterable[Value]) -> SubjectReport:
-    """Count values by source, and put those that were guessed into sentences."""
-    values = list(values)
-    count = Counter(value.source for value in values)
-    worth = sum(SOURCE_CONFIDENCE[source] * n for source, n in count.items())
-    alike = Counter((v.of, v.words, v.source) for v in values if v.source != "tagged")
-    return SubjectReport(
-        subject=subject,
-        tagged=count["tagged"],
-        inferred=count["inferred"],
-        default=count["default"],
-        confidence=round(worth / len(values), 2) if values else None,
-        guessed=tuple(
-            f"{of}: {words}, {source}" + (f" ({n} times)" if n > 1 else "")
-            for (of, words, source), n in sorted(
-                alike.items(), key=lambda item: (_SOURCES.index(item[0][2]) * -1, *item[0][:2])
-            )
-        ),
-    )
 
 
 class Neighbourhood:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
-from world_gen.report_subjects import SOURCE_CONFIDENCE, SubjectReport
+from world_gen.report_values import SOURCE_CONFIDENCE, SubjectReport
 
 if TYPE_CHECKING:
     from world_gen.report import JunctionReport, WorldReport

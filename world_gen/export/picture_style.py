@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
 from contracts.arrays import Array
@@ -70,11 +69,6 @@ class View:
     def width_m(self) -> float:
         """How much ground it shows from west to east."""
         return self.east_m - self.west_m
-
-    def line_width(self, width_m: float, axes: Axes) -> float:
-        """Return the width in points of a line that is `width_m` wide on the ground."""
-        inches = axes.get_position().width * axes.figure.get_figwidth()  # type: ignore[union-attr]
-        return width_m / self.width_m * inches * 72.0
 
 
 def view_around(middle: Array, half_height_m: float, aspect: float, *, close: bool) -> View:
