@@ -219,7 +219,6 @@ def _fit(points: Array, heading: Array, toward: Array) -> list[Array]:
     begin, finish = points[0], points[-1]
     if len(points) == 2:
         return [_arc_like(begin, heading, finish, toward)]
-    chord = math.hypot(*(finish - begin))
     steps = np.hypot(*np.diff(points, axis=0).T)
     t = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
     r = 1.0 - t
@@ -231,7 +230,9 @@ def _fit(points: Array, heading: Array, toward: Array) -> list[Array]:
     cubic = _arc_like(begin, heading, finish, toward)
     if det > 1e-9 * c11 * c22:
         h1, h2 = (x1 * c22 - x2 * c12) / det, (c11 * x2 - c12 * x1) / det
-        if 0.05 * chord < min(h1, h2) and max(h1, h2) < 2.0 * chord:
+        # With handles much longer than an arc's, a cubic runs ahead and comes back.
+        usual = math.hypot(*(cubic[1] - begin))
+        if 0.2 * usual < min(h1, h2) and max(h1, h2) < 2.0 * usual:
             cubic = np.array([begin, begin + heading * h1, finish - toward * h2, finish])
     tangent = (
         (r * r)[:, None] * (cubic[1] - cubic[0])
