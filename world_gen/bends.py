@@ -15,7 +15,9 @@ MIN_STEP_M = 0.25
 _SHARE = 0.45
 _DEVIATION_M, _WIDEST_DEVIATION_M = 0.35, 2.5
 _SOFTEST_RAD, _SHARPEST_RAD = math.radians(3.0), math.radians(150.0)
-_STEP_RAD = math.radians(16.0)
+_SOFTEST_SHARED_RAD = math.radians(0.05)
+_STEP_RAD, _STEP_M = math.radians(16.0), 12.0
+"""Two chords of an arc turn no farther, and are no longer."""
 
 
 class Rounded(NamedTuple):
@@ -63,7 +65,8 @@ def rounded_through(lines: Polylines, radius_m: Array, before: Array, after: Arr
     An arc takes at most 0.45 of the shorter neighbouring segment. It keeps within 0.35 m of its
     corner, farther (2.5 m) only as needed for a radius of `radius_m` (L,). Where a road goes on
     beyond an end, `before` and `after` (L, 2) are its next points there (else NaN): the bend at
-    the end is rounded too, and each of the two lines gets half of the arc.
+    the end is rounded too, however small, and each of the two lines gets half of the arc. Both
+    end in the middle of one chord of it, so that what is offset from them is cut square there.
     """
     on_before, on_after = np.isfinite(before[:, 0]), np.isfinite(after[:, 0])
     whole = with_ends(lines, before, after)
@@ -74,39 +77,51 @@ def rounded_through(lines: Polylines, radius_m: Array, before: Array, after: Arr
     bend = np.arctan2(into[:, 0] * u[:, 1] - into[:, 1] * u[:, 0], (into * u).sum(axis=1))
     bend[first[:-1]] = bend[first[1:] - 1] = 0.0
     angle = np.abs(bend)
-    arc = (angle > _SOFTEST_RAD) & (angle < _SHARPEST_RAD)
+    head, tail = first[:-1][on_before] + 1, first[1:][on_after] - 2
+    softest = np.full(len(xy), _SOFTEST_RAD)
+    softest[head] = softest[tail] = _SOFTEST_SHARED_RAD
+    arc = (angle > softest) & (angle < _SHARPEST_RAD)
     half = np.where(arc, angle, 1.0) / 2.0
     outside = 1.0 / np.cos(half) - 1.0
     wanted = np.minimum(radius_m[whole.line], _WIDEST_DEVIATION_M / outside)
     tangent = np.maximum(_DEVIATION_M / outside, wanted) * np.tan(half)
     tangent = np.minimum(tangent, _SHARE * np.minimum(seg, np.roll(seg, 1)))
     arc &= tangent > 0.05
-    steps = np.where(arc, 2 * np.ceil(angle / _STEP_RAD).astype(np.int64), 0)
+    pairs = np.maximum(angle / _STEP_RAD, tangent / np.tan(half) * angle / _STEP_M)
+    steps = np.where(arc, 2 * np.ceil(pairs), 0).astype(np.int64)
+    steps[head] += arc[head]
+    steps[tail] += arc[tail]
 
+    # A shared arc has an odd number of chords: half of them, and half of the middle one, are ours.
     counts = steps + 1
     begin = np.zeros(len(xy), dtype=np.int64)
-    head, tail = first[:-1][on_before] + 1, first[1:][on_after] - 2
     begin[head] = steps[head] // 2
     counts[head] -= begin[head]
-    counts[tail] -= steps[tail] - steps[tail] // 2
+    counts[tail] -= steps[tail] // 2
     counts[first[:-1][on_before]] = 0
     counts[first[1:][on_after] - 1] = 0
     at = np.repeat(np.arange(len(xy)), counts)
     starts = np.concatenate([[0], np.cumsum(counts)])
     number = np.arange(len(at)) - starts[at] + begin[at]
-    turned = angle[at] * number / np.maximum(steps[at], 1)
     radius = np.where(arc, tangent / np.tan(half), 0.0)[at]
+    chord_rad = angle[at] / np.maximum(steps[at], 1)
+    turned = chord_rad * number
+    from_centre = radius.copy()
+    cut = np.concatenate([starts[head], starts[tail + 1] - 1])
+    cut = cut[arc[at[cut]]]
+    turned[cut] = angle[at[cut]] / 2.0
+    from_centre[cut] *= np.cos(chord_rad[cut] / 2.0)
     ahead = into[at]
     inward = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) * np.sign(bend)[at][:, None]
     points = xy[at] - ahead * np.where(arc, tangent, 0.0)[at][:, None]
-    points += ahead * (radius * np.sin(turned))[:, None]
-    points += inward * (radius * (1.0 - np.cos(turned)))[:, None]
+    points += ahead * (from_centre * np.sin(turned))[:, None]
+    points += inward * (radius - from_centre * np.cos(turned))[:, None]
 
-    # What lies beyond a shared end is the arc's next chord.
-    chord = np.where(arc, bend * (0.5 - 0.5 / np.maximum(steps, 1)), 0.0)
+    # What lies beyond a shared end is the other half of the chord.
+    share = np.where(arc, 0.5, 0.0)
     beyond_before, beyond_after = np.full_like(before, np.nan), np.full_like(after, np.nan)
-    beyond_before[on_before] = _turned(into[head], chord[head])
-    beyond_after[on_after] = _turned(u[tail], -chord[tail])
+    beyond_before[on_before] = _turned(into[head], (bend * share)[head])
+    beyond_after[on_after] = _turned(u[tail], -(bend * share)[tail])
     return Rounded(Polylines(points, starts[first]), beyond_before, beyond_after)
 
 

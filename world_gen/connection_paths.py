@@ -16,6 +16,7 @@ from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
 _LONG_PATH_M = 25.0
 _MAX_DETOUR_M = 9.0
 _GUIDED_RADIUS_M = 12.0
+_GRID_SHARE = 0.95
 
 
 def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
@@ -27,7 +28,6 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     headings = _units(begins - np.array([c.start.centerline[-2] for c in connections]))
     end_headings = _units(np.array([c.end.centerline[1] for c in connections]) - ends)
     turns = turn_curves(begins, headings, ends, end_headings)
-    radii_m = turns.radius_m.tolist()
     for c, path in zip(connections, turns.lines.split(), strict=True):
         c.centerline = path
     long = [i for i, c in enumerate(connections) if _inner_m(c) > _LONG_PATH_M]
@@ -44,24 +44,31 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     for i, path, detour_m in zip(long, guided, far.tolist(), strict=True):
         if detour_m > _MAX_DETOUR_M:
             connections[i].centerline = path
-            radii_m[i] = tightest_radius_m(path)
-    for c, radius_m in zip(connections, radii_m, strict=True):
-        if radius_m < LEAST_RADIUS_M:
+    # Points on the millimetre grid bend a little more than the arcs that they stand for.
+    least = _GRID_SHARE * LEAST_RADIUS_M
+    for c, radius_m in zip(
+        connections, _tightest_m([c.centerline for c in connections]).tolist(), strict=True
+    ):
+        if radius_m < least:
             notes.append(
                 f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
                 f"into way {c.end.edge.way_id} ({c.turn})"
             )
 
 
-def tightest_radius_m(path: Array) -> float:
-    """Return the least radius of circles through three points in a row of a path (N, 2)."""
-    a, b, c = path[:-2], path[1:-1], path[2:]
-    if not len(a):
-        return float("inf")
-    u, v, w = b - a, c - b, c - a
-    product = np.hypot(*u.T) * np.hypot(*v.T) * np.hypot(*w.T)
-    bent = 2.0 * np.abs(u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / np.maximum(product, 1e-12)
-    return float(1.0 / max(float(bent.max()), 1e-9))
+def _tightest_m(paths: list[Array]) -> Array:
+    """Return for each path (N, 2) the least radius of circles through three points in a row."""
+    lines = Polylines.of(paths)
+    step, length = lines.steps
+    # Point by point: from the one before, to the next, and from the one before to the next.
+    before, after = np.roll(step, 1, axis=0), step
+    both = before + after
+    product = np.roll(length, 1) * length * np.hypot(both[:, 0], both[:, 1])
+    cross = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
+    inside = ~lines.is_last
+    inside[lines.first[:-1]] = False
+    bent = np.where(inside, 2.0 * cross / np.maximum(product, 1e-12), 0.0)
+    return np.asarray(1.0 / np.maximum(np.maximum.reduceat(bent, lines.first[:-1]), 1e-9))
 
 
 def _inner_m(connection: ConnectionDraft) -> float:

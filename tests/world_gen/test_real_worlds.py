@@ -13,7 +13,7 @@ import pytest
 from shapely.geometry import LineString
 
 from contracts.codec import content_bytes, decode, encode
-from contracts.world import World
+from contracts.world import Lane, Road, World
 from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
 from world_gen.build import build_world
 from world_gen.build_graph import build_road_graph
@@ -82,6 +82,10 @@ def _check(world: World, junction: Junction) -> None:
         ways = lanes[c.from_lane_id].osm_way, lanes[c.to_lane_id].osm_way
         assert ways in tight or tightest_radius_m(c.centerline) > 0.93 * LEAST_RADIUS_M
         assert set(c.yields_to) <= set(c.conflicts_with) <= connections
+    astray = [lane.id for road in world.roads for lane in map(lanes.__getitem__, road.lane_ids)
+              if _off_reference_m(road, lane) > 0.01]  # fmt: skip
+    # Where a street folds back on itself no lane can follow its inside.
+    assert len(astray) <= 0.01 * len(lanes), astray
     for line in world.stop_lines:
         assert LineString(line.ends).intersects(LineString(lanes[line.lane_id].centerline))
     for signal in world.signals:
@@ -92,6 +96,16 @@ def _check(world: World, junction: Junction) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data)
     assert data.time > 0.0
+
+
+def _off_reference_m(road: Road, lane: Lane) -> float:
+    """Return how far a lane lies from where its road's reference line puts it."""
+    if lane.left_of_reference_m == 0.0:
+        beside = LineString(road.reference_line)
+        return float(LineString(lane.centerline).hausdorff_distance(beside))
+    line = LineString(road.reference_line)
+    beside = line.offset_curve(lane.left_of_reference_m, join_style="mitre")
+    return float(LineString(lane.centerline).hausdorff_distance(beside))
 
 
 @pytest.mark.real_data
