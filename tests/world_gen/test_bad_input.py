@@ -89,7 +89,7 @@ DAMAGE = st.lists(
 )
 
 
-@settings(max_examples=150, derandomize=True)
+@settings(max_examples=80, derandomize=True)
 @given(st.sampled_from(["xml", "gz", "pbf", "loose pbf"]), DAMAGE)
 def test_a_damaged_file_is_read_or_refused(
     packing: str, damage: list[tuple[float, str, bytes]]
