@@ -19,6 +19,8 @@ from world_gen.reflex_cuts import cut_at_reflex_corners, nearly_the_same, polygo
 
 COLLISION_TOLERANCE_M = SILHOUETTE_TOLERANCE_M - FOOTPRINT_TOLERANCE_M
 """How far convex parts may move a silhouette that the footprint has moved already."""
+SIMPLIFY_SHARE, HULL_SHARE, BOX_SHARE = 0.25, 0.15, 0.6
+"""Most of it goes into rectangles, since those save most; together they are 1."""
 _MIN_AREA_M2 = 0.01
 
 Geometries = npt.NDArray[np.object_]
@@ -54,21 +56,20 @@ def convex_cover(
 ) -> ConvexParts:
     """Return convex pieces that together cover polygons, each an outline (N, 2) and its holes.
 
-    No point of a silhouette moves by more than `tolerance_m`: a third of it goes into simplifying
-    outlines, one into taking a piece for its convex hull, one into taking that for a rectangle.
-    Self-crossing outlines are mended.
+    No point of a silhouette moves by more than `tolerance_m`: outlines are simplified, pieces taken
+    for their convex hulls, and those for rectangles, each within its share of it. Self-crossing
+    outlines are mended.
     """
-    share_m = tolerance_m / 3
     shapes, owner = _sound(polygons_from(outlines))
-    simple = shapely.simplify(shapes, share_m, preserve_topology=True)
+    simple = shapely.simplify(shapes, SIMPLIFY_SHARE * tolerance_m, preserve_topology=True)
     worse = ~shapely.is_valid(simple) | shapely.is_empty(simple)
     simple[worse] = shapes[worse]
-    pieces, of = cut_at_reflex_corners(simple, share_m)
+    pieces, of = cut_at_reflex_corners(simple, HULL_SHARE * tolerance_m)
     keep = shapely.area(pieces) >= _MIN_AREA_M2
     pieces, of = pieces[keep], of[keep]
     boxes = shapely.oriented_envelope(pieces)
     is_box = shapely.get_type_id(boxes) == _POLYGON
-    is_box[is_box] = nearly_the_same(boxes[is_box], pieces[is_box], share_m)
+    is_box[is_box] = nearly_the_same(boxes[is_box], pieces[is_box], BOX_SHARE * tolerance_m)
     return _told(owner[of], np.where(is_box, boxes, pieces), is_box)
 
 

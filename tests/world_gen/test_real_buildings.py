@@ -23,8 +23,8 @@ from world_gen.read_osm import read_map
 pytestmark = pytest.mark.real_data
 
 CHUNK = 1_500
-SLOT_M = 0.2
-"""Slots in a wall that are narrower are no silhouette, nor are cracks between convex parts."""
+SLOT_M = SILHOUETTE_TOLERANCE_M
+"""Slots in a wall narrower than this are no silhouette, nor are cracks between convex parts."""
 
 
 def _without_slots(shapes: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
