@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
-import shapely.ops
 
 from contracts.arrays import Array
 from world_gen.cross_section import CrossSection
 from world_gen.legs import heading_out, is_ring_edge, lateral_positions
-from world_gen.polyline import without_repeats
+from world_gen.polyline_batch import Polylines, cut, without_repeats
 from world_gen.road_graph import RoadEdge
 from world_gen.turn_curves import LEAD_M, WANTED_RADIUS_M
 
@@ -27,6 +26,8 @@ CORNER_M = 3.5
 RING_CORNER_M = 1.5
 MAX_TRIM_M = 22.0
 _LEG_LOOK_M = 45.0
+_OWN_START_M = 15.0
+"""What overlaps a leg farther out belongs to another place, unless it goes on from here."""
 TAPER_M = 6.0
 """Lanes end so far before, and begin so far behind, a place where their number changes."""
 SHARPEST_BEND_COS = math.cos(math.radians(75.0))
@@ -59,6 +60,8 @@ def trims(
     by_size: dict[int, list[Cluster]] = {}
     for cluster in clusters:
         by_size.setdefault(len(cluster.legs), []).append(cluster)
+    wide = [cluster for cluster in clusters if len(cluster.nodes) > 1]
+    areas = dict(zip([c.key for c in wide], _area_trims(wide, edges, sections), strict=True))
     for alike in by_size.values():
         legs = _legs_of(alike, sections)
         turning, at_node = _turning_trims(legs), _node_trims(legs)
@@ -68,7 +71,7 @@ def trims(
             elif len(cluster.nodes) == 1:
                 values = np.maximum(at_node[k], turning[k])
             else:
-                values = np.maximum(_area_trims(cluster, edges, sections), turning[k])
+                values = np.maximum(areas[cluster.key], turning[k])
             for leg, value in zip(cluster.legs, values.tolist(), strict=True):
                 found[leg.edge.index, leg.reverse] = min(value, MAX_TRIM_M)
     for index, edge in edges.items():
@@ -162,38 +165,72 @@ def _turning_trims(legs: _Legs) -> Array:
 
 
 def _area_trims(
-    cluster: Cluster, edges: Mapping[int, RoadEdge], sections: Mapping[int, CrossSection]
-) -> list[float]:
-    """Cut each leg where it has left the carriageways of all other roads of the cluster."""
-    near = [shapely.LineString(without_repeats(leg.xy_m)) for leg in cluster.legs]
-    near = [shapely.ops.substring(line, 0.0, _LEG_LOOK_M) for line in near]
-    widths = [sections[leg.edge.index].half_width_m for leg in cluster.legs]
-    legs = shapely.buffer(near, widths, cap_style="flat")
-    inside = [
-        shapely.buffer(shapely.LineString(edges[i].xy_m), sections[i].half_width_m)
-        for i in sorted(cluster.inner)
-        if i in edges
-    ]
-    heads = [heading_out(leg, 15.0) for leg in cluster.legs]
-    values = []
-    for i, leg in enumerate(legs):
-        # A leg beside this one, going the same way, is the other carriageway of the same road.
-        others = [
-            legs[j]
-            for j in range(len(legs))
-            if j != i
-            and not (
-                heads[i] @ heads[j] > 0.85
-                and cluster.legs[i].start_node != cluster.legs[j].start_node
-            )
-        ]
-        overlap = shapely.intersection(leg, shapely.union_all([*others, *inside]))
-        reach = 0.0
-        for part in shapely.get_parts(overlap):
-            if part.area > 0.05 and shapely.distance(part, shapely.Point(near[i].coords[0])) < 15.0:
-                at = shapely.line_locate_point(
-                    near[i], shapely.points(shapely.get_coordinates(part))
-                )
-                reach = max(reach, float(at.max()))
-        values.append(reach + CORNER_M)
-    return values
+    clusters: list[Cluster], edges: Mapping[int, RoadEdge], sections: Mapping[int, CrossSection]
+) -> list[Array]:
+    """Cut each leg where it has left the carriageways of all other roads of its cluster."""
+    legs = [leg for cluster in clusters for leg in cluster.legs]
+    if not legs:
+        return []
+    ways = without_repeats(Polylines.of([leg.xy_m for leg in legs]))
+    ways = cut(ways, np.zeros(len(ways)), np.minimum(ways.length_m, _LEG_LOOK_M))
+    lines = shapely.linestrings(ways.xy_m, indices=ways.line)
+    widths = [sections[leg.edge.index].half_width_m for leg in legs]
+    strips = shapely.buffer(lines, widths, cap_style="flat", quad_segs=4)
+    within = [(k, i) for k, c in enumerate(clusters) for i in sorted(c.inner) if i in edges]
+    inner = np.array([shapely.LineString(edges[i].xy_m) for _, i in within], dtype=object)
+    inner = shapely.buffer(inner, [sections[i].half_width_m for _, i in within], quad_segs=4)
+    shapes = np.concatenate([strips, inner])
+    heads = np.array([heading_out(leg, 15.0) for leg in legs])
+    starts = [leg.start_node for leg in legs]
+    pairs: list[tuple[int, int]] = []
+    begin = 0
+    inside: dict[int, list[int]] = {}
+    for row, (k, _) in enumerate(within):
+        inside.setdefault(k, []).append(len(legs) + row)
+    for k, cluster in enumerate(clusters):
+        mine = range(begin, begin + len(cluster.legs))
+        begin = mine.stop
+        beside = (heads[mine] @ heads[mine].T > 0.85).tolist()
+        for i in mine:
+            # A leg beside this one, going the same way, is the road's other carriageway.
+            pairs += [
+                (i, j)
+                for j in mine
+                if j != i and not (beside[i - mine[0]][j - mine[0]] and starts[i] != starts[j])
+            ]
+            pairs += [(i, j) for j in inside.get(k, ())]
+    reach = np.zeros(len(legs))
+    for i, near_m, first_m, last_m in _overlaps(lines, strips, shapes, np.array(pairs)):
+        if near_m < _OWN_START_M or first_m <= reach[i]:
+            reach[i] = max(reach[i], last_m)
+    return np.split(reach + CORNER_M, np.cumsum([len(c.legs) for c in clusters])[:-1])
+
+
+def _overlaps(
+    lines: np.ndarray, strips: np.ndarray, shapes: np.ndarray, pairs: np.ndarray
+) -> list[tuple[int, float, float, float]]:
+    """Return where legs (pairs[:, 0]) overlap shapes (pairs[:, 1]), in order along each leg.
+
+    Each is the leg's row, the distance from its start, and metres along it of begin and end.
+    """
+    if not len(pairs):
+        return []
+    pairs = pairs[shapely.intersects(strips[pairs[:, 0]], shapes[pairs[:, 1]])]
+    common = shapely.intersection(strips[pairs[:, 0]], shapes[pairs[:, 1]])
+    parts, pair = shapely.get_parts(common, return_index=True)
+    large = shapely.area(parts) > 0.05
+    parts, leg = parts[large], pairs[pair[large], 0]
+    if not len(parts):
+        return []
+    near_m = shapely.distance(parts, shapely.get_point(lines[leg], 0))
+    points, part = shapely.get_coordinates(parts, return_index=True)
+    at_m = shapely.line_locate_point(lines[leg[part]], shapely.points(points))
+    each = np.searchsorted(part, np.arange(len(parts)))
+    first_m, last_m = np.minimum.reduceat(at_m, each), np.maximum.reduceat(at_m, each)
+    order = np.lexsort((first_m, leg))
+    return list(
+        zip(
+            leg[order].tolist(), near_m[order].tolist(), first_m[order].tolist(),
+            last_m[order].tolist(), strict=True,
+        )
+    )  # fmt: skip
