@@ -11,7 +11,7 @@ from world_gen.paved import Paved
 from world_gen.polyline_batch import Polylines
 
 OVERLAP_M = 0.06
-"""So far around a neighbouring piece its own border is no kerb."""
+"""So near to a neighbouring piece the border of a place is no kerb."""
 SHORTEST_M = 0.3
 
 
@@ -23,7 +23,7 @@ def kerb_lines(lanes: LaneSet, paved: Paved) -> tuple[Array, ...]:
     layers = [road.layer for road in lanes.roads]
     layers += [max(leg.edge.layer for leg in c.legs) for c in paved.place_of]
     layer = np.array(layers)
-    tree = shapely.STRtree(shapely.buffer(pieces, OVERLAP_M, join_style="mitre", mitre_limit=2.0))
+    tree = shapely.STRtree(pieces)
     lines = [*_road_edges(lanes, paved, tree, layer), *_place_borders(paved, tree, layer)]
     joined = shapely.get_parts(shapely.line_merge(np.array(lines, dtype=object)))
     joined = joined[shapely.length(joined) > SHORTEST_M]
@@ -72,7 +72,7 @@ def _place_borders(paved: Paved, tree: shapely.STRtree, layer: Array) -> list[sh
     inside = ring[1:] == ring[:-1]
     a, b = points[:-1][inside], points[1:][inside]
     mine = len(paved.roads) + owner[ring[1:][inside]]
-    row, piece = tree.query(shapely.points((a + b) / 2), predicate="within")
+    row, piece = tree.query(shapely.points((a + b) / 2), predicate="dwithin", distance=OVERLAP_M)
     other = (mine[row] != piece) & (layer[mine[row]] == layer[piece])
     open_ = np.ones(len(a), dtype=bool)
     open_[row[other]] = False

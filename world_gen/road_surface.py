@@ -39,13 +39,11 @@ class Areas(NamedTuple):
     islands: tuple[Area, ...]
     kerbs: tuple[Array, ...]
     driven: np.ndarray
-    """What lanes and connections cover, polygon by polygon; nothing solid may stand there."""
+    """What roads and connections cover, polygon by polygon; nothing solid may stand there."""
 
 
 def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraft]) -> Areas:
     """Return the paved areas and what borders them."""
-    lane_paths = [(lane.centerline, lane.width_m.value) for lane in lanes.lanes.values()]
-    swept_lanes = _swept(lane_paths)
     swept = _swept([(c.centerline, c.width_m.value) for c in connections])
     roads = _road_polygons(lanes)
     clusters, places = _place_polygons(around, connections, swept)
@@ -62,7 +60,7 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
         junction_areas=_junction_areas(around, lanes, paved, of_place),
         islands=islands,
         kerbs=kerb_lines(lanes, paved),
-        driven=np.concatenate([swept_lanes, swept]),
+        driven=np.concatenate([roads, swept]),
     )
 
 
