@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from contracts.codec import content_bytes
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from contracts.world import Arm, IntersectionSummary, World, WorldJunction
 from world_gen.beside_roads import beside_roads
 from world_gen.buildings import buildings_in_frame
@@ -151,7 +151,9 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
         road_surface=surface.road_surface,
         sidewalks=sidewalk_areas(around, lanes, surface.road_surface, osm, beside),
         buildings=buildings,
-        notes=tuple(dict.fromkeys((*lanes.notes, *notes, *tracks.notes, *cut))),
+        notes=tuple(
+            dict.fromkeys((*lanes.notes, *notes, *tracks.notes, *cut, *_reading_notes(osm, around)))
+        ),
         attribution=osm.attribution,
     )
     return with_id(world)
@@ -175,6 +177,16 @@ def _connections(
         found.extend(connect(cluster, ways, around, lanes, notes))
     draw_paths(found, around, notes)
     return found
+
+
+def _reading_notes(osm: OsmMap, around: Surroundings) -> tuple[str, ...]:
+    """Return what the reader of the map left out or mended within the World."""
+    west, south, east, north = around.extent.polygon.bounds
+    corners = np.array([[west, south], [west, north], [east, south], [east, north]])
+    lat, lon = geo_from_local(around.frame, corners).T
+    return osm.notes_within(
+        LatLonBounds(float(lat.min()), float(lon.min()), float(lat.max()), float(lon.max()))
+    )
 
 
 def _arms(junction: Junction, around: Surroundings) -> tuple[Arm, ...]:

@@ -19,6 +19,7 @@ from tests.world_gen.drawn_maps import (
     roundabout,
     world_of,
 )
+from tests.world_gen.sketch import star
 from world_gen.build import build_world
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
@@ -249,3 +250,12 @@ def test_a_radius_out_of_range_is_refused():
     (junction,) = find_intersections(osm, graph)
     with pytest.raises(ValueError, match="radius 5 m is not between 10 and 2000 m"):
         build_world(osm, graph, junction, radius_m=5)
+
+
+def test_what_the_reader_left_out_is_told_in_the_world(tmp_path):
+    sketch = star([0.0, 90.0, 200.0])
+    sketch.node(50, 30.0, 30.0)
+    sketch.way(300, [50, 1, 999], highway="footway")
+    osm = sketch.read(tmp_path)
+    (note,) = [n for n in world_of(osm).notes if "way 300" in n]
+    assert note == "way 300: the map lacks its node 999; 2 of its 3 nodes are kept"
