@@ -20,6 +20,10 @@ _STEP_RAD, _STEP_M = math.radians(16.0), 12.0
 """Two chords of an arc turn no farther, and are no longer."""
 
 
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+_KINK_RAD, _STUB_M = math.radians(15.0), 1.5
+
+
 class Rounded(NamedTuple):
     """Rounded lines, and (L, 2) unit directions of what lies beyond their ends; NaN: nothing."""
 
@@ -44,6 +48,28 @@ def thinned(lines: Polylines, min_step_m: float = MIN_STEP_M) -> Polylines:
             break
         lines = lines.keep(~near)
     return lines
+
+
+def without_end_kinks(lines: Polylines, at_start: Flags, at_end: Flags) -> Polylines:
+    """Return the lines without a bend just behind a start, or before an end, flagged (L,).
+
+    A stub of a road left over where a junction begins would turn its lanes aside.
+    """
+    gap, step = lines.steps
+    into = np.roll(gap, 1, axis=0)
+    cross = into[:, 0] * gap[:, 1] - into[:, 1] * gap[:, 0]
+    bend = np.abs(np.arctan2(cross, (into * gap).sum(axis=1)))
+    keep = np.ones(len(lines.xy_m), dtype=bool)
+    long = np.diff(lines.first) > 2
+    second, last_but_one = lines.first[:-1] + 1, lines.first[1:] - 2
+    for at, flags, stub_m in (
+        (second, at_start, np.roll(step, 1)),
+        (last_but_one, at_end, step),
+    ):
+        rows = np.nonzero(flags & long)[0]
+        kinks = at[rows]
+        keep[kinks[(bend[kinks] > _KINK_RAD) & (stub_m[kinks] < _STUB_M)]] = False
+    return lines.keep(keep)
 
 
 def with_ends(lines: Polylines, before: Array, after: Array) -> Polylines:

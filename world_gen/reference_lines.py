@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from world_gen.bends import Rounded, rounded_through, thinned
+from world_gen.bends import Rounded, rounded_through, thinned, without_end_kinks
 from world_gen.clusters import Surroundings
 from world_gen.extent import stretches_inside
 from world_gen.polyline import cut, left_of, length, points_at
@@ -58,6 +58,7 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
     if not len(kept):
         return [], notes
     pieces = thinned(cut_all(ways.rows(kept), start_m[kept], (total - stop_m)[kept]))
+    pieces = without_end_kinks(pieces, start_m[kept] > 0.0, stop_m[kept] > 0.0)
     indices = [edges[i].index for i in kept.tolist()]
     half_m = np.array([around.sections[i].half_width_m for i in indices])
     goes_on = _points_beyond(around, indices, pieces)

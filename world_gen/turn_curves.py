@@ -95,7 +95,8 @@ def _one_arc(gap: Array, u: Array, v: Array, turn: Array, side: float) -> _Paths
     before, behind = _dot(rest, u), _dot(rest, v)
     ahead = (np.abs(_cross(rest, u)) <= np.abs(_cross(rest, v)) + 1e-6) & (before > 0.0)
     before, behind = np.where(ahead, before, 0.0), np.where(ahead, 0.0, behind)
-    valid = (radius > 0.05) & (turn > 1e-4) & (behind > -1e-6)
+    valid = (radius > 0.05) & (radius < 1e5) & (behind > -1e-6)
+    valid &= (turn > 1e-4) & (turn < math.tau - 1e-4)
     none = np.zeros(len(gap))
     return _Paths(before, side * turn, none, behind, np.where(valid, radius, np.nan))
 
