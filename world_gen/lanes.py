@@ -124,7 +124,7 @@ def build_lanes(around: Surroundings) -> LaneSet:
     for stretch, section in zip(stretches, sections, strict=True):
         index, edge = stretch.edge, around.edges[stretch.edge]
         road = _road_id(edge, names)
-        borders[road] = (next(curves), next(curves))
+        borders[road] = (_line(next(curves)), _line(next(curves)))
         mine: list[str] = []
         for plan in section.lanes:
             points = next(curves)
@@ -188,6 +188,11 @@ def _offsets(stretches: list[Stretch], sections: list[CrossSection]) -> list[Arr
     shift = np.array([value for mine in left_m for value in mine])
     shifted = without_repeats(offset(lines, shift, before=before, after=after))
     return Polylines(np.round(shifted.xy_m, 3), shifted.first).split()
+
+
+def _line(points: Array) -> Array:
+    """Return an edge of the carriageway as a line, even where a tight bend shrinks it to a point."""
+    return points if len(points) > 1 else np.repeat(points, 2, axis=0)
 
 
 def _road_id(edge: RoadEdge, taken: set[str]) -> str:
