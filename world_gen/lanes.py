@@ -191,7 +191,7 @@ def _offsets(stretches: list[Stretch], sections: list[CrossSection]) -> list[Arr
 
 
 def _line(points: Array) -> Array:
-    """Return an edge of the carriageway as a line, even where a tight bend shrinks it to a point."""
+    """Return an edge of a carriageway as a line, even where a bend shrinks it to a point."""
     return points if len(points) > 1 else np.repeat(points, 2, axis=0)
 
 
