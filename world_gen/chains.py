@@ -3,48 +3,51 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
 
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
 from world_gen.road_tags import RING_TAGS, is_car_road
 
+Tags = Mapping[str, str]
+STOPS = frozenset({"traffic_signals", "stop", "give_way"})
+"""`highway` of the nodes at which drivers stop or give way."""
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Chain:
+
+class Mark(NamedTuple):
+    """A light or sign on a chain, `distance_m` from its start."""
+
+    node: int
+    tags: Tags
+    distance_m: float
+
+
+class Chain(NamedTuple):
     """A road from one branching to the next, over the places where only its tags change.
 
     `outward` and `inward` tell whether cars may leave and reach `start` by it, as far as its
-    first edge goes. `key` is the same for both directions of one chain.
+    first edge goes; `one_way` that they may use it one way round alone. `key` is the same for
+    both directions of one chain. `x_m` and `y_m` are its points from `start` to `end`, those
+    between two edges twice; `marks` its lights and signs in that order, those at its ends too.
+    `name` is the name or number of its first edge that has one.
     """
 
     start: int
     end: int
     edges: tuple[DirectedEdge, ...]
+    x_m: Sequence[float]
+    y_m: Sequence[float]
     length_m: float
     key: tuple[int, int]
-
-    @property
-    def outward(self) -> bool:
-        """Whether cars may leave `start` by this chain."""
-        return self.edges[0].allowed
-
-    @property
-    def inward(self) -> bool:
-        """Whether cars may reach `start` by this chain."""
-        first = self.edges[0]
-        return first.edge.forward if first.reverse else first.edge.backward
-
-    @property
-    def one_way(self) -> bool:
-        """Whether cars may use its first edge one way round alone."""
-        return self.outward != self.inward
-
-    @property
-    def name(self) -> str:
-        """Name or number of its first edge that has one."""
-        return next((item.edge.name for item in self.edges if item.edge.name), "")
+    outward: bool
+    inward: bool
+    one_way: bool
+    name: str
+    marks: tuple[Mark, ...]
 
     @property
     def link(self) -> bool:
@@ -54,30 +57,12 @@ class Chain:
     @property
     def inner_nodes(self) -> tuple[int, ...]:
         """Graph nodes between its ends."""
-        return tuple(item.end_node for item in self.edges[:-1])
-
-    def points(self) -> Iterator[tuple[float, float]]:
-        """Yield its points in metres, from `start` to `end`."""
-        for item in self.edges:
-            yield from item.xy_m.tolist()
-
-    def nodes(self) -> Iterator[tuple[int, float]]:
-        """Yield all its OSM nodes, shape nodes too, with metres from `start`."""
-        along_m = 0.0
-        before: tuple[float, float] | None = None
-        for item in self.edges:
-            ids = item.edge.node_ids[::-1] if item.reverse else item.edge.node_ids
-            for node, (x_m, y_m) in zip(ids, item.xy_m.tolist(), strict=True):
-                if before is not None:
-                    along_m += math.hypot(x_m - before[0], y_m - before[1])
-                before = (x_m, y_m)
-                yield node, along_m
+        return tuple([item.end_node for item in self.edges[:-1]])
 
     def point_at(self, distance_m: float) -> tuple[float, float]:
         """Return the point so far along it, or its end."""
-        points = self.points()
-        x0, y0 = next(points)
-        for x1, y1 in points:
+        x0, y0 = self.x_m[0], self.y_m[0]
+        for x1, y1 in zip(self.x_m, self.y_m, strict=True):
             step = math.hypot(x1 - x0, y1 - y0)
             if step >= distance_m and step > 0.0:
                 part = distance_m / step
@@ -88,7 +73,7 @@ class Chain:
 
     def bearing_rad(self, distance_m: float) -> float:
         """Return the bearing from `start` to the point `distance_m` along it."""
-        x0, y0 = next(self.points())
+        x0, y0 = self.x_m[0], self.y_m[0]
         x1, y1 = self.point_at(distance_m)
         if x0 == x1 and y0 == y1:
             x1, y1 = self.point_at(self.length_m / 2.0)
@@ -122,51 +107,127 @@ def car_roads(osm: OsmMap, graph: RoadGraph) -> CarRoads:
     rings = tuple(_rings(ring_edges))
     on_ring = {node for ring in rings for node in ring.nodes}
     in_ring = {edge.index for edge in ring_edges}
-    leaving = {
-        node: outward
-        for node, items in graph.leaving.items()
-        if (
-            outward := tuple(
-                item for item in items if item.edge.car and item.edge.index not in in_ring
-            )
-        )
-        or node in on_ring
-    }
-    mini = {
-        node for node, tags in osm.node_tags.items() if tags.get("highway") == "mini_roundabout"
-    }
+    edges = [edge for edge in graph.edges if edge.car and edge.index not in in_ring]
+    between = {edge.index for edge in edges}
+    leaving: dict[int, tuple[DirectedEdge, ...]] = {}
+    for node, items in graph.leaving.items():
+        outward = tuple([item for item in items if item[0].index in between])
+        if outward or node in on_ring:
+            leaving[node] = outward
+    highway = {node: tags["highway"] for node, tags in osm.node_tags.items() if "highway" in tags}
+    mini = {node for node, word in highway.items() if word == "mini_roundabout"}
     ends = {
         node
         for node, outward in leaving.items()
         if len(outward) != 2 or node in on_ring or node in mini
     }
+    stops = {node: osm.node_tags[node] for node, word in highway.items() if word in STOPS}
+    walk = _Walk(edges, leaving, ends, stops)
     return CarRoads(
         chains_from={
-            node: tuple(_follow(item, leaving, ends) for item in leaving[node])
-            for node in leaving
+            node: tuple([walk.chain(item) for item in outward])
+            for node, outward in leaving.items()
             if node in ends
         },
         rings=rings,
     )
 
 
-def _follow(
-    first: DirectedEdge, leaving: Mapping[int, tuple[DirectedEdge, ...]], ends: set[int]
-) -> Chain:
-    edges = [first]
-    while edges[-1].end_node not in ends:
-        last = edges[-1]
-        a, b = leaving[last.end_node]
-        came_by_a = a.edge.index == last.edge.index and a.reverse != last.reverse
-        edges.append(b if came_by_a else a)
-    first_key, last_key = first.edge.index, edges[-1].edge.index
-    return Chain(
-        start=first.start_node,
-        end=edges[-1].end_node,
-        edges=tuple(edges),
-        length_m=sum(item.edge.length_m for item in edges),
-        key=(min(first_key, last_key), max(first_key, last_key)),
-    )
+class _Walk:
+    """Follows chains edge by edge, each once for both of its directions."""
+
+    def __init__(
+        self,
+        edges: Sequence[RoadEdge],
+        leaving: Mapping[int, tuple[DirectedEdge, ...]],
+        ends: set[int],
+        stops: Mapping[int, Tags],
+    ) -> None:
+        self._leaving, self._ends, self._stops = leaving, ends, stops
+        # All points in one call: one for each edge costs ten times as much. Two lists of numbers,
+        # since thousands of pairs are thousands of objects that the garbage collector visits.
+        xy_m = np.concatenate([edge.xy_m for edge in edges]) if edges else np.zeros((0, 2))
+        self._x_m: list[float] = xy_m[:, 0].tolist()
+        self._y_m: list[float] = xy_m[:, 1].tolist()
+        self._span: dict[int, tuple[int, int]] = {}
+        begin = 0
+        for edge in edges:
+            end = begin + len(edge.node_ids)
+            self._span[edge.index] = begin, end
+            begin = end
+        self._known: dict[tuple[int, bool], Chain] = {}
+
+    def chain(self, first: DirectedEdge) -> Chain:
+        """Return the chain that begins with an edge."""
+        edge, reverse = first
+        found = self._known.pop((edge.index, reverse), None)
+        if found is not None:
+            return found
+        edges = [first]
+        last = first
+        node = last.end_node
+        while node not in self._ends:
+            a, b = self._leaving[node]
+            came_by_a = a.edge.index == last.edge.index and a.reverse != last.reverse
+            last = b if came_by_a else a
+            edges.append(last)
+            node = last.end_node
+        back = [DirectedEdge(edge, not reverse) for edge, reverse in reversed(edges)]
+        self._known[(last.edge.index, not last.reverse)] = self._made(back)
+        return self._made(edges)
+
+    def _made(self, edges: Sequence[DirectedEdge]) -> Chain:
+        first, first_reverse = edges[0]
+        last, last_reverse = edges[-1]
+        x_m: list[float] = []
+        y_m: list[float] = []
+        marked = False
+        length_m, name = 0.0, ""
+        for edge, reverse in edges:
+            begin, end = self._span[edge.index]
+            xs, ys = self._x_m[begin:end], self._y_m[begin:end]
+            if reverse:
+                xs.reverse()
+                ys.reverse()
+            x_m += xs
+            y_m += ys
+            length_m += edge.length_m
+            name = name or edge.name
+            marked = marked or not self._stops.keys().isdisjoint(edge.node_ids)
+        outward, inward = first.forward, first.backward
+        if first_reverse:
+            outward, inward = inward, outward
+        a, b = first.index, last.index
+        return Chain(
+            first.end_node if first_reverse else first.start_node,
+            last.start_node if last_reverse else last.end_node,
+            tuple(edges),
+            x_m,
+            y_m,
+            length_m,
+            (a, b) if a <= b else (b, a),
+            outward,
+            inward,
+            outward != inward,
+            name,
+            tuple(self._marks(edges, x_m, y_m)) if marked else (),
+        )
+
+    def _marks(
+        self, edges: Sequence[DirectedEdge], x_m: list[float], y_m: list[float]
+    ) -> Iterator[Mark]:
+        ids = [
+            node
+            for edge, reverse in edges
+            for node in (edge.node_ids[::-1] if reverse else edge.node_ids)
+        ]
+        along_m = 0.0
+        x0, y0 = x_m[0], y_m[0]
+        for node, x, y in zip(ids, x_m, y_m, strict=True):
+            along_m += math.hypot(x - x0, y - y0)
+            x0, y0 = x, y
+            if node in self._stops:
+                yield Mark(node, self._stops[node], along_m)
 
 
 def _ring_kind(edge: RoadEdge) -> str | None:

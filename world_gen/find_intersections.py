@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from typing import NamedTuple
 
 import numpy as np
 
+from contracts.arrays import Array
 from contracts.frames import geo_from_local
 from contracts.world import IntersectionSummary, JunctionKind
 from world_gen.chains import CarRoads, car_roads
@@ -46,33 +48,60 @@ def find_intersections(
             for index in edges
             for node in (graph.edges[index].start_node, graph.edges[index].end_node)
         }
-    found = []
+    places = []
     for cluster in cluster_branchings(roads, graph, osm.node_tags):
-        junction = _junction(cluster, roads, osm, graph)
-        if junction is not None and (wanted is None or wanted & junction.nodes):
-            found.append(junction)
-    return tuple(sorted(found, key=lambda junction: junction.summary.id))
+        place = _place(cluster, roads, osm, graph)
+        if place is not None and (wanted is None or not wanted.isdisjoint(place.nodes)):
+            places.append(place)
+    if not places:
+        return ()
+    centres = np.array([_centre_xy_m(place.cluster, graph) for place in places])
+    degrees = geo_from_local(graph.frame, centres).tolist()
+    found = [
+        _junction(place, centre, lat_lon, osm, graph)
+        for place, centre, lat_lon in zip(places, centres, degrees, strict=True)
+    ]
+    found.sort(key=lambda junction: junction.summary.id)
+    return tuple(found)
 
 
-def _junction(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) -> Junction | None:
+class _Place(NamedTuple):
+    """A junction to be: its branchings, its roads and arms, all its graph nodes."""
+
+    cluster: Cluster
+    around: ClusterRoads
+    arms: tuple[Approach, ...]
+    mini: bool
+    nodes: frozenset[int]
+
+
+def _place(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) -> _Place | None:
+    """Return what meets at a cluster; None where no three roads do."""
     around = roads_of(cluster, roads, graph)
+    if len(around.leaving) < 2 and cluster.ring is None:
+        return None
     arms = approaches(around.leaving)
-    mini = any(
-        osm.node_tags.get(node, {}).get("highway") == "mini_roundabout" for node in cluster.core
-    )
+    mini = "mini_roundabout" in [
+        osm.node_tags[node].get("highway") for node in cluster.core if node in osm.node_tags
+    ]
     if len(arms) < 3 and cluster.ring is None and not (mini and len(arms) == 2):
         return None
-    inner = [item.edge for chain in around.inside for item in chain.edges]
+    between = [node for chain in around.inside for node in chain.inner_nodes]
+    return _Place(cluster, around, arms, mini, frozenset(cluster.nodes).union(between))
+
+
+def _junction(
+    place: _Place, centre: Array, lat_lon_deg: list[float], osm: OsmMap, graph: RoadGraph
+) -> Junction:
+    cluster, around, arms, mini, nodes = place
+    inner = {item.edge.index for chain in around.inside for item in chain.edges}
     if cluster.ring is not None:
-        inner += cluster.ring.edges
-    nodes = frozenset(
-        [*cluster.nodes, *(node for chain in around.inside for node in chain.inner_nodes)]
-    )
-    centre = _centre_xy_m(cluster, graph)
+        inner.update([edge.index for edge in cluster.ring.edges])
+    centre_xy_m = centre.tolist()
     kind = _kind(cluster, arms, mini)
-    lat_deg, lon_deg = geo_from_local(graph.frame, centre).tolist()
+    lat_deg, lon_deg = lat_lon_deg
     core = frozenset(cluster.core)
-    incoming = tuple(chain for item in arms for chain in item.chains if chain.inward)
+    incoming = tuple([chain for item in arms for chain in item.chains if chain.inward])
     lights = lights_of(core, around.inside, incoming, osm.node_tags)
     control = control_of(
         core,
@@ -96,25 +125,25 @@ def _junction(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) 
         ),
         centre_xy_m=centre,
         nodes=nodes,
-        inner=tuple(sorted({edge.index for edge in inner})),
-        arms=tuple(item.arm for item in arms),
-        radius_m=max(math.dist(centre, graph.node_xy_m[node]) for node in nodes),
+        inner=tuple(sorted(inner)),
+        arms=tuple([item.arm for item in arms]),
+        radius_m=max([math.dist(centre_xy_m, graph.node_xy_m[node]) for node in nodes]),
         lights=lights,
     )
 
 
-def _centre_xy_m(
-    cluster: Cluster, graph: RoadGraph
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _centre_xy_m(cluster: Cluster, graph: RoadGraph) -> tuple[float, float]:
     """Return the mean of the core nodes, of a ring the middle of its line."""
     if cluster.ring is None:
-        points = np.array([graph.node_xy_m[node] for node in sorted(cluster.core)])
-        return np.asarray(points.mean(axis=0))
+        points = [graph.node_xy_m[node] for node in sorted(cluster.core)]
+        x_m, y_m = sum([x for x, _ in points]), sum([y for _, y in points])
+        return x_m / len(points), y_m / len(points)
     middles, lengths = [], []
     for edge in cluster.ring.edges:
         middles.append((edge.xy_m[1:] + edge.xy_m[:-1]) / 2.0)
         lengths.append(np.linalg.norm(np.diff(edge.xy_m, axis=0), axis=1))
-    return np.asarray(np.average(np.vstack(middles), axis=0, weights=np.concatenate(lengths)))
+    centre = np.average(np.vstack(middles), axis=0, weights=np.concatenate(lengths))
+    return float(centre[0]), float(centre[1])
 
 
 def _kind(cluster: Cluster, arms: tuple[Approach, ...], mini: bool) -> JunctionKind:

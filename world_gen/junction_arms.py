@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 from world_gen.chains import CarRoads, Chain
 from world_gen.grouping import Cluster
@@ -21,16 +21,14 @@ INSIDE_M = 15.0
 """A road between two nodes of a junction is inside it if it bulges no farther out."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClusterRoads:
+class ClusterRoads(NamedTuple):
     """The chains at a cluster: those inside it (one direction each) and those that leave it."""
 
     inside: tuple[Chain, ...]
     leaving: tuple[Chain, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Approach:
+class Approach(NamedTuple):
     """One arm with the chains that make it, each leaving the junction."""
 
     arm: JunctionArm
@@ -40,19 +38,28 @@ class Approach:
 
 def roads_of(cluster: Cluster, roads: CarRoads, graph: RoadGraph) -> ClusterRoads:
     """Split the chains at a cluster's nodes into those inside and those that leave it."""
-    points = [graph.node_xy_m[node] for node in sorted(cluster.nodes)]
+    nodes = cluster.nodes
+    if len(nodes) == 1 and not cluster.ring:
+        (node,) = nodes
+        chains = roads.chains_from[node]
+        if node not in [chain.end for chain in chains]:
+            return ClusterRoads(inside=(), leaving=chains)
+    points = [graph.node_xy_m[node] for node in sorted(nodes)]
     centre = (
-        sum(x for x, _ in points) / len(points),
-        sum(y for _, y in points) / len(points),
+        sum([x for x, _ in points]) / len(points),
+        sum([y for _, y in points]) / len(points),
     )
-    reach_m = max(math.dist(point, centre) for point in points) + INSIDE_M
+    reach_m = max([math.dist(point, centre) for point in points]) + INSIDE_M
     inside: dict[tuple[int, int], Chain] = {}
     leaving: list[Chain] = []
-    for node in sorted(cluster.nodes):
+    for node in sorted(nodes):
         for chain in roads.chains_from.get(node, ()):
-            within = chain.end in cluster.nodes and (
+            within = chain.end in nodes and (
                 chain.key in cluster.chains
-                or all(math.dist(point, centre) <= reach_m for point in chain.points())
+                or all(
+                    math.dist(point, centre) <= reach_m
+                    for point in zip(chain.x_m, chain.y_m, strict=True)
+                )
             )
             if within:
                 inside.setdefault(chain.key, chain)
@@ -63,21 +70,31 @@ def roads_of(cluster: Cluster, roads: CarRoads, graph: RoadGraph) -> ClusterRoad
 
 def approaches(leaving: tuple[Chain, ...]) -> tuple[Approach, ...]:
     """Group the chains that leave a junction into its arms, by bearing from east."""
+    ways_out = [_WayOut(chain, chain.bearing_rad(LOOK_M)) for chain in leaving]
     group = list(range(len(leaving)))
-    for i, j in combinations(range(len(leaving)), 2):
-        if _one_road(leaving[i], leaving[j]):
+    one_way = [i for i, chain in enumerate(leaving) if chain.one_way]
+    for i, j in combinations(one_way, 2):
+        if _one_road(ways_out[i], ways_out[j]):
             group = [group[i] if g == group[j] else g for g in group]
-    arms = [
-        _approach(tuple(chain for chain, g in zip(leaving, group, strict=True) if g == label))
-        for label in dict.fromkeys(group)
-    ]
-    return tuple(sorted(arms, key=lambda item: (item.arm.bearing_rad, item.chains[0].key)))
+    of_arm: dict[int, list[_WayOut]] = {}
+    for label, way_out in zip(group, ways_out, strict=True):
+        of_arm.setdefault(label, []).append(way_out)
+    arms = [_approach(together) for together in of_arm.values()]
+    arms.sort(key=lambda item: (item.arm.bearing_rad, item.chains[0].key))
+    return tuple(arms)
 
 
-def _one_road(a: Chain, b: Chain) -> bool:
-    if not (a.one_way and b.one_way):
-        return False
-    angle = abs(math.remainder(a.bearing_rad(LOOK_M) - b.bearing_rad(LOOK_M), math.tau))
+class _WayOut(NamedTuple):
+    """A chain that leaves a junction, and where it points."""
+
+    chain: Chain
+    bearing_rad: float
+
+
+def _one_road(way_a: _WayOut, way_b: _WayOut) -> bool:
+    """Tell whether two one-way chains are carriageways of one road."""
+    a, b = way_a.chain, way_b.chain
+    angle = abs(math.remainder(way_a.bearing_rad - way_b.bearing_rad, math.tau))
     if a.outward != b.outward:
         if a.end == b.end and max(a.length_m, b.length_m) <= REJOIN_M and angle < math.pi / 2:
             return True
@@ -86,8 +103,9 @@ def _one_road(a: Chain, b: Chain) -> bool:
         widest_rad = ALONGSIDE_RAD
     else:
         return False
-    gap_m = math.dist(a.point_at(LOOK_M), b.point_at(LOOK_M))
-    return _same_street(a, b) and angle <= widest_rad and gap_m <= CARRIAGEWAY_GAP_M
+    if angle > widest_rad or not _same_street(a, b):
+        return False
+    return math.dist(a.point_at(LOOK_M), b.point_at(LOOK_M)) <= CARRIAGEWAY_GAP_M
 
 
 def _same_street(a: Chain, b: Chain) -> bool:
@@ -97,19 +115,19 @@ def _same_street(a: Chain, b: Chain) -> bool:
     return classes[0].removesuffix("_link") == classes[1].removesuffix("_link")
 
 
-def _approach(chains: tuple[Chain, ...]) -> Approach:
-    x_m = sum(math.cos(chain.bearing_rad(LOOK_M)) for chain in chains)
-    y_m = sum(math.sin(chain.bearing_rad(LOOK_M)) for chain in chains)
-    starts = [next(chain.points()) for chain in chains]
+def _approach(together: list[_WayOut]) -> Approach:
+    chains = tuple([way_out.chain for way_out in together])
+    x_m = sum([math.cos(way_out.bearing_rad) for way_out in together])
+    y_m = sum([math.sin(way_out.bearing_rad) for way_out in together])
     return Approach(
         arm=JunctionArm(
             name=next((chain.name for chain in chains if chain.name), ""),
             bearing_rad=math.atan2(y_m, x_m),
-            outward=tuple(chain.edges[0] for chain in chains),
+            outward=tuple([chain.edges[0] for chain in chains]),
         ),
         chains=chains,
         start_xy_m=(
-            sum(x for x, _ in starts) / len(starts),
-            sum(y for _, y in starts) / len(starts),
+            sum([chain.x_m[0] for chain in chains]) / len(chains),
+            sum([chain.y_m[0] for chain in chains]) / len(chains),
         ),
     )

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 
-from world_gen.chains import CarRoads, Chain
+from world_gen.chains import CarRoads, Chain, Tags
 from world_gen.grouping import Cluster, Grouping
-from world_gen.junction_control import Tags, facing
+from world_gen.junction_control import facing
 from world_gen.road_graph import RoadGraph
 from world_gen.slip_roads import add_slips, slip_ends
 
@@ -121,7 +121,9 @@ def _in_island(chain: Chain, roads: CarRoads) -> bool:
 def _one_signal(chain: Chain, roads: CarRoads, node_tags: Mapping[int, Tags]) -> bool:
     """Tell whether both ends of a chain are signalled and nothing stops a driver in between."""
     ends = (chain.start, chain.end)
-    if any(node not in ends and _is_signal(node, node_tags) for node, _ in chain.nodes()):
+    if any(
+        mark.node not in ends and mark.tags["highway"] == "traffic_signals" for mark in chain.marks
+    ):
         return False
     return all(_has_signal(node, chain, roads, node_tags) for node in ends)
 
@@ -131,7 +133,7 @@ def _has_signal(node: int, besides: Chain, roads: CarRoads, node_tags: Mapping[i
         True
         for chain in roads.chains_from[node]
         if chain.key != besides.key and chain.inward
-        for _ in facing(chain, node_tags, STOP_LINE_M, "traffic_signals")
+        for _ in facing(chain, STOP_LINE_M, "traffic_signals")
     )
 
 
@@ -172,16 +174,18 @@ def _add_flares(grouping: Grouping, roads: CarRoads) -> None:
         own = grouping.of.get(node)
         if own is None or own.ring:
             continue
-        for a, b in combinations(chains, 2):
-            target = grouping.of.get(a.end)
+        to_ring = [
+            (chain, target)
+            for chain in chains
+            if chain.one_way
+            and chain.length_m <= FLARE_M
+            and (target := grouping.of.get(chain.end)) is not None
+            and target.ring
+        ]
+        for (a, target), (b, other) in combinations(to_ring, 2):
             if (
-                target is not None
-                and target.ring
-                and grouping.of.get(b.end) is target
-                and a.one_way
-                and b.one_way
+                other is target
                 and a.outward != b.outward
-                and max(a.length_m, b.length_m) <= FLARE_M
                 and grouping.attach(target, own, (a.key, b.key))
             ):
                 break

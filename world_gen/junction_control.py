@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 from contracts.world import Control
-from world_gen.chains import Chain
+from world_gen.chains import Chain, Mark, Tags
 
 SIGNALS_WITHIN_M, SIGNS_WITHIN_M = 40.0, 30.0
 PEDESTRIAN_LIGHT_M = 15.0
 """A light at a crossing farther out than this serves pedestrians alone."""
-Tags = Mapping[str, str]
 
 
 def lights_of(
@@ -24,12 +22,12 @@ def lights_of(
 
     A light counts for the nearer junction of the road it stands on, or the one that it faces.
     """
-    within = {*core, *(node for chain in inside for node, _ in chain.nodes())}
-    found = {node for node in within if _is_light(node_tags.get(node, {}), 0.0)}
+    found = {node for node in core if node in node_tags and _is_light(node_tags[node], 0.0)}
+    found.update(mark.node for chain in inside for mark in chain.marks if _is_light(mark.tags, 0.0))
     for chain in incoming:
-        for item in facing(chain, node_tags, SIGNALS_WITHIN_M, "traffic_signals"):
-            if _is_light(item.tags, item.distance_m):
-                found.add(item.node)
+        for mark in facing(chain, SIGNALS_WITHIN_M, "traffic_signals"):
+            if _is_light(mark.tags, mark.distance_m):
+                found.add(mark.node)
     return frozenset(found)
 
 
@@ -52,8 +50,8 @@ def control_of(
     if ring:
         return "roundabout"
     inner = [node_tags[node] for node in core if node in node_tags]
-    inner += [node_tags[node] for chain in inside for node, _ in chain.nodes() if node in node_tags]
-    stops = [_sign(chain, node_tags, "stop") for chain in incoming]
+    inner += [mark.tags for chain in inside for mark in chain.marks]
+    stops = [_sign(chain, "stop") for chain in incoming]
     all_way = any(
         tags.get("highway") == "stop" and tags.get("stop") == "all" for tags in inner
     ) or any(tags.get("stop") == "all" for tags in stops if tags is not None)
@@ -62,15 +60,15 @@ def control_of(
     at_inner = {tags.get("highway") for tags in inner}
     if "stop" in at_inner or any(tags is not None for tags in stops):
         return "stop"
-    if "give_way" in at_inner or any(
-        _sign(chain, node_tags, "give_way") is not None for chain in incoming
-    ):
+    if "give_way" in at_inner or any(_sign(chain, "give_way") is not None for chain in incoming):
         return "give_way"
     return "uncontrolled"
 
 
-def _sign(chain: Chain, node_tags: Mapping[int, Tags], word: str) -> Tags | None:
-    return next((item.tags for item in facing(chain, node_tags, SIGNS_WITHIN_M, word)), None)
+def _sign(chain: Chain, word: str) -> Tags | None:
+    if not chain.marks:
+        return None
+    return next((mark.tags for mark in facing(chain, SIGNS_WITHIN_M, word)), None)
 
 
 def _is_light(tags: Tags, distance_m: float) -> bool:
@@ -80,34 +78,24 @@ def _is_light(tags: Tags, distance_m: float) -> bool:
     return distance_m <= PEDESTRIAN_LIGHT_M or not pedestrians
 
 
-class Facing(NamedTuple):
-    """A light or sign on a road to a junction, `distance_m` before it."""
-
-    node: int
-    tags: Tags
-    distance_m: float
-
-
-def facing(
-    chain: Chain, node_tags: Mapping[int, Tags], within_m: float, word: str
-) -> Iterator[Facing]:
+def facing(chain: Chain, within_m: float, word: str) -> Iterator[Mark]:
     """Yield the nodes of `highway=word` that drivers towards a junction obey, nearest first.
 
     `chain` leaves the junction. A node counts up to `within_m` where it is tagged to face who
     comes in, or stands on a one-way road and at no crossing; else on the nearer half alone.
     """
     nearer_m = min(within_m, chain.length_m / 2.0)
-    for node, distance_m in chain.nodes():
+    for mark in chain.marks:
+        node, tags, distance_m = mark
         if distance_m > within_m:
             break
-        tags = node_tags.get(node)
-        if tags is None or tags.get("highway") != word or node in (chain.start, chain.end):
+        if tags["highway"] != word or node in (chain.start, chain.end):
             continue
         faced = tags.get(f"{word}:direction") or tags.get("direction")
         along = next((item for item in chain.edges if node in item.edge.node_ids[1:-1]), None)
         if along is not None and faced in ("forward", "backward"):
             # The chain leaves the junction: who comes in drives against it.
             if faced == ("forward" if along.reverse else "backward"):
-                yield Facing(node, tags, distance_m)
+                yield mark
         elif distance_m <= nearer_m or (chain.one_way and "crossing" not in tags):
-            yield Facing(node, tags, distance_m)
+            yield mark

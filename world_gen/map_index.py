@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
 import shapely
 
+from contracts.arrays import Array
 from world_gen.building_parts import Footprint
 from world_gen.buildings import BuildingIndex
 from world_gen.intersections import Junction
@@ -59,7 +62,7 @@ def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ())
         if edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
     )
     known = tuple(junctions)
-    lines = [shapely.LineString(graph.edges[i].xy_m) for i in car]
+    lines = _lines([graph.edges[i].xy_m for i in car])
     return MapIndex(
         osm=osm,
         graph=graph,
@@ -70,3 +73,14 @@ def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ())
         junction_of_node={node: j for j in known for node in sorted(j.nodes)},
         junction_lights=frozenset().union(*(junction.lights for junction in known)),
     )
+
+
+def _lines(xy_m: list[Array]) -> npt.NDArray[np.object_]:
+    """Return lines of many arrays of points (N, 2) in one call: shapely takes long to be called."""
+    if not xy_m:
+        return np.empty(0, dtype=object)
+    counts = [len(xy) for xy in xy_m]
+    lines: npt.NDArray[np.object_] = shapely.linestrings(
+        np.concatenate(xy_m), indices=np.repeat(np.arange(len(counts)), counts)
+    )
+    return lines

@@ -69,7 +69,7 @@ def slip_ends(roads: CarRoads) -> dict[int, frozenset[int]]:
     """
     found: dict[int, set[int]] = {}
     for slip in (chain for chains in roads.chains_from.values() for chain in chains):
-        if not (slip.link and slip.one_way and slip.outward and slip.length_m <= RAMP_SLIP_M):
+        if not (slip.one_way and slip.outward and slip.length_m <= RAMP_SLIP_M and slip.link):
             continue
         if max(_angle_leaving(slip, roads), _angle_joining(slip, roads)) > SMOOTH_RAD:
             continue
