@@ -15,6 +15,7 @@ from world_gen.connections import ConnectionDraft
 from world_gen.met_on_the_way import (
     Met,
     NodeTags,
+    arcs_of,
     is_light,
     lights_behind,
     met_inside,
@@ -88,9 +89,10 @@ def approaches(
     `junction_lights` are the nodes of the lights that are known to govern some junction.
     Roads of a ring are approaches only where a light stands on them.
     """
+    arcs_m = arcs_of(around.edges)
     inside: dict[tuple[int, bool], list[Met]] = {}
     for connection in connections:
-        if connection.cluster.whole:
+        if connection.cluster.whole and connection.movement.inside:
             toward = connection.movement.toward
             met = inside.setdefault((toward.edge.index, toward.reverse), [])
             met.extend(met_inside(connection.movement.inside, node_tags))
@@ -110,18 +112,14 @@ def approaches(
         for leg in cluster.legs:
             toward = DirectedEdge(leg.edge, not leg.reverse)
             if not toward.allowed:
-                if signalled:
-                    found_behind = [
-                        (n, leg)
-                        for n in lights_behind(leg, node_tags, LIGHT_NEAR_M)
-                        if n not in junction_lights
-                    ]
-                    behind.setdefault(junction.summary.id, []).extend(found_behind)
+                passed_out = lights_behind(leg, node_tags, LIGHT_NEAR_M) if signalled else []
+                lights_out = [(n, leg) for n in passed_out if n not in junction_lights]
+                behind.setdefault(junction.summary.id, []).extend(lights_out)
                 continue
             on_ring = cluster.ring and is_ring_edge(leg.edge)
             if not on_ring and not cluster.ring and leg.edge.index in junction.inner:
                 continue
-            met = met_toward(leg, plain_from, node_tags, junction.nodes)
+            met = met_toward(leg, plain_from, node_tags, junction.nodes, arcs_m)
             lights = [m for m in met if is_light(m.tags) and m.node in junction.lights]
             if on_ring and not lights:
                 continue
@@ -261,7 +259,7 @@ def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> 
     sign_nearer = d.sign is not None and not d.lights
     if signalled and (d.lights or (for_all and not sign_nearer and standing.rank > Rank.YARD)):
         on_leg = [m for m in d.lights if math.isfinite(m.distance_m)]
-        far = max((m for m in on_leg), key=lambda m: m.distance_m, default=None)
+        far = max(on_leg, key=lambda m: m.distance_m, default=None)
         line = _before_crossing(d.met)
         if far is not None and far.distance_m > OWN_LINE_M:
             on_crossing = "crossing" in far.tags

@@ -29,7 +29,7 @@ from world_gen.signal_heads import (
     to_kerb_m,
     towards_drivers_rad,
 )
-from world_gen.stop_lines import line_across
+from world_gen.stop_lines import lines_across
 
 DRIVING_S, WALKING_S = 40.0, 10.0
 AMBER_S, ALL_RED_S = 3.0, 2.0
@@ -103,7 +103,8 @@ def _line(
     if "crossing" in tags[node]:
         at_m -= BEFORE_CROSSING_M
     back_m = length(lane.centerline) - at_m
-    return line_across(lane, back_m, Choice("signal", "tagged"), f"light{node}")
+    (line,) = lines_across([lane], [back_m], [Choice("signal", "tagged")], f"light{node}")
+    return line
 
 
 def _heads(

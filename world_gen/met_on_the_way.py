@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from contracts.world import YieldRule
 from world_gen.clusters import Cluster
 from world_gen.polyline import arc_lengths
-from world_gen.road_graph import DirectedEdge
+from world_gen.polyline_batch import Polylines
+from world_gen.road_graph import DirectedEdge, RoadEdge
 
 LOOK_BACK_M = 40.0
 NodeTags = Mapping[int, Mapping[str, str]]
@@ -37,28 +39,38 @@ def sign_of(tags: Mapping[str, str]) -> YieldRule | None:
     return "give_way" if word == "give_way" or sign.startswith("DE:205") else None
 
 
+def arcs_of(edges: Mapping[int, RoadEdge]) -> dict[int, list[float]]:
+    """Return metres from the first node to each node of every edge, by edge index."""
+    paths = Polylines.of([edge.xy_m for edge in edges.values()])
+    arc_m, first = paths.arc_m.tolist(), paths.first.tolist()
+    return {i: arc_m[a:b] for i, (a, b) in zip(edges, pairwise(first), strict=True)}
+
+
 def met_toward(
     leg: DirectedEdge,
     plain_from: Mapping[int, Cluster],
     node_tags: NodeTags,
     junction_nodes: Collection[int],
+    arcs_m: Mapping[int, Sequence[float]],
 ) -> list[Met]:
     """Walk outward along the leg, on through nodes where the road merely goes on.
 
-    A node that does not say which way it faces counts for the nearer junction.
+    A node that does not say which way it faces counts for the nearer junction. `arcs_m` are
+    those of `arcs_of`.
     """
     found: list[tuple[Met, bool]] = []
     gone, current, meets_another = 0.0, leg, False
     for _ in range(8):
-        nodes = current.edge.node_ids[::-1] if current.reverse else current.edge.node_ids
-        along = arc_lengths(current.xy_m)
-        for node, at in zip(nodes, along, strict=False):
+        along, total_m = arcs_m[current.edge.index], arcs_m[current.edge.index][-1]
+        order = -1 if current.reverse else 1
+        for node, arc_m in zip(current.edge.node_ids[::order], along[::order], strict=False):
             tags = node_tags.get(node)
-            if tags and gone + at <= LOOK_BACK_M:
+            if tags:
+                at_m = gone + (total_m - arc_m if current.reverse else arc_m)
                 facing = faces(tags, current.reverse)
-                if facing is not False:
-                    found.append((Met(node, gone + float(at), tags), facing is None))
-        gone += float(along[-1])
+                if facing is not False and at_m <= LOOK_BACK_M:
+                    found.append((Met(node, at_m, tags), facing is None))
+        gone += total_m
         cluster = plain_from.get(current.end_node)
         meets_another = cluster is None
         if (

@@ -37,6 +37,7 @@ from world_gen.conflicts import Meetings, meetings
 from world_gen.connections import ConnectionDraft
 from world_gen.met_on_the_way import NodeTags, met_inside, sign_of
 from world_gen.polyline import arc_lengths, locate
+from world_gen.polyline_batch import Polylines
 from world_gen.priority_roads import Rank, Standing, has_priority, importance
 
 ALONGSIDE_RAD, FAST_ALONGSIDE_RAD = math.radians(10.0), math.radians(50.0)
@@ -106,7 +107,10 @@ def right_of_way(
     )  # fmt: skip
     for i, j, merging, point, area, apart_m, from_first in rows:
         a, b = ways[i], ways[j]
-        standing = _standing_at(a, area), _standing_at(b, area)
+        standing = (
+            a.standing if a.sign is None else _standing_at(a, area, a.sign),
+            b.standing if b.sign is None else _standing_at(b, area, b.sign),
+        )
         answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side)
         loser, winner = (i, j) if answer.first_waits else (j, i)
         conflicting[i].append(b.id)
@@ -146,24 +150,31 @@ def _ways(
         name = approach.junction_id
         tops[name] = max(tops.get(name, Rank.YARD), approach.standing.rank)
         classes[name] = max(classes.get(name, 0.0), importance(approach.toward.edge))
+    paths = Polylines.of([c.centerline for c in connections])
+    gap = paths.steps[0]
+    ahead = np.arctan2(gap[:, 1], gap[:, 0])
+    start, end = ahead[paths.first[:-1]], ahead[paths.first[1:] - 2]
+    bend = np.abs((end - start + math.pi) % math.tau - math.pi)
+    rows = zip(
+        connections, start.tolist(), end.tolist(), bend.tolist(), paths.length_m.tolist(),
+        strict=True,
+    )  # fmt: skip
     ways = []
-    for c in connections:
+    for c, heading, exit_heading, bend_rad, length_m in rows:
         toward = c.movement.toward
         mine = by_road.get((toward.edge.index, toward.reverse))
         junction = c.cluster.junction
         name = junction.summary.id if junction is not None else ""
         kind = junction.summary.kind if junction is not None else "other"
-        d = np.diff(c.centerline, axis=0)
-        start, end = math.atan2(d[0, 1], d[0, 0]), math.atan2(d[-1, 1], d[-1, 0])
-        sign, sign_m = _sign_inside(c, node_tags)
+        sign, sign_m = _sign_inside(c, node_tags) if c.movement.inside else (None, math.inf)
         ways.append(
             Way(
                 id=c.id,
                 turn_weight=weight.get(c.turn, 2),
                 on_the_spot=c.turn == "u_turn" and not c.movement.inside,
-                heading=start,
-                bend_rad=abs(math.remainder(end - start, math.tau)),
-                length_m=float(np.hypot(d[:, 0], d[:, 1]).sum()),
+                heading=heading,
+                bend_rad=bend_rad,
+                length_m=length_m,
                 road=(toward.edge.index, toward.reverse),
                 opposite=None if mine is None else mine.opposite,
                 on_ring=c.start.role == "ring",
@@ -175,7 +186,7 @@ def _ways(
                 on_main=kind == "staggered" and _runs_along_main(c, tops, classes, name),
                 fast=toward.edge.road_class in _FAST,
                 mini=kind == "mini_roundabout",
-                exit_heading=end,
+                exit_heading=exit_heading,
             )
         )
     return ways
@@ -247,14 +258,14 @@ def _answer(
     return _beside(a, b)
 
 
-def _standing_at(way: Way, area: Array) -> Standing:
+def _standing_at(way: Way, area: Array, sign: Standing) -> Standing:
     """Return the standing with which a path comes to the ground that it shares with another."""
-    if way.sign is None or way.standing.rank <= way.sign.rank:
+    if way.standing.rank <= sign.rank:
         return way.standing
     xy = way.centerline
     gaps = np.hypot(*(area[:, None] - xy[None]).transpose(2, 0, 1))
     reached_m = float(arc_lengths(xy)[gaps.argmin(axis=1)].min())
-    return way.sign if reached_m > way.sign_m else way.standing
+    return sign if reached_m > way.sign_m else way.standing
 
 
 def _passes(mover: Way, waiting: Way, driving_side: DrivingSide) -> bool:

@@ -10,7 +10,8 @@ from contracts.world import Choice, LineControl, StopLine
 from world_gen.approaches import Approach
 from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft, LaneSet
-from world_gen.polyline import arc_lengths
+from world_gen.polyline import left_of
+from world_gen.polyline_batch import Polylines
 
 LINE_SETBACK_M = 0.3
 
@@ -23,11 +24,15 @@ def stop_lines(
     All lanes of a road stop at one line: where the map has the sign or light, before a crossing
     that waiting cars would block, else where lanes end.
     """
-    return tuple(
-        line_across(lane, _line_back_m(approach, around), approach.control)
+    mine = [
+        (lane, _line_back_m(approach, around), approach.control)
         for approach in found
         for lane in entering(approach, around, lanes)
-    )
+    ]
+    return lines_across(
+        [lane for lane, _, _ in mine], [back_m for _, back_m, _ in mine],
+        [control for _, _, control in mine],
+    )  # fmt: skip
 
 
 def entering(approach: Approach, around: Surroundings, lanes: LaneSet) -> list[LaneDraft]:
@@ -44,19 +49,29 @@ def _line_back_m(approach: Approach, around: Surroundings) -> float:
     return max(LINE_SETBACK_M, approach.line_m - trim)
 
 
-def line_across(lane: LaneDraft, back_m: float, control: Choice, name: str = "stop") -> StopLine:
-    """Return the line across a lane, `back_m` metres before its end but within the lane."""
-    xy = lane.centerline
-    along = arc_lengths(xy)
-    total = float(along[-1])
-    at_m = max(total - back_m, min(0.5, 0.5 * total))
-    i = min(int(np.searchsorted(along, at_m, side="right")), len(xy) - 1) - 1
-    step = xy[i + 1] - xy[i]
-    step_m = max(float(along[i + 1] - along[i]), 1e-9)
-    centre = xy[i] + step * ((at_m - float(along[i])) / step_m)
-    left = np.array([-step[1], step[0]]) * (lane.width_m.value / 2.0 / step_m)
-    ends = np.asarray([centre + left, centre - left], dtype=np.float64).round(3)
-    return StopLine(id=f"{lane.id}:{name}", lane_id=lane.id, ends=ends, control=control)
+def lines_across(
+    lanes: Sequence[LaneDraft],
+    back_m: Sequence[float],
+    controls: Sequence[Choice],
+    name: str = "stop",
+) -> tuple[StopLine, ...]:
+    """Return a line across each lane, so many metres before its end but within the lane."""
+    paths = Polylines.of([lane.centerline for lane in lanes])
+    total = paths.length_m
+    at_m = np.maximum(total - np.array(back_m), np.minimum(0.5, 0.5 * total))
+    half_m = np.array([lane.width_m.value for lane in lanes]) / 2.0
+    # A key that grows along each lane and from lane to lane finds all segments in one search.
+    room = np.concatenate([[0.0], np.cumsum(total + 1.0)])
+    i = np.searchsorted(paths.arc_m + room[paths.line], at_m + room[:-1], side="right") - 1
+    i = np.clip(i, paths.first[:-1], paths.first[1:] - 2)
+    ahead = paths.steps[0][i] / np.maximum(paths.steps[1][i], 1e-9)[:, None]
+    centre = paths.xy_m[i] + ahead * (at_m - paths.arc_m[i])[:, None]
+    left = left_of(ahead) * half_m[:, None]
+    ends = np.stack([centre + left, centre - left], axis=1).round(3)
+    return tuple(
+        StopLine(id=f"{lane.id}:{name}", lane_id=lane.id, ends=mine, control=control)
+        for lane, mine, control in zip(lanes, ends, controls, strict=True)
+    )
 
 
 def line_controls(lines: Sequence[StopLine]) -> dict[str, LineControl]:
