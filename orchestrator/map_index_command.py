@@ -8,15 +8,14 @@ from pathlib import Path
 from world_gen.map_store import MapStore
 
 
-def index_map_file(map_file: Path, *, folder: Path | None) -> None:
-    """Build the index of a map in `folder`, by default in the user's cache, unless it is there."""
+def open_index(map_file: Path, folder: Path | None) -> MapStore:
+    """Open the index of a map; where it is not there yet it is made behind a progress bar."""
     from rich.console import Console
     from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
 
-    begin_s = time.monotonic()
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=Console(stderr=True), transient=True,
     )  # fmt: skip
     with bar:
         task = bar.add_task(f"reading {map_file.name}", total=None)
@@ -27,7 +26,13 @@ def index_map_file(map_file: Path, *, folder: Path | None) -> None:
             else:
                 bar.update(task, completed=done, total=total)
 
-        store = MapStore.open(map_file, folder, show)
+        return MapStore.open(map_file, folder, show)
+
+
+def index_map_file(map_file: Path, *, folder: Path | None) -> None:
+    """Build the index of a map in `folder`, by default in the user's cache, unless it is there."""
+    begin_s = time.monotonic()
+    store = open_index(map_file, folder)
     meta = store.meta
     print(
         f"{store.path}: {meta.ways} ways, {meta.nodes} nodes of {map_file} "

@@ -16,6 +16,7 @@ from world_gen.intersections import Junction
 from world_gen.osm_map import LatLonBounds, OsmMap
 from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
+from world_gen.service_roads import with_service_roads
 
 LARGE_MAP_BYTES = 64_000_000
 """Of larger files, what is needed is clipped from an index on disk, made on first use."""
@@ -47,10 +48,12 @@ def open_map(
     file: Path,
     *,
     clip: Clip | LatLonBounds | None = None,
+    service_roads: bool = False,
     large_bytes: int = LARGE_MAP_BYTES,
 ) -> OpenMap:
     """Read a map, or of a large one what `clip` needs, and find its junctions.
 
+    With `service_roads`, driveways and parking aisles open to cars are roads like any other.
     Raises MapError where the file is no map or has no roads there.
     """
     if clip is not None and file.is_file() and file.stat().st_size >= large_bytes:
@@ -58,6 +61,8 @@ def open_map(
     else:
         osm = read_map(file)
     graph = build_road_graph(osm)
+    if service_roads:
+        graph = with_service_roads(graph)
     return OpenMap(file, osm, graph, find_intersections(osm, graph))
 
 
@@ -94,17 +99,9 @@ def _words(bounds: LatLonBounds) -> str:
 
 def _clipped(file: Path, clip: Clip | LatLonBounds) -> OsmMap:
     # Imported here: most maps are small, and commands on them are to start fast.
-    from rich.console import Console
-    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+    from orchestrator.map_index_command import open_index
 
-    from world_gen.map_store import MapStore
-
-    columns = TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(f"reading {file.name}", total=None)
-        store = MapStore.open(
-            file, None, lambda done, total: bar.update(task, completed=done, total=total)
-        )
+    store = open_index(file, None)
     try:
         if isinstance(clip, Clip):
             return store.clip_route(clip.line_deg, clip.margin_m + CLIP_MARGIN_M)
