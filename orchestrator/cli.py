@@ -24,6 +24,10 @@ maps = typer.Typer(name="map", help="Fetch maps and prepare them.", no_args_is_h
 app.add_typer(maps)
 
 MapArgument = Annotated[Path, typer.Argument(help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")]
+ServiceRoadsOption = Annotated[
+    bool,
+    typer.Option("--service-roads", help="driveways and parking aisles count as roads everywhere"),
+]
 OutOption = Annotated[Path, typer.Option("--out", help="file to write")]
 
 
@@ -77,12 +81,13 @@ def intersections(
     route: Annotated[
         Path | None, typer.Option(help="only those along this GPX or GeoJSON line")
     ] = None,
+    service_roads: ServiceRoadsOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
 ) -> None:
     """List the junctions of a map, each one as a driver sees it."""
     from orchestrator.map_commands import list_intersections
 
-    list_intersections(map_file, route=route, as_json=as_json)
+    list_intersections(map_file, route=route, as_json=as_json, service_roads=service_roads)
 
 
 @app.command()
@@ -100,6 +105,7 @@ def world(
         Path | None, typer.Option(help="each junction along this GPX or GeoJSON line")
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="each junction of the map")] = False,
+    service_roads: ServiceRoadsOption = False,
     file_format: Annotated[
         str,
         typer.Option(
@@ -126,7 +132,8 @@ def world(
         write_worlds(
             WorldRequest(
                 map_file=map_file, out=out, at=at, junction_id=junction_id, bbox=bbox,
-                route=route, everything=everything, file_format=file_format, radius_m=radius,
+                route=route, everything=everything, service_roads=service_roads,
+                file_format=file_format, radius_m=radius,
                 opendrive_version=opendrive_version, simulator=simulator, vehicles=vehicles,
                 vehicle=vehicle, report=report,
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,17 +60,32 @@ def read_route(route: Path) -> Array:
     return np.stack([line.lat_deg, line.lon_deg], axis=-1)
 
 
-def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> tuple[Junction, ...]:
-    """Return the junctions along a route's line in driving order, once per passage."""
+class AlongRoute(NamedTuple):
+    """The junctions along a route in driving order, once per passage, and the map they are of."""
+
+    opened: OpenMap
+    junctions: tuple[Junction, ...]
+
+
+def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> AlongRoute:
+    """Return the junctions along a route's line; the service roads that it uses count there."""
     from orchestrator.line_matching import match_line
+    from world_gen.find_intersections import find_intersections
     from world_gen.route_junctions import junctions_on_route
+    from world_gen.service_roads import open_service_roads, with_roads
 
     matched = match_line(opened.graph, line_deg, name=f"--route {route}")
-    return tuple(
+    used = (item.edge for stretch in matched.routes for item in stretch.edges)
+    added = open_service_roads(used)
+    if added:
+        graph = with_roads(opened.graph, added)
+        opened = OpenMap(opened.file, opened.osm, graph, find_intersections(opened.osm, graph))
+    junctions = tuple(
         passage.junction
         for stretch in matched.routes
         for passage in junctions_on_route(opened.junctions, stretch.edges)
     )
+    return AlongRoute(opened, junctions)
 
 
 def parse_bbox(option: str, bbox: str) -> LatLonBounds:

@@ -10,14 +10,19 @@ from orchestrator.map_choice import junctions_along, read_route
 from orchestrator.map_opening import Clip, open_map
 
 
-def list_intersections(map_file: Path, *, route: Path | None, as_json: bool) -> None:
-    """Print the junctions of a map, or those along a line, in driving order."""
+def list_intersections(
+    map_file: Path, *, route: Path | None, as_json: bool, service_roads: bool = False
+) -> None:
+    """Print the junctions of a map, or those along a line, in driving order.
+
+    Service roads count where the line uses them, or everywhere if asked for.
+    """
     if route is not None:
         line_deg = read_route(route)
-        opened = open_map(map_file, clip=Clip(line_deg, 0.0))
-        junctions = junctions_along(opened, route, line_deg)
+        opened = open_map(map_file, clip=Clip(line_deg, 0.0), service_roads=service_roads)
+        junctions = junctions_along(opened, route, line_deg).junctions
     else:
-        opened = open_map(map_file)
+        opened = open_map(map_file, service_roads=service_roads)
         junctions = tuple(sorted(opened.junctions, key=lambda j: j.summary.id))
     if as_json:
         body = msgspec.json.encode([j.summary for j in junctions])

@@ -31,7 +31,7 @@ from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
-from world_gen.service_roads import with_roads
+from world_gen.service_roads import open_service_roads, with_roads
 
 EMBEDDED = Path(__file__).parent / "embedded"
 EMBEDDED_MAP = EMBEDDED / "drawn_town.osm"
@@ -124,7 +124,8 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     if positions is not None and log_file is not None:
         _check_in_map(positions, log_file, index, map_file)
     routes, route_source = _routes(config, graph, index, given)
-    added = _service_roads(config, graph, routes)
+    used = (item.edge for route in routes for item in route.edges)
+    added = open_service_roads(graph.edges if config.service_roads else used)
     if added:
         # Only now is it known where the route leaves the streets; what it meets there counts.
         graph = with_roads(graph, added)
@@ -212,21 +213,6 @@ def _routes(
     what = f"from-log of {config.log}" if from_log else config.route or EMBEDDED_ROUTE
     source = "from-log" if from_log else "given"
     return match_line(graph, given, name=f"--route {what}", index=index).routes, source
-
-
-def _service_roads(
-    config: DriveConfig, graph: RoadGraph, routes: tuple[Route, ...]
-) -> tuple[int, ...]:
-    """Return the service roads open to cars that count: those of the route, or all by choice."""
-    used = (item.edge for route in routes for item in route.edges)
-    candidates = graph.edges if config.service_roads else used
-    return tuple(
-        sorted({
-            edge.index
-            for edge in candidates
-            if edge.road_class == "service" and not edge.car and (edge.forward or edge.backward)
-        })
-    )  # fmt: skip
 
 
 def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:

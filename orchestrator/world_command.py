@@ -34,6 +34,7 @@ from world_gen.export.formats import (
 )
 from world_gen.intersections import Junction
 from world_gen.map_index import MapIndex, index_map
+from world_gen.osm_map import LatLonBounds
 
 _Word = TypeVar("_Word", bound=str)
 MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
@@ -50,6 +51,7 @@ class WorldRequest:
     bbox: str | None = None
     route: Path | None = None
     everything: bool = False
+    service_roads: bool = False
     file_format: str = "mjcf"
     radius_m: float = 150.0
     opendrive_version: str = "1.8"
@@ -72,29 +74,31 @@ def write_worlds(request: WorldRequest) -> int:
         return _region(request, format_, options)
     if request.at is not None:
         lat, lon = parse_place(request.at)
-        opened = open_map(
-            request.map_file, clip=Clip(np.array([[lat, lon]]), request.radius_m + FARTHEST_M)
-        )
+        opened = _open(request, Clip(np.array([[lat, lon]]), request.radius_m + FARTHEST_M))
         return _single(opened, nearest_junction(opened, lat, lon), request, format_, options)
     if request.junction_id is not None:
-        opened = open_map(request.map_file)
+        opened = _open(request)
         junction = junction_by_id(opened, request.junction_id)
         return _single(opened, junction, request, format_, options)
     if request.route is not None:
         line_deg = read_route(request.route)
-        opened = open_map(request.map_file, clip=Clip(line_deg, request.radius_m))
-        along = junctions_along(opened, request.route, line_deg)
+        opened = _open(request, Clip(line_deg, request.radius_m))
+        opened, along = junctions_along(opened, request.route, line_deg)
         # A junction that is passed twice is written once.
         junctions = tuple({junction.summary.id: junction for junction in along}.values())
     else:
-        opened = open_map(request.map_file)
+        opened = _open(request)
         junctions = tuple(sorted(opened.junctions, key=lambda j: j.summary.id))
     return _write_many(opened, junctions, request, format_, options)
 
 
+def _open(request: WorldRequest, clip: Clip | LatLonBounds | None = None) -> OpenMap:
+    return open_map(request.map_file, clip=clip, service_roads=request.service_roads)
+
+
 def _region(request: WorldRequest, format_: Format, options: ExportOptions) -> int:
     bounds = parse_bbox("--bbox", request.bbox or "")
-    opened = open_map(request.map_file, clip=bounds)
+    opened = _open(request, bounds)
     part = region_on_map(opened.file, opened.osm.bounds, bounds)
     world = build_region(opened.osm, opened.graph, part, index=_index(opened))
     return _write_one(world, request, format_, options)

@@ -5,19 +5,22 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable
 
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
 
 
 def with_service_roads(graph: RoadGraph) -> RoadGraph:
     """Return the graph with every service road that is open to cars counted as a car road."""
-    return with_roads(
-        graph,
-        (
-            edge.index
-            for edge in graph.edges
-            if edge.road_class == "service" and (edge.forward or edge.backward)
-        ),
-    )
+    return with_roads(graph, open_service_roads(graph.edges))
+
+
+def open_service_roads(edges: Iterable[RoadEdge]) -> tuple[int, ...]:
+    """Return the indices, ascending, of those edges that are service roads open to cars."""
+    found = {
+        edge.index
+        for edge in edges
+        if edge.road_class == "service" and not edge.car and (edge.forward or edge.backward)
+    }
+    return tuple(sorted(found))
 
 
 def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:

@@ -17,6 +17,7 @@ from orchestrator.cli import run
 from orchestrator.map_opening import Clip, open_map, region_on_map
 from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
 from orchestrator.world_files import FAILURES_FILE, write_each
+from tests.world_gen.sketch import Sketch
 from world_gen.build import build_world
 from world_gen.export.formats import FORMATS
 from world_gen.intersections import Junction
@@ -116,6 +117,59 @@ def test_a_route_writes_the_junctions_along_it(tmp_path: Path) -> None:
         for path in out.iterdir()
     ]
     assert sorted(kinds) == ["crossing", "crossing", "roundabout", "t_junction"]
+
+
+def drawn_yard(folder: Path) -> tuple[Path, Path]:
+    """A street with two driveways, and a route that turns into the first."""
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -200.0, 0.0), (2, 0.0, 0.0), (3, 100.0, 0.0), (4, 200.0, 0.0),
+        (5, 0.0, 80.0), (6, 100.0, 80.0),
+    ):  # fmt: skip
+        sketch.node(node, x_m, y_m)
+    sketch.road(10, [1, 2, 3, 4], "Street")
+    sketch.road(11, [2, 5], highway="service")
+    sketch.road(12, [3, 6], highway="service")
+    osm = sketch.read(folder)
+    line = [osm.locations[node][::-1] for node in (1, 2, 5)]
+    route = folder / "route.geojson"
+    route.write_text(json.dumps({"type": "LineString", "coordinates": line}), encoding="utf-8")
+    return Path(osm.file), route
+
+
+def listed(capsys: pytest.CaptureFixture[str], *arguments: str) -> list[str]:
+    capsys.readouterr()
+    assert run(["intersections", *arguments, "--json"]) == 0
+    return [junction["id"] for junction in json.loads(capsys.readouterr().out)]
+
+
+def test_driveways_make_junctions_by_option_and_where_a_route_uses_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    map_file, route = (str(path) for path in drawn_yard(tmp_path))
+    assert listed(capsys, map_file) == []
+    assert listed(capsys, map_file, "--service-roads") == ["n2", "n3"]
+    assert listed(capsys, map_file, "--route", route) == ["n2"]
+
+    out = tmp_path / "worlds"
+    common = ["--format", "geojson", "--out", str(out)]
+    assert run(["world", map_file, "--all", *common]) == 2
+    assert "no intersection" in capsys.readouterr().err
+    assert run(["world", map_file, "--route", route, *common]) == 0
+    (world,) = out.iterdir()
+    assert world.stem == "n2"
+    # The other driveway has lanes in no World but one that asks for all.
+    assert service_ways(world) == {11}
+    assert run(["world", map_file, "--all", "--service-roads", *common]) == 0
+    assert {path.stem for path in out.iterdir()} == {"n2", "n3"}
+    assert service_ways(world) == {11, 12}
+
+
+def service_ways(world: Path) -> set[int]:
+    """The ways 11 and 12 among those whose lanes a GeoJSON World holds."""
+    features = json.loads(world.read_text(encoding="utf-8"))["features"]
+    lanes = (f["properties"] for f in features if f["properties"]["kind"] == "lane")
+    return {lane["osm_way"] for lane in lanes} & {11, 12}
 
 
 def test_a_report_says_beside_the_file_what_was_guessed(
