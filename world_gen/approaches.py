@@ -6,9 +6,6 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from contracts.arrays import Array
 from contracts.world import Choice, LineControl, YieldRule
 from world_gen.clusters import RING_KINDS, Cluster, Surroundings, heading_out, is_ring_edge
 from world_gen.connections import ConnectionDraft
@@ -22,7 +19,7 @@ from world_gen.met_on_the_way import (
     met_toward,
     sign_of,
 )
-from world_gen.priority_roads import Entry, Rank, Standing, standings
+from world_gen.priority_roads import Entry, Rank, Standing, opposites, outward, standings
 from world_gen.road_graph import DirectedEdge
 
 OWN_LINE_M = 3.0
@@ -32,7 +29,6 @@ BEFORE_CROSSING_M = 3.0
 LIGHT_NEAR_M = 25.0
 _SIGN_NEAR_M = 25.0
 _CROSSING_NEAR_M = 16.0
-_OPPOSITE_COS = math.cos(math.radians(135.0))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -168,13 +164,8 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
         nearest.signal_nodes = (*nearest.signal_nodes, node)
     for node, leg in behind:
         out = heading_out(leg, 15.0)
-        ahead = min(lit, key=lambda item: float(out @ _out(item.toward)))
+        ahead = min(lit, key=lambda item: float(out @ outward(item.toward)))
         ahead.signal_nodes = (*ahead.signal_nodes, node)
-
-
-def _out(toward: DirectedEdge) -> Array:
-    """Return the unit direction (2,) in which a road in leaves the junction."""
-    return heading_out(DirectedEdge(toward.edge, not toward.reverse), 15.0)
 
 
 def _own_sign(met: list[Met], cluster: Cluster) -> Met | None:
@@ -198,11 +189,13 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
         for m in d.met
         if m.distance_m <= 0.1 and sign_of(m.tags) and not d.cluster.ring
     }
+    clusters = {d.cluster.key: d.cluster for d in drafts}.values()
+    ahead_of = opposites([d.toward for d in drafts], [leg for c in clusters for leg in c.legs])
     entries = [
-        Entry(d.toward.edge, word, ahead)
-        for d, word, ahead in zip(drafts, words, _opposites(drafts), strict=True)
+        Entry(d.toward.edge, word, ahead, leads_on)
+        for d, word, (ahead, leads_on) in zip(drafts, words, ahead_of, strict=True)
     ]
-    ranks = standings(entries, around.driving_side)
+    ranks = standings(entries, len(junction.arms), around.driving_side)
     if control == "all_way_stop":
         ranks = [
             rank if word else Standing(Rank.MINOR, "stop", "inferred" if any(words) else "tagged")
@@ -232,14 +225,6 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
             approach.opposite = (ahead.edge.index, ahead.reverse)
         found.append(approach)
     return found
-
-
-def _opposites(drafts: list[_Draft]) -> list[int | None]:
-    """Return for each road the index of the one that lies straight ahead."""
-    out = np.array([_out(d.toward) for d in drafts])
-    cos = out @ out.T
-    best = cos.argmin(axis=1)
-    return [int(j) if cos[i, j] < _OPPOSITE_COS else None for i, j in enumerate(best.tolist())]
 
 
 def _for_all(drafts: list[_Draft]) -> bool:

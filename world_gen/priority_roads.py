@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
+import numpy as np
+
+from contracts.arrays import Array
 from contracts.world import DrivingSide, Provenance, YieldRule
-from world_gen.road_graph import RoadEdge
+from world_gen.legs import heading_out
+from world_gen.road_graph import DirectedEdge, RoadEdge
 
 _IMPORTANCE: Mapping[str, float] = {
     "motorway": 8.0, "trunk": 7.0, "primary": 6.0, "secondary": 5.0, "tertiary": 4.0,
@@ -18,6 +23,10 @@ _YARD = 1.0
 _NUMBERED, _CLASSIFIED = 4.0, 5.0
 """From tertiary up a road of higher class is usually signed as the one with priority; from
 secondary up every junction has signs."""
+
+LOOK_M = 15.0
+"""Where a road leads is told by its first metres out of the junction."""
+_OPPOSITE_COS = math.cos(math.radians(135.0))
 
 
 class Rank(IntEnum):
@@ -42,12 +51,39 @@ class Entry(NamedTuple):
     """One road driven toward a junction, as `standings` weighs it.
 
     `sign` is a stop or give-way sign that is tagged for it, `opposite` the place in the list of
-    the road that goes straight on from it.
+    the road that goes straight on from it. `leads_on` tells that it goes straight on at all, be
+    it into a road that leads out alone.
     """
 
     edge: RoadEdge
     sign: YieldRule | None
     opposite: int | None
+    leads_on: bool
+
+
+def opposites(
+    roads: Sequence[DirectedEdge], legs: Sequence[DirectedEdge]
+) -> list[tuple[int | None, bool]]:
+    """Return for each road in which of them lies straight ahead, and whether any leg does.
+
+    `roads` are driven toward the junction, `legs` out of it; a leg that nobody enters by has no
+    place among the roads.
+    """
+    ways_out = [
+        heading_out(g, LOOK_M) for g in legs if not DirectedEdge(g.edge, not g.reverse).allowed
+    ]
+    out = np.array([outward(road) for road in roads])
+    cos = out @ out.T
+    leads_on = (out @ np.array([*out, *ways_out]).T).min(axis=1) < _OPPOSITE_COS
+    return [
+        (j if cos[i, j] < _OPPOSITE_COS else None, bool(leads_on[i]))
+        for i, j in enumerate(cos.argmin(axis=1).tolist())
+    ]
+
+
+def outward(toward: DirectedEdge) -> Array:
+    """Return the unit direction (2,) in which a road in leaves the junction."""
+    return heading_out(DirectedEdge(toward.edge, not toward.reverse), LOOK_M)
 
 
 def importance(edge: RoadEdge) -> float:
@@ -64,8 +100,8 @@ def has_priority(tags: Mapping[str, str]) -> bool:
     return tags.get("priority_road") in ("designated", "yes_unposted", "yes")
 
 
-def standings(entries: list[Entry], driving_side: DrivingSide) -> list[Standing]:
-    """Return how each road into one junction ranks there.
+def standings(entries: list[Entry], arms: int, driving_side: DrivingSide) -> list[Standing]:
+    """Return how each road into one junction ranks there; `arms` counts those that lead out too.
 
     In this order: a tagged stop or give-way sign (StVO §8 (1) 1, signs 205 and 206; UK Highway
     Code 171, 172; MUTCD 2B.05, 2B.08); a tagged priority road (signs 301, 306; §8 (1) 1); a way
@@ -87,8 +123,8 @@ def standings(entries: list[Entry], driving_side: DrivingSide) -> list[Standing]
             if importance(entry.edge) <= importance(entries[j].edge) and _others(found, i, j):
                 found[i] = Standing(Rank.MINOR, entries[j].sign or "give_way", "inferred")
     _lesser(entries, found)
-    if len(entries) >= 3 and not any(found):
-        _through(entries, found, driving_side)
+    if not any(found):
+        _through(entries, found, arms, driving_side)
     plain = Standing(Rank.PLAIN, "near_side", "default")
     return [plain if standing is None else standing for standing in found]
 
@@ -124,17 +160,21 @@ def _lesser(entries: list[Entry], found: list[Standing | None]) -> None:
             found[i] = Standing(Rank.MINOR, "lesser_road", "inferred")
 
 
-def _through(entries: list[Entry], found: list[Standing | None], driving_side: DrivingSide) -> None:
+def _through(
+    entries: list[Entry], found: list[Standing | None], arms: int, driving_side: DrivingSide
+) -> None:
     """Let the road that goes on through the junction go first, where one road does."""
-    mine = [_known_as(entry.edge) for entry in entries]
     classes = [importance(entry.edge) for entry in entries]
-    shared = {name for name in mine if name and mine.count(name) > 1}
     lesser: list[int] = []
-    if len(shared) == 1 and min(classes) >= _NUMBERED:
-        lesser = [i for i, name in enumerate(mine) if name not in shared]
-    if not lesser and len(entries) == 3 and (driving_side == "left" or min(classes) >= _CLASSIFIED):
-        stems = [i for i, entry in enumerate(entries) if entry.opposite is None]
-        lesser = stems if len(stems) == 1 else []
+    if len(entries) >= 3 and min(classes) >= _NUMBERED:
+        mine = [_known_as(entry.edge) for entry in entries]
+        shared = {name for name in mine if name and mine.count(name) > 1}
+        if len(shared) == 1:
+            lesser = [i for i, name in enumerate(mine) if name not in shared]
+    signed = driving_side == "left" or min(classes, default=0.0) >= _CLASSIFIED
+    if not lesser and arms == 3 and signed:
+        stems = [i for i, entry in enumerate(entries) if not entry.leads_on]
+        lesser = stems if len(stems) == 1 < len(entries) else []
     for i in lesser:
         found[i] = Standing(Rank.MINOR, "lesser_road", "inferred")
 

@@ -140,6 +140,20 @@ def test_the_stem_of_a_t_of_classified_roads_waits(highway):
     assert waits(world, "S>W", "E>W")[0] == "S>W"  # by its rank, or because E comes from the right
 
 
+def test_a_one_way_road_goes_on_past_the_stem_of_a_t():
+    main = {"highway": "secondary", "oneway": "yes"}
+    out = {"highway": "secondary", "oneway": "-1"}
+    world = world_of(drawn_map(CROSS, sides(W=main, E=out, S={"highway": "secondary"})))
+    assert waits(world, "S>E", "W>E") == ("S>E", "lesser_road", "inferred")
+
+
+def test_a_crossing_with_a_road_that_leads_out_alone_has_no_stem():
+    classified = {"highway": "secondary"}
+    one_way = {"S": classified | {"oneway": "yes"}, "N": classified | {"oneway": "-1"}}
+    world = world_of(drawn_map(CROSS, sides(E=classified, W=classified, **one_way)))
+    assert waits(world, "W>E", "S>N") == ("W>E", "near_side", "default")
+
+
 @pytest.mark.parametrize(
     ("highway", "rule"), [("motorway", "merge_order"), ("tertiary", "near_side")]
 )
