@@ -10,6 +10,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.world import Connection, DrivingSide, LineControl, Quantity, Turn
 from world_gen.clusters import Cluster, Surroundings
+from world_gen.forks import beside_at_fork, merged_ends, merges
 from world_gen.lanes import LaneDraft, LaneSet
 from world_gen.movements import Movement
 from world_gen.polyline import unit
@@ -65,6 +66,7 @@ def connect(
 ) -> list[ConnectionDraft]:
     """Return the connections of one cluster, yet to be drawn, and enter them as successors."""
     found: list[ConnectionDraft] = []
+    merging = merges(cluster, ways)
     for leg in cluster.legs:
         mine = [
             m
@@ -77,14 +79,16 @@ def connect(
         plans = around.section(toward).driven(reverse=toward.reverse)
         starts = lanes.incoming(toward, plans)
         middle = lanes.incoming(toward, around.section(toward).turning(reverse=toward.reverse))
-        for movement in _by_tags(mine, starts):
+        named = _by_tags(mine, starts)
+        beside = beside_at_fork(cluster, named, around)
+        for unnamed, movement in zip(mine, named, strict=True):
             away = movement.away
             ends = lanes.outgoing(away, around.section(away).driven(reverse=away.reverse))
             if not starts or not ends:
                 continue
             chosen = [lane for lane in middle if movement.turn in lane.turns]
             chosen = chosen or _starting_lanes(
-                movement, starts, mine, len(ends), around.driving_side
+                movement, starts, mine, len(ends), beside, around.driving_side
             )
             if not chosen and len(starts) < len(plans):
                 continue  # the lanes for it are beyond the World's edge
@@ -94,6 +98,8 @@ def connect(
                     f"{movement.turn} into way {away.edge.way_id}; left out"
                 )
                 continue
+            if merging and len(ends) > 1:
+                ends = merged_ends(unnamed, merging, ends, around)
             for a, b in _pairs(chosen, ends, movement.turn, around.driving_side, len(mine) == 1):
                 found.append(_drafted(a, b, movement, cluster))
     for connection in found:
@@ -136,11 +142,17 @@ def _starting_lanes(
     starts: list[LaneDraft],
     ways: list[Movement],
     room: int,
+    beside: int,
     driving_side: DrivingSide,
 ) -> list[LaneDraft]:
-    """Return the lanes, from the left, from which this movement begins."""
+    """Return the lanes, from the left, from which this movement begins.
+
+    `room` is the number of lanes it leads to. Where a one-way road forks, `beside` is that of
+    the branch straight on, else 0: there one lane at most leads into both branches.
+    """
     turn = movement.turn
     far: Turn = "left" if driving_side == "right" else "right"
+    cars = [lane for lane in starts if lane.kind == "driving"] or starts
     if any(lane.plan.turns_source == "tagged" for lane in starts):
         wanted = {turn, far} if turn == "u_turn" else {turn}
         fits = [
@@ -148,10 +160,19 @@ def _starting_lanes(
             for lane in starts
             if wanted & set(lane.plan.turns) or (lane.plan.turns_source != "tagged")
         ]
-        return _outermost(fits, far) if turn == "u_turn" else fits
-    cars = [lane for lane in starts if lane.kind == "driving"] or starts
+        if turn == "u_turn":
+            return _outermost(fits, far)
+        if turn == "straight":
+            return fits
+        # Lanes without an arrow go straight on; beside a tagged lane those turn that have room.
+        named = sum(lane.plan.turns_source == "tagged" for lane in fits)
+        return _outermost(
+            fits, turn, max(named, min(room, len(cars) + 1 - beside) if beside else 1)
+        )
+    if turn == "u_turn":
+        return _outermost(cars, far)
     if turn != "straight":
-        return _outermost(cars, far if turn == "u_turn" else turn)
+        return _outermost(cars, turn, max(1, min(room, len(cars) + 1 - beside) if beside else 1))
     have = {m.turn for m in ways}
     straight = list(starts)
     # The lane on the far side, from which drivers turn across the road, is the first to be lost.
@@ -162,8 +183,8 @@ def _starting_lanes(
     return straight
 
 
-def _outermost(lanes: list[LaneDraft], side: Turn) -> list[LaneDraft]:
-    return lanes[:1] if side == "left" else lanes[-1:]
+def _outermost(lanes: list[LaneDraft], side: Turn, count: int = 1) -> list[LaneDraft]:
+    return lanes[:count] if side == "left" else lanes[-count:]
 
 
 def _pairs(

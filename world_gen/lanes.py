@@ -12,6 +12,7 @@ from contracts.arrays import Array
 from contracts.world import Lane, LaneKind, Provenance, Quantity, Road, Turn
 from world_gen.clusters import Cluster, Surroundings
 from world_gen.cross_section import CrossSection, LanePlan
+from world_gen.places import places_led_through, without_dead_places
 from world_gen.polyline_batch import Polylines, offset, without_repeats
 from world_gen.reference_lines import Stretch, reference_lines
 from world_gen.road_graph import DirectedEdge, RoadEdge
@@ -91,6 +92,16 @@ class LaneSet:
     ends: Mapping[LaneKey, str]
     notes: tuple[str, ...]
 
+    def ending(self, toward: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
+        """Return the lane of a plan that ends where `toward` ends; None where it was left out."""
+        name = self.ends.get(LaneKey(toward.edge.index, toward.reverse, plan.number))
+        return None if name is None else self.lanes[name]
+
+    def beginning(self, away: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
+        """Return the lane of a plan that begins where `away` begins; None where it was left out."""
+        name = self.begins.get(LaneKey(away.edge.index, away.reverse, plan.number))
+        return None if name is None else self.lanes[name]
+
     def incoming(self, toward: DirectedEdge, plans: tuple[LanePlan, ...]) -> list[LaneDraft]:
         """Return the lanes that end where `toward` ends, from the left."""
         keys = [LaneKey(toward.edge.index, toward.reverse, p.number) for p in plans]
@@ -109,11 +120,12 @@ def build_lanes(around: Surroundings) -> LaneSet:
     for index in dict.fromkeys(stretch.edge for stretch in stretches):
         notes.extend(around.sections[index].notes)
     curves = iter(_offsets(stretches, sections))
-    places = {
-        (leg.edge.index, leg.reverse): cluster.key
+    legs = {
+        (leg.edge.index, leg.reverse): (cluster.key, leg)
         for cluster in around.clusters
         for leg in cluster.legs
     }
+    places = {key: place for key, (place, _) in legs.items()}
     lanes: dict[str, LaneDraft] = {}
     roads: list[Road] = []
     borders: dict[str, tuple[Array, Array]] = {}
@@ -159,7 +171,11 @@ def build_lanes(around: Surroundings) -> LaneSet:
                 tunnel=edge.tags.get("tunnel", "no") not in ("no", "building_passage"),
             )
         )
-    return LaneSet(lanes, tuple(roads), borders, begins, ends, tuple(notes))
+    led_through = places_led_through(
+        legs, ((key.edge, key.reverse) for key in begins), ((key.edge, key.reverse) for key in ends)
+    )
+    known = tuple(without_dead_places(roads, led_through))
+    return LaneSet(lanes, known, borders, begins, ends, tuple(notes))
 
 
 def _lane_count_source(edge: RoadEdge) -> Provenance:
@@ -243,11 +259,14 @@ def join_straight_on(cluster: Cluster, around: Surroundings, lanes: LaneSet) -> 
         return False
     for leg, other in (cluster.legs, cluster.legs[::-1]):
         toward = DirectedEdge(leg.edge, not leg.reverse)
-        arriving = lanes.incoming(toward, around.section(leg).driven(reverse=toward.reverse))
-        leaving = lanes.outgoing(other, around.section(other).driven(reverse=other.reverse))
-        arriving += lanes.incoming(toward, around.section(leg).cycled(reverse=toward.reverse))
-        leaving += lanes.outgoing(other, around.section(other).cycled(reverse=other.reverse))
-        for a, b in zip(arriving, leaving, strict=False):
-            if a.kind == b.kind:
-                a.successors.append(b.id)
+        before, behind = around.section(leg), around.section(other)
+        # Plans are paired, not lanes: a lane too short to be drawn must not shift its neighbours.
+        for mine, its in (
+            (before.driven(reverse=toward.reverse), behind.driven(reverse=other.reverse)),
+            (before.cycled(reverse=toward.reverse), behind.cycled(reverse=other.reverse)),
+        ):
+            for a, b in zip(mine, its, strict=False):
+                start, end = lanes.ending(toward, a), lanes.beginning(other, b)
+                if start is not None and end is not None and a.kind == b.kind:
+                    start.successors.append(end.id)
     return True

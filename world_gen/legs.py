@@ -10,6 +10,8 @@ from contracts.arrays import Array
 from world_gen.cross_section import CrossSection
 from world_gen.road_graph import DirectedEdge, RoadEdge
 
+_PARTED_M = 25.0
+_BESIDE_COS = math.cos(math.radians(30.0))
 RING_KINDS = ("roundabout", "circular")
 
 
@@ -39,6 +41,18 @@ def heading_out(leg: DirectedEdge, look_m: float = 8.0) -> Array:
     if span_m > 0.1:
         ahead = ((x - x0) / span_m, (y - y0) / span_m)
     return np.array(ahead or (1.0, 0.0))
+
+
+def opposed(leg: DirectedEdge, other: DirectedEdge) -> bool:
+    """Return whether two one-way roads leave a place side by side, as carriageways of a street."""
+    if leg.edge.index == other.edge.index or any(
+        d.edge.forward == d.edge.backward for d in (leg, other)
+    ):
+        return False
+    return any(
+        float(heading_out(leg, look_m) @ heading_out(other, look_m)) > _BESIDE_COS
+        for look_m in (8.0, _PARTED_M)
+    )
 
 
 def lateral_positions(

@@ -10,6 +10,7 @@ import numpy as np
 
 from contracts.world import DrivingSide, Turn
 from world_gen.clusters import Cluster, Surroundings, heading_out, is_ring_edge
+from world_gen.legs import opposed
 from world_gen.road_graph import DirectedEdge
 from world_gen.turn_restrictions import TurnRestrictions
 
@@ -53,11 +54,14 @@ def movements(
             continue
         marked = any("u_turn" in lane.turns for lane in around.section(toward).lanes
                      if lane.reverse == toward.reverse)  # fmt: skip
+        ways = _ways_through(cluster, toward, inner, restrictions, back=marked)
+        # Who has no other way out of a street may turn back.
         ways = [
-            way
-            for way in _ways_through(cluster, toward, inner, restrictions, back=marked)
-            if not _around_a_nose(cluster, toward, way[0])
-        ]
+            (away, inside)
+            for away, inside in ways
+            if not _around_a_nose(cluster, toward, away)
+            and (marked or not _back_along(toward, away))
+        ] or ways
         found.extend(_with_turns(toward, ways, around.driving_side))
     return tuple(found)
 
@@ -112,6 +116,21 @@ def _around_a_nose(cluster: Cluster, toward: DirectedEdge, away: DirectedEdge) -
     return bool(heading_out(outward) @ heading_out(away) > _NOSE_COS)
 
 
+def _back_along(toward: DirectedEdge, away: DirectedEdge) -> bool:
+    """Return whether a way leads back along the other carriageway of the same street."""
+    a, b = toward.edge, away.edge
+    if is_ring_edge(a) or is_ring_edge(b):
+        return False
+    same = a.name == b.name if a.name or b.name else a.road_class == b.road_class
+    return same and _parting(toward, away)
+
+
+def _parting(toward: DirectedEdge, away: DirectedEdge) -> bool:
+    """Return whether two one-way roads part where one ends and the other begins."""
+    outward = DirectedEdge(toward.edge, not toward.reverse)
+    return toward.end_node == away.start_node and opposed(outward, away)
+
+
 def _with_turns(
     toward: DirectedEdge,
     ways: list[tuple[DirectedEdge, tuple[DirectedEdge, ...]]],
@@ -128,8 +147,10 @@ def _with_turns(
         turn = _turn(angle, straightest, angles)
         if is_ring_edge(toward.edge) or is_ring_edge(leg.edge):
             turn = _ring_turn(toward, leg, driving_side)
-        elif toward.edge.index == leg.edge.index or (
-            abs(angle) > U_TURN_RAD and (path or toward.end_node != leg.start_node)
+        elif (
+            toward.edge.index == leg.edge.index
+            or _parting(toward, leg)
+            or (abs(angle) > U_TURN_RAD and (path or toward.end_node != leg.start_node))
         ):
             turn = "u_turn"
         found.append(Movement(toward=toward, away=leg, inside=path, turn=turn, angle_rad=angle))
