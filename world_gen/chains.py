@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -121,8 +122,8 @@ def car_roads(osm: OsmMap, graph: RoadGraph) -> CarRoads:
         for node, outward in leaving.items()
         if len(outward) != 2 or node in on_ring or node in mini
     }
-    stops = {node: osm.node_tags[node] for node, word in highway.items() if word in STOPS}
-    walk = _Walk(edges, leaving, ends, stops)
+    stops = frozenset(node for node, word in highway.items() if word in STOPS)
+    walk = _Walk(edges, leaving, ends, osm.node_tags, stops)
     return CarRoads(
         chains_from={
             node: tuple([walk.chain(item) for item in outward])
@@ -141,14 +142,15 @@ class _Walk:
         edges: Sequence[RoadEdge],
         leaving: Mapping[int, tuple[DirectedEdge, ...]],
         ends: set[int],
-        stops: Mapping[int, Tags],
+        tags: Mapping[int, Tags],
+        stops: frozenset[int],
     ) -> None:
-        self._leaving, self._ends, self._stops = leaving, ends, stops
-        # All points in one call: one for each edge costs ten times as much. Two lists of numbers,
-        # since thousands of pairs are thousands of objects that the garbage collector visits.
+        self._leaving, self._ends, self._tags, self._stops = leaving, ends, tags, stops
+        # All points in one call: one for each edge costs ten times as much. Arrays, since each
+        # of thousands of lists is one more object that the garbage collector visits.
         xy_m = np.concatenate([edge.xy_m for edge in edges]) if edges else np.zeros((0, 2))
-        self._x_m: list[float] = xy_m[:, 0].tolist()
-        self._y_m: list[float] = xy_m[:, 1].tolist()
+        self._x_m = array("d", xy_m[:, 0].tobytes())
+        self._y_m = array("d", xy_m[:, 1].tobytes())
         self._span: dict[int, tuple[int, int]] = {}
         begin = 0
         for edge in edges:
@@ -172,17 +174,16 @@ class _Walk:
             last = b if came_by_a else a
             edges.append(last)
             node = last.end_node
-        back = [DirectedEdge(edge, not reverse) for edge, reverse in reversed(edges)]
-        self._known[(last.edge.index, not last.reverse)] = self._made(back)
-        return self._made(edges)
+        there, back = self._both_ways(edges)
+        self._known[(last.edge.index, not last.reverse)] = back
+        return there
 
-    def _made(self, edges: Sequence[DirectedEdge]) -> Chain:
-        first, first_reverse = edges[0]
-        last, last_reverse = edges[-1]
-        x_m: list[float] = []
-        y_m: list[float] = []
+    def _both_ways(self, edges: list[DirectedEdge]) -> tuple[Chain, Chain]:
+        """Return the chain along `edges` and the one against them."""
+        x_m, y_m = array("d"), array("d")
+        lengths_m = []
+        names = []
         marked = False
-        length_m, name = 0.0, ""
         for edge, reverse in edges:
             begin, end = self._span[edge.index]
             xs, ys = self._x_m[begin:end], self._y_m[begin:end]
@@ -191,9 +192,28 @@ class _Walk:
                 ys.reverse()
             x_m += xs
             y_m += ys
-            length_m += edge.length_m
-            name = name or edge.name
-            marked = marked or not self._stops.keys().isdisjoint(edge.node_ids)
+            lengths_m.append(edge.length_m)
+            if edge.name:
+                names.append(edge.name)
+            marked = marked or not self._stops.isdisjoint(edge.node_ids)
+        there = self._chain(edges, x_m, y_m, sum(lengths_m), names[0] if names else "", marked)
+        against = [DirectedEdge(edge, not reverse) for edge, reverse in reversed(edges)]
+        lengths_m.reverse()
+        name = names[-1] if names else ""
+        back = self._chain(against, x_m[::-1], y_m[::-1], sum(lengths_m), name, marked)
+        return there, back
+
+    def _chain(
+        self,
+        edges: list[DirectedEdge],
+        x_m: array[float],
+        y_m: array[float],
+        length_m: float,
+        name: str,
+        marked: bool,
+    ) -> Chain:
+        first, first_reverse = edges[0]
+        last, last_reverse = edges[-1]
         outward, inward = first.forward, first.backward
         if first_reverse:
             outward, inward = inward, outward
@@ -214,7 +234,7 @@ class _Walk:
         )
 
     def _marks(
-        self, edges: Sequence[DirectedEdge], x_m: list[float], y_m: list[float]
+        self, edges: list[DirectedEdge], x_m: array[float], y_m: array[float]
     ) -> Iterator[Mark]:
         ids = [
             node
@@ -227,7 +247,7 @@ class _Walk:
             along_m += math.hypot(x - x0, y - y0)
             x0, y0 = x, y
             if node in self._stops:
-                yield Mark(node, self._stops[node], along_m)
+                yield Mark(node, self._tags[node], along_m)
 
 
 def _ring_kind(edge: RoadEdge) -> str | None:

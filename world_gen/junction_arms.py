@@ -117,17 +117,16 @@ def _same_street(a: Chain, b: Chain) -> bool:
 
 def _approach(together: list[_WayOut]) -> Approach:
     chains = tuple([way_out.chain for way_out in together])
-    x_m = sum([math.cos(way_out.bearing_rad) for way_out in together])
-    y_m = sum([math.sin(way_out.bearing_rad) for way_out in together])
+    x, y, east, north = 0.0, 0.0, 0.0, 0.0
+    for chain, bearing_rad in together:
+        x, y = x + chain.x_m[0], y + chain.y_m[0]
+        east, north = east + math.cos(bearing_rad), north + math.sin(bearing_rad)
     return Approach(
         arm=JunctionArm(
             name=next((chain.name for chain in chains if chain.name), ""),
-            bearing_rad=math.atan2(y_m, x_m),
+            bearing_rad=math.atan2(north, east),
             outward=tuple([chain.edges[0] for chain in chains]),
         ),
         chains=chains,
-        start_xy_m=(
-            sum([chain.x_m[0] for chain in chains]) / len(chains),
-            sum([chain.y_m[0] for chain in chains]) / len(chains),
-        ),
+        start_xy_m=(x / len(chains), y / len(chains)),
     )

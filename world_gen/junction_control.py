@@ -25,6 +25,8 @@ def lights_of(
     found = {node for node in core if node in node_tags and _is_light(node_tags[node], 0.0)}
     found.update(mark.node for chain in inside for mark in chain.marks if _is_light(mark.tags, 0.0))
     for chain in incoming:
+        if not chain.marks:
+            continue
         for mark in facing(chain, SIGNALS_WITHIN_M, "traffic_signals"):
             if _is_light(mark.tags, mark.distance_m):
                 found.add(mark.node)
@@ -51,6 +53,8 @@ def control_of(
         return "roundabout"
     inner = [node_tags[node] for node in core if node in node_tags]
     inner += [mark.tags for chain in inside for mark in chain.marks]
+    if not inner and all(not chain.marks for chain in incoming):
+        return "uncontrolled"
     stops = [_sign(chain, "stop") for chain in incoming]
     all_way = any(
         tags.get("highway") == "stop" and tags.get("stop") == "all" for tags in inner
