@@ -9,6 +9,7 @@ from contracts.arrays import Array
 from world_gen.bends import rounded_through
 from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
+from world_gen.inner_lanes import paths_along_inner_lanes
 from world_gen.polyline import offset, without_repeats
 from world_gen.polyline_batch import Polylines
 from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
@@ -30,7 +31,10 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     turns = turn_curves(begins, headings, ends, end_headings)
     for c, path in zip(connections, turns.lines.split(), strict=True):
         c.centerline = path
-    long = [i for i, c in enumerate(connections) if _inner_m(c) > _LONG_PATH_M]
+    inside = paths_along_inner_lanes(connections, around)
+    for i, path in inside.items():
+        connections[i].centerline = path
+    long = [i for i, c in enumerate(connections) if i not in inside and _inner_m(c) > _LONG_PATH_M]
     guided = _guided(
         [
             _along_path(begins[i], headings[i], ends[i], end_headings[i], connections[i], around)

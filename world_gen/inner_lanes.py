@@ -1,0 +1,97 @@
+"""Paths through wide junctions: along the lanes of the roads inside, with turns between them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from world_gen.clusters import Surroundings
+from world_gen.connections import ConnectionDraft
+from world_gen.polyline import length, offset, points_at, without_repeats
+from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
+
+_LONG_EDGE_M = 18.0
+"""Roads inside a junction that are shorter are crossed in one sweep."""
+_TURN_ROOM_M = 10.0
+_MOST_TURN_RAD = math.radians(170.0)
+"""A piece between two lanes that turns farther goes round in a loop: no car drives it."""
+
+
+class _Pose(NamedTuple):
+    at: Array
+    heading: Array
+
+
+def paths_along_inner_lanes(
+    connections: list[ConnectionDraft], around: Surroundings
+) -> dict[int, Array]:
+    """Return (N, 2) paths by the connection's place in the list, where the lanes inside allow one.
+
+    Each leads through its lane of every long road inside, and turns where the roads meet; left
+    out are those with a turn tighter than a car can drive.
+    """
+    poses: list[_Pose] = []
+    ends: list[_Pose] = []
+    owner: list[int] = []
+    for i, c in enumerate(connections):
+        if all(part.edge.length_m < _LONG_EDGE_M for part in c.movement.inside):
+            continue
+        first, last = c.start.centerline, c.end.centerline
+        chain = [
+            _Pose(first[-1], _unit(first[-1] - first[-2])),
+            *_poses_inside(c, around),
+            _Pose(last[0], _unit(last[1] - last[0])),
+        ]
+        poses += chain[:-1]
+        ends += chain[1:]
+        owner += [i] * (len(chain) - 1)
+    if not owner:
+        return {}
+    turns = turn_curves(
+        np.array([p.at for p in poses]),
+        np.array([p.heading for p in poses]),
+        np.array([p.at for p in ends]),
+        np.array([p.heading for p in ends]),
+    )
+    pieces: dict[int, list[Array]] = {}
+    refused: set[int] = set()
+    for i, piece, radius_m in zip(owner, turns.lines.split(), turns.radius_m.tolist(), strict=True):
+        pieces.setdefault(i, []).append(piece)
+        if radius_m < LEAST_RADIUS_M or _turned_rad(piece) > _MOST_TURN_RAD:
+            refused.add(i)
+    return {
+        i: np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+        for i, parts in pieces.items()
+        if i not in refused
+    }
+
+
+def _poses_inside(c: ConnectionDraft, around: Surroundings) -> list[_Pose]:
+    found: list[_Pose] = []
+    for part in c.movement.inside:
+        plans = around.section(part).driven(reverse=part.reverse)
+        if part.edge.length_m < _LONG_EDGE_M or not plans:
+            continue
+        number = {"left": 0, "u_turn": 0, "right": -1}.get(c.turn, c.start.plan.number)
+        left_m = plans[min(number, len(plans) - 1)].left_m
+        line = offset(without_repeats(part.xy_m), -left_m if part.reverse else left_m)
+        total_m = length(line)
+        room_m = min(_TURN_ROOM_M, total_m / 2)
+        for at_m in sorted({room_m, total_m - room_m}):
+            near = points_at(line, np.array([at_m - 0.5, at_m, at_m + 0.5]))
+            found.append(_Pose(near[1], _unit(near[2] - near[0])))
+    return found
+
+
+def _unit(vector: Array) -> Array:
+    return np.asarray(vector / max(math.hypot(*vector), 1e-9))
+
+
+def _turned_rad(line: Array) -> float:
+    step = np.diff(line, axis=0)
+    a, b = step[:-1], step[1:]
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return float(np.abs(np.arctan2(cross, (a * b).sum(axis=1))).sum())
