@@ -12,11 +12,11 @@ from world_gen.connections import ConnectionDraft
 from world_gen.met_on_the_way import (
     Met,
     NodeTags,
-    arcs_of,
     is_light,
     lights_behind,
     met_inside,
     met_toward,
+    passed_on,
     sign_of,
 )
 from world_gen.priority_roads import Entry, Rank, Standing, opposites, outward, standings
@@ -85,7 +85,7 @@ def approaches(
     `junction_lights` are the nodes of the lights that are known to govern some junction.
     Roads of a ring are approaches only where a light stands on them.
     """
-    arcs_m = arcs_of(around.edges)
+    tagged_on = passed_on(around.edges, node_tags)
     inside: dict[tuple[int, bool], list[Met]] = {}
     for connection in connections:
         if connection.cluster.whole and connection.movement.inside:
@@ -115,7 +115,7 @@ def approaches(
             on_ring = cluster.ring and is_ring_edge(leg.edge)
             if not on_ring and not cluster.ring and leg.edge.index in junction.inner:
                 continue
-            met = met_toward(leg, plain_from, node_tags, junction.nodes, arcs_m)
+            met = met_toward(leg, plain_from, node_tags, junction.nodes, tagged_on)
             lights = [m for m in met if is_light(m.tags) and m.node in junction.lights]
             if on_ring and not lights:
                 continue

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 from contracts.world import YieldRule
@@ -39,11 +38,26 @@ def sign_of(tags: Mapping[str, str]) -> YieldRule | None:
     return "give_way" if word == "give_way" or sign.startswith("DE:205") else None
 
 
-def arcs_of(edges: Mapping[int, RoadEdge]) -> dict[int, list[float]]:
-    """Return metres from the first node to each node of every edge, by edge index."""
+class Passed(NamedTuple):
+    """An edge's length, and its tagged nodes in the order of the way, each with its arc length."""
+
+    length_m: float
+    tagged: tuple[tuple[int, float], ...]
+
+
+def passed_on(edges: Mapping[int, RoadEdge], node_tags: NodeTags) -> dict[int, Passed]:
+    """Return what lies on every edge, by edge index."""
     paths = Polylines.of([edge.xy_m for edge in edges.values()])
-    arc_m, first = paths.arc_m.tolist(), paths.first.tolist()
-    return {i: arc_m[a:b] for i, (a, b) in zip(edges, pairwise(first), strict=True)}
+    found = {}
+    rows = zip(edges.items(), paths.first[:-1].tolist(), paths.length_m.tolist(), strict=True)
+    for (index, edge), first, length_m in rows:
+        tagged = tuple(
+            (node, float(paths.arc_m[first + i]))
+            for i, node in enumerate(edge.node_ids)
+            if node in node_tags
+        )
+        found[index] = Passed(length_m, tagged)
+    return found
 
 
 def met_toward(
@@ -51,26 +65,23 @@ def met_toward(
     plain_from: Mapping[int, Cluster],
     node_tags: NodeTags,
     junction_nodes: Collection[int],
-    arcs_m: Mapping[int, Sequence[float]],
+    passed: Mapping[int, Passed],
 ) -> list[Met]:
     """Walk outward along the leg, on through nodes where the road merely goes on.
 
-    A node that does not say which way it faces counts for the nearer junction. `arcs_m` are
-    those of `arcs_of`.
+    A node that does not say which way it faces counts for the nearer junction. `passed`
+    is that of `passed_on`.
     """
     found: list[tuple[Met, bool]] = []
     gone, current, meets_another = 0.0, leg, False
     for _ in range(8):
-        along, total_m = arcs_m[current.edge.index], arcs_m[current.edge.index][-1]
-        order = -1 if current.reverse else 1
-        for node, arc_m in zip(current.edge.node_ids[::order], along[::order], strict=False):
-            tags = node_tags.get(node)
-            if tags:
-                at_m = gone + (total_m - arc_m if current.reverse else arc_m)
-                facing = faces(tags, current.reverse)
-                if facing is not False and at_m <= LOOK_BACK_M:
-                    found.append((Met(node, at_m, tags), facing is None))
-        gone += total_m
+        length_m, tagged = passed[current.edge.index]
+        for node, arc_m in tagged[::-1] if current.reverse else tagged:
+            at_m = gone + (length_m - arc_m if current.reverse else arc_m)
+            facing = faces(node_tags[node], current.reverse)
+            if facing is not False and at_m <= LOOK_BACK_M:
+                found.append((Met(node, at_m, node_tags[node]), facing is None))
+        gone += length_m
         cluster = plain_from.get(current.end_node)
         meets_another = cluster is None
         if (

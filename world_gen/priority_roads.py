@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
-import numpy as np
-
 from contracts.arrays import Array
 from contracts.world import DrivingSide, Provenance, YieldRule
 from world_gen.legs import heading_out
@@ -69,16 +67,18 @@ def opposites(
     `roads` are driven toward the junction, `legs` out of it; a leg that nobody enters by has no
     place among the roads.
     """
-    ways_out = [
-        heading_out(g, LOOK_M) for g in legs if not DirectedEdge(g.edge, not g.reverse).allowed
-    ]
-    out = np.array([outward(road) for road in roads])
-    cos = out @ out.T
-    leads_on = (out @ np.array([*out, *ways_out]).T).min(axis=1) < _OPPOSITE_COS
-    return [
-        (j if cos[i, j] < _OPPOSITE_COS else None, bool(leads_on[i]))
-        for i, j in enumerate(cos.argmin(axis=1).tolist())
-    ]
+    # A junction has few roads: plain floats are faster here than arrays.
+    out: list[list[float]] = [outward(road).tolist() for road in roads]
+    out_only = [leg for leg in legs if not DirectedEdge(leg.edge, not leg.reverse).allowed]
+    ways_out: list[list[float]] = [heading_out(leg, LOOK_M).tolist() for leg in out_only]
+    found: list[tuple[int | None, bool]] = []
+    for x, y in out:
+        cos = [x * u + y * v for u, v in out]
+        lowest = min(cos)
+        ahead = cos.index(lowest) if lowest < _OPPOSITE_COS else None
+        past = any(x * u + y * v < _OPPOSITE_COS for u, v in ways_out)
+        found.append((ahead, past or ahead is not None))
+    return found
 
 
 def outward(toward: DirectedEdge) -> Array:
