@@ -21,9 +21,10 @@ from world_gen.legs import heading_out as heading_out
 from world_gen.legs import is_ring_edge as is_ring_edge
 from world_gen.map_index import MapIndex
 from world_gen.polyline import without_repeats
-from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from world_gen.road_graph import DirectedEdge, RoadEdge
 from world_gen.transitions import transition_shifts
 from world_gen.trims import trims
+from world_gen.turn_restrictions import TurnRestrictions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +69,7 @@ class Surroundings:
     ring_edges: frozenset[int]
     shifts_m: Mapping[int, tuple[float, float]]
     """How far left of their way roads in a transition begin and end, by edge index."""
+    notes: tuple[str, ...] = ()
 
     @property
     def inner_edges(self) -> frozenset[int]:
@@ -96,29 +98,20 @@ def surroundings(
     frame: LocalFrame,
     extent: Extent,
     made_for: tuple[Junction, ...],
-    *,
-    extra_edges: frozenset[int] = frozenset(),
-    service_roads: bool = False,
 ) -> Surroundings:
     """Collect the roads within `extent` of the frame's origin and cluster their nodes.
 
-    Roads of the junctions in `made_for` are kept even where they lie beyond. Service roads,
-    driveways and parking aisles get lanes and are joined to the roads where they are named in
-    `extra_edges` (indices of the graph's edges, such as those of a route) or, with
-    `service_roads`, everywhere; none of them makes a junction.
+    Roads of the junctions in `made_for` are kept even where they lie beyond.
     """
     graph = index.graph
     area = in_map(extent, frame, graph.frame)
     wanted = set(index.car_edges_in(area))
-    wanted.update(_minor_edges_in(graph, area, extra_edges, service_roads=service_roads))
     for junction in made_for:
         wanted.update(i for i in junction.inner if _drivable(graph.edges[i]))
         wanted.update(
             leg.edge.index for arm in junction.arms for leg in arm.outward if _drivable(leg.edge)
         )
-    edges = _in_frame(
-        [_opened(graph.edges[i], extra_edges) for i in sorted(wanted)], frame, graph.frame
-    )
+    edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
     sections = _sections(index, edges)
     clusters = _clusters(index, made_for, edges, extent)
     whole = {id(c.junction): c.junction for c in clusters if c.whole and c.junction is not None}
@@ -136,44 +129,36 @@ def surroundings(
         trims_m=trims(clusters, edges, sections, shifts),
         shifts_m=shifts,
         ring_edges=ring_edges,
+        notes=_restriction_notes(index.restrictions, clusters, edges),
     )
+
+
+def _restriction_notes(
+    restrictions: TurnRestrictions, clusters: tuple[Cluster, ...], edges: Mapping[int, RoadEdge]
+) -> tuple[str, ...]:
+    """Return a line for each restriction over ways that do not lie within one place."""
+    if not restrictions.over_ways:
+        return ()
+    of_way: dict[int, set[int]] = {}
+    for index, edge in edges.items():
+        of_way.setdefault(edge.way_id, set()).add(index)
+    notes = []
+    for rule in restrictions.over_ways:
+        if not {rule.from_way, *rule.via_ways} <= of_way.keys():
+            continue
+        inside = set().union(*(of_way[way] for way in rule.via_ways))
+        if not any(inside <= cluster.inner for cluster in clusters):
+            ways = ", ".join(str(way) for way in rule.via_ways)
+            notes.append(
+                f"relation {rule.relation}: its turn restriction from way {rule.from_way} leads "
+                f"over way {ways}, part of which lies outside a junction; held there alone "
+                "where the ways follow each other within one"
+            )
+    return tuple(dict.fromkeys(notes))
 
 
 def _drivable(edge: RoadEdge) -> bool:
     return edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
-
-
-def _minor_edges_in(
-    graph: RoadGraph, area: shapely.Polygon, extra_edges: frozenset[int], *, service_roads: bool
-) -> list[int]:
-    """Return roads within an area that make no junction: those named, or all service roads."""
-    edges = [graph.edges[i] for i in sorted(extra_edges)]
-    if service_roads:
-        edges += [
-            edge
-            for edge in graph.edges
-            if edge.road_class == "service"
-            and (edge.forward or edge.backward)
-            and edge.index not in extra_edges
-        ]
-    edges = [edge for edge in edges if not edge.car and edge.length_m > 0.05]
-    if not edges:
-        return []
-    lines = shapely.linestrings(
-        np.concatenate([edge.xy_m for edge in edges]),
-        indices=np.repeat(np.arange(len(edges)), [len(edge.xy_m) for edge in edges]),
-    )
-    shapely.prepare(area)
-    return [edges[i].index for i in np.nonzero(shapely.intersects(area, lines))[0].tolist()]
-
-
-def _opened(edge: RoadEdge, extra_edges: frozenset[int]) -> RoadEdge:
-    """Return an edge that a route uses with lanes, even where the public may not drive."""
-    if edge.index not in extra_edges or edge.forward or edge.backward:
-        return edge
-    against = edge.tags.get("oneway") in ("-1", "reverse")
-    along = edge.tags.get("oneway") in ("yes", "true", "1")
-    return dataclasses.replace(edge, forward=not against, backward=not along)
 
 
 def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, CrossSection]:

@@ -116,6 +116,7 @@ class LaneSet:
 def build_lanes(around: Surroundings) -> LaneSet:
     """Return every car lane within the World's extent, joined to lanes that simply go on."""
     stretches, notes = reference_lines(around)
+    notes.extend(around.notes)
     sections = [around.sections[stretch.edge] for stretch in stretches]
     for index in dict.fromkeys(stretch.edge for stretch in stretches):
         notes.extend(around.sections[index].notes)

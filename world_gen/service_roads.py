@@ -26,15 +26,15 @@ def open_service_roads(edges: Iterable[RoadEdge]) -> tuple[int, ...]:
 def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
     """Return the graph with these edges, say those of a route, counted as car roads.
 
+    They are open to the car that is to use them even where the public may not drive.
+
     Junctions and Worlds found in it know the places where they meet a street; edges keep their
     indices, so what was found in one graph holds in the other.
     """
     added = {index for index in edges if not graph.edges[index].car}
     if not added:
         return graph
-    changed = tuple(
-        dataclasses.replace(edge, car=True) if edge.index in added else edge for edge in graph.edges
-    )
+    changed = tuple(_opened(edge) if edge.index in added else edge for edge in graph.edges)
     leaving = dict(graph.leaving)
     ends = {
         node for index in added for node in (changed[index].start_node, changed[index].end_node)
@@ -44,3 +44,11 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
             DirectedEdge(changed[item.edge.index], item.reverse) for item in graph.leaving[node]
         )
     return dataclasses.replace(graph, edges=changed, leaving=leaving)
+
+
+def _opened(edge: RoadEdge) -> RoadEdge:
+    if edge.forward or edge.backward:
+        return dataclasses.replace(edge, car=True)
+    against = edge.tags.get("oneway") in ("-1", "reverse")
+    along = edge.tags.get("oneway") in ("yes", "true", "1")
+    return dataclasses.replace(edge, car=True, forward=not against, backward=not along)

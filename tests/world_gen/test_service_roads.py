@@ -13,6 +13,7 @@ from world_gen.find_intersections import find_intersections
 from world_gen.lanes import build_lanes
 from world_gen.map_index import index_map
 from world_gen.movements import movements
+from world_gen.service_roads import with_roads, with_service_roads
 
 DRIVEWAY = {"highway": "service", "service": "driveway", "access": "private"}
 
@@ -30,14 +31,16 @@ def place():
             (21, [7, 8], {"highway": "service", "service": "parking_aisle", "oneway": "yes"}),
         ],
     )  # fmt: skip
-    graph = build_road_graph(osm)
-    (junction,) = find_intersections(osm, graph)
-    return index_map(osm, graph, (junction,)), junction
+    return osm, build_road_graph(osm)
 
 
-def _around(place, **options):
-    index, junction = place
-    return surroundings(index, world_frame(junction), Disc(150.0), (junction,), **options)
+def _index(osm, graph):
+    return index_map(osm, graph, find_intersections(osm, graph))
+
+
+def _around(index):
+    junction = index.junction_of_node[0]
+    return surroundings(index, world_frame(junction), Disc(150.0), (junction,))
 
 
 def _ways(around) -> set[int]:
@@ -45,31 +48,26 @@ def _ways(around) -> set[int]:
 
 
 def test_they_have_no_lanes_unless_asked_for(place):
-    assert _ways(_around(place)) == {11, 12, 13}
+    osm, graph = place
+    assert _ways(_around(_index(osm, graph))) == {11, 12, 13}
     # Where the public may not drive there are none even then.
-    assert _ways(_around(place, service_roads=True)) == {11, 12, 13, 21}
+    assert _ways(_around(_index(osm, with_service_roads(graph)))) == {11, 12, 13, 21}
 
 
 def test_a_route_opens_the_driveway_that_it_uses(place):
-    index, _ = place
-    (driveway,) = (edge.index for edge in index.graph.edges if edge.way_id == 20)
-    around = _around(place, extra_edges=frozenset({driveway}))
-    lanes = build_lanes(around)
+    osm, graph = place
+    (driveway,) = (edge.index for edge in graph.edges if edge.way_id == 20)
+    around = _around(_index(osm, with_roads(graph, [driveway])))
     assert _ways(around) == {11, 12, 13, 20}
-    assert len([lane for lane in lanes.lanes.values() if lane.edge.way_id == 20]) == 2
-    (gate,) = (c for c in around.clusters if c.nodes == {5})
-    assert gate.junction is None
-    found = connect(gate, movements(gate, around, index.restrictions), around, lanes, [])
-    into = {c.turn for c in found if c.end.edge.way_id == 20}
-    assert into == {"left", "right"}
-    assert len(found) == 6
+    assert len([k for k in build_lanes(around).lanes.values() if k.edge.way_id == 20]) == 2
 
 
 def test_a_one_way_aisle_is_only_entered(place):
-    index, _ = place
-    around = _around(place, service_roads=True)
+    osm, graph = place
+    index = _index(osm, with_service_roads(graph))
+    around = _around(index)
     lanes = build_lanes(around)
-    (gate,) = (c for c in around.clusters if c.nodes == {7})
+    (gate,) = (c for c in around.clusters if 7 in c.nodes)
     found = connect(gate, movements(gate, around, index.restrictions), around, lanes, [])
     assert len([c for c in found if c.end.edge.way_id == 21]) == 2
     assert not [c for c in found if c.start.edge.way_id == 21]

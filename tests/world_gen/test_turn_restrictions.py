@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from tests.world_gen.drawn_maps import crossing, world_of
+from world_gen.build import build_world
+from world_gen.build_graph import build_road_graph
+from world_gen.find_intersections import find_intersections
+from world_gen.read_osm import read_map
+from world_gen.turn_restrictions import read_turn_restrictions
 
 FROM_WEST = ("w", 13, "from")
 VIA = ("n", 0, "via")
@@ -49,3 +56,24 @@ def test_two_ways_of_which_one_must_be_taken():
 
 def test_a_relation_without_an_end_forbids_nothing():
     assert _leaving_west({"restriction": "no_exit"}, ends=()) == {11, 12, 14}
+
+
+def test_a_restriction_over_a_way_beyond_the_junction_is_named():
+    members = [("w", 12, "from"), ("w", 13, "via"), ("w", 20, "to")]
+    world = world_of(
+        crossing(
+            extra_nodes={20: (-100.0, 80.0)},
+            extra_ways=[(20, [3, 20], {"highway": "residential", "name": "Lane"})],
+            relations=[(7, members, {"type": "restriction", "restriction": "no_u_turn"})],
+        )
+    )
+    assert [note for note in world.notes if note.startswith("relation 7:")]
+
+
+def test_a_restriction_over_ways_within_a_junction_needs_no_note():
+    maps = Path(__file__).parents[1] / "data" / "junctions"
+    osm = read_map(maps / "32_restriction_via_way.osm")
+    graph = build_road_graph(osm)
+    (junction,) = find_intersections(osm, graph)
+    assert len(read_turn_restrictions(osm).over_ways) == 2
+    assert not [n for n in build_world(osm, graph, junction).notes if n.startswith("relation")]
