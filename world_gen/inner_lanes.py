@@ -33,6 +33,7 @@ def paths_along_inner_lanes(
     Each leads through its lane of every long road inside, and turns where the roads meet; left
     out are those with a turn tighter than a car can drive.
     """
+    known: dict[tuple[int, bool, float], list[_Pose]] = {}
     poses: list[_Pose] = []
     ends: list[_Pose] = []
     owner: list[int] = []
@@ -42,7 +43,7 @@ def paths_along_inner_lanes(
         first, last = c.start.centerline, c.end.centerline
         chain = [
             _Pose(first[-1], _unit(first[-1] - first[-2])),
-            *_poses_inside(c, around),
+            *_poses_inside(c, around, known),
             _Pose(last[0], _unit(last[1] - last[0])),
         ]
         poses += chain[:-1]
@@ -69,7 +70,9 @@ def paths_along_inner_lanes(
     }
 
 
-def _poses_inside(c: ConnectionDraft, around: Surroundings) -> list[_Pose]:
+def _poses_inside(
+    c: ConnectionDraft, around: Surroundings, known: dict[tuple[int, bool, float], list[_Pose]]
+) -> list[_Pose]:
     found: list[_Pose] = []
     for part in c.movement.inside:
         plans = around.section(part).driven(reverse=part.reverse)
@@ -77,13 +80,21 @@ def _poses_inside(c: ConnectionDraft, around: Surroundings) -> list[_Pose]:
             continue
         number = {"left": 0, "u_turn": 0, "right": -1}.get(c.turn, c.start.plan.number)
         left_m = plans[min(number, len(plans) - 1)].left_m
-        line = offset(without_repeats(part.xy_m), -left_m if part.reverse else left_m)
-        total_m = length(line)
-        room_m = min(_TURN_ROOM_M, total_m / 2)
-        for at_m in sorted({room_m, total_m - room_m}):
-            near = points_at(line, np.array([at_m - 0.5, at_m, at_m + 0.5]))
-            found.append(_Pose(near[1], _unit(near[2] - near[0])))
+        key = (part.edge.index, part.reverse, left_m)
+        if key not in known:
+            known[key] = _poses_along(part.xy_m, -left_m if part.reverse else left_m)
+        found += known[key]
     return found
+
+
+def _poses_along(way: Array, left_m: float) -> list[_Pose]:
+    """Return where turns off a lane end and begin: near both ends of it, or in its middle."""
+    line = offset(without_repeats(way), left_m)
+    total_m = length(line)
+    room_m = min(_TURN_ROOM_M, total_m / 2)
+    at_m = sorted({room_m, total_m - room_m})
+    near = points_at(line, np.array([[at - 0.5, at, at + 0.5] for at in at_m]).ravel())
+    return [_Pose(near[i + 1], _unit(near[i + 2] - near[i])) for i in range(0, len(near), 3)]
 
 
 def _unit(vector: Array) -> Array:

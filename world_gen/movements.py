@@ -127,8 +127,10 @@ def _back_along(toward: DirectedEdge, away: DirectedEdge) -> bool:
 
 def _parting(toward: DirectedEdge, away: DirectedEdge) -> bool:
     """Return whether two one-way roads part where one ends and the other begins."""
-    outward = DirectedEdge(toward.edge, not toward.reverse)
-    return toward.end_node == away.start_node and opposed(outward, away)
+    a, b = toward.edge, away.edge
+    if toward.end_node != away.start_node or a.forward == a.backward or b.forward == b.backward:
+        return False
+    return opposed(DirectedEdge(a, not toward.reverse), away)
 
 
 def _with_turns(
