@@ -151,7 +151,8 @@ def _score_lanes(truth: TrueJunction, world: World, seen: Seen, result: Score) -
         road = roads[lane.road_id]
         ends = (road.to_place, road.from_place)
         there, back = ends[::-1] if lane.reverse else ends
-        if lane.id not in seen.inside:
+        # A lane from which both directions turn counts for neither, though it is driven one way.
+        if lane.id not in seen.inside and not lane.id.endswith(".centre"):
             found[lane.name, lane.kind, "in"] += there in places
             found[lane.name, lane.kind, "out"] += back in places
     for arm in truth.arms.values():
