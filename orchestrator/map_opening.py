@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,7 +64,10 @@ def open_map(
     graph = build_road_graph(osm)
     if service_roads:
         graph = with_service_roads(graph)
-    return OpenMap(file, osm, graph, find_intersections(osm, graph))
+    junctions = find_intersections(osm, graph)
+    # A map stays for as long as its process: the collector need not visit it again and again.
+    gc.freeze()
+    return OpenMap(file, osm, graph, junctions)
 
 
 def region_on_map(file: Path, have: LatLonBounds, wanted: LatLonBounds) -> LatLonBounds:

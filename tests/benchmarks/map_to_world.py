@@ -10,21 +10,17 @@ import sys
 from pathlib import Path
 
 from contracts.world import World
+from orchestrator.map_opening import open_map
 from world_gen.build import build_region
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
 from world_gen.map_index import index_map
-from world_gen.read_osm import read_map
 from world_gen.world_store import WorldStore
 
 
 def make_world(map_file: Path, folder: Path) -> World:
     """Build the World of all roads of a map and save it in `folder`."""
-    osm = read_map(map_file)
-    graph = build_road_graph(osm)
-    junctions = find_intersections(osm, graph)
-    index = index_map(osm, graph, junctions)
-    world = build_region(osm, graph, osm.bounds, index=index)
+    opened = open_map(map_file)
+    index = index_map(opened.osm, opened.graph, opened.junctions)
+    world = build_region(opened.osm, opened.graph, opened.osm.bounds, index=index)
     WorldStore(folder).save(world)
     return world
 
