@@ -20,11 +20,13 @@ from world_gen.legs import RING_KINDS as RING_KINDS
 from world_gen.legs import heading_out as heading_out
 from world_gen.legs import is_ring_edge as is_ring_edge
 from world_gen.map_index import MapIndex
-from world_gen.polyline import without_repeats
+from world_gen.polyline_batch import Polylines
 from world_gen.road_graph import DirectedEdge, RoadEdge
 from world_gen.transitions import transition_shifts
 from world_gen.trims import trims
-from world_gen.turn_restrictions import TurnRestrictions
+from world_gen.turn_restrictions import restriction_notes
+
+_REPEAT_M = 0.01
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,69 +131,79 @@ def surroundings(
         trims_m=trims(clusters, edges, sections, shifts),
         shifts_m=shifts,
         ring_edges=ring_edges,
-        notes=_restriction_notes(index.restrictions, clusters, edges),
+        notes=restriction_notes(index.restrictions, [c.inner for c in clusters], edges),
     )
-
-
-def _restriction_notes(
-    restrictions: TurnRestrictions, clusters: tuple[Cluster, ...], edges: Mapping[int, RoadEdge]
-) -> tuple[str, ...]:
-    """Return a line for each restriction over ways that do not lie within one place."""
-    if not restrictions.over_ways:
-        return ()
-    of_way: dict[int, set[int]] = {}
-    for index, edge in edges.items():
-        of_way.setdefault(edge.way_id, set()).add(index)
-    notes = []
-    for rule in restrictions.over_ways:
-        if not {rule.from_way, *rule.via_ways} <= of_way.keys():
-            continue
-        inside = set().union(*(of_way[way] for way in rule.via_ways))
-        if not any(inside <= cluster.inner for cluster in clusters):
-            ways = ", ".join(str(way) for way in rule.via_ways)
-            notes.append(
-                f"relation {rule.relation}: its turn restriction from way {rule.from_way} leads "
-                f"over way {ways}, part of which lies outside a junction; held there alone "
-                "where the ways follow each other within one"
-            )
-    return tuple(dict.fromkeys(notes))
 
 
 def _drivable(edge: RoadEdge) -> bool:
     return edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
 
 
+_SAY_NOTHING_OF_LANES = frozenset(
+    {"name", "ref", "maxspeed", "surface", "lit", "smoothness", "source", "wikidata", "note"}
+)
+
+
 def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, CrossSection]:
-    """Return cross-sections by edge index; the edges of one way share theirs."""
-    known: dict[tuple[int, bool, bool, bool], CrossSection] = {}
+    """Return cross-sections by edge index; ways whose tags say the same share theirs."""
+    of_way: dict[tuple[int, bool, bool, bool], CrossSection] = {}
+    of_tags: dict[object, CrossSection] = {}
     found: dict[int, CrossSection] = {}
     for i, edge in edges.items():
         # A centre lane for turns is driven toward the junction, where there is one.
         centre_reverse = (
-            edge.start_node in index.junction_of_node
+            "lanes:both_ways" in edge.tags
+            and edge.start_node in index.junction_of_node
             and edge.end_node not in index.junction_of_node
         )
         key = (edge.way_id, edge.forward, edge.backward, centre_reverse)
-        section = known.get(key)
+        section = of_way.get(key)
         if section is None:
-            section = cross_section(edge, index.graph.driving_side, centre_reverse=centre_reverse)
-            known[key] = section
+            section = of_way[key] = _section(
+                edge, index.graph.driving_side, of_tags, centre_reverse=centre_reverse
+            )
         found[i] = section
     return found
+
+
+def _section(
+    edge: RoadEdge,
+    driving_side: DrivingSide,
+    of_tags: dict[object, CrossSection],
+    *,
+    centre_reverse: bool,
+) -> CrossSection:
+    lanes = (edge.lanes_forward, edge.lanes_backward)
+    tags = frozenset(item for item in edge.tags.items() if item[0] not in _SAY_NOTHING_OF_LANES)
+    key = (
+        edge.road_class,
+        edge.forward,
+        edge.backward,
+        centre_reverse,
+        *((count.value, count.source) for count in lanes),
+        tags,
+    )
+    section = of_tags.get(key)
+    if section is None:
+        section = cross_section(edge, driving_side, centre_reverse=centre_reverse)
+        if not section.notes:  # these name the way
+            of_tags[key] = section
+    return section
 
 
 def _in_frame(
     edges: list[RoadEdge], frame: LocalFrame, map_frame: LocalFrame
 ) -> dict[int, RoadEdge]:
+    """Return edges in the World's frame by index, without those that are but a point."""
     if not edges:
         return {}
-    joined = np.concatenate([edge.xy_m for edge in edges])
-    moved = target_from_source(frame, map_frame, joined, 0.0).xy_m
-    ends = np.cumsum([len(edge.xy_m) for edge in edges])[:-1]
+    lines = Polylines.of([edge.xy_m for edge in edges])
+    moved = Polylines(target_from_source(frame, map_frame, lines.xy_m, 0.0).xy_m, lines.first)
+    step_m = np.maximum.reduceat(moved.steps[1] * ~moved.is_last, moved.first[:-1]).tolist()
     return {
         edge.index: dataclasses.replace(edge, xy_m=xy)
-        for edge, xy in zip(edges, np.split(moved, ends), strict=True)
-        if len(without_repeats(xy)) >= 2
+        for edge, xy, longest_m in zip(edges, moved.split(), step_m, strict=True)
+        if longest_m > _REPEAT_M
     }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from world_gen.osm_map import OsmMap
-from world_gen.road_graph import DirectedEdge
+from world_gen.road_graph import DirectedEdge, RoadEdge
 
 _KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehicle", "restriction")
 """The most specific word holds; one for lorries or buses alone does not, nor one at times."""
@@ -98,3 +98,32 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
                 rule = NodeRule(relation.id, start, ends, only, word.endswith("u_turn"))
                 at_node.setdefault(node, []).append(rule)
     return TurnRestrictions({k: tuple(v) for k, v in at_node.items()}, tuple(over_ways))
+
+
+def restriction_notes(
+    restrictions: TurnRestrictions,
+    inner: Sequence[frozenset[int]],
+    edges: Mapping[int, RoadEdge],
+) -> tuple[str, ...]:
+    """Return a line for each restriction over ways that do not lie within one place.
+
+    `inner` are the edges within each place.
+    """
+    if not restrictions.over_ways:
+        return ()
+    of_way: dict[int, set[int]] = {}
+    for index, edge in edges.items():
+        of_way.setdefault(edge.way_id, set()).add(index)
+    notes = []
+    for rule in restrictions.over_ways:
+        if not {rule.from_way, *rule.via_ways} <= of_way.keys():
+            continue
+        inside = set().union(*(of_way[way] for way in rule.via_ways))
+        if not any(inside <= edges_inside for edges_inside in inner):
+            ways = ", ".join(str(way) for way in rule.via_ways)
+            notes.append(
+                f"relation {rule.relation}: its turn restriction from way {rule.from_way} leads "
+                f"over way {ways}, part of which lies outside a junction; held there alone "
+                "where the ways follow each other within one"
+            )
+    return tuple(dict.fromkeys(notes))
