@@ -17,6 +17,8 @@ from world_gen.turn_restrictions import TurnRestrictions
 STRAIGHT_RAD = math.radians(45.0)
 FORK_RAD = math.radians(18.0)
 U_TURN_RAD = math.radians(150.0)
+Heads = dict[tuple[int, bool], tuple[float, ...]]
+"""Where legs head, by (edge index, reverse)."""
 _NOSE_COS = math.cos(math.radians(60.0))
 
 
@@ -47,6 +49,9 @@ def movements(
         for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
             if directed.allowed:
                 inner.setdefault(directed.start_node, []).append(directed)
+    heads: Heads = {
+        (leg.edge.index, leg.reverse): tuple(heading_out(leg).tolist()) for leg in cluster.legs
+    }
     found: list[Movement] = []
     for leg in cluster.legs:
         toward = DirectedEdge(leg.edge, not leg.reverse)
@@ -62,7 +67,7 @@ def movements(
             if not _around_a_nose(cluster, toward, away)
             and (marked or not _back_along(toward, away))
         ] or ways
-        found.extend(_with_turns(toward, ways, around.driving_side))
+        found.extend(_with_turns(toward, ways, heads, around.driving_side))
     return tuple(found)
 
 
@@ -136,12 +141,13 @@ def _parting(toward: DirectedEdge, away: DirectedEdge) -> bool:
 def _with_turns(
     toward: DirectedEdge,
     ways: list[tuple[DirectedEdge, tuple[DirectedEdge, ...]]],
+    heads: Heads,
     driving_side: DrivingSide,
 ) -> list[Movement]:
-    x, y = heading_out(DirectedEdge(toward.edge, not toward.reverse)).tolist()
+    x, y = heads[toward.edge.index, not toward.reverse]
     angles = []
     for leg, _ in ways:
-        u, v = heading_out(leg).tolist()
+        u, v = heads[leg.edge.index, leg.reverse]
         angles.append(math.atan2(y * u - x * v, -x * u - y * v))
     straightest = min((abs(a) for a in angles), default=0.0)
     found = []
