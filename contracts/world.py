@@ -12,8 +12,9 @@ import msgspec
 
 from contracts.arrays import Array
 from contracts.frames import LocalFrame
+from contracts.provenance import Choice, Provenance, Quantity
+from contracts.signals import Signal, SignalPlan
 
-Provenance = Literal["tagged", "inferred", "default"]
 JunctionKind = Literal[
     "roundabout", "circular", "mini_roundabout", "crossing", "t_junction", "y_junction",
     "staggered", "merge", "other", "region",
@@ -44,20 +45,6 @@ DRAWN_GENERATOR = "foretwin draw_town"
 """How the generator of a map drawn for foretwin begins."""
 DRAWN_ATTRIBUTION = "drawn for foretwin, an invented town"
 """Stands in OpenStreetMap's place where the map is none of theirs."""
-
-
-class Quantity(msgspec.Struct, frozen=True):
-    """A number and where it came from."""
-
-    value: float
-    source: Provenance
-
-
-class Choice(msgspec.Struct, frozen=True):
-    """A word and where it came from."""
-
-    value: str
-    source: Provenance
 
 
 class IntersectionSummary(msgspec.Struct, frozen=True, kw_only=True):
@@ -200,49 +187,6 @@ class Crossing(msgspec.Struct, frozen=True, kw_only=True):
     osm_node: int | None = None
     island: bool = False
     """Whether a refuge in the middle parts it."""
-
-
-class Signal(msgspec.Struct, frozen=True, kw_only=True):
-    """A signal head that governs lanes; `position` (3,), facing `yaw_rad` (towards the driver)."""
-
-    id: str
-    osm_node: int | None
-    group_id: str
-    lane_ids: tuple[str, ...]
-    position: Array
-    yaw_rad: float
-    source: Provenance
-    osm_nodes: tuple[int, ...] = ()
-    """All nodes of the map that stand for this light; `osm_node` is the one met first."""
-
-
-class SignalGroup(msgspec.Struct, frozen=True, kw_only=True):
-    """What is green together: connections, and crossings for those on foot; live by this id."""
-
-    id: str
-    connection_ids: tuple[str, ...]
-    crossing_ids: tuple[str, ...] = ()
-
-
-class SignalPhase(msgspec.Struct, frozen=True, kw_only=True):
-    """A stretch of a cycle in which the named groups are green and all others red."""
-
-    green_s: float
-    green_group_ids: tuple[str, ...]
-
-
-class SignalPlan(msgspec.Struct, frozen=True, kw_only=True):
-    """A fixed-time plan: phases in order, each followed by `amber_s` and `all_red_s`.
-
-    Groups of one phase never conflict, but for turns across oncoming traffic, which wait as
-    `Conflict` says. A live `SignalState` overrides it.
-    """
-
-    groups: tuple[SignalGroup, ...]
-    phases: tuple[SignalPhase, ...]
-    amber_s: float
-    all_red_s: float
-    source: Provenance
 
 
 class Area(msgspec.Struct, frozen=True, kw_only=True):

@@ -9,7 +9,8 @@ import rerun as rr
 
 from contracts.arrays import Array
 from contracts.frames import LocalFrame, geo_from_local, target_from_source
-from contracts.world import Provenance, World
+from contracts.provenance import Provenance
+from contracts.world import World
 from viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
 from viewer.rows import Row, path_part
 

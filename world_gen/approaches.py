@@ -6,7 +6,8 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from contracts.world import Choice, LineControl, YieldRule
+from contracts.provenance import Choice
+from contracts.world import LineControl, YieldRule
 from world_gen.clusters import RING_KINDS, Cluster, Surroundings, heading_out, is_ring_edge
 from world_gen.connections import ConnectionDraft
 from world_gen.met_on_the_way import (

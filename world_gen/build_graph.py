@@ -12,7 +12,7 @@ import rustworkx
 
 from contracts.arrays import Array
 from contracts.frames import local_from_geo
-from contracts.world import Quantity
+from contracts.provenance import Quantity
 from world_gen.driving_side import driving_side
 from world_gen.node_locations import NodeLocations
 from world_gen.osm_map import MapError, OsmMap, OsmWay

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from contracts.world import Provenance, Quantity
+from contracts.provenance import Provenance, Quantity
 from world_gen.building_outlines import valid_polygons
 
 _OWN_SHARE = 0.5

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.world import Connection, DrivingSide, LineControl, Quantity, Turn
+from contracts.provenance import Quantity
+from contracts.world import Connection, DrivingSide, LineControl, Turn
 from world_gen.clusters import Cluster, Surroundings
 from world_gen.forks import beside_at_fork, merged_ends, merges
 from world_gen.lanes import LaneDraft, LaneSet

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import re
 
-from contracts.world import DrivingSide, Quantity
+from contracts.provenance import Quantity
+from contracts.world import DrivingSide
 from world_gen.lane_plans import CrossSection as CrossSection
 from world_gen.lane_plans import LanePlan as LanePlan
 from world_gen.lane_plans import metres as metres

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contracts.world import Choice, Crossing, Quantity
+from contracts.provenance import Choice, Quantity
+from contracts.world import Crossing
 from world_gen.beside_roads import BesideRoads
 from world_gen.clusters import Surroundings
 from world_gen.polyline import arc_lengths, direction_at, left_of

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-from contracts.world import Conflict, Crossing, Signal, SignalPlan, StopLine
+from contracts.signals import Signal, SignalPlan
+from contracts.world import Conflict, Crossing, StopLine
 from world_gen.approaches import Approach, approaches
 from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft

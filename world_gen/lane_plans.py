@@ -7,7 +7,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from contracts.world import LaneChange, LaneKind, Provenance, Quantity, Turn
+from contracts.provenance import Provenance, Quantity
+from contracts.world import LaneChange, LaneKind, Turn
 
 _NUMBER = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*(m|ft|')?\s*$")
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from contracts.world import DrivingSide, LaneChange, LaneKind, Provenance, Quantity, Turn
+from contracts.provenance import Provenance, Quantity
+from contracts.world import DrivingSide, LaneChange, LaneKind, Turn
 from world_gen.lane_plans import LanePlan, metres, of_side
 from world_gen.road_graph import RoadEdge
 from world_gen.side_lanes import BICYCLE_WIDTH_M

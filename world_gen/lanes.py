@@ -9,7 +9,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.world import Lane, LaneKind, Provenance, Quantity, Road, Turn
+from contracts.provenance import Provenance, Quantity
+from contracts.world import Lane, LaneKind, Road, Turn
 from world_gen.clusters import Cluster, Surroundings
 from world_gen.cross_section import CrossSection, LanePlan
 from world_gen.places import places_led_through, without_dead_places

@@ -8,15 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.world import (
-    Choice,
-    Crossing,
-    Signal,
-    SignalGroup,
-    SignalPhase,
-    SignalPlan,
-    StopLine,
-)
+from contracts.provenance import Choice
+from contracts.signals import Signal, SignalGroup, SignalPhase, SignalPlan
+from contracts.world import Crossing, StopLine
 from world_gen.approaches import BEFORE_CROSSING_M
 from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft, LaneSet

@@ -8,7 +8,8 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from contracts.arrays import Array
-from contracts.world import DrivingSide, Provenance, YieldRule
+from contracts.provenance import Provenance
+from contracts.world import DrivingSide, YieldRule
 from world_gen.legs import heading_out
 from world_gen.road_graph import DirectedEdge, RoadEdge
 

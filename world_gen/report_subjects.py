@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import msgspec
 import numpy as np
 
+from contracts.signals import Signal
 from contracts.world import (
     Building,
     Conflict,
@@ -15,7 +16,6 @@ from contracts.world import (
     Crossing,
     Lane,
     Road,
-    Signal,
     StopLine,
     Turn,
     World,

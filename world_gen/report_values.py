@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from contracts.world import Provenance
+from contracts.provenance import Provenance
 
 SOURCE_CONFIDENCE: Mapping[Provenance, float] = {"tagged": 1.0, "inferred": 0.7, "default": 0.3}
 """What a value is worth by where it came from: a convention to compare junctions by.

@@ -31,7 +31,8 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.world import Conflict, DrivingSide, Provenance, YieldRule
+from contracts.provenance import Provenance
+from contracts.world import Conflict, DrivingSide, YieldRule
 from world_gen.approaches import Approach
 from world_gen.conflicts import Meetings, meetings
 from world_gen.connections import ConnectionDraft

@@ -10,7 +10,8 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.frames import LocalFrame
-from contracts.world import DrivingSide, Quantity
+from contracts.provenance import Quantity
+from contracts.world import DrivingSide
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from contracts.world import DrivingSide, LaneKind, Quantity
+from contracts.provenance import Quantity
+from contracts.world import DrivingSide, LaneKind
 from world_gen.lane_plans import LanePlan, metres, of_side
 from world_gen.road_graph import RoadEdge
 

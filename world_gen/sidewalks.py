@@ -8,7 +8,8 @@ import numpy as np
 import shapely
 
 from contracts.arrays import Array
-from contracts.world import Area, Provenance
+from contracts.provenance import Provenance
+from contracts.world import Area
 from world_gen.beside_roads import BesideRoads, in_frame
 from world_gen.clusters import Surroundings
 from world_gen.lane_plans import metres

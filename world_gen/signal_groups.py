@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from contracts.world import Crossing, SignalGroup
+from contracts.signals import SignalGroup
+from contracts.world import Crossing
 from world_gen.approaches import Approach
 from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft

@@ -8,7 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.world import DrivingSide, Provenance, Signal, StopLine
+from contracts.provenance import Provenance
+from contracts.signals import Signal
+from contracts.world import DrivingSide, StopLine
 from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft
 from world_gen.signal_groups import LaneGroup

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.world import Conflict, SignalPhase, SignalPlan, YieldRule
+from contracts.signals import SignalPhase, SignalPlan
+from contracts.world import Conflict, YieldRule
 from world_gen.conflicts import Meetings
 from world_gen.connections import ConnectionDraft
 from world_gen.signal_groups import LaneGroup, WalkGroup

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from contracts.drive import SignalColour, SignalState
-from contracts.world import SignalPlan, World
+from contracts.signals import SignalPlan
+from contracts.world import World
 
 LIVE_FOR_S = 2.0
 """A live colour counts for so long; vehicles and roadside units repeat theirs at 1 Hz or more."""

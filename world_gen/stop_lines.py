@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contracts.world import Choice, LineControl, StopLine
+from contracts.provenance import Choice
+from contracts.world import LineControl, StopLine
 from world_gen.approaches import Approach
 from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft, LaneSet

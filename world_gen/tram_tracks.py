@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.world import Lane, Quantity, Road
+from contracts.provenance import Quantity
+from contracts.world import Lane, Road
 from world_gen.beside_roads import BesideRoads, in_frame
 from world_gen.clusters import Surroundings
 from world_gen.extent import stretches_inside

@@ -10,8 +10,9 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, LocalFrame
+from contracts.provenance import Quantity
 from contracts.simulation import FuturesJob, PathAhead, Variant
-from contracts.world import Area, Building, IntersectionSummary, Quantity, World
+from contracts.world import Area, Building, IntersectionSummary, World
 
 FUTURES = 64
 HORIZON_S = 8.0

@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from contracts.world import DrivingSide, IntersectionSummary, Quantity
+from contracts.provenance import Quantity
+from contracts.world import DrivingSide, IntersectionSummary
 from world_gen.intersections import Junction
 from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
 

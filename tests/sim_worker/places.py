@@ -9,8 +9,9 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from contracts.provenance import Quantity
 from contracts.simulation import FuturesJob, PathAhead, Variant
-from contracts.world import Area, Building, Connection, IntersectionSummary, Lane, Quantity, World
+from contracts.world import Area, Building, Connection, IntersectionSummary, Lane, World
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 

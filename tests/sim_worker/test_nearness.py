@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contracts.arrays import Array
+from contracts.provenance import Quantity
 from contracts.simulation import Variant
-from contracts.world import Building, Quantity
+from contracts.world import Building
 from sim_worker.futures import result_digest, run_job
 from sim_worker.nearness import NearStatics
 from sim_worker.stage import Stage

@@ -6,16 +6,15 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.frames import GeoPoint, LocalFrame
+from contracts.provenance import Choice, Quantity
+from contracts.signals import Signal
 from contracts.world import (
     Area,
     Building,
-    Choice,
     Connection,
     Crossing,
     IntersectionSummary,
     Lane,
-    Quantity,
-    Signal,
     StopLine,
     World,
     WorldJunction,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contracts.world import SignalPlan, World
+from contracts.signals import SignalPlan
+from contracts.world import World
 from world_gen.signal_plan import LEAST_GREEN_S
 
 

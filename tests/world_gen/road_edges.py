@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contracts.world import Quantity
+from contracts.provenance import Quantity
 from world_gen.road_graph import RoadEdge
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.world import Quantity
+from contracts.provenance import Quantity
 from world_gen.building_tags import (
     HEIGHT_KEYS,
     building_extent,

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from contracts.frames import GeoPoint, LocalFrame
-from contracts.world import Building, Quantity
+from contracts.provenance import Quantity
+from contracts.world import Building
 from tests.world_gen.drawn_maps import drawn_map
 from world_gen.building_parts import Footprint
 from world_gen.buildings import (

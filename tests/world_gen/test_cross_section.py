@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.world import Quantity
+from contracts.provenance import Quantity
 from tests.world_gen.road_edges import road as _road
 from world_gen.cross_section import cross_section, metres
 

@@ -246,7 +246,7 @@ def test_the_start_of_a_slip_road_stays_with_its_corner(tmp_path: Path) -> None:
     sketch.road(102, [4, 7, 8], "Quer", highway="secondary", oneway="yes")
     sketch.road(103, [3, 9, 7], highway="secondary_link", oneway="yes")
     found = {j.summary.name: j for j in sketch.junctions(tmp_path)}
-    assert found["Haupt × Neben"].nodes == {2}
-    assert found["Haupt × Quer"].nodes == {3, 4, 7}
+    assert found["Haupt \u00d7 Neben"].nodes == {2}
+    assert found["Haupt \u00d7 Quer"].nodes == {3, 4, 7}
     assert {j.summary.kind for j in found.values()} == {"t_junction"}
-    assert found["Haupt × Quer"].lights == {50}
+    assert found["Haupt \u00d7 Quer"].lights == {50}

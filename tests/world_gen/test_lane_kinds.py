@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.world import Quantity
+from contracts.provenance import Quantity
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, world_of
 from tests.world_gen.road_edges import road
 from world_gen.cross_section import cross_section

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from contracts.world import Quantity
+from contracts.provenance import Quantity
 from world_gen.driving_side import side_at
 from world_gen.road_tags import directions, lane_counts, open_to_cars, road_layer, speed_limit
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contracts.drive import SignalState
-from contracts.world import SignalGroup, SignalPhase, SignalPlan
+from contracts.signals import SignalGroup, SignalPhase, SignalPlan
 from tests.world_gen.drawn_maps import crossing, world_of
 from world_gen.signal_state import (
     LiveColour,

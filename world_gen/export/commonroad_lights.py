@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 from lxml import etree
 
-from contracts.world import SignalPlan, Turn, World
+from contracts.signals import SignalPlan
+from contracts.world import Turn, World
 from world_gen.export.commonroad_elements import IdCounter, child, position
 
 _DIRECTIONS: Mapping[frozenset[str], str] = {

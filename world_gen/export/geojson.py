@@ -13,7 +13,8 @@ import shapely
 
 from contracts.arrays import Array
 from contracts.frames import LocalFrame, geo_from_local, local_from_geo
-from contracts.world import Choice, Quantity, World
+from contracts.provenance import Choice, Quantity
+from contracts.world import World
 
 DEGREE_DIGITS = 9
 """A nanodegree is 0.1 mm: files keep the millimetres of a World."""

@@ -9,7 +9,8 @@ import numpy as np
 import shapely
 
 from contracts.arrays import Array
-from contracts.world import Connection, Lane, Signal, SignalPlan, StopLine, World
+from contracts.signals import Signal, SignalPlan
+from contracts.world import Connection, Lane, StopLine, World
 from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
 from world_gen.polyline import left_of
 

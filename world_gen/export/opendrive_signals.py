@@ -12,7 +12,8 @@ from lxml import etree
 
 from contracts.arrays import Array
 from contracts.frames import wrap_angle
-from contracts.world import DrivingSide, Lane, Signal, StopLine, World
+from contracts.signals import Signal
+from contracts.world import DrivingSide, Lane, StopLine, World
 from world_gen.export.opendrive_elements import Version, number
 from world_gen.export.opendrive_places import OdrJunction, OdrNetwork
 from world_gen.export.opendrive_roads import OdrRoad

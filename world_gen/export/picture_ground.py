@@ -12,7 +12,8 @@ from matplotlib.collections import LineCollection, PathCollection, PolyCollectio
 from matplotlib.path import Path as Outline
 
 from contracts.arrays import Array
-from contracts.world import Area, Building, Crossing, Provenance, Road, World
+from contracts.provenance import Provenance
+from contracts.world import Area, Building, Crossing, Road, World
 from world_gen.export.picture_style import (
     DASH,
     DECK_EDGE,

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.colors import Normalize
 
 from contracts.arrays import Array
-from contracts.world import Provenance, Turn
+from contracts.provenance import Provenance
+from contracts.world import Turn
 
 GROUND, ROAD, JUNCTION, KERB, SIDEWALK = "#e9ece4", "#c9ccd1", "#b9bdc4", "#7c828a", "#d9d3c7"
 LANE_EDGE, LANE, BUS, BICYCLE, TRAM, RING = (

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
 from contracts.arrays import Array
-from contracts.world import Conflict, Connection, Lane, Provenance, StopLine, Turn, World, YieldRule
+from contracts.provenance import Provenance
+from contracts.world import Conflict, Connection, Lane, StopLine, Turn, World, YieldRule
 from world_gen.export.picture_style import (
     BICYCLE,
     BUS,

@@ -10,7 +10,8 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.frames import GeoPoint, LocalFrame
-from contracts.world import Connection, IntersectionSummary, Lane, Quantity, Road, World
+from contracts.provenance import Quantity
+from contracts.world import Connection, IntersectionSummary, Lane, Road, World
 
 NOWHERE = IntersectionSummary(
     id="drawn", kind="crossing", lat=52.0, lon=10.0, arms=4, control="uncontrolled",

@@ -5,14 +5,8 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from contracts.world import (
-    Conflict,
-    SignalGroup,
-    SignalPhase,
-    SignalPlan,
-    World,
-    WorldJunction,
-)
+from contracts.signals import SignalGroup, SignalPhase, SignalPlan
+from contracts.world import Conflict, World, WorldJunction
 from tests.world_gen.drawn_maps import crossing, world_of
 
 

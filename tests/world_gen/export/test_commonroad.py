@@ -15,18 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from contracts.world import (
-    ATTRIBUTION,
-    Building,
-    Choice,
-    Crossing,
-    Quantity,
-    SignalGroup,
-    SignalPhase,
-    SignalPlan,
-    StopLine,
-    World,
-)
+from contracts.provenance import Choice, Quantity
+from contracts.signals import SignalGroup, SignalPhase, SignalPlan
+from contracts.world import ATTRIBUTION, Building, Crossing, StopLine, World
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.drawn_world import road, world
 from tests.world_gen.export.signalled import signalled_crossing

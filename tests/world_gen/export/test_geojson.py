@@ -12,17 +12,9 @@ import pytest
 import shapely
 
 from contracts.frames import GeoPoint, local_from_geo
-from contracts.world import (
-    ATTRIBUTION,
-    Area,
-    Building,
-    Choice,
-    Conflict,
-    Crossing,
-    Quantity,
-    Signal,
-    World,
-)
+from contracts.provenance import Choice, Quantity
+from contracts.signals import Signal
+from contracts.world import ATTRIBUTION, Area, Building, Conflict, Crossing, World
 from tests.world_gen.drawn_maps import crossing, world_of
 from world_gen.export.geojson import write_geojson
 

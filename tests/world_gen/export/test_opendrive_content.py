@@ -11,7 +11,8 @@ import pyproj
 import pytest
 
 from contracts.frames import geo_from_local
-from contracts.world import ATTRIBUTION, Area, Building, Quantity
+from contracts.provenance import Quantity
+from contracts.world import ATTRIBUTION, Area, Building
 from tests.world_gen.drawn_maps import (
     AVENUE,
     CROSS,

@@ -15,8 +15,10 @@ from lxml import etree
 from shapely import union_all
 from shapely.geometry import Point, Polygon
 
+from contracts.provenance import Choice, Quantity
+from contracts.signals import Signal
 from contracts.vehicle import Parameter, VehicleParameters
-from contracts.world import ATTRIBUTION, Building, Choice, Quantity, Signal, StopLine, World
+from contracts.world import ATTRIBUTION, Building, StopLine, World
 from tests.world_gen.drawn_maps import GERMANY, crossing, roundabout, world_of
 from world_gen.export.sdformat import write_sdf
 from world_gen.export.sdformat_shapes import extrusions

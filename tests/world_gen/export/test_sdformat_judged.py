@@ -11,7 +11,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.world import Building, Quantity
+from contracts.provenance import Quantity
+from contracts.world import Building
 from tests.world_gen.drawn_maps import crossing, world_of
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.test_sdformat import ALL_KINDS, CAR, built

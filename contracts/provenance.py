@@ -1,0 +1,24 @@
+"""Values of a World that a map can lack, each with where it came from."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+Provenance = Literal["tagged", "inferred", "default"]
+"""Said by the map, following from what it says, or neither."""
+
+
+class Quantity(msgspec.Struct, frozen=True):
+    """A number and where it came from."""
+
+    value: float
+    source: Provenance
+
+
+class Choice(msgspec.Struct, frozen=True):
+    """A word and where it came from."""
+
+    value: str
+    source: Provenance

@@ -1,0 +1,51 @@
+"""Lights of a World: heads, what is green together, and the plan by which they change."""
+
+from __future__ import annotations
+
+import msgspec
+
+from contracts.arrays import Array
+from contracts.provenance import Provenance
+
+
+class Signal(msgspec.Struct, frozen=True, kw_only=True):
+    """A signal head that governs lanes; `position` (3,), facing `yaw_rad` (towards the driver)."""
+
+    id: str
+    osm_node: int | None
+    group_id: str
+    lane_ids: tuple[str, ...]
+    position: Array
+    yaw_rad: float
+    source: Provenance
+    osm_nodes: tuple[int, ...] = ()
+    """All nodes of the map that stand for this light; `osm_node` is the one met first."""
+
+
+class SignalGroup(msgspec.Struct, frozen=True, kw_only=True):
+    """What is green together: connections, and crossings for those on foot; live by this id."""
+
+    id: str
+    connection_ids: tuple[str, ...]
+    crossing_ids: tuple[str, ...] = ()
+
+
+class SignalPhase(msgspec.Struct, frozen=True, kw_only=True):
+    """A stretch of a cycle in which the named groups are green and all others red."""
+
+    green_s: float
+    green_group_ids: tuple[str, ...]
+
+
+class SignalPlan(msgspec.Struct, frozen=True, kw_only=True):
+    """A fixed-time plan: phases in order, each followed by `amber_s` and `all_red_s`.
+
+    Groups of one phase never conflict, but for turns across oncoming traffic, which wait as
+    `Conflict` says. A live `SignalState` overrides it.
+    """
+
+    groups: tuple[SignalGroup, ...]
+    phases: tuple[SignalPhase, ...]
+    amber_s: float
+    all_red_s: float
+    source: Provenance
