@@ -15,7 +15,7 @@ import numpy as np
 
 from contracts.arrays import array_from_wire, array_to_wire
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 MAGIC = b"FTw1"
 _HEADER = struct.Struct("<4sHxxQq")
 
