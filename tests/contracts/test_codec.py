@@ -90,7 +90,7 @@ def test_another_schema_version_is_refused_with_both_versions_named() -> None:
         decode(bytes(data), SpeedSample, where="foretwin/v1/vehicle/ego/telemetry/speed")
 
     assert str(caught.value) == (
-        "foretwin/v1/vehicle/ego/telemetry/speed: schema version 2; this foretwin reads version 1"
+        "foretwin/v1/vehicle/ego/telemetry/speed: schema version 3; this foretwin reads version 2"
     )
 
 
