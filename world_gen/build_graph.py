@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import rustworkx
 
 from contracts.arrays import Array
 from contracts.frames import local_from_geo
@@ -151,31 +150,3 @@ def _edges(
                 )
             )
     return edges
-
-
-class RoutingGraph(NamedTuple):
-    """A rustworkx digraph whose nodes carry OSM ids and whose edges carry `DirectedEdge`s."""
-
-    digraph: Any
-    index_of: Mapping[int, int]
-    """rustworkx index of each OSM node."""
-
-
-def routing_graph(graph: RoadGraph, *, allowed_only: bool = True) -> RoutingGraph:
-    """Return the graph for shortest paths; nodes in the order of their OSM ids.
-
-    With `allowed_only` false it also holds the directions in which cars may not drive, for
-    drives older or newer than the map.
-    """
-    digraph = rustworkx.PyDiGraph(multigraph=True)
-    nodes = list(graph.leaving)
-    index_of = dict(zip(nodes, digraph.add_nodes_from(nodes), strict=True))
-    digraph.add_edges_from(
-        [
-            (index_of[edge.start_node], index_of[edge.end_node], edge)
-            for node in nodes
-            for edge in graph.leaving[node]
-            if edge.allowed or not allowed_only
-        ]
-    )
-    return RoutingGraph(digraph, index_of)

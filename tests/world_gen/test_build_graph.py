@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import rustworkx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.world_gen.sketch import MANCHESTER, Sketch
-from world_gen.build_graph import build_road_graph, routing_graph
+from world_gen.build_graph import build_road_graph
 from world_gen.osm_map import MapError
 
 
@@ -44,17 +43,6 @@ def test_all_leave_from_a_node_allowed_or_not(crossing: Sketch, tmp_path: Path) 
     assert [(item.edge.name, item.end_node, item.allowed) for item in leaving] == [
         ("Ost", 1, False), ("Ost", 3, True), ("Nord", 4, True), ("Nord", 5, True),
     ]  # fmt: skip
-
-
-def test_shortest_paths_respect_one_way_streets(crossing: Sketch, tmp_path: Path) -> None:
-    graph = crossing.graph(tmp_path)
-    for allowed_only, reachable in ((True, False), (False, True)):
-        routing = routing_graph(graph, allowed_only=allowed_only)
-        start, goal = routing.index_of[3], routing.index_of[1]
-        found = rustworkx.dijkstra_shortest_path_lengths(
-            routing.digraph, start, lambda item: item.edge.length_m, goal
-        )
-        assert (goal in found) == reachable
 
 
 def test_ways_that_a_car_might_use_are_kept_but_no_car_roads(tmp_path: Path) -> None:

@@ -14,7 +14,6 @@ from contracts.frames import geo_from_ecef, local_from_geo
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
-from world_gen.listing import intersection_list
 from world_gen.osm_map import OsmMap
 from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
@@ -109,11 +108,6 @@ def test_signals_at_junctions(found: Found) -> None:
     signalled = sum(junction.summary.control == "signals" for junction in junctions)
     at_least = {"berlin-mitte": 8, "moritzplatz": 3, "kingsway": 1, "badhersfeld": 15, "monaco": 3}
     assert signalled >= at_least.get(name, 1)
-
-
-def test_the_list_is_the_junctions_summaries(found: Found) -> None:
-    _, _, osm, graph, junctions = found
-    assert intersection_list(osm, graph) == [junction.summary for junction in junctions]
 
 
 def drive_xy_m(data_dir: Path, osm: OsmMap, end_s: float) -> np.ndarray:
