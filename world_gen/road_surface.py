@@ -16,7 +16,7 @@ from shapely.geometry import Polygon
 
 from contracts.arrays import Array
 from contracts.world import Area
-from world_gen.clusters import Cluster, Surroundings
+from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.intersections import Junction
 from world_gen.islands import RING_ISLAND as RING_ISLAND
@@ -24,6 +24,7 @@ from world_gen.islands import island_areas
 from world_gen.kerbs import kerb_lines
 from world_gen.lanes import LaneSet
 from world_gen.paved import GRID_M, Paved, area_of
+from world_gen.place_outlines import simple_outlines
 from world_gen.polyline_batch import Polylines, cut, offset, without_repeats
 
 CORNER_FILLET_M = 3.0
@@ -44,9 +45,15 @@ class Areas(NamedTuple):
 
 def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraft]) -> Areas:
     """Return the paved areas and what borders them."""
-    swept = _swept([(c.centerline, c.width_m.value) for c in connections])
     roads = _road_polygons(lanes)
-    clusters, places = _place_polygons(around, connections, swept)
+    simple = simple_outlines(around, lanes, connections)
+    outlined = {around.clusters[i].key for i in simple.rows}
+    turning = [c for c in connections if c.cluster.key not in outlined]
+    swept = _swept([(c.centerline, c.width_m.value) for c in turning])
+    rows, shapes = _place_polygons(around, turning, swept, frozenset(simple.rows))
+    order = np.argsort([*simple.rows, *rows], kind="stable")
+    clusters = tuple(around.clusters[(*simple.rows, *rows)[k]] for k in order)
+    places = np.concatenate([simple.polygons, shapes])[order]
     islands, middles = island_areas(around, lanes, Paved(roads, places, clusters))
     if len(middles):
         # Where a turn sweeps over a roundabout's middle, the middle stays.
@@ -60,7 +67,7 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
         junction_areas=_junction_areas(around, lanes, paved, of_place),
         islands=islands,
         kerbs=kerb_lines(lanes, paved),
-        driven=np.concatenate([roads, swept]),
+        driven=np.concatenate([roads, simple.polygons, swept]),
     )
 
 
@@ -103,13 +110,22 @@ def polygons(rings: list[Array]) -> np.ndarray:
 
 
 def _place_polygons(
-    around: Surroundings, connections: list[ConnectionDraft], swept: np.ndarray
-) -> tuple[tuple[Cluster, ...], np.ndarray]:
-    """Return what each cluster covers: its stubs, its inner edges and its turns, corners filled."""
+    around: Surroundings,
+    connections: list[ConnectionDraft],
+    swept: np.ndarray,
+    done: frozenset[int],
+) -> tuple[list[int], np.ndarray]:
+    """Return what each cluster not `done` covers, and the rows of these clusters.
+
+    That is its stubs, its inner edges and what its turns sweep, corners filled.
+    """
     row = {cluster.key: i for i, cluster in enumerate(around.clusters)}
-    rings, owners = _stubs_and_inner_edges(around)
-    pieces = np.concatenate([rings, _node_discs(around), swept])
-    owners += range(len(around.clusters))
+    rings, owners = _stubs_and_inner_edges(around, done)
+    discs, disc_owners = _node_discs(around, done)
+    pieces = np.concatenate([rings, discs, swept])
+    if not len(pieces):
+        return [], pieces
+    owners += disc_owners
     owners += [row[c.cluster.key] for c in connections]
     order = np.argsort(owners, kind="stable")
     owner = np.asarray(owners)[order]
@@ -121,11 +137,12 @@ def _place_polygons(
     closed = shapely.buffer(grown, -CORNER_FILLET_M, quad_segs=4)
     closed = shapely.set_precision(shapely.simplify(closed, 0.04), GRID_M)
     keep = shapely.area(closed) > SMALLEST_M2
-    clusters = tuple(around.clusters[i] for i, ok in zip(used.tolist(), keep, strict=True) if ok)
-    return clusters, closed[keep]
+    return used[keep].tolist(), closed[keep]
 
 
-def _stubs_and_inner_edges(around: Surroundings) -> tuple[np.ndarray, list[int]]:
+def _stubs_and_inner_edges(
+    around: Surroundings, done: frozenset[int]
+) -> tuple[np.ndarray, list[int]]:
     """Return the carriageways that clusters swallow, and the number of the cluster of each.
 
     These are the stub of each leg, from its node to where its lanes begin, and all inner edges.
@@ -135,6 +152,8 @@ def _stubs_and_inner_edges(around: Surroundings) -> tuple[np.ndarray, list[int]]
     edges_m: list[tuple[float, float]] = []
     owners: list[int] = []
     for i, cluster in enumerate(around.clusters):
+        if i in done:
+            continue
         for leg in cluster.legs:
             trim = around.trims_m.get((leg.edge.index, leg.reverse), 0.0)
             if trim >= 0.05:
@@ -164,19 +183,20 @@ def _stubs_and_inner_edges(around: Surroundings) -> tuple[np.ndarray, list[int]]
     ), owners
 
 
-def _node_discs(around: Surroundings) -> np.ndarray:
-    """Return a round piece where the legs of a cluster meet at an angle; empty where none do."""
-    centres, radii = [], []
-    for cluster in around.clusters:
-        halves = sorted(around.section(leg).width_m / 2 for leg in cluster.legs)
-        first = cluster.legs[0]
+def _node_discs(around: Surroundings, done: frozenset[int]) -> tuple[np.ndarray, list[int]]:
+    """Return a round piece where the legs of a cluster of one node meet at an angle."""
+    centres, radii, owners = [], [], []
+    for i, cluster in enumerate(around.clusters):
         bent = any(around.trims_m.get((d.edge.index, d.reverse), 0.0) for d in cluster.legs)
-        radii.append(halves[-2] if bent and len(cluster.nodes) == 1 else 0.0)
-        centres.append(first.xy_m[0])
+        if i in done or not bent or len(cluster.nodes) > 1:
+            continue
+        halves = sorted(around.section(leg).width_m / 2 for leg in cluster.legs)
+        radii.append(halves[-2])
+        centres.append(cluster.legs[0].xy_m[0])
+        owners.append(i)
     if not centres:
-        return np.array([], dtype=object)
-    discs: np.ndarray = shapely.buffer(shapely.points(np.array(centres)), radii, quad_segs=4)
-    return discs
+        return np.array([], dtype=object), owners
+    return shapely.buffer(shapely.points(np.array(centres)), radii, quad_segs=4), owners
 
 
 def _surface(paved: Paved, lanes: LaneSet) -> tuple[list[Area], list[list[Area]]]:

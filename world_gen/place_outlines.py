@@ -1,0 +1,167 @@
+"""Outlines of places where roads meet in one point, from the mouths of their roads alone.
+
+Joining what turns sweep and rounding the result off is the general way to pave a place, and by far
+the most expensive step of a World. Most places are simple: kerb to kerb, with a round corner.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
+from world_gen.clusters import Cluster, Surroundings
+from world_gen.connections import ConnectionDraft
+from world_gen.lanes import LaneSet
+from world_gen.polyline import left_of
+from world_gen.polyline_batch import Polylines, points_at
+from world_gen.road_graph import DirectedEdge
+
+CORNER_STEPS = 6
+SHARPEST_CORNER_M = 0.3
+FARTHEST_CORNER_M = 40.0
+PARALLEL = 0.05
+"""Sine of the angle between kerbs that are taken to run on straight."""
+SAMPLES = (0.2, 0.35, 0.5, 0.65, 0.8)
+CAR_HALF_WIDTH_M = 1.0
+"""Paths must lie so far inside an outline, else the place is paved by what is swept."""
+
+
+class Outlines(NamedTuple):
+    """Simple places: rows of `Surroundings.clusters`, and their polygons."""
+
+    rows: tuple[int, ...]
+    polygons: np.ndarray
+
+
+class _Mouth(NamedTuple):
+    """Where a road begins at a place, seen outward: its edges' ends and their way inward."""
+
+    angle_rad: float
+    right: Array
+    right_inward: Array
+    left: Array
+    left_inward: Array
+
+
+def simple_outlines(
+    around: Surroundings, lanes: LaneSet, connections: Sequence[ConnectionDraft]
+) -> Outlines:
+    """Return the outlines of places with one node whose paths all lie well inside."""
+    ends = _road_ends(lanes)
+    rows: list[int] = []
+    rings: list[list[_Mouth]] = []
+    for i, cluster in enumerate(around.clusters):
+        if len(cluster.nodes) > 1 or cluster.ring or cluster.inner:
+            continue
+        mouths = _mouths(cluster, lanes, ends)
+        if mouths is not None:
+            rows.append(i)
+            rings.append(mouths)
+    if not rows:
+        return Outlines((), np.array([], dtype=object))
+    shapes = shapely.simplify(_polygons(rings), 0.02, preserve_topology=False)
+    fits = shapely.is_valid(shapes) & (shapely.area(shapes) > 1.0)
+    place = {around.clusters[i].key: k for k, i in enumerate(rows)}
+    fits &= ~_left_by_a_path(shapes, place, connections)
+    kept = np.nonzero(fits)[0]
+    return Outlines(tuple(rows[k] for k in kept), shapes[kept])
+
+
+def _road_ends(lanes: LaneSet) -> dict[tuple[int, bool], tuple[Array, Array]]:
+    """Return (left, right) edges, outward from it, at each end of an edge that has a place."""
+    found: dict[tuple[int, bool], tuple[Array, Array]] = {}
+    for road in lanes.roads:
+        if not road.lane_ids:
+            continue
+        edge = lanes.lanes[road.lane_ids[0]].key.edge
+        left, right = lanes.edges[road.id]
+        if road.from_place is not None:
+            found[edge, False] = left, right
+        if road.to_place is not None:
+            found[edge, True] = right[::-1], left[::-1]
+    return found
+
+
+def _mouths(
+    cluster: Cluster, lanes: LaneSet, ends: dict[tuple[int, bool], tuple[Array, Array]]
+) -> list[_Mouth] | None:
+    """Return the mouths of a place counter-clockwise; None where a road is missing or folded."""
+    found = []
+    for leg in cluster.legs:
+        edges = ends.get((leg.edge.index, leg.reverse))
+        if edges is None:
+            return None
+        found.append(_mouth(leg, *edges))
+    return sorted(found, key=lambda mouth: mouth.angle_rad)
+
+
+def _mouth(leg: DirectedEdge, left: Array, right: Array) -> _Mouth:
+    x, y = (left[0] + right[0] - 2.0 * leg.xy_m[0]).tolist()
+    return _Mouth(math.atan2(y, x), right[0], right[0] - right[1], left[0], left[0] - left[1])
+
+
+def _polygons(rings: list[list[_Mouth]]) -> np.ndarray:
+    """Return polygons that go from mouth to mouth, round each corner between two kerbs."""
+    count = np.array([len(mouths) for mouths in rings])
+    first = np.concatenate([[0], np.cumsum(count)])
+    flat = [mouth for mouths in rings for mouth in mouths]
+    after = np.arange(1, len(flat) + 1)
+    after[first[1:] - 1] = first[:-1]
+    right = np.array([mouth.right for mouth in flat])
+    a = np.array([mouth.left for mouth in flat])
+    u = np.array([mouth.left_inward for mouth in flat])
+    v = np.array([mouth.right_inward for mouth in flat])[after]
+    b = right[after]
+    u /= np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-9)[:, None]
+    v /= np.maximum(np.hypot(v[:, 0], v[:, 1]), 1e-9)[:, None]
+    cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    gap = b - a
+    safe = np.where(np.abs(cross) > PARALLEL, cross, 1.0)
+    s = (gap[:, 0] * v[:, 1] - gap[:, 1] * v[:, 0]) / safe
+    t = (gap[:, 0] * u[:, 1] - gap[:, 1] * u[:, 0]) / safe
+    meets = (np.abs(cross) > PARALLEL) & (np.minimum(s, t) > SHARPEST_CORNER_M)
+    meets &= (s < FARTHEST_CORNER_M) & (t < FARTHEST_CORNER_M)
+    corner = np.where(meets[:, None], a + s[:, None] * u, (a + b) / 2)
+    tangent = np.minimum(s, t)[:, None]
+    # The widest arc that is tangent to both kerbs, as a rational quadratic Bézier curve.
+    begin = np.where(meets[:, None], corner - tangent * u, a)
+    end = np.where(meets[:, None], corner - tangent * v, b)
+    turned = np.clip(-(u * v).sum(axis=1), -1.0, 1.0)
+    weight = np.where(meets, np.sqrt((1.0 + turned) / 2.0), 1.0)[:, None, None]
+    w = np.linspace(0.0, 1.0, CORNER_STEPS + 1)[None, :, None]
+    p0, p1, p2 = (1 - w) ** 2, 2 * weight * w * (1 - w), w**2
+    curve = p0 * begin[:, None] + p1 * corner[:, None] + p2 * end[:, None]
+    curve /= p0 + p1 + p2
+    # Each mouth gives its right end, its left end and the curve on the way to the next.
+    pieces = np.concatenate([right[:, None], a[:, None], curve], axis=1).round(3)
+    owner = np.repeat(np.repeat(np.arange(len(rings)), count), CORNER_STEPS + 3)
+    shapes: np.ndarray = shapely.polygons(shapely.linearrings(pieces.reshape(-1, 2), indices=owner))
+    return shapes
+
+
+def _left_by_a_path(
+    shapes: np.ndarray, place: dict[str, int], connections: Sequence[ConnectionDraft]
+) -> np.ndarray:
+    """Return for each place whether a car on one of its paths would leave the outline."""
+    out = np.zeros(len(shapes), dtype=bool)
+    mine = [c for c in connections if c.cluster.key in place]
+    if not mine:
+        return out
+    lines = Polylines.of([c.centerline for c in mine])
+    which = np.repeat(np.arange(len(mine)), len(SAMPLES))
+    at_m = (lines.length_m[:, None] * np.array(SAMPLES)).ravel()
+    here = points_at(lines, which, at_m)
+    step = points_at(lines, which, at_m + 0.1) - here
+    step /= np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
+    side = left_of(step) * CAR_HALF_WIDTH_M
+    at = np.stack([here + side, here - side], axis=1).reshape(-1, 2)
+    owner = np.array([place[c.cluster.key] for c in mine])
+    owner = np.repeat(owner, 2 * len(SAMPLES))
+    inside = shapely.contains_xy(shapes[owner], at[:, 0], at[:, 1])
+    out[owner[~inside]] = True
+    return out
