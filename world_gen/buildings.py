@@ -98,9 +98,9 @@ class BuildingIndex:
             asked, other = self._tree.query(self._tree.geometries[todo])
             apart = is_part[todo[asked]] != is_part[other]
             involved = np.concatenate([todo[asked[apart]], other[apart]])
-        self._make_raw(np.unique(np.concatenate([todo, involved])))
+        self._make_raw(_distinct(np.concatenate([todo, involved])))
         done = {k: self._raw[k] for k in todo.tolist()}
-        done.update(self._resolved(np.unique(involved), is_part, done))
+        done.update(self._resolved(_distinct(involved), is_part, done))
         self._done.update(done)
 
     def _resolved(
@@ -148,6 +148,11 @@ class BuildingIndex:
                     for i, polygon in enumerate(polygons[begin:end])
                 )
             begin = end
+
+
+def _distinct(rows: Indices) -> Indices:
+    """Return the rows once each, ascending; plain `np.unique` would load masked arrays for this."""
+    return np.unique(rows, return_index=True)[0]
 
 
 def footprints(osm: OsmMap, notes: list[str]) -> tuple[Footprint, ...]:

@@ -117,7 +117,7 @@ def sorted_positions(chunks: Sequence[NodePositions], notes: list[str]) -> NodeP
         last = np.append(ids[1:] != ids[:-1], True)
         notes.extend(
             f"node {node}: stands in the file more than once; its last position is used"
-            for node in np.unique(ids[~last]).tolist()
+            for node in sorted(set(ids[~last].tolist()))
         )
         ids, lat, lon = ids[last], lat[last], lon[last]
     on_earth = (np.abs(lat) <= 90 * UNITS_PER_DEG) & (np.abs(lon) <= 180 * UNITS_PER_DEG)
