@@ -21,7 +21,11 @@ _GRID_SHARE = 0.95
 
 
 def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: list[str]) -> None:
-    """Lay the path of every connection, and name those that the map makes tighter than 4 m."""
+    """Lay the path of every connection, and name those that the map makes tighter than 4 m.
+
+    Connections between lanes that nearly touch, and that no wheel could turn between, are taken
+    out of the list and named.
+    """
     if not connections:
         return
     begins = np.array([c.start.centerline[-1] for c in connections])
@@ -31,6 +35,12 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     turns = turn_curves(begins, headings, ends, end_headings)
     for c, path in zip(connections, turns.lines.split(), strict=True):
         c.centerline = path
+    fits = turns.radius_m > 0.0
+    if not fits.all():
+        _leave_out([c for c, ok in zip(connections, fits, strict=True) if not ok], notes)
+        connections[:] = [c for c, ok in zip(connections, fits, strict=True) if ok]
+        begins, ends = begins[fits], ends[fits]
+        headings, end_headings = headings[fits], end_headings[fits]
     inside = paths_along_inner_lanes(connections, around)
     for i, path in inside.items():
         connections[i].centerline = path
@@ -58,6 +68,15 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
                 f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
                 f"into way {c.end.edge.way_id} ({c.turn})"
             )
+
+
+def _leave_out(connections: list[ConnectionDraft], notes: list[str]) -> None:
+    for c in connections:
+        c.start.successors.remove(c.id)
+        notes.append(
+            f"way {c.start.edge.way_id}: no room at all to turn into way {c.end.edge.way_id} "
+            f"({c.turn}); left out"
+        )
 
 
 def _tightest_m(paths: list[Array]) -> Array:

@@ -13,6 +13,8 @@ from world_gen.polyline_batch import Polylines
 LEAST_RADIUS_M = 4.0
 """No car turns tighter (turning circle of a passenger car: 10 m and more from kerb to kerb)."""
 WANTED_RADIUS_M = 4.5
+LEAST_DRAWN_M = 0.2
+"""Tighter arcs are no path: a wheel is larger, and the millimetre grid would bend them."""
 LEAD_M = 0.4
 """Straight before the first and behind the last arc, so that paths leave along their lanes."""
 _STEP_RAD, _STEP_M = math.radians(8.0), 0.5
@@ -22,7 +24,10 @@ Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 class Turns(NamedTuple):
-    """Paths from lane to lane, and the radius in metres of the tightest arc of each, (K,)."""
+    """Paths from lane to lane, and the radius in metres of the tightest arc of each, (K,).
+
+    A radius of 0 says that there is no room for any: the path is then no more than a chord.
+    """
 
     lines: Polylines
     radius_m: Array
@@ -65,10 +70,11 @@ def turn_curves(start: Array, heading: Array, end: Array, end_heading: Array) ->
             turned = np.abs(found.first_rad) + np.abs(found.second_rad)
             tight = np.maximum(1.0 - found.radius_m / WANTED_RADIUS_M, 0.0)
             worth = turned + _TIGHTNESS * tight
-            worth[~(found.radius_m > 0.05)] = np.inf
+            worth[~(found.radius_m > LEAST_DRAWN_M)] = np.inf
             better = worth < cost - 1e-6
             best, cost = best.where(better, found), np.where(better, worth, cost)
-    return _drawn(start, end, p, q, heading, end_heading, best)
+    drawn = _drawn(start, end, p, q, heading, end_heading, best)
+    return Turns(drawn.lines, np.where(np.isfinite(cost), drawn.radius_m, 0.0))
 
 
 def _cross(a: Array, b: Array) -> Array:

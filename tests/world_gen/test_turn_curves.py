@@ -92,3 +92,11 @@ def test_many_paths_are_what_each_alone_is():
     ends = np.stack([np.cos(end_yaw), np.sin(end_yaw)], axis=-1)
     for i, path in enumerate(turn_curves(start, headings, end, ends).lines.split()):
         np.testing.assert_allclose(path, _turn(start[i], yaw[i], end[i], end_yaw[i])[0])
+
+
+def test_lanes_that_nearly_touch_leave_no_room_to_turn_back():
+    back = np.array([[-0.28, 0.96]]) / np.hypot(0.28, 0.96)
+    found = turn_curves(
+        np.array([[0.028, 22.94]]), np.array([[-0.29, -0.957]]), np.array([[-0.101, 22.94]]), back
+    )
+    assert found.radius_m.tolist() == [0.0]
