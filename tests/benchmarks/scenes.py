@@ -42,7 +42,6 @@ def street(*, buildings: int) -> World:
         frame=LocalFrame(_ORIGIN),
         radius_m=250.0,
         map_sha256="",
-        arms=(),
         lanes=(),
         connections=(),
         stop_lines=(),
@@ -51,7 +50,6 @@ def street(*, buildings: int) -> World:
         islands=(),
         kerbs=(),
         road_surface=(Area(id="road", outline=kerbs[::-1]),),
-        junction_area=None,
         buildings=tuple(boxes),
         attribution="drawn for a benchmark",
     )  # fmt: skip

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.benchmarks import __main__ as harness
+from tests.benchmarks import scenes
 from tests.benchmarks.measuring import Measurement, UnavailableError
 
 
@@ -42,3 +43,10 @@ def test_rows_hold_value_unit_baseline_and_ratio(
 def test_an_unknown_name_lists_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
     assert harness.main(["speed"]) == 2
     assert "unknown benchmark speed; known: futures_closed_loop_20hz" in capsys.readouterr().out
+
+
+def test_the_street_that_futures_are_measured_on_can_be_drawn() -> None:
+    world = scenes.street(buildings=4)
+
+    assert len(world.buildings) == 4
+    assert scenes.job(world, ()).world_id == world.id
