@@ -1,0 +1,142 @@
+"""Scenarios: what could happen at a junction, written down without naming any junction.
+
+A `Scenario` is abstract: relations instead of places, spans instead of numbers. Sides are named
+by the traffic: `near` is where one drives (right where traffic keeps right), `across` the other.
+A `ConcreteScenario` is one of its cases, at one place of one World, with every number drawn.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+from contracts.drive import RoadUserKind
+from contracts.world import Control, JunctionKind
+
+TrafficTurn = Literal["straight", "across", "near"]
+"""Through a junction: straight on, across oncoming traffic, or to the side where one drives."""
+Relation = Literal[
+    "oncoming", "from_near", "from_across", "ahead", "behind", "beside", "on_ring", "joins_ring",
+    "crosses_exit", "crosses_entry", "parked",
+]  # fmt: skip
+"""Where a road user comes from, as the ego sees it.
+
+`oncoming` from the opposite arm, `from_near` and `from_across` from the side arms, `ahead`,
+`behind` and `beside` (on the near side) along the ego's own path, `on_ring` circulates where the
+ego enters, `joins_ring` enters where the ego circulates, `crosses_exit` and `crosses_entry` on
+foot or wheels over the arm that the ego leaves or enters by, `parked` beside its path.
+"""
+Conduct = Literal["heedless", "law_abiding", "stops", "parked", "overtakes"]
+"""`heedless` keeps its speed whatever happens, `law_abiding` follows, waits and gives way,
+`stops` keeps its speed, then brakes, `parked` stands, `overtakes` passes who is slower."""
+Setting = Literal["junction", "road", "motorway", "circuit", "parking_bay"]
+
+EGO = "ego"
+FAULTS = "faults"
+
+
+class Span(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a number may be: one of `values`, or uniform from `min` to `max`, or, with `mean` and
+    `std`, normal and cut to `min` and `max` where these are given."""
+
+    values: tuple[float, ...] = ()
+    min: float | None = None
+    max: float | None = None
+    mean: float | None = None
+    std: float | None = None
+
+
+Number = float | Span
+"""A number that is always the same, or one that differs from case to case."""
+
+
+class EgoPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the car under test does when nobody intervenes."""
+
+    turn: TrafficTurn = "straight"
+    speed_mps: Number = 8.33
+    lateral_shift_m: Number = 0.0
+    reverse: bool = False
+
+
+class ActorPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Another road user.
+
+    Without intervention it touches the ego `arrives_after_s` later than meant: 0 is an impact.
+    `impact_share` says where on the ego's front, from 0 at its near side to 1. `gap_m` is from
+    bumper to bumper along the ego's path (`ahead`, `behind`, `parked`), `lateral_m` to the across
+    side of that path. Who `stops` does so `acts_after_s` with `decel_mps2`.
+    """
+
+    name: str
+    relation: Relation
+    kind: RoadUserKind = "car"
+    turn: TrafficTurn = "straight"
+    speed_mps: Number = 8.33
+    conduct: Conduct = "heedless"
+    impact_share: Number = 0.5
+    arrives_after_s: Number = 0.0
+    gap_m: Number = 20.0
+    lateral_m: Number = 0.0
+    acts_after_s: Number = 0.0
+    decel_mps2: Number = 4.0
+    hidden_by: str = ""
+    """Name of another actor behind which this one stays unseen until it comes out."""
+
+
+class FaultPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is wrong with the car under test, or with the ground below it."""
+
+    friction_factor: Number = 1.0
+    extra_steering_delay_s: Number = 0.0
+    steering_gain: Number = 1.0
+    steering_offset_rad: Number = 0.0
+    brake_gain: Number = 1.0
+    perception_delay_s: Number = 0.0
+    position_offset_m: Number = 0.0
+    """How far to the left of the truth the planner believes to be."""
+    lost_from_s: Number = 0.0
+    lost_for_s: Number = 0.0
+    """Detections are lost for so long, from `lost_from_s` on."""
+
+
+class Where(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Which places a scenario is for; an empty list admits all."""
+
+    setting: Setting = "junction"
+    kinds: tuple[JunctionKind, ...] = ()
+    controls: tuple[Control, ...] = ()
+
+
+class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One entry of the catalogue, as its TOML file states it; `source` names who defined it."""
+
+    id: str
+    title: str
+    shows: str
+    """What one sees when it runs, in one sentence."""
+    source: str
+    where: Where = Where()
+    ego: EgoPart = EgoPart()
+    actors: tuple[ActorPart, ...] = ()
+    faults: FaultPart = FaultPart()
+    horizon_s: float = 8.0
+    lead_time_s: float = 4.0
+    """From the start to the planned impact."""
+    seed: int = 0
+    samples: int = 1
+    """How many cases to draw for each combination of listed values."""
+
+
+class ConcreteScenario(msgspec.Struct, frozen=True, kw_only=True):
+    """One case of a scenario at one place; `values` holds every number that was drawn, named
+    `ego.speed_mps`, `<actor>.speed_mps`, `faults.friction_factor` and so on."""
+
+    scenario_id: str
+    world_id: str
+    junction_id: str
+    place: str
+    """The connection that the ego takes and, after a `/`, that of the first other road user."""
+    values: dict[str, float]
+    seed: int
