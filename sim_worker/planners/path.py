@@ -91,6 +91,11 @@ class FrenetPath:
             self.speed_limit_mps = limit[nearest]
         """(M,) limits at the nodes, infinite where unknown."""
 
+    @property
+    def node_poses(self) -> Array:
+        """(M, 3) x, y and heading without jumps at the nodes."""
+        return np.column_stack([self._x, self._y, self._heading])
+
     @functools.cached_property
     def curvature_pm(self) -> Array:
         """(M,) curvature at the nodes in 1/m, positive to the left, smoothed over 4 m."""

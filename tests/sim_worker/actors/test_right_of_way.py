@@ -1,0 +1,59 @@
+"""Who waits for whom, read from a World for any set of paths."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim_worker.actors.right_of_way import JunctionRules
+from tests.sim_worker.actors.crossroads import centre_arc, crossroads, path_of, straight_on
+
+EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
+
+
+def test_a_path_knows_its_connections_and_nothing_else(tmp_path: Path) -> None:
+    world = crossroads(tmp_path)
+    rules = JunctionRules(world)
+    for connection in world.connections:
+        taken = rules.taken(path_of(world, connection))
+        assert [one.connection.id for one in taken] == [connection.id]
+
+
+def test_right_before_left_makes_one_wait_where_both_paths_cross(tmp_path: Path) -> None:
+    world = crossroads(tmp_path)
+    rules = JunctionRules(world)
+    # Who drives east has those who drive north on the right.
+    east, north = straight_on(world, EAST), straight_on(world, NORTH)
+    found = rules.between([rules.taken(east), rules.taken(north)]).meetings
+    wait_in, wait_out, go_in, go_out = found[0, 1]
+    assert wait_in < centre_arc(east) + 1.75 < wait_out
+    assert go_in < centre_arc(north) - 1.75 < go_out
+    assert np.isnan(found[1, 0]).all()
+    assert np.isnan(found[0, 0]).all()
+
+
+def test_lights_rule_instead_and_give_stop_lines(tmp_path: Path) -> None:
+    world = crossroads(tmp_path, centre={"highway": "traffic_signals"})
+    rules = JunctionRules(world)
+    east, north = straight_on(world, EAST), straight_on(world, NORTH)
+    found = rules.between([rules.taken(east), rules.taken(north)])
+    assert np.isnan(found.meetings).all()
+    assert len(found.groups) == 2
+    red = found.red({found.groups[found.stop_groups[0, 0]]: "red"})
+    assert red[0, 0] < centre_arc(east)
+    assert np.isinf(red[1]).all()
+
+
+@pytest.mark.parametrize("colour", ["green", "dark", "unknown"])
+def test_only_red_and_amber_stop(tmp_path: Path, colour: str) -> None:
+    world = crossroads(tmp_path, centre={"highway": "traffic_signals"})
+    rules = JunctionRules(world)
+    found = rules.between([rules.taken(straight_on(world, EAST))])
+    assert np.isinf(found.red(dict.fromkeys(found.groups, colour))).all()  # type: ignore[arg-type]
+
+
+def test_open_ground_has_no_rules() -> None:
+    rules = JunctionRules(None)
+    assert rules.between([(), ()]).groups == ()
