@@ -78,6 +78,9 @@ class Traffic:
         self._accel = np.zeros_like(self.arc_m)
         self._lawful = np.nonzero(crowd.lawful & crowd.present)
         self._brakes = bool(np.isfinite(crowd.brakes_at_s[crowd.present]).any())
+        # One more row and column than paths: who is not there takes the last, and meets nobody.
+        self._waits = np.pad(np.isfinite(rules.meetings[..., 0]), (0, 1))
+        self._path_there = np.where(crowd.present, crowd.path_of, len(table))
         self.reacts = len(self._lawful[0]) > 0
         """Whether anybody does anything but keep a speed."""
 
@@ -187,32 +190,32 @@ class Traffic:
         s, r = mine.rows, mine.columns
         crowd = self.crowd
         count = len(crowd.path_of)
-        paths = np.concatenate([np.full((count, 1), ego.path_of), crowd.path_of], axis=1)[s]
-        found = self._rules.meetings[mine.path[:, None], paths]
-        ahead = found[..., 0] - (mine.arc + mine.half)[:, None]
-        # Whoever has entered, or can no more stop before, goes on.
-        reach = np.square(mine.speed) / (2.0 * mine.decel)
-        there = np.concatenate([np.ones((count, 1), dtype=bool), crowd.present], axis=1)[s]
-        meets = there & (ahead > reach[:, None] - _LINE_GAP_M) & (ahead < reach[:, None] + _SIGHT_M)
-        meets[np.arange(len(s)), r + 1] = False
-        k, o = np.nonzero(meets)
+        there = np.concatenate([np.full((count, 1), ego.path_of), self._path_there], axis=1)
+        k, o = np.nonzero(self._waits[mine.path[:, None], there[s]])
         row = s[k]
+        found = self._rules.meetings[mine.path[k], there[row, o]]
+        ahead = found[:, 0] - mine.arc[k] - mine.half[k]
+        # Whoever has entered, or can no more stop before, goes on.
+        reach = np.square(mine.speed[k]) / (2.0 * mine.decel[k])
+        meets = (ahead > reach - _LINE_GAP_M) & (ahead < reach + _SIGHT_M) & (o != r[k] + 1)
+        k, row, o, found, ahead = k[meets], row[meets], o[meets], found[meets], ahead[meets]
         arcs = np.concatenate([ego.arc_m[:, None], self.arc_m], axis=1)[row, o]
         speeds = np.concatenate([ego.speed_mps[:, None], self.speed_mps], axis=1)[row, o]
-        halves = np.concatenate(
-            [np.full((count, 1), ego.length_m / 2), crowd.length_m / 2], axis=1
-        )[row, o]
-        _, leave, their_in, their_out = found[k, o].T
+        halves = (
+            0.5
+            * np.concatenate([np.full((count, 1), ego.length_m), crowd.length_m], axis=1)[row, o]
+        )
+        _, leave, their_in, their_out = found.T
         moving = np.maximum(speeds, _STANDING_MPS)
         reach_s = (their_in - arcs - halves) / moving
         reach_s = np.where((speeds < _STANDING_MPS) & (reach_s > 0.0), np.inf, reach_s)
         gone_s = (their_out - arcs + halves) / moving
         pace = np.maximum(mine.speed[k], 4.0)
-        enter_s = np.maximum(ahead[k, o], 0.0) / pace
+        enter_s = np.maximum(ahead, 0.0) / pace
         clear_s = (leave - mine.arc[k] + mine.half[k]) / pace
         taken = (gone_s > 0.0) & (reach_s < clear_s + _LAG_S) & (gone_s > enter_s - _LEAD_S)
         gap = np.full(len(s), np.inf)
-        np.minimum.at(gap, k[taken], ahead[k, o][taken] - _LINE_GAP_M)
+        np.minimum.at(gap, k[taken], ahead[taken] - _LINE_GAP_M)
         return gap
 
 
