@@ -4,9 +4,52 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from sim_worker.planners.path import FrenetPath
+
+
+class SeenUsers(NamedTuple):
+    """Other road users as perceived: up to R for each of S cars, NaN where there is none.
+
+    `poses` (S, R, 3) x, y, yaw of box centres in the World's frame, `speed_mps` (S, R) along their
+    yaw, `size_m` (S, R, 2) length and width, `arc_m` and `offset_m` (S, R) of box centres on the
+    ego's path, `walks` (S, R) true for those who keep to no lane. Who drives a future with faults
+    perceives late, displaced, or nothing.
+    """
+
+    poses: Array
+    speed_mps: Array
+    size_m: Array
+    arc_m: Array
+    offset_m: Array
+    walks: npt.NDArray[np.bool_]
+
+
+class SharedGround(NamedTuple):
+    """Ground on the ego's path that other movements of the junction cross or join; C pieces.
+
+    Between `enter_arc_m` and `leave_arc_m` (C,) the ego is on it; `point_m` (C, 2) is its middle;
+    `waits` (C,) where the ego has to give way there, wherever no light says otherwise.
+    """
+
+    enter_arc_m: Array
+    leave_arc_m: Array
+    point_m: Array
+    waits: npt.NDArray[np.bool_]
+
+
+class KnownPlan(NamedTuple):
+    """The real car's own plan: `time_s` (K,) from the start, `xy_m` (K, 2), `yaw_rad`, `speed_mps`
+    (K,) of base_link in the World's frame."""
+
+    time_s: Array
+    xy_m: Array
+    yaw_rad: Array
+    speed_mps: Array
 
 
 class PlannerView(NamedTuple):
@@ -15,7 +58,9 @@ class PlannerView(NamedTuple):
     `states` (S, 8) as `contracts.simulation.STATE_COLUMNS`; `arc_m` and `offset_m` (S,) place
     base_link on `path`; `desired_offset_m` (S,) is the lateral offset to keep; `speed_factor` (S,)
     is how much faster than the nominal future this one likes everything, curves included;
-    `lead_gap_m` (S,) from bumper to bumper, infinite without a lead, and `lead_speed_mps` (S,).
+    `lead_gap_m` (S,) from bumper to bumper, infinite without a lead, and `lead_speed_mps` (S,);
+    `stop_arc_m` (S,) where the front has to stand for a light, infinite without one; `users` and
+    `ground` are None where there are none; `car_plan` where none was received.
     """
 
     time_s: float
@@ -29,6 +74,10 @@ class PlannerView(NamedTuple):
     lead_gap_m: Array
     lead_speed_mps: Array
     vehicle: VehicleParameters
+    stop_arc_m: Array | None = None
+    users: SeenUsers | None = None
+    ground: SharedGround | None = None
+    car_plan: KnownPlan | None = None
 
 
 class PlannerOutput(NamedTuple):
@@ -43,3 +92,22 @@ class Planner(Protocol):
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
+
+
+def rows_of(view: PlannerView, rows: npt.NDArray[np.intp]) -> PlannerView:
+    """Return what a planner sees that drives only some of the cars."""
+    users = view.users
+    if users is not None:
+        users = SeenUsers(*(field[rows] for field in users))
+    return view._replace(
+        states=view.states[rows],
+        arc_m=view.arc_m[rows],
+        offset_m=view.offset_m[rows],
+        desired_offset_m=view.desired_offset_m[rows],
+        target_speed_mps=view.target_speed_mps[rows],
+        speed_factor=view.speed_factor[rows],
+        lead_gap_m=view.lead_gap_m[rows],
+        lead_speed_mps=view.lead_speed_mps[rows],
+        stop_arc_m=None if view.stop_arc_m is None else view.stop_arc_m[rows],
+        users=users,
+    )
