@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
+from itertools import chain, compress
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from contracts.arrays import Array
 from contracts.frames import LocalFrame, local_from_geo
+from world_gen.extent import box_deg
 from world_gen.osm_map import OsmMap, OsmWay
 
 _RAILS = frozenset({"tram", "light_rail"})
@@ -45,10 +49,58 @@ def beside_roads(osm: OsmMap) -> BesideRoads:
     return BesideRoads(tuple(sidewalks), tuple(tracks), tuple(islands), crossed_at)
 
 
+class BesideIndex:
+    """What lies beside a map's roads, collected once and told place by place."""
+
+    def __init__(self, osm: OsmMap) -> None:
+        self._osm = osm
+
+    @cached_property
+    def _all(self) -> BesideRoads:
+        return beside_roads(self._osm)
+
+    @cached_property
+    def _corners_deg(self) -> tuple[Array, Array, Array]:
+        every = self._all
+        return (
+            _corners_deg(every.sidewalks, self._osm),
+            _corners_deg(every.tracks, self._osm),
+            _corners_deg(every.islands, self._osm),
+        )
+
+    def within(self, area: shapely.Geometry) -> BesideRoads:
+        """Return the ways that may reach into `area`, a shape in the map's frame."""
+        west, south, east, north = box_deg(area, self._osm.frame).bounds
+
+        def near(ways: tuple[OsmWay, ...], corners: Array) -> tuple[OsmWay, ...]:
+            apart = (corners[:, :2] > (north, east)) | (corners[:, 2:] < (south, west))
+            reaching: list[bool] = (~apart.any(axis=1)).tolist()
+            return tuple(compress(ways, reaching))
+
+        (*drawn, crossed_at), corners_of = self._all, self._corners_deg
+        sidewalks, tracks, islands = map(near, drawn, corners_of)
+        return BesideRoads(sidewalks, tracks, islands, crossed_at)
+
+
+def _corners_deg(ways: tuple[OsmWay, ...], osm: OsmMap) -> Array:
+    """Return the south-western and north-eastern corner of each way, (K, 4)."""
+    if not ways:
+        return np.zeros((0, 4))
+    lat_lon, first = _lat_lon_deg(ways, osm)
+    low, high = (f.reduceat(lat_lon, first, axis=0) for f in (np.minimum, np.maximum))
+    return np.concatenate([low, high], axis=1)
+
+
+def _lat_lon_deg(ways: tuple[OsmWay, ...], osm: OsmMap) -> tuple[Array, np.ndarray]:
+    """Return the points of ways in one row, and where each way begins."""
+    counts = np.array([len(way.nodes) for way in ways])
+    nodes = np.fromiter(chain.from_iterable(way.nodes for way in ways), np.int64, counts.sum())
+    return osm.lat_lon_deg(nodes), np.cumsum(counts) - counts
+
+
 def in_frame(ways: tuple[OsmWay, ...], osm: OsmMap, frame: LocalFrame) -> list[Array]:
     """Return the points (N, 2) of ways in a World's frame."""
     if not ways:
         return []
-    lat_lon = np.array([osm.locations[node] for way in ways for node in way.nodes])
-    xy_m = local_from_geo(frame, lat_lon[:, 0], lat_lon[:, 1])
-    return np.split(xy_m, np.cumsum([len(way.nodes) for way in ways])[:-1])
+    lat_lon, first = _lat_lon_deg(ways, osm)
+    return np.split(local_from_geo(frame, lat_lon[:, 0], lat_lon[:, 1]), first[1:])

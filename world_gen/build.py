@@ -10,7 +10,6 @@ import numpy as np
 from contracts.codec import content_bytes
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from contracts.world import Arm, IntersectionSummary, World, WorldJunction
-from world_gen.beside_roads import beside_roads
 from world_gen.buildings import buildings_in_frame
 from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
 from world_gen.connection_paths import draw_paths
@@ -113,14 +112,15 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
     notes: list[str] = []
     lanes = build_lanes(around)
     connections = _connections(index, around, lanes, notes)
-    beside = beside_roads(osm)
+    on_map = in_map(extent, around.frame, index.graph.frame)
+    beside = index.beside.within(on_map)
     crossed = crossings(around, osm.node_tags, beside)
     rules = junction_rules(
         around, osm.node_tags, lanes, connections, crossed, index.junction_lights
     )
     surface = areas(around, lanes, connections)
     tracks = tram_tracks(around, osm, beside)
-    near = index.buildings_in(in_map(extent, around.frame, index.graph.frame))
+    near = index.buildings_in(on_map)
     buildings, cut = buildings_in_frame(near, around.frame, index.graph.frame, surface.driven)
     world = World(
         id="",

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import shapely
 
 from contracts.arrays import Array
-from contracts.frames import LocalFrame, geo_from_local, target_from_source
+from contracts.frames import LocalFrame, target_from_source
 from contracts.world import Building
 from world_gen.building_outlines import (
     MIN_PIECE_M2,
@@ -23,6 +23,7 @@ from world_gen.building_outlines import (
 from world_gen.building_parts import Footprint as Footprint
 from world_gen.building_parts import resolve_parts
 from world_gen.building_tags import building_extent
+from world_gen.extent import box_deg
 from world_gen.osm_map import OsmMap
 
 GRID_M = 0.001
@@ -72,20 +73,12 @@ class BuildingIndex:
 
     def within(self, area: shapely.Geometry) -> tuple[Footprint, ...]:
         """Return the buildings that reach into `area`, a shape in the map's frame."""
-        near = np.sort(self._tree.query(self._box_deg(area)))
+        near = np.sort(self._tree.query(box_deg(area, self._osm.frame)))
         self._make(near)
         found = [footprint for k in near.tolist() for footprint in self._done[k]]
         shapely.prepare(area)
         hit = shapely.intersects(area, np.array([f.polygon for f in found], dtype=object))
         return tuple(f for f, inside in zip(found, hit.tolist(), strict=True) if inside)
-
-    def _box_deg(self, area: shapely.Geometry) -> shapely.Geometry:
-        """Return a box in degrees around a shape; meridians curve in the map's frame."""
-        ring = shapely.segmentize(shapely.box(*area.bounds), max(area.length / 64.0, 1.0))
-        lat, lon = geo_from_local(self._osm.frame, shapely.get_coordinates(ring)).T
-        if np.ptp(lon) > 180.0:
-            return shapely.box(-180.0, lat.min() - 1e-3, 180.0, lat.max() + 1e-3)
-        return shapely.box(lon.min() - 1e-3, lat.min() - 1e-3, lon.max() + 1e-3, lat.max() + 1e-3)
 
     def _make(self, entries: Indices) -> None:
         todo = np.array([k for k in entries.tolist() if k not in self._done], dtype=np.intp)

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from contracts.arrays import Array
+from contracts.frames import LocalFrame, geo_from_local
 from world_gen.polyline import arc_lengths, points_at
 
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
@@ -118,3 +119,15 @@ def stretches_inside(xy_m: Array, extent: Extent) -> list[tuple[float, float]]:
                 begin = found.pop()[0]
             found.append((begin, stop))
     return [(a, b) for a, b in found if b - a > MIN_PIECE_M]
+
+
+def box_deg(area: shapely.Geometry, frame: LocalFrame) -> shapely.Polygon:
+    """Return a box of longitudes and latitudes around a shape in `frame`, some 100 m to spare.
+
+    Meridians curve in the frame. Across the antimeridian the box goes all around.
+    """
+    ring = shapely.segmentize(shapely.box(*area.bounds), max(area.length / 64.0, 1.0))
+    lat, lon = geo_from_local(frame, shapely.get_coordinates(ring)).T
+    if np.ptp(lon) > 180.0:
+        return shapely.box(-180.0, lat.min() - 1e-3, 180.0, lat.max() + 1e-3)
+    return shapely.box(lon.min() - 1e-3, lat.min() - 1e-3, lon.max() + 1e-3, lat.max() + 1e-3)

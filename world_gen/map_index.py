@@ -10,6 +10,7 @@ import numpy.typing as npt
 import shapely
 
 from contracts.arrays import Array
+from world_gen.beside_roads import BesideIndex
 from world_gen.building_parts import Footprint
 from world_gen.buildings import BuildingIndex
 from world_gen.intersections import Junction
@@ -28,6 +29,7 @@ class MapIndex:
     car_edges: tuple[int, ...]
     car_edge_tree: shapely.STRtree
     buildings: BuildingIndex
+    beside: BesideIndex
     restrictions: TurnRestrictions
     junction_of_node: Mapping[int, Junction]
     junction_lights: frozenset[int]
@@ -69,6 +71,7 @@ def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ())
         car_edges=car,
         car_edge_tree=shapely.STRtree(lines),
         buildings=BuildingIndex(osm),
+        beside=BesideIndex(osm),
         restrictions=read_turn_restrictions(osm),
         junction_of_node={node: j for j in known for node in sorted(j.nodes)},
         junction_lights=frozenset().union(*(junction.lights for junction in known)),

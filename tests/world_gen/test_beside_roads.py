@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString, Point, Polygon
 
 from tests.world_gen.drawn_maps import STREET, crossing, world_of
+from world_gen.beside_roads import BesideIndex
 from world_gen.sidewalks import sides_with_sidewalk
 
 
@@ -49,6 +50,17 @@ def test_a_sidewalk_of_its_own_keeps_its_place():
     # The avenue cuts it in two.
     assert [area.id for area in walks] == ["sidewalk:w30", "sidewalk:w30-1"]
     assert all(7.0 <= y <= 9.0 for area in walks for y in np.round(area.outline[:, 1], 2))
+
+
+def test_what_lies_elsewhere_on_the_map_is_not_looked_at():
+    walk = {"highway": "footway", "footway": "sidewalk"}
+    osm = crossing(
+        extra_nodes={30: (-90.0, 8.0), 31: (90.0, 8.0), 32: (5000.0, 8.0), 33: (5100.0, 8.0)},
+        extra_ways=[(30, [30, 31], walk), (31, [32, 33], walk)],
+    )
+    index = BesideIndex(osm)
+    assert [way.id for way in index.within(Point(0.0, 0.0).buffer(50.0)).sidewalks] == [30]
+    assert [way.id for way in index.within(Point(5050.0, 0.0).buffer(50.0)).sidewalks] == [31]
 
 
 def test_a_way_that_crosses_a_road_is_a_crossing():
