@@ -98,7 +98,7 @@ def rows_of(view: PlannerView, rows: npt.NDArray[np.intp]) -> PlannerView:
     """Return what a planner sees that drives only some of the cars."""
     users = view.users
     if users is not None:
-        users = SeenUsers(*(field[rows] for field in users))
+        users = SeenUsers._make(field[rows] for field in users)
     return view._replace(
         states=view.states[rows],
         arc_m=view.arc_m[rows],
