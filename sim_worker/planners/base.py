@@ -17,8 +17,9 @@ class SeenUsers(NamedTuple):
 
     `poses` (S, R, 3) x, y, yaw of box centres in the World's frame, `speed_mps` (S, R) along their
     yaw, `size_m` (S, R, 2) length and width, `arc_m` and `offset_m` (S, R) of box centres on the
-    ego's path, `walks` (S, R) true for those who keep to no lane. Who drives a future with faults
-    perceives late, displaced, or nothing.
+    ego's path, `walks` (S, R) true for those who keep to no lane, `turned_rad` (S, R) their yaw
+    against the path's heading there. Who drives a future with faults perceives late, displaced,
+    or nothing.
     """
 
     poses: Array
@@ -27,6 +28,7 @@ class SeenUsers(NamedTuple):
     arc_m: Array
     offset_m: Array
     walks: npt.NDArray[np.bool_]
+    turned_rad: Array
 
 
 class SharedGround(NamedTuple):
