@@ -11,6 +11,10 @@ import typer
 from contracts.errors import UserError
 
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
+PATH_ERRORS = (
+    FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError, PermissionError,
+)  # fmt: skip
+"""What is wrong with a path is the user's to mend."""
 
 app = typer.Typer(
     name="foretwin",
@@ -202,7 +206,7 @@ def run(arguments: list[str]) -> int:
     """Run one command; returns 0 done, 1 internal error, 2 the user's input, 130 Ctrl-C."""
     try:
         result = app(arguments, standalone_mode=False)
-    except (UserError, FileNotFoundError, IsADirectoryError, PermissionError) as error:
+    except (UserError, *PATH_ERRORS) as error:
         print(f"foretwin: {_one_line(error)}", file=sys.stderr)
         return EXIT_USER
     except (KeyboardInterrupt, typer.Abort):

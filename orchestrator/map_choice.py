@@ -39,7 +39,7 @@ def nearest_junction(opened: OpenMap, lat: float, lon: float) -> Junction:
     if not away[best] <= FARTHEST_M:
         raise UserError(
             f"--at {lat},{lon}: the nearest intersection of {opened.file} is "
-            f"{away[best]:.0f} m away"
+            f"{away[best]:.0f} m away, more than {FARTHEST_M:.0f}"
         )
     return opened.junctions[best]
 

@@ -67,7 +67,8 @@ def _fetch(settings: OverpassConfig, query: str, answer: Path) -> None:
 
     console = Console(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), DownloadColumn())
-    with Progress(*columns, console=console) as bar, answer.open("w+b") as target:
+    bar = Progress(*columns, console=console, disable=not console.is_terminal)
+    with bar, answer.open("w+b") as target:
         task = bar.add_task(f"asking {settings.endpoint}", total=None)
 
         def show(done: int, total: int | None) -> None:

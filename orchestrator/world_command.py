@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -225,10 +226,20 @@ def _check_out(out: Path, format_: Format, *, many: bool) -> None:
     if many:
         if out.exists() and not out.is_dir():
             raise UserError(f"--out {out}: is a file; --all and --route write into a folder")
-        out.mkdir(parents=True, exist_ok=True)
-    elif out.is_dir():
+        _check_writable(out, next(path for path in (out, *out.parents) if path.exists()))
+        return
+    if out.is_dir():
         raise UserError(f"--out {out}: is a folder; name the file to write")
-    elif not out.parent.is_dir():
+    if not out.parent.is_dir():
         raise UserError(f"--out {out}: folder {out.parent} does not exist")
-    elif format_.told_by_suffix and out.suffix.lower() != format_.suffix:
+    if format_.told_by_suffix and out.suffix.lower() != format_.suffix:
         raise UserError(f"--out {out}: a file of --format {format_.name} ends in {format_.suffix}")
+    _check_writable(out, out.parent)
+
+
+def _check_writable(out: Path, folder: Path) -> None:
+    """Refuse before the map is read, which may take long; UserError says what stands there."""
+    if not folder.is_dir():
+        raise UserError(f"--out {out}: {folder} is no folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UserError(f"--out {out}: folder {folder} cannot be written to")

@@ -30,13 +30,14 @@ def write_each(
     attribution: str,
     report: bool = False,
 ) -> int:
-    """Write one file per junction, named by its id; returns 0, or 3 where some failed.
+    """Write one file per junction into a folder, made if need be; returns 0, or 3 if some failed.
 
     What goes wrong with one junction is said in a line and in the failures file of the folder,
     and does not stop the others.
     """
     from world_gen.report import note_kind
 
+    folder.mkdir(parents=True, exist_ok=True)
     kinds: Counter[str] = Counter()
     failures: list[str] = []
     with _progress(len(junctions)) as (advance, say):

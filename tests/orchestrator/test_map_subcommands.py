@@ -27,8 +27,17 @@ def test_no_map_server_is_asked_unless_it_is_named(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_file_in_the_place_of_the_folder_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    assert run(["map", "index", str(EMBEDDED_MAP), "--folder", str(file)]) == 2
+    assert capsys.readouterr().err == f"foretwin: {file}: file exists\n"
+
+
 def test_a_map_that_is_not_there_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["map", "index", "no.osm", "--folder", str(tmp_path)]) == 2
-    assert "no.osm" in capsys.readouterr().err
+    assert capsys.readouterr().err == "foretwin: no.osm: there is no such map file\n"

@@ -280,9 +280,46 @@ def test_an_output_that_cannot_be_is_named(
         (["--at", "45,-30", "--out", str(tmp_path)], "is a folder"),
         (["--at", "45,-30", "--out", str(tmp_path / "no" / "w.xml")], "does not exist"),
         (["--at", "45,-30", "--format", "svg", "--out", str(tmp_path / "w.png")], "ends in .svg"),
+        (["--all", "--out", str(file / "worlds")], "is no folder"),
     ):
         assert run(["world", MAP, *arguments]) == 2
         assert named in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--all", "--out", "new/worlds"], ["--at", "45,-30", "--out", "world.xml"]]
+)
+def test_a_folder_that_cannot_be_written_to_is_named_before_the_map_is_read(
+    arguments: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    assert run(["world", "no.osm", *arguments]) == 2
+    assert "cannot be written to" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_wrong_map_leaves_no_folder_behind(tmp_path: Path) -> None:
+    assert run(["world", "no.osm", "--all", "--out", str(tmp_path / "worlds")]) == 2
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("file_format", ["mjcf", "sdf", "opendrive", "lanelet2", "commonroad",
+                                         "geojson", "svg"])  # fmt: skip
+def test_every_format_names_the_file_that_cannot_be_written(
+    file_format: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Past all checks: a link to nowhere takes no file, whoever writes it.
+    out = tmp_path / f"world{FORMATS[file_format].suffix}"
+    out.symlink_to(tmp_path / "no" / "folder")
+    arguments = ["--at", "45,-30", "--format", file_format, "--out", str(out)]
+    assert run(["world", MAP, *arguments]) == 2
+    error = capsys.readouterr().err.strip()
+    assert out.name in error
+    assert "\n" not in error
 
 
 def test_help_needs_none_of_the_rooms() -> None:
