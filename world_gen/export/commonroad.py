@@ -69,7 +69,8 @@ def write_commonroad(
         "timeStepSize": str(TIME_STEP_S),
     }
     elements = commonroad_elements(world, country=country)
-    with etree.xmlfile(str(path), encoding="utf-8") as xml:
+    # lxml would not say which file cannot be written: it is opened here.
+    with path.open("wb") as file, etree.xmlfile(file, encoding="utf-8") as xml:
         xml.write_declaration()
         with xml.element("commonRoad", root):
             xml.write("\n")

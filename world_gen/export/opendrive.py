@@ -24,7 +24,8 @@ def write_opendrive(world: World, path: Path, *, version: Version = "1.8") -> No
     root = opendrive_element(world, version=version)
     tree = etree.ElementTree(root)
     path.parent.mkdir(parents=True, exist_ok=True)
-    tree.write(str(path), encoding="UTF-8", xml_declaration=True, pretty_print=True)
+    with path.open("wb") as file:  # lxml would not say which file cannot be written
+        tree.write(file, encoding="UTF-8", xml_declaration=True, pretty_print=True)
 
 
 def opendrive_element(world: World, *, version: Version = "1.8") -> etree._Element:

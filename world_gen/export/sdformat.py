@@ -87,7 +87,8 @@ def write_sdf(
     root.insert(0, etree.Comment(printable.replace("--", "- ")))
     tree = etree.ElementTree(root)
     etree.indent(tree, space=" ")
-    tree.write(str(path), xml_declaration=True, encoding="utf-8")
+    with path.open("wb") as file:  # lxml would not say which file cannot be written
+        tree.write(file, xml_declaration=True, encoding="utf-8")
 
 
 def _check_names(vehicles: Sequence[SdfVehicle]) -> None:
