@@ -166,6 +166,11 @@ class Conflict(msgspec.Struct, frozen=True, kw_only=True):
     rule: YieldRule
     source: Provenance
 
+    @property
+    def goes_id(self) -> str:
+        """The connection that does not wait."""
+        return self.second_id if self.yields_id == self.first_id else self.first_id
+
 
 class StopLine(msgspec.Struct, frozen=True, kw_only=True):
     """Where vehicles of a lane stop; `ends` (2, 2) from left to right."""

@@ -216,9 +216,7 @@ def _right_of_way(at: Neighbourhood, conflicts: Iterable[Conflict]) -> list[Valu
     found = []
     for conflict in conflicts:
         waits = at.connections[conflict.yields_id]
-        goes = at.connections[
-            conflict.second_id if conflict.yields_id == conflict.first_id else conflict.first_id
-        ]
+        goes = at.connections[conflict.goes_id]
         waits_road = at.road_name(at.lanes[waits.from_lane_id])
         goes_road = at.road_name(at.lanes[goes.from_lane_id])
         words = f"waits for {goes_road} ({_RULES[conflict.rule]})"

@@ -136,9 +136,7 @@ def _add_priority(
     for conflict in world.conflicts:
         if conflict.rule not in _SIGNED_RULES:
             continue
-        winner = (
-            conflict.second_id if conflict.yields_id == conflict.first_id else conflict.first_id
-        )
+        winner = conflict.goes_id
         if winner in connections and connections[winner].from_lane_id not in waiting:
             lane_id = connections[winner].from_lane_id
             first[lane_id] = first.get(lane_id, False) or conflict.source == "tagged"

@@ -213,8 +213,7 @@ def _add_right_of_way(
     together = _green_together(world)
     waits: dict[tuple[str, bool], list[str]] = {}
     for conflict in world.conflicts:
-        loser = conflict.yields_id
-        winner = conflict.second_id if loser == conflict.first_id else conflict.first_id
+        loser, winner = conflict.yields_id, conflict.goes_id
         if loser not in connections or winner not in connections:
             continue
         if connections[loser].junction_id in without:

@@ -31,8 +31,7 @@ def junction_elements(
     for conflict in world.conflicts:
         if conflict.first_id not in roads or conflict.second_id not in roads:
             continue
-        first, second = roads[conflict.first_id], roads[conflict.second_id]
-        low, high = (first, second) if conflict.yields_id == conflict.first_id else (second, first)
+        low, high = roads[conflict.yields_id], roads[conflict.goes_id]
         if at[low] == at[high]:
             waits.setdefault(at[low], []).append((high, low))
     return [
