@@ -74,8 +74,7 @@ class BesideIndex:
 
         def near(ways: tuple[OsmWay, ...], corners: Array) -> tuple[OsmWay, ...]:
             apart = (corners[:, :2] > (north, east)) | (corners[:, 2:] < (south, west))
-            reaching: list[bool] = (~apart.any(axis=1)).tolist()
-            return tuple(compress(ways, reaching))
+            return tuple(compress(ways, np.logical_not(apart.any(axis=1))))
 
         (*drawn, crossed_at), corners_of = self._all, self._corners_deg
         sidewalks, tracks, islands = map(near, drawn, corners_of)
