@@ -69,7 +69,9 @@ def convex_cover(
     pieces, of = pieces[keep], of[keep]
     boxes = shapely.oriented_envelope(pieces)
     is_box = shapely.get_type_id(boxes) == _POLYGON
-    is_box[is_box] = nearly_the_same(boxes[is_box], pieces[is_box], BOX_SHARE * tolerance_m)
+    is_box[is_box] = nearly_the_same(
+        boxes[is_box], pieces[is_box], BOX_SHARE * tolerance_m, convex=True
+    )
     return _told(owner[of], np.where(is_box, boxes, pieces), is_box)
 
 

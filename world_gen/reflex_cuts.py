@@ -47,9 +47,12 @@ def cut_at_reflex_corners(polygons: Geometries, tolerance_m: float) -> tuple[Geo
 
 
 def nearly_the_same(
-    shapes: Geometries, others: Geometries, tolerance_m: float
+    shapes: Geometries, others: Geometries, tolerance_m: float, *, convex: bool = False
 ) -> npt.NDArray[np.bool_]:
-    """Return which polygons' edges lie within `tolerance_m` of the edges of those they hold."""
+    """Return which polygons' edges lie within `tolerance_m` of the edges of those they hold.
+
+    Where all `others` are known to be `convex`, none is farther than at a corner of `shapes`.
+    """
     missing = np.abs(shapely.area(shapes) - shapely.area(others))
     near: npt.NDArray[np.bool_] = missing <= _EQUAL_M2
     # A strip along the edge is no wider than this only where it has no more area than that.
@@ -57,6 +60,9 @@ def nearly_the_same(
     a, b = shapely.get_exterior_ring(shapes[at]), shapely.get_exterior_ring(others[at])
     at_corners = shapely.hausdorff_distance(a, b) <= tolerance_m
     at, a, b = at[at_corners], a[at_corners], b[at_corners]
+    if convex:
+        near[at] = True
+        return near
     # The corners alone miss a pocket behind a spike: look along the edges too.
     doubtful = missing[at] > _SURE_M2
     along = shapely.hausdorff_distance(a[doubtful], b[doubtful], densify=_DENSIFY) <= tolerance_m
@@ -116,6 +122,7 @@ class _Corners:
         closed = shapely.get_coordinates(rings)
         last = np.cumsum(counts + 1) - 1
         self.xy: Array = np.delete(closed, last, axis=0)
+        self.count: Indices = counts
         self.first: Indices = np.cumsum(counts) - counts
         self.ring: Indices = np.repeat(np.arange(len(counts)), counts)
         row = np.arange(len(self.xy))
@@ -177,41 +184,44 @@ def _cut_once(pieces: Geometries, owner: Indices) -> tuple[Geometries, Indices]:
     off = np.hypot(*np.moveaxis(corners.xy[ends] - place[:, None], 2, 0))
     off[(ends[:, :, None] == neighbours[:, None, :]).any(axis=2)] = np.inf
     end = np.where(off.min(axis=1) < _TO_CORNER_M, off.argmin(axis=1), -1)
-    rows: list[int] = []
-    counts: list[int] = []
-    of: list[int] = []
-    begins = corners.first.tolist()
-    stops = [*begins[1:], len(corners.xy)]
-    walls, sides = wall.tolist(), end.tolist()
-    from_corner = corner.tolist()
-    for k in np.flatnonzero(~stuck).tolist():
-        c, w, begin, stop, side = from_corner[k], walls[k], begins[k], stops[k], sides[k]
-        if c <= w:
-            head, tail = [*range(c, w + 1)], [*range(w + 1, stop), *range(begin, c + 1)]
-        else:
-            head, tail = [*range(c, stop), *range(begin, w + 1)], [*range(w + 1, c + 1)]
-        hit = len(corners.xy) + k if side < 0 else (w, tail[0])[side]
-        if side != 1:
-            tail.insert(0, hit)
-        if side != 0:
-            head.append(hit)
-        rows += head
-        rows += tail
-        counts += [len(head), len(tail)]
-        of += [k, k]
-    points = np.concatenate([corners.xy, place])[np.array(rows, dtype=np.intp)]
-    made = shapely.polygons(
-        shapely.linearrings(points, indices=np.repeat(np.arange(len(counts)), counts))
-    )
+    made = _halves_at(corners, corner, wall, end, place, np.flatnonzero(~stuck))
     # Where rounding has made a piece cross itself, no ray meets a wall.
     sound, sound_owner = polygons_of(shapely.make_valid(pieces[stuck]), owner[stuck])
     triangles, which = shapely.get_parts(
         shapely.constrained_delaunay_triangles(sound), return_index=True
     )
     found = np.concatenate([made, triangles])
-    found_owner = np.concatenate([owner[np.array(of, dtype=np.intp)], sound_owner[which]])
+    found_owner = np.concatenate([np.repeat(owner[~stuck], 2), sound_owner[which]])
     solid = shapely.area(found) > _MIN_AREA_M2
     return found[solid], found_owner[solid]
+
+
+def _halves_at(
+    corners: _Corners, corner: Indices, wall: Indices, end: Indices, place: Array, rings: Indices
+) -> Geometries:
+    """Return both halves of chosen `rings`, cut from a corner to a place on a wall.
+
+    `end` is 0 or 1 where that end of the wall stands for the place, else -1.
+    """
+    c, w, end = corner[rings], wall[rings], end[rings]
+    # One half runs from the corner to the wall's begin, the other from the wall's end on.
+    start = np.stack([c, w + (end != 0)], axis=1).ravel()
+    stop = np.stack([w + (end == 1), c], axis=1).ravel()
+    first, count = np.repeat(corners.first[rings], 2), np.repeat(corners.count[rings], 2)
+    run = (stop - start) % count + 1
+    # A new point ends the first half and begins the second.
+    new = np.repeat(end < 0, 2)
+    second = np.arange(len(run)) % 2 == 1
+    half = np.repeat(np.arange(len(run)), run + new)
+    at = np.arange(len(half)) - np.searchsorted(half, half)
+    step = start - first - (new & second)
+    rows = first[half] + (step[half] + at) % count[half]
+    is_new = new[half] & (at == np.where(second, 0, run)[half])
+    rows[is_new] = len(corners.xy) + np.repeat(rings, 2)[half[is_new]]
+    made: Geometries = shapely.polygons(
+        shapely.linearrings(np.concatenate([corners.xy, place])[rows], indices=half)
+    )
+    return made
 
 
 def _unit(vectors: Array) -> Array:
