@@ -24,7 +24,7 @@ from world_gen.export.commonroad_lights import traffic_lights
 from world_gen.export.commonroad_signs import DEFAULT_COUNTRY, traffic_signs
 from world_gen.export.lane_borders import Borders, lane_borders
 from world_gen.export.lane_markings import Marking, lane_markings
-from world_gen.polyline import left_of, unit
+from world_gen.export.lanelets import URBAN_MPS, crosswalk_edges, is_marked, narrower_lane
 
 VERSION = "2020a"
 TIME_STEP_S = 0.1
@@ -42,8 +42,6 @@ _USERS: dict[LaneKind, tuple[str, ...]] = {
     "tram": ("train",),
 }
 _CLASS_TYPES = {"motorway": "interstate", "trunk": "highway"}
-_COUNTRY_MPS = 60.0 / 3.6
-"""Roads on which one may drive faster count as outside towns."""
 
 
 def write_commonroad(
@@ -149,8 +147,7 @@ class _Lanelets:
 
     def connection(self, connection: Connection, signs: Sequence[int]) -> Any:
         """Return the lanelet of a connection; users are those of its narrower lane."""
-        start, end = self._lanes[connection.from_lane_id], self._lanes[connection.to_lane_id]
-        kind_of = end if start.kind == "driving" else start
+        kind_of = narrower_lane(connection, self._lanes)
         lanelet = self._begun(connection.id, "no_marking", "no_marking")
         types = self._types(kind_of)
         if connection.junction_id:
@@ -190,7 +187,7 @@ class _Lanelets:
     def _types(self, lane: Lane) -> list[str]:
         road = self._roads.get(lane.road_id)
         road_class = road.road_class.removesuffix("_link") if road is not None else ""
-        country = lane.speed_limit_mps.value > _COUNTRY_MPS
+        country = lane.speed_limit_mps.value > URBAN_MPS
         types = [_CLASS_TYPES.get(road_class, "country" if country else "urban")]
         if lane.kind in _TYPES:
             types.append(_TYPES[lane.kind])
@@ -247,7 +244,7 @@ def _tags(world: World) -> Any:
     kinds = {world.intersection.kind, *(j.summary.kind for j in world.junctions)}
     urban = not world.lanes or np.median(
         [lane.speed_limit_mps.value for lane in world.lanes]
-    ) <= _COUNTRY_MPS  # fmt: skip
+    ) <= URBAN_MPS  # fmt: skip
     child(tags, "urban" if urban else "rural")
     child(tags, "intersection")
     if kinds & {"roundabout", "circular", "mini_roundabout"}:
@@ -257,11 +254,10 @@ def _tags(world: World) -> Any:
 
 def _crosswalk(crossing: Crossing, number: int) -> Any:
     lanelet = etree.Element("lanelet", id=str(number))
-    across = left_of(unit(crossing.line[1] - crossing.line[0])) * (crossing.width_m.value / 2)
-    marked = "dashed" if crossing.kind.value not in ("unmarked", "no") else "no_marking"
-    for tag, shift in (("leftBound", across), ("rightBound", -across)):
+    marked = "dashed" if is_marked(crossing) else "no_marking"
+    for tag, edge in zip(("leftBound", "rightBound"), crosswalk_edges(crossing), strict=True):
         bound = child(lanelet, tag)
-        points(bound, crossing.line + shift)
+        points(bound, edge)
         child(bound, "lineMarking", marked)
     child(lanelet, "laneletType", "crosswalk")
     child(lanelet, "userBidirectional", "pedestrian")

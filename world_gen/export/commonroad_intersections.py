@@ -12,6 +12,7 @@ from lxml import etree
 from contracts.arrays import Array
 from contracts.world import Connection, Lane, World
 from world_gen.export.commonroad_elements import IdCounter, ref
+from world_gen.export.lanelets import indicated
 from world_gen.polyline import unit
 
 LEFT_OF_RAD = math.radians(150.0)
@@ -34,7 +35,7 @@ def intersections(world: World, lanes: Mapping[str, int], ids: IdCounter) -> Ite
             approach = (start.road_id or start.id, start.reverse)
             place = places.setdefault(c.place_id or c.junction_id, {})
             place.setdefault(approach, []).append(c)
-    far = "left" if world.intersection.driving_side == "right" else "right"
+    side = world.intersection.driving_side
     for incoming in places.values():
         number = ids.new()
         numbers = {approach: ids.new() for approach in incoming}
@@ -46,7 +47,7 @@ def intersections(world: World, lanes: Mapping[str, int], ids: IdCounter) -> Ite
                 ref(part, "incomingLanelet", lanes[lane_id])
             for turn, tag in _TAGS.items():
                 for c in connections:
-                    if (far if c.turn == "u_turn" else c.turn) == turn:
+                    if indicated(c.turn, side) == turn:
                         ref(part, tag, lanes[c.id])
             if approach in left_of:
                 ref(part, "isLeftOf", numbers[left_of[approach]])

@@ -10,8 +10,9 @@ from lxml import etree
 from contracts.signals import SignalPlan
 from contracts.world import Turn, World
 from world_gen.export.commonroad_elements import IdCounter, child, position
+from world_gen.export.lanelets import indicated
 
-_DIRECTIONS: Mapping[frozenset[str], str] = {
+_DIRECTIONS: Mapping[frozenset[Turn], str] = {
     frozenset({"right"}): "right",
     frozenset({"straight"}): "straight",
     frozenset({"left"}): "left",
@@ -108,11 +109,10 @@ def _add_cycle(light: Any, shown: Sequence[CycleElement], time_step_s: float) ->
 
 def _direction(world: World, lane_ids: Sequence[str], group_id: str) -> str:
     """Return for which turns a light stands, by the connections of its group."""
-    turns: set[Turn] = {
-        c.turn
+    side = world.intersection.driving_side
+    turns = frozenset(
+        indicated(c.turn, side)
         for c in world.connections
         if c.from_lane_id in lane_ids and c.signal_group_id in (None, group_id)
-    }
-    far = "left" if world.intersection.driving_side == "right" else "right"
-    named = frozenset(far if turn == "u_turn" else turn for turn in turns)
-    return _DIRECTIONS.get(named, "all")
+    )
+    return _DIRECTIONS.get(turns, "all")

@@ -18,13 +18,17 @@ from world_gen.export.lanelet2_orientation import oriented
 from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
 from world_gen.export.lanelet2_rules import LaneletRules, add_rules
 from world_gen.export.lanelet2_surroundings import add_intersection_areas, add_surroundings
+from world_gen.export.lanelets import (
+    URBAN_MPS,
+    crosswalk_edges,
+    indicated,
+    is_marked,
+    narrower_lane,
+)
 from world_gen.export.road_heights import RoadHeights
-from world_gen.polyline import left_of, unit
 
 AUTOWARE_MAP_NAME = "lanelet2_map.osm"
 """A map of this name gets the projector file under the name that Autoware looks for beside it."""
-URBAN_MPS = 60.0 / 3.6
-"""Roads on which one may drive faster count as outside towns."""
 _SUBTYPES: dict[LaneKind, str] = {
     "driving": "road", "bus": "bus_lane", "bicycle": "bicycle_lane", "parking": "parking",
     "tram": "rail",
@@ -155,8 +159,7 @@ def _connection_tags(
 ) -> dict[str, str]:
     """Return the tags of the narrower of both lanes, with the turn where it is a junction's."""
     start, end = lanes[connection.from_lane_id], lanes[connection.to_lane_id]
-    kind_of = end if start.kind == "driving" else start
-    tags = _lane_tags(kind_of)
+    tags = _lane_tags(narrower_lane(connection, lanes))
     tags["foretwin:id"] = connection.id
     tags["foretwin:width"] = f"{connection.width_m.value:.2f} {connection.width_m.source}"
     if "speed_limit" in tags:
@@ -165,21 +168,18 @@ def _connection_tags(
         tags["foretwin:speed_limit"] = slower.source
     tags.pop("road_name", None)
     if connection.junction_id:
-        far = "left" if world.intersection.driving_side == "right" else "right"
-        # Indicators know no U-turn: one turns across the road.
-        tags["turn_direction"] = far if connection.turn == "u_turn" else connection.turn
+        tags["turn_direction"] = indicated(connection.turn, world.intersection.driving_side)
     return tags
 
 
 def _crosswalk(crossing: Crossing, drawn: Lanelet2Map) -> int:
     """Draw the lanelet over which pedestrians cross and return its id."""
-    marked = crossing.kind.value not in ("unmarked", "no")
-    edge = {"type": "zebra_marking" if crossing.kind.value == "zebra" else "pedestrian_marking"}
-    across = left_of(unit(crossing.line[1] - crossing.line[0])) * (crossing.width_m.value / 2)
+    paint = {"type": "zebra_marking" if crossing.kind.value == "zebra" else "pedestrian_marking"}
     sides = []
-    for name, shift in (("left", across), ("right", -across)):
-        nodes = tuple(drawn.node(x, y, 0.0) for x, y in (crossing.line + shift).tolist())
-        sides.append(Member("way", drawn.way(nodes, edge if marked else VIRTUAL), name))
+    for name, edge in zip(SIDES, crosswalk_edges(crossing), strict=True):
+        nodes = tuple(drawn.node(x, y, 0.0) for x, y in edge.tolist())
+        way = drawn.way(nodes, paint if is_marked(crossing) else VIRTUAL)
+        sides.append(Member("way", way, name))
     return drawn.relation(
         sides,
         {
