@@ -1,12 +1,65 @@
-"""Displacement of a prediction from what happened, and how many futures really differ."""
+"""Displacement of predictions from what happened, and how many futures really differ."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from contracts.arrays import Array
 from contracts.frames import wrap_angle
 from contracts.simulation import HorizonError
+from sim_worker.metrics.rollout import Flags, Measure
+from sim_worker.metrics.scene import Scene
+
+_Summary = Callable[["Displacements"], Array]
+_SEED_S = 1e-6
+"""The seeding instant is left out: there every prediction is right."""
+
+
+class Displacements(NamedTuple):
+    """S predictions against one reference at N instants; signed values in the reference's axes.
+
+    `distance_m`, `lateral_m` (positive: the prediction lies to the left), `longitudinal_m` and
+    `heading_rad` are (S, N).
+    """
+
+    distance_m: Array
+    lateral_m: Array
+    longitudinal_m: Array
+    heading_rad: Array
+
+
+def displacements(predicted: Array, reference: Array) -> Displacements:
+    """Compare poses (S, N, 3) with poses (N, 3) or (S, N, 3) at the same instants of one frame."""
+    dx = predicted[..., 0] - reference[..., 0]
+    dy = predicted[..., 1] - reference[..., 1]
+    cos, sin = np.cos(reference[..., 2]), np.sin(reference[..., 2])
+    return Displacements(
+        distance_m=np.hypot(dx, dy),
+        lateral_m=cos * dy - sin * dx,
+        longitudinal_m=cos * dx + sin * dy,
+        heading_rad=wrap_angle(predicted[..., 2] - reference[..., 2]),
+    )
+
+
+def absolute_pose_error(predicted: Array, reference: Array) -> Array:
+    """Return (S,) root mean square distances of (S, N, 3) from (N, 3), without alignment.
+
+    Absolute trajectory error: Sturm et al. (2012), A Benchmark for the Evaluation of RGB-D SLAM
+    Systems, equation 3, with the identity for S. What evo calls the APE's translation part.
+    """
+    return np.asarray(np.sqrt(np.square(displacements(predicted, reference).distance_m).mean(-1)))
+
+
+def relative_pose_error(predicted: Array, reference: Array) -> Array:
+    """Return (S,) root mean square errors in metres of the way from each instant to the next.
+
+    Translational part of the relative pose error with Δ = 1: Sturm et al. (2012), equation 2.
+    """
+    difference = _steps_in_own_axes(predicted) - _steps_in_own_axes(reference)
+    return np.asarray(np.sqrt(np.square(difference).sum(axis=-1).mean(axis=-1)))
 
 
 def horizon_error(predicted: Array, actual: Array) -> HorizonError:
@@ -19,17 +72,13 @@ def horizon_error(predicted: Array, actual: Array) -> HorizonError:
         raise ValueError(f"poses of shape {predicted.shape} against {actual.shape}: need (N, 3)")
     if len(predicted) == 0:
         raise ValueError("no instant to compare")
-    difference = predicted[:, :2] - actual[:, :2]
-    distance = np.hypot(difference[:, 0], difference[:, 1])
-    yaw = float(actual[-1, 2])
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    dx, dy = difference[-1]
+    found = displacements(predicted, actual)
     return HorizonError(
-        ade_m=float(distance.mean()),
-        fde_m=float(distance[-1]),
-        lateral_m=float(cos * dy - sin * dx),
-        longitudinal_m=float(cos * dx + sin * dy),
-        heading_rad=float(wrap_angle(predicted[-1, 2] - yaw)),
+        ade_m=float(found.distance_m.mean()),
+        fde_m=float(found.distance_m[-1]),
+        lateral_m=float(found.lateral_m[-1]),
+        longitudinal_m=float(found.longitudinal_m[-1]),
+        heading_rad=float(found.heading_rad[-1]),
     )
 
 
@@ -41,3 +90,82 @@ def distinct_count(ends: Array, least_m: float = 0.1) -> int:
         if np.isfinite(end).all() and (apart > least_m).all():
             kept = np.vstack([kept, end])
     return len(kept)
+
+
+def known(scene: Scene) -> tuple[Array, Array]:
+    """Return the futures' poses (S, K, 3) and the reference (K, 3) where that is known."""
+    reference = scene.context.reference
+    if reference is None:
+        raise ValueError("no reference to compare with")
+    if reference.shape != (len(scene.time_s), 3):
+        raise ValueError(f"reference: {reference.shape}, expected ({len(scene.time_s)}, 3)")
+    there: Flags = np.asarray(np.isfinite(reference).all(axis=1))
+    return scene.states[:, there, :3], np.asarray(reference[there], dtype=np.float64)
+
+
+def ade(scene: Scene) -> Measure:
+    """Average displacement error (S,): Pellegrini et al. (2009), You'll Never Walk Alone."""
+    return _of(scene, lambda found: found.distance_m.mean(axis=1))
+
+
+def fde(scene: Scene) -> Measure:
+    """Final displacement error (S,), at the last known instant: Alahi et al. (2016), Social LSTM.
+
+    Where the reference ends before the rollout, that is not the rollout's last.
+    """
+    return _of(scene, lambda found: found.distance_m[:, -1])
+
+
+def lateral(scene: Scene) -> Measure:
+    """How far to the left of the reference (S,) the future ends, negative to the right."""
+    return _of(scene, lambda found: found.lateral_m[:, -1])
+
+
+def longitudinal(scene: Scene) -> Measure:
+    """How far ahead of the reference (S,) the future ends, negative behind."""
+    return _of(scene, lambda found: found.longitudinal_m[:, -1])
+
+
+def heading(scene: Scene) -> Measure:
+    """How far the future's yaw is turned (S,) from the reference's at the end."""
+    return _of(scene, lambda found: found.heading_rad[:, -1])
+
+
+def ape(scene: Scene) -> Measure:
+    """Absolute pose error (S,) over all known instants but the seeding one."""
+    return _of(scene, lambda found: np.sqrt(np.square(found.distance_m).mean(axis=1)))
+
+
+def rpe(scene: Scene) -> Measure:
+    """Relative pose error (S,) from each known instant to the next."""
+    predicted, reference = known(scene)
+    if len(reference) < 2:
+        return nowhere(scene)
+    return scene.measure(relative_pose_error(predicted, reference))
+
+
+def nowhere(scene: Scene) -> Measure:
+    """Return a measure (S,) that is valid for no future."""
+    return scene.measure(np.full(len(scene.valid), np.nan), np.zeros(len(scene.valid), dtype=bool))
+
+
+def _of(scene: Scene, summary: _Summary) -> Measure:
+    found = scene.keep(_after_seed)
+    return nowhere(scene) if found is None else scene.measure(np.asarray(summary(found)))
+
+
+def _after_seed(scene: Scene) -> Displacements | None:
+    predicted, reference = known(scene)
+    time_s = scene.time_s[np.isfinite(scene.context.reference).all(axis=1)]  # type: ignore[arg-type]
+    later = time_s > _SEED_S
+    if not later.any():
+        return None
+    return displacements(predicted[:, later], reference[later])
+
+
+def _steps_in_own_axes(poses: Array) -> Array:
+    step = np.diff(poses[..., :2], axis=-2)
+    cos, sin = np.cos(poses[..., :-1, 2]), np.sin(poses[..., :-1, 2])
+    return np.stack(
+        [cos * step[..., 0] + sin * step[..., 1], cos * step[..., 1] - sin * step[..., 0]], axis=-1
+    )

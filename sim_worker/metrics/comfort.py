@@ -1,0 +1,133 @@
+"""Comfort: accelerations, jerk and turning of the ego, with nuPlan's bounds."""
+
+from __future__ import annotations
+
+import functools
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from contracts.arrays import Array
+from sim_worker.metrics.rollout import Flags, Measure
+from sim_worker.metrics.scene import Scene
+
+BOUNDS = MappingProxyType(
+    {
+        "lon_accel_mps2": (-4.05, 2.40),
+        "lat_accel_mps2": (-4.89, 4.89),
+        "jerk_mps3": (-8.37, 8.37),
+        "lon_jerk_mps3": (-4.13, 4.13),
+        "yaw_rate_radps": (-0.95, 0.95),
+        "yaw_accel_radps2": (-1.93, 1.93),
+    }
+)
+"""nuPlan devkit, planning/metrics, ego_is_comfortable (Caesar et al., 2021, nuPlan: A closed-loop
+ML-based planning benchmark): the extremes of its human drivers. The same in NAVSIM."""
+_ACCEL_WINDOW_S = 0.8
+_JERK_WINDOW_S = 1.4
+_ORDER = 2
+"""Smoothing as there: quadratics over 8 samples of 0.1 s for accelerations, 15 for derivatives."""
+
+
+class Motion(NamedTuple):
+    """How base_link moves, all (S, N), smoothed; jerk is the rate of the acceleration's size."""
+
+    lon_accel_mps2: Array
+    lat_accel_mps2: Array
+    jerk_mps3: Array
+    lon_jerk_mps3: Array
+    yaw_rate_radps: Array
+    yaw_accel_radps2: Array
+
+
+def motion(scene: Scene) -> Motion:
+    """Return the motion of the ego by Savitzky and Golay (1964), Smoothing and Differentiation.
+
+    Accelerations follow from the velocities in the states, so that planned motion is judged like
+    simulated: a_lon = dvx/dt - vy ω, a_lat = dvy/dt + vx ω. Raises ValueError where the instants
+    are not evenly spaced.
+    """
+    steps = np.diff(scene.time_s)
+    if np.ptp(steps) > 1e-3 * steps[0]:
+        raise ValueError("comfort needs evenly spaced instants")
+    vx, vy = scene.states[..., 3], scene.states[..., 4]
+    yaw = np.unwrap(scene.states[..., 2], axis=1)
+    count, step_s = len(scene.time_s), float(steps.mean())
+    slope = _operator(count, step_s, _ACCEL_WINDOW_S, 1)
+    rate = _operator(count, step_s, _JERK_WINDOW_S, 1)
+    curve = _operator(count, step_s, _JERK_WINDOW_S, 2)
+    turning = yaw @ rate
+    lon = vx @ slope - vy * turning
+    lat = vy @ slope + vx * turning
+    return Motion(
+        lon_accel_mps2=lon,
+        lat_accel_mps2=lat,
+        jerk_mps3=np.hypot(lon, lat) @ rate,
+        lon_jerk_mps3=lon @ rate,
+        yaw_rate_radps=turning,
+        yaw_accel_radps2=yaw @ curve,
+    )
+
+
+@functools.lru_cache(maxsize=32)
+def _operator(count: int, step_s: float, window_s: float, derivative: int) -> Array:
+    """Return (N, N) what a row of N samples is multiplied with for its smoothed derivative."""
+    window = min(2 * round(window_s / step_s / 2.0) + 1, count - (count + 1) % 2)
+    order = min(max(_ORDER, derivative), window - 1)
+    if order < derivative:
+        return np.zeros((count, count))
+    operator: Array = savgol_filter(
+        np.eye(count), window, order, deriv=derivative, delta=step_s, axis=1
+    )
+    operator.flags.writeable = False
+    return operator
+
+
+def _kept(scene: Scene) -> Motion:
+    return scene.keep(motion)
+
+
+def max_acceleration(scene: Scene) -> Measure:
+    """Greatest acceleration along the road (S,)."""
+    return scene.measure(_kept(scene).lon_accel_mps2.max(axis=1))
+
+
+def max_deceleration(scene: Scene) -> Measure:
+    """Greatest deceleration along the road (S,), positive where it brakes at all."""
+    return scene.measure(-_kept(scene).lon_accel_mps2.min(axis=1))
+
+
+def max_lateral_acceleration(scene: Scene) -> Measure:
+    """Greatest lateral acceleration (S,) to either side."""
+    return scene.measure(np.abs(_kept(scene).lat_accel_mps2).max(axis=1))
+
+
+def max_jerk(scene: Scene) -> Measure:
+    """Greatest rate of change of the acceleration's size (S,)."""
+    return scene.measure(np.abs(_kept(scene).jerk_mps3).max(axis=1))
+
+
+def max_longitudinal_jerk(scene: Scene) -> Measure:
+    """Greatest rate of change of the acceleration along the road (S,)."""
+    return scene.measure(np.abs(_kept(scene).lon_jerk_mps3).max(axis=1))
+
+
+def max_yaw_rate(scene: Scene) -> Measure:
+    """Greatest yaw rate (S,) to either side."""
+    return scene.measure(np.abs(_kept(scene).yaw_rate_radps).max(axis=1))
+
+
+def max_yaw_acceleration(scene: Scene) -> Measure:
+    """Greatest yaw acceleration (S,) to either side."""
+    return scene.measure(np.abs(_kept(scene).yaw_accel_radps2).max(axis=1))
+
+
+def comfortable(scene: Scene) -> Measure:
+    """Whether all of `BOUNDS` are kept at all instants (S,): 1 or 0."""
+    found = _kept(scene)._asdict()
+    kept: Flags = np.ones(len(scene.valid), dtype=bool)
+    for name, (least, most) in BOUNDS.items():
+        kept &= ((found[name] >= least) & (found[name] <= most)).all(axis=1)
+    return scene.measure(kept.astype(np.float64))

@@ -1,0 +1,199 @@
+"""Who drives or stands ahead on the ego's course: headway, and what avoiding them would take.
+
+The course is the circle of the ego's present yaw rate and speed. Ahead on it is who overlaps the
+strip that the ego would sweep and is not driven against it or across it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from contracts.arrays import Array
+from sim_worker.metrics.rollout import Measure
+from sim_worker.metrics.scene import Scene
+
+_SLOW_MPS = 1.0
+"""Below this speed a yaw rate says nothing about the course, which is then taken as straight."""
+_MAX_CURVATURE_PM = 0.25
+_ALONG_COS = 0.5
+"""Whose heading is within 60° of the course drives along it."""
+_STANDS_MPS = 0.5
+"""Who is slower may stand at any angle."""
+_MOVES_MPS = 0.1
+"""An ego slower than this has no headway in time."""
+
+
+class Leaders(NamedTuple):
+    """K pairs of an instant and a road user ahead on the course.
+
+    `row` (K,) is future times N + instant; `gap_m` (K,) from the ego's front to the other's
+    nearest end along the course; `left_m` (K,) of the other's middle; `reach_m` (K,) half of both
+    widths; speeds (K,) along and across the course; `accel_mps2` (K,) of the other along it.
+    """
+
+    row: npt.NDArray[np.intp]
+    gap_m: Array
+    left_m: Array
+    reach_m: Array
+    ego_mps: Array
+    other_mps: Array
+    other_left_mps: Array
+    accel_mps2: Array
+
+
+def time_headway(scene: Scene) -> Measure:
+    """Least time headway (S,), infinite where nobody is ahead or the ego stands.
+
+    Seconds until the ego's front is where the leader's rear is now: Jansson (2005), Collision
+    Avoidance Theory, section 5.3.1; Westhofen et al. (2023), Criticality Metrics for Automated
+    Driving, THW.
+    """
+    ahead = scene.keep(leaders)
+    moving = ahead.ego_mps > _MOVES_MPS
+    headway = np.where(moving, ahead.gap_m, np.inf) / np.where(moving, ahead.ego_mps, 1.0)
+    return _extreme(scene, ahead, headway, np.minimum, np.inf)
+
+
+def drac(scene: Scene) -> Measure:
+    """Greatest deceleration rate to avoid the crash (S,), 0 where nobody is approached.
+
+    Cooper and Ferguson (1976), Traffic studies at T-junctions; (v - v_leader)² / (2 gap) in
+    Archer (2005), Indicators for traffic safety assessment and prediction, equation 4.
+    """
+    ahead = scene.keep(leaders)
+    return _extreme(scene, ahead, _drac(ahead), np.maximum, 0.0)
+
+
+def required_deceleration(scene: Scene) -> Measure:
+    """Greatest deceleration (S,) that matches the leader's speed just before touching it.
+
+    Jansson (2005), Collision Avoidance Theory, section 5.3.5: the leader keeps its acceleration;
+    0 where nobody is approached. Positive here, negative in the source.
+    """
+    ahead = scene.keep(leaders)
+    return _extreme(scene, ahead, _longitudinal(ahead), np.maximum, 0.0)
+
+
+def required_lateral_acceleration(scene: Scene) -> Measure:
+    """Greatest lateral acceleration (S,) that gets past the leader just before touching it.
+
+    Jansson (2005), Collision Avoidance Theory, section 5.3.8, to the easier side.
+    """
+    ahead = scene.keep(leaders)
+    return _extreme(scene, ahead, _lateral(ahead), np.maximum, 0.0)
+
+
+def required_acceleration(scene: Scene) -> Measure:
+    """Greatest root sum of squares (S,) of the two above, taken at the same instant.
+
+    Jansson (2005), Collision Avoidance Theory, section 5.3.10.
+    """
+    ahead = scene.keep(leaders)
+    return _extreme(scene, ahead, np.hypot(_longitudinal(ahead), _lateral(ahead)), np.maximum, 0.0)
+
+
+def leaders(scene: Scene) -> Leaders:
+    """Return everybody who is ahead on the ego's course at some instant.
+
+    With κ the curvature, a point at (x, y) of base_link's axes lies ((1 - r) / κ) to the left of
+    the circle and atan2(κ x, 1 - κ y) / κ along it, where r² = (κ x)² + (1 - κ y)².
+    """
+    seen = scene.relative
+    speed = scene.states[..., 3]
+    curvature = np.where(
+        np.abs(speed) > _SLOW_MPS, scene.states[..., 5] / np.maximum(np.abs(speed), _SLOW_MPS), 0.0
+    )
+    curvature = np.clip(curvature, -_MAX_CURVATURE_PM, _MAX_CURVATURE_PM)[..., None]
+    half_length, half_width = scene.user_half_m
+    x = seen.ahead_m + scene.centre_ahead_m
+    # (1 - r) / κ = (2 y - κ (x² + y²)) / (1 + r), and 1 + r is at least 1: a bound without a root.
+    square = np.square(x)
+    square += np.square(seen.left_m)
+    square *= curvature
+    sideways = 2.0 * seen.left_m - square
+    inward = 1.0 - curvature * seen.left_m
+    widest = scene.half_width_m + np.hypot(half_length, half_width)
+    # r ≤ 1 + |κ| widest wherever the road user can overlap the strip at all.
+    bound = widest * (2.0 + np.abs(curvature) * widest)
+    near = (np.abs(sideways) < bound) & (seen.ahead_m > 0.0) & (inward > 0.0)
+    pair = np.flatnonzero(near)
+    users = near.shape[2]
+    row = pair // users
+
+    def of_pairs(values: Array) -> Array:
+        return np.asarray(np.broadcast_to(values, near.shape).reshape(-1)[pair])
+
+    kappa, x, inward = of_pairs(curvature), of_pairs(x), of_pairs(inward)
+    straight = np.abs(kappa) < 1e-6
+    safe = np.where(straight, 1.0, kappa)
+    angle = np.arctan2(kappa * x, inward)
+    along = np.where(straight, x, angle / safe)
+    left = of_pairs(sideways) / (1.0 + np.hypot(kappa * x, inward))
+    cos, sin = of_pairs(seen.cos), of_pairs(seen.sin)
+    turned_cos = cos * np.cos(angle) + sin * np.sin(angle)
+    turned_sin = sin * np.cos(angle) - cos * np.sin(angle)
+    a, b = of_pairs(half_length), of_pairs(half_width)
+    reach = scene.half_width_m + a * np.abs(turned_sin) + b * np.abs(turned_cos)
+    front = scene.centre_ahead_m + scene.half_length_m
+    gap = along - front - a * np.abs(turned_cos) - b * np.abs(turned_sin)
+    other = of_pairs(seen.speed_mps)
+    kept = (np.abs(left) < reach) & (along > front)
+    kept &= (turned_cos >= _ALONG_COS) | (np.abs(other) < _STANDS_MPS)
+    accel = of_pairs(scene.keep(_user_acceleration)) if kept.any() else np.zeros(len(pair))
+    return Leaders(
+        row=row[kept],
+        gap_m=np.maximum(gap[kept], 0.0),
+        left_m=left[kept],
+        reach_m=reach[kept],
+        ego_mps=np.broadcast_to(speed[..., None], near.shape).reshape(-1)[pair[kept]],
+        other_mps=(other * turned_cos)[kept],
+        other_left_mps=(other * turned_sin)[kept],
+        accel_mps2=(accel * turned_cos)[kept],
+    )
+
+
+def _user_acceleration(scene: Scene) -> Array:
+    """Return (S, N, R) accelerations of road users, 0 where they come or go."""
+    accel = np.gradient(scene.rollout.user_speed_mps, scene.time_s, axis=1)
+    return np.nan_to_num(np.asarray(accel, dtype=np.float64))
+
+
+def _closing(ahead: Leaders) -> Array:
+    return np.maximum(ahead.ego_mps - ahead.other_mps, 0.0)
+
+
+def _drac(ahead: Leaders) -> Array:
+    closing = _closing(ahead)
+    touching = ahead.gap_m <= 0.0
+    rate = closing * closing / (2.0 * np.where(touching, 1.0, ahead.gap_m))
+    return np.where(touching & (closing > 0.0), np.inf, rate)
+
+
+def _longitudinal(ahead: Leaders) -> Array:
+    needed = _drac(ahead) - ahead.accel_mps2
+    return np.where(_closing(ahead) > 0.0, np.maximum(needed, 0.0), 0.0)
+
+
+def _lateral(ahead: Leaders) -> Array:
+    closing = _closing(ahead)
+    approaching = closing > 1e-9
+    until = np.where(approaching, ahead.gap_m, 1.0) / np.where(approaching, closing, 1.0)
+    then_left = ahead.left_m + ahead.other_left_mps * until
+    way = np.maximum(ahead.reach_m - np.abs(then_left), 0.0)
+    touching = until <= 0.0
+    needed = 2.0 * way / np.square(np.where(touching, 1.0, until))
+    needed = np.where(touching & (way > 0.0), np.inf, needed)
+    return np.where(approaching, needed, 0.0)
+
+
+def _extreme(
+    scene: Scene, ahead: Leaders, values: Array, extreme: np.ufunc, without: float
+) -> Measure:
+    """Return the smallest or greatest of `values` (K,) for each future (S,)."""
+    futures, instants = scene.states.shape[:2]
+    found = np.full(futures, without)
+    extreme.at(found, ahead.row // instants, values)
+    return scene.measure(found)

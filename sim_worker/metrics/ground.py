@@ -1,0 +1,70 @@
+"""The ground that may be driven on, as a look-up that thousands of points ask at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from contracts.arrays import Array
+from contracts.world import Area, World
+
+TOLERANCE_M = 0.3
+"""Beyond the edge this much is no violation: nuPlan, drivable_area_compliance."""
+_CELL_M = 0.5
+_UNKNOWN, _OUTSIDE, _INSIDE, _EDGE = -1, 0, 1, 2
+_MARGIN_M = 2.0
+
+
+class DrivableGround:
+    """Road surface and junction areas of a World, without its islands, `TOLERANCE_M` wider.
+
+    Cells of half a metre are looked at once, when a point first falls into them; points of cells
+    that an edge passes through are tested exactly. Answers do not depend on what was asked before.
+    """
+
+    def __init__(self, world: World) -> None:
+        areas = [*world.road_surface, *(j.area for j in world.junctions if j.area is not None)]
+        paved = shapely.union_all([_polygon(area) for area in areas]).buffer(TOLERANCE_M)
+        islands = shapely.union_all([_polygon(area) for area in world.islands])
+        self.surface = shapely.difference(paved, islands.buffer(-TOLERANCE_M))
+        shapely.prepare(self.surface)
+        west, south, east, north = self.surface.bounds if areas else (0.0, 0.0, 0.0, 0.0)
+        self._origin = np.array([west, south]) - _MARGIN_M
+        size = np.array([east - west, north - south]) + 2.0 * _MARGIN_M
+        self._columns, self._rows = np.ceil(size / _CELL_M).astype(int) + 1
+        self._cells = np.full(self._columns * self._rows, _UNKNOWN, dtype=np.int8)
+
+    def contains(self, x_m: Array, y_m: Array) -> npt.NDArray[np.bool_]:
+        """Return (…) whether points (…) in the World's frame lie on drivable ground."""
+        column = ((x_m - self._origin[0]) * (1.0 / _CELL_M)).astype(np.intp)
+        row = ((y_m - self._origin[1]) * (1.0 / _CELL_M)).astype(np.intp)
+        within = (x_m >= self._origin[0]) & (y_m >= self._origin[1])
+        within &= (column < self._columns) & (row < self._rows)
+        cell = np.where(within, row * self._columns + column, 0)
+        kind = self._cells[cell]
+        if (kind == _UNKNOWN).any():
+            self._look(np.unique(cell[kind == _UNKNOWN]))
+            kind = self._cells[cell]
+        inside = (kind == _INSIDE) & within
+        edge = (kind == _EDGE) & within
+        if edge.any():
+            inside[edge] = shapely.intersects_xy(self.surface, x_m[edge], y_m[edge])
+        return np.asarray(inside)
+
+    def _look(self, cells: npt.NDArray[np.intp]) -> None:
+        row, column = np.divmod(cells, self._columns)
+        west = self._origin[0] + column * _CELL_M
+        south = self._origin[1] + row * _CELL_M
+        boxes = shapely.box(west, south, west + _CELL_M, south + _CELL_M)
+        touched = shapely.intersects(self.surface, boxes)
+        kind = np.where(touched, _EDGE, _OUTSIDE).astype(np.int8)
+        kind[touched] = np.where(
+            shapely.contains_properly(self.surface, boxes[touched]), _INSIDE, _EDGE
+        )
+        self._cells[cells] = kind
+
+
+def _polygon(area: Area) -> shapely.Polygon:
+    polygon = shapely.Polygon(area.outline, area.holes)
+    return polygon if polygon.is_valid else polygon.buffer(0.0)

@@ -1,0 +1,191 @@
+"""Clearance to road users, the first touch with one of them, and how hard it is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from contracts.arrays import Array
+from sim_worker.metrics.rollout import Flags, Measure
+from sim_worker.metrics.scene import Scene
+from sim_worker.metrics.time_to_collision import Pairs, meeting
+from sim_worker.overlap import Rectangles, clearance
+
+_STANDS_MPS = 0.05
+"""An ego slower than this stands: nuPlan, no_ego_at_fault_collisions."""
+Indices = npt.NDArray[np.intp]
+
+
+class Impacts(NamedTuple):
+    """The first touch of each future (S,), NaN (user -1) where `collided` is false.
+
+    `time_s` since the first instant; `impact_mps` the ego's speed; `closing_mps` the speed of one
+    relative to the other; `at_fault` false where the ego stands, or the other's middle is behind
+    its rear axle.
+    """
+
+    collided: Flags
+    time_s: Array
+    user: Indices
+    impact_mps: Array
+    closing_mps: Array
+    at_fault: Flags
+
+
+def minimum_clearance(scene: Scene) -> Measure:
+    """Least distance (S,) between the ego's outline and anybody's, infinite where nobody is there.
+
+    Boxes are at least as far apart as their centres less the half diagonals, and at most as their
+    centres less the half widths: only pairs that can be the nearest are measured.
+    """
+    distance = scene.centre_distance_m
+    half_length, half_width = scene.user_half_m
+    ego_diagonal = np.hypot(scene.half_length_m, scene.half_width_m)
+    least = distance - (np.hypot(half_length, half_width) + ego_diagonal)
+    inner = np.minimum(half_length, half_width) + min(scene.half_length_m, scene.half_width_m)
+    most = (distance - inner).min(axis=(1, 2), initial=np.inf)
+    users = least.shape[2]
+    pair = np.flatnonzero((least <= np.maximum(most, 0.0)[:, None, None]) & scene.there)
+    row, user = np.divmod(pair, max(users, 1))
+    future = row // len(scene.time_s)
+    x, y, yaw, _ = (values.reshape(-1)[pair] for values in scene.users)
+    apart = clearance(
+        Rectangles(
+            scene.centre_m.reshape(-1, 2)[row], scene.states[..., 2].reshape(-1)[row],
+            2.0 * scene.half_length_m, 2.0 * scene.half_width_m,
+        ),
+        Rectangles(
+            np.stack([x, y], axis=-1), yaw,
+            2.0 * half_length[future, 0, user], 2.0 * half_width[future, 0, user],
+        ),
+    )  # fmt: skip
+    found = np.full(len(scene.valid), np.inf)
+    np.minimum.at(found, future, apart)
+    return scene.measure(found)
+
+
+def collided(scene: Scene) -> Measure:
+    """Whether the ego touches a road user (S,): 1 or 0."""
+    return scene.measure(scene.keep(impacts).collided.astype(np.float64))
+
+
+def at_fault_collision(scene: Scene) -> Measure:
+    """Whether the ego drives into a road user (S,): 1 or 0; see `Impacts.at_fault`."""
+    return scene.measure(scene.keep(impacts).at_fault.astype(np.float64))
+
+
+def collision_time(scene: Scene) -> Measure:
+    """Seconds until the first touch (S,), invalid where there is none."""
+    found = scene.keep(impacts)
+    return scene.measure(found.time_s, found.collided)
+
+
+def impact_speed(scene: Scene) -> Measure:
+    """The ego's speed at the first touch (S,), invalid where there is none."""
+    found = scene.keep(impacts)
+    return scene.measure(found.impact_mps, found.collided)
+
+
+def closing_speed(scene: Scene) -> Measure:
+    """Speed of one relative to the other at the first touch (S,), invalid where there is none."""
+    found = scene.keep(impacts)
+    return scene.measure(found.closing_mps, found.collided)
+
+
+def delta_v(scene: Scene) -> Measure:
+    """Change of the ego's velocity (S,) if both went on as one body from the first touch.
+
+    Plastic and central: m_other / (m_ego + m_other) times the relative speed; Shelby (2011),
+    Delta-V as a measure of traffic conflict severity, equation 1. A simulated accident replaces
+    this estimate. Invalid where nothing is hit or the other's mass is unknown.
+    """
+    found, masses = scene.keep(impacts), scene.context.user_mass_kg
+    if masses is None:
+        raise ValueError("delta-v needs the road users' masses")
+    if not masses.shape[1]:
+        return scene.measure(found.closing_mps, found.collided)
+    other = masses[np.arange(len(masses)), np.maximum(found.user, 0)]
+    share = other / (other + scene.rollout.vehicle.mass_kg.value)
+    return scene.measure(found.closing_mps * share, found.collided & np.isfinite(other))
+
+
+def impacts(scene: Scene) -> Impacts:
+    """Return the first touch of each future; between instants both move straight and evenly.
+
+    How a box is turned is taken from the instant before; a touch that only the turn between two
+    instants brings about is found at the later one.
+    """
+    seen = scene.relative
+    _, instants, users = seen.ahead_m.shape
+    reach = np.hypot(*scene.user_half_m) + np.hypot(scene.half_length_m, scene.half_width_m)
+    pair = np.flatnonzero(scene.centre_distance_m < reach + _travel_m(scene))
+    row, user = np.divmod(pair, max(users, 1))
+    future, instant = np.divmod(row, instants)
+    after = np.minimum(instant + 1, instants - 1)
+    x, y, _, _ = scene.users
+    cos, sin = (values[future, instant] for values in scene.heading)
+    here = np.stack([x[future, instant, user], y[future, instant, user]], axis=-1)
+    there = np.stack([x[future, after, user], y[future, after, user]], axis=-1)
+    both = scene.there[future, instant, user]
+    there = np.where((both & scene.there[future, after, user])[:, None], there, here)
+    before = here - scene.centre_m[future, instant]
+    move = there - scene.centre_m[future, after] - before
+    half_length, half_width = scene.user_half_m
+    touch = meeting(
+        Pairs(
+            cos * before[:, 0] + sin * before[:, 1], cos * before[:, 1] - sin * before[:, 0],
+            cos * move[:, 0] + sin * move[:, 1], cos * move[:, 1] - sin * move[:, 0],
+            seen.cos[future, instant, user], seen.sin[future, instant, user],
+            (scene.half_length_m, scene.half_width_m),
+            (half_length[future, 0, user], half_width[future, 0, user]),
+        )
+    )  # fmt: skip
+    # In units of the step: 0 at this instant, 1 at the next.
+    share = np.maximum(touch.from_s, 0.0)
+    hit = both & (touch.from_s <= touch.until_s) & (touch.until_s >= 0.0)
+    hit &= (share < 1.0) & ((instant < after) | (share == 0.0))
+    return _first(scene, future[hit], instant[hit], user[hit], share[hit])
+
+
+def _first(scene: Scene, future: Indices, instant: Indices, user: Indices, share: Array) -> Impacts:
+    futures, instants = scene.states.shape[:2]
+    order = np.lexsort((user, instant + share, future))
+    who, first = np.unique(future[order], return_index=True)
+    chosen = order[first]
+    instant, user, share = instant[chosen], user[chosen], share[chosen]
+    after = np.minimum(instant + 1, instants - 1)
+    begin, end = scene.time_s[instant], scene.time_s[after]
+    state = scene.states[who, instant]
+    motion = state[:, 3:5] + share[:, None] * (scene.states[who, after, 3:5] - state[:, 3:5])
+    _, _, yaw, speed = scene.users
+    other_mps = speed[who, instant, user]
+    turned = yaw[who, instant, user] - state[:, 2]
+    relative = other_mps[:, None] * np.stack([np.cos(turned), np.sin(turned)], axis=-1) - motion
+    impact = np.hypot(motion[:, 0], motion[:, 1])
+    ahead = scene.relative.ahead_m[who, instant, user] + scene.centre_ahead_m
+
+    def spread(values: Array, without: float) -> Array:
+        found = np.full(futures, without)
+        found[who] = values
+        return found
+
+    return Impacts(
+        collided=spread(np.ones(len(who)), 0.0) > 0.0,
+        time_s=spread(begin + share * (end - begin), np.nan) - scene.time_s[0],
+        user=spread(user.astype(np.float64), -1.0).astype(np.intp),
+        impact_mps=spread(impact, np.nan),
+        closing_mps=spread(np.hypot(relative[:, 0], relative[:, 1]), np.nan),
+        at_fault=spread(((impact > _STANDS_MPS) & (ahead > 0.0)).astype(np.float64), 0.0) > 0.0,
+    )
+
+
+def _travel_m(scene: Scene) -> Array:
+    """Return (S, N, R) no less than the two move together until the next instant."""
+    travel = np.zeros(scene.centre_distance_m.shape)
+    moved = np.abs(np.diff(scene.centre_m, axis=1)).sum(axis=-1)
+    for values in scene.users[:2]:
+        travel[:, :-1] += np.abs(np.diff(values, axis=1))
+    travel[:, :-1] += moved[..., None]
+    return travel

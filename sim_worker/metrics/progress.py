@@ -1,0 +1,71 @@
+"""Progress along the path, and whether the ego keeps to ground that may be driven on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contracts.arrays import Array
+from sim_worker.metrics.rollout import Flags, Measure
+from sim_worker.metrics.scene import Scene
+
+_LOOK_AGAIN_M = 8.0
+"""The path is searched near the place known last, so no farther than this between looks."""
+_CORNERS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
+
+
+def progress(scene: Scene) -> Measure:
+    """Metres along the path (S,) from the first to the last instant, negative backwards."""
+    arc = scene.keep(arc_along_path)
+    return scene.measure(arc[:, -1] - arc[:, 0])
+
+
+def backwards(scene: Scene) -> Measure:
+    """Metres (S,) the ego falls back along the path behind where it once was."""
+    arc = scene.keep(arc_along_path)
+    return scene.measure((np.maximum.accumulate(arc, axis=1) - arc).max(axis=1))
+
+
+def arc_along_path(scene: Scene) -> Array:
+    """Return arc lengths (S, L) along the path at the first, the last and some instants between.
+
+    Raises ValueError where there is no path.
+    """
+    path = scene.context.path
+    if path is None:
+        raise ValueError("progress needs a path")
+    xy = scene.states[..., :2]
+    last = xy.shape[1] - 1
+    moved = np.abs(np.diff(xy, axis=1)).sum(axis=2).max(initial=0.0)
+    stride = max(int(_LOOK_AGAIN_M / max(float(moved), 1e-3)), 1)
+    looks = [*range(0, last, stride), last]
+    arcs = [path.locate(xy[:, 0]).arc_m]
+    for look in looks[1:]:
+        arcs.append(path.locate(xy[:, look], near_arc_m=arcs[-1]).arc_m)
+    return np.stack(arcs, axis=1)
+
+
+def off_road_share(scene: Scene) -> Measure:
+    """Share of the instants (S,) at which a corner of the ego is off the drivable ground.
+
+    The ground is 0.3 m wider than drawn: nuPlan, drivable_area_compliance.
+    """
+    share: Array = scene.keep(_off_road).astype(np.float64).mean(axis=1, keepdims=True)
+    return scene.measure(share[:, 0])
+
+
+def on_road(scene: Scene) -> Measure:
+    """Whether all corners stay on drivable ground at all instants (S,): 1 or 0."""
+    return scene.measure((~scene.keep(_off_road).any(axis=1)).astype(np.float64))
+
+
+def _off_road(scene: Scene) -> Flags:
+    ground = scene.context.ground
+    if ground is None:
+        raise ValueError("drivable area: no World given")
+    cos, sin = scene.heading
+    x, y = scene.centre_m[..., 0], scene.centre_m[..., 1]
+    ahead_x, ahead_y = scene.half_length_m * cos, scene.half_length_m * sin
+    left_x, left_y = -scene.half_width_m * sin, scene.half_width_m * cos
+    corners_x = np.stack([x + a * ahead_x + b * left_x for a, b in _CORNERS])
+    corners_y = np.stack([y + a * ahead_y + b * left_y for a, b in _CORNERS])
+    return np.asarray(~ground.contains(corners_x, corners_y).all(axis=0))

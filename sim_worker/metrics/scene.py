@@ -1,0 +1,190 @@
+"""What many metrics share of one rollout: outlines, and everybody as the ego sees them.
+
+Everything is computed when first asked for and kept, so that metrics can be picked one by one.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.simulation import STATE_COLUMNS
+from sim_worker.metrics.ground import DrivableGround
+from sim_worker.metrics.rollout import Flags, Measure, Rollout
+from sim_worker.metrics.route_rules import RouteRules
+from sim_worker.planners.path import FrenetPath
+from sim_worker.vehicle.planar import box_centre_from_base_m
+from world_gen.signal_state import LiveColour
+
+_Kept = TypeVar("_Kept")
+_FAR_M = 1e6
+"""Where a road user is put who is not there: out of reach of every metric, yet a number."""
+
+
+class Context(NamedTuple):
+    """What a rollout is judged against; a metric that needs what is None is not computed.
+
+    `reference` (N, 3) holds base_link poses at the rollout's instants, NaN where unknown;
+    `user_mass_kg` (S, R) the road users' masses. `start_s` is the drive time
+    of the rollout's time 0, at which signal plans are read, and `live` what signals were heard.
+    """
+
+    path: FrenetPath | None = None
+    ground: DrivableGround | None = None
+    rules: RouteRules | None = None
+    reference: Array | None = None
+    user_mass_kg: Array | None = None
+    start_s: float = 0.0
+    live: Mapping[str, LiveColour] | None = None
+
+
+class Relative(NamedTuple):
+    """Road users in the axes of the ego's box at the same instant, all (S, N, R).
+
+    Positions of centres `ahead_m`, `left_m`; relative yaw as `cos` and `sin`; velocities relative
+    to the ego's `ahead_mps`, `left_mps`; `speed_mps` of the road users over ground.
+    """
+
+    ahead_m: Array
+    left_m: Array
+    cos: Array
+    sin: Array
+    ahead_mps: Array
+    left_mps: Array
+    speed_mps: Array
+
+
+class Scene:
+    """One rollout and what it is judged against. Raises ValueError for shapes that do not fit."""
+
+    def __init__(self, rollout: Rollout, context: Context | None = None) -> None:
+        _check(rollout)
+        self.rollout = rollout
+        self.context = context or Context()
+        states = np.asarray(rollout.states, dtype=np.float64)
+        whole = np.isfinite(states).all(axis=(1, 2))
+        self.valid: Flags = np.asarray(rollout.valid, dtype=bool) & whole
+        """(S,) whether a future was simulated to its end."""
+        self.states = states if self.valid.all() else np.where(
+            self.valid[:, None, None], states, 0.0
+        )  # fmt: skip
+        self.time_s = np.asarray(rollout.time_s, dtype=np.float64)
+        vehicle = rollout.vehicle
+        self.half_length_m = vehicle.length_m.value / 2.0
+        self.half_width_m = vehicle.width_m.value / 2.0
+        self.centre_ahead_m = box_centre_from_base_m(vehicle)
+        """How far the middle of the ego's box lies ahead of base_link."""
+        self._kept: dict[Callable[[Scene], Any], Any] = {}
+
+    def keep(self, compute: Callable[[Scene], _Kept]) -> _Kept:
+        """Return `compute(self)`, computed once: for what several metrics have in common."""
+        if compute not in self._kept:
+            self._kept[compute] = compute(self)
+        kept: _Kept = self._kept[compute]
+        return kept
+
+    def measure(self, values: Array, valid: Flags | None = None) -> Measure:
+        """Return `values` (S, …) as a Measure, NaN where a future, or `valid` (S, …), is not."""
+        good = self.valid.reshape((-1,) + (1,) * (values.ndim - 1))
+        good = np.broadcast_to(good, values.shape) if valid is None else good & valid
+        return Measure(np.where(good, values, np.nan), np.asarray(good))
+
+    @functools.cached_property
+    def heading(self) -> tuple[Array, Array]:
+        """Cosine and sine (S, N) of the ego's yaw."""
+        yaw = self.states[..., 2]
+        return np.cos(yaw), np.sin(yaw)
+
+    @functools.cached_property
+    def centre_m(self) -> Array:
+        """(S, N, 2) middles of the ego's box."""
+        cos, sin = self.heading
+        return np.stack(
+            [
+                self.states[..., 0] + self.centre_ahead_m * cos,
+                self.states[..., 1] + self.centre_ahead_m * sin,
+            ],
+            axis=-1,
+        )
+
+    @functools.cached_property
+    def speed_mps(self) -> Array:
+        """(S, N) speed of the ego over ground, negative in reverse."""
+        vx, vy = self.states[..., 3], self.states[..., 4]
+        return np.asarray(np.copysign(np.hypot(vx, vy), vx))
+
+    @functools.cached_property
+    def there(self) -> Flags:
+        """(S, N, R) where a road user is on the road."""
+        return np.asarray(np.isfinite(self.rollout.users[..., 0]))
+
+    @functools.cached_property
+    def users(self) -> tuple[Array, Array, Array, Array]:
+        """x, y, yaw and speed (S, N, R) of road users, far away and standing where absent."""
+        users = self.rollout.users
+        x, y, yaw = (np.array(users[..., k], dtype=np.float64, order="C") for k in range(3))
+        speed = np.array(self.rollout.user_speed_mps, dtype=np.float64)
+        if not self.there.all():
+            gone = ~self.there
+            x[gone] = _FAR_M
+            for values in (y, yaw, speed):
+                values[gone] = 0.0
+        return x, y, yaw, speed
+
+    @functools.cached_property
+    def user_half_m(self) -> tuple[Array, Array]:
+        """Half lengths and half widths (S, 1, R) of road users, 0 where unknown."""
+        half = np.nan_to_num(np.asarray(self.rollout.user_size_m, dtype=np.float64)) / 2.0
+        return half[:, None, :, 0], half[:, None, :, 1]
+
+    @functools.cached_property
+    def user_heading(self) -> tuple[Array, Array]:
+        """Cosine and sine (S, N, R) of the road users' yaw."""
+        yaw = self.users[2]
+        return np.cos(yaw), np.sin(yaw)
+
+    @functools.cached_property
+    def relative(self) -> Relative:
+        """Everybody in the ego's axes."""
+        x, y, _, speed = self.users
+        cos, sin = (values[..., None] for values in self.heading)
+        dx, dy = x - self.centre_m[..., 0, None], y - self.centre_m[..., 1, None]
+        user_cos, user_sin = self.user_heading
+        turned_cos = user_cos * cos + user_sin * sin
+        turned_sin = user_sin * cos - user_cos * sin
+        return Relative(
+            ahead_m=cos * dx + sin * dy,
+            left_m=cos * dy - sin * dx,
+            cos=turned_cos,
+            sin=turned_sin,
+            ahead_mps=speed * turned_cos - self.states[..., 3, None],
+            left_mps=speed * turned_sin - self.states[..., 4, None],
+            speed_mps=speed,
+        )
+
+    @functools.cached_property
+    def centre_distance_m(self) -> Array:
+        """(S, N, R) between the middles of the boxes."""
+        seen = self.relative
+        return np.sqrt(seen.ahead_m * seen.ahead_m + seen.left_m * seen.left_m)
+
+
+def _check(rollout: Rollout) -> None:
+    futures, instants = len(rollout.states), len(rollout.time_s)
+    users = rollout.user_size_m.shape[1] if rollout.user_size_m.ndim == 3 else -1
+    expected = {
+        "states": (rollout.states.shape, (futures, instants, len(STATE_COLUMNS))),
+        "users": (rollout.users.shape, (futures, instants, users, 3)),
+        "user_speed_mps": (rollout.user_speed_mps.shape, (futures, instants, users)),
+        "user_size_m": (rollout.user_size_m.shape, (futures, users, 2)),
+        "valid": (rollout.valid.shape, (futures,)),
+    }
+    for name, (found, right) in expected.items():
+        if found != right:
+            raise ValueError(f"rollout: {name} has shape {found}, expected {right}")
+    if instants < 2 or not (np.diff(rollout.time_s) > 0.0).all():
+        raise ValueError("rollout: time_s must rise and hold at least two instants")

@@ -1,0 +1,122 @@
+"""All metrics in one table, and the call that computes those asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import MappingProxyType
+from typing import Literal, NamedTuple
+
+from sim_worker.metrics import (
+    comfort,
+    curves,
+    displacement,
+    encroachment,
+    following,
+    impact,
+    progress,
+    score,
+    time_to_collision,
+    violations,
+)
+from sim_worker.metrics.rollout import Measure, Rollout
+from sim_worker.metrics.scene import Context, Scene
+
+Need = Literal["path", "ground", "rules", "reference", "user_mass_kg"]
+"""Fields of `Context` without which a metric cannot be computed."""
+Better = Literal["lower", "higher", "neither"]
+
+
+class Metric(NamedTuple):
+    """One row: how it is computed, its unit ("1" for counts, shares and verdicts), which direction
+    is better, what it needs, and whether it has a value for each instant (S, N)."""
+
+    compute: Callable[[Scene], Measure]
+    unit: str
+    better: Better
+    needs: tuple[Need, ...] = ()
+    series: bool = False
+
+
+_DRIVEN: tuple[Need, ...] = ("path", "ground")
+
+METRICS = MappingProxyType(
+    {
+        "ade": Metric(displacement.ade, "m", "lower", ("reference",)),
+        "fde": Metric(displacement.fde, "m", "lower", ("reference",)),
+        "lateral": Metric(displacement.lateral, "m", "neither", ("reference",)),
+        "longitudinal": Metric(displacement.longitudinal, "m", "neither", ("reference",)),
+        "heading": Metric(displacement.heading, "rad", "neither", ("reference",)),
+        "ape": Metric(displacement.ape, "m", "lower", ("reference",)),
+        "rpe": Metric(displacement.rpe, "m", "lower", ("reference",)),
+        "frechet": Metric(curves.frechet, "m", "lower", ("reference",)),
+        "dtw": Metric(curves.dtw, "m", "lower", ("reference",)),
+        "ttc": Metric(time_to_collision.ttc, "s", "higher"),
+        "ttc_series": Metric(time_to_collision.ttc_series, "s", "higher", series=True),
+        "time_exposed": Metric(time_to_collision.time_exposed, "s", "lower"),
+        "time_integrated": Metric(time_to_collision.time_integrated, "s²", "lower"),
+        "pet": Metric(encroachment.post_encroachment_time, "s", "higher"),
+        "thw": Metric(following.time_headway, "s", "higher"),
+        "drac": Metric(following.drac, "m/s²", "lower"),
+        "required_deceleration": Metric(following.required_deceleration, "m/s²", "lower"),
+        "required_lateral_acceleration": Metric(
+            following.required_lateral_acceleration, "m/s²", "lower"
+        ),
+        "required_acceleration": Metric(following.required_acceleration, "m/s²", "lower"),
+        "min_clearance": Metric(impact.minimum_clearance, "m", "higher"),
+        "collided": Metric(impact.collided, "1", "lower"),
+        "at_fault_collision": Metric(impact.at_fault_collision, "1", "lower"),
+        "collision_time": Metric(impact.collision_time, "s", "higher"),
+        "impact_speed": Metric(impact.impact_speed, "m/s", "lower"),
+        "closing_speed": Metric(impact.closing_speed, "m/s", "lower"),
+        "delta_v": Metric(impact.delta_v, "m/s", "lower", ("user_mass_kg",)),
+        "max_acceleration": Metric(comfort.max_acceleration, "m/s²", "lower"),
+        "max_deceleration": Metric(comfort.max_deceleration, "m/s²", "lower"),
+        "max_lateral_acceleration": Metric(comfort.max_lateral_acceleration, "m/s²", "lower"),
+        "max_jerk": Metric(comfort.max_jerk, "m/s³", "lower"),
+        "max_longitudinal_jerk": Metric(comfort.max_longitudinal_jerk, "m/s³", "lower"),
+        "max_yaw_rate": Metric(comfort.max_yaw_rate, "rad/s", "lower"),
+        "max_yaw_acceleration": Metric(comfort.max_yaw_acceleration, "rad/s²", "lower"),
+        "comfortable": Metric(comfort.comfortable, "1", "higher"),
+        "progress": Metric(progress.progress, "m", "higher", ("path",)),
+        "backwards": Metric(progress.backwards, "m", "lower", ("path",)),
+        "off_road_share": Metric(progress.off_road_share, "1", "lower", ("ground",)),
+        "on_road": Metric(progress.on_road, "1", "higher", ("ground",)),
+        "red_light_violations": Metric(
+            violations.red_light_violations, "1", "lower", ("rules",)
+        ),
+        "right_of_way_violations": Metric(
+            violations.right_of_way_violations, "1", "lower", ("rules",)
+        ),
+        "driving_score": Metric(score.driving_score, "1", "higher", _DRIVEN),
+    }
+)  # fmt: skip
+
+
+def computable(context: Context) -> tuple[str, ...]:
+    """Return the names of all metrics that `context` suffices for, in the table's order."""
+    return tuple(name for name in METRICS if not _missing(name, context))
+
+
+def evaluate(
+    rollout: Rollout, names: Sequence[str] | None = None, *, context: Context | None = None
+) -> dict[str, Measure]:
+    """Return the named metrics of a rollout, by default all that `context` suffices for.
+
+    Values are NaN where the mask is false: for futures that are not valid, and where a metric says
+    so. Raises ValueError for an unknown name, for a metric whose needs `context` lacks, and for
+    arrays whose shapes do not fit.
+    """
+    given = context or Context()
+    chosen = computable(given) if names is None else tuple(names)
+    unknown = [name for name in chosen if name not in METRICS]
+    if unknown:
+        raise ValueError(f"unknown metric {', '.join(unknown)}; known: {', '.join(METRICS)}")
+    for name in chosen:
+        if missing := _missing(name, given):
+            raise ValueError(f"metric {name} needs {', '.join(missing)}, which is not given")
+    scene = Scene(rollout, given)
+    return {name: METRICS[name].compute(scene) for name in chosen}
+
+
+def _missing(name: str, context: Context) -> tuple[Need, ...]:
+    return tuple(need for need in METRICS[name].needs if getattr(context, need) is None)

@@ -1,0 +1,176 @@
+"""Rules broken at junctions: stop lines crossed at red, and right of way not given."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from contracts.arrays import Array
+from contracts.drive import SignalColour
+from sim_worker.metrics.rollout import Flags, Measure
+from sim_worker.metrics.route_rules import PriorityConflict, RouteRules
+from sim_worker.metrics.scene import Scene
+from world_gen.signal_state import world_colours_at
+
+HARD_BRAKING_MPS2 = 2.0
+"""Who has priority and must brake harder was not given way to."""
+NARROW_S = 1.0
+"""Nor was who reaches the shared ground sooner than this after the ego has left it."""
+_AT_POINT_M = 2.5
+_ALONG_COS = 0.5
+_ON_WAY_M = 2.0
+_STOPS = ("red", "red_amber")
+Indices = npt.NDArray[np.intp]
+
+
+def red_light_violations(scene: Scene) -> Measure:
+    """How many stop lines (S,) the ego's front crosses while their group shows red.
+
+    Colours are those of the signal plans, or as heard, at the drive time of the crossing; amber is
+    no violation, red and amber together is. Between instants the front moves straight.
+    """
+    rules = _rules(scene)
+    count = np.zeros(len(scene.valid))
+    cos, sin = scene.heading
+    front = scene.centre_m + scene.half_length_m * np.stack([cos, sin], axis=-1)
+    for line in rules.lines:
+        if line.group_id is None or line.control != "signal":
+            continue
+        future, time_s = _line_crossings(front, line.ends_m, scene.time_s)
+        for row, at_s in zip(future.tolist(), time_s.tolist(), strict=True):
+            count[row] += _colour(scene, line.group_id, at_s) in _STOPS
+    return scene.measure(count)
+
+
+def right_of_way_violations(scene: Scene) -> Measure:
+    """How many road users (S,) the ego forces to brake hard, or narrowly misses, against priority.
+
+    Counted is who drives on a movement that the ego must wait for, has not reached the shared
+    ground when the ego enters it, and would then have to brake by more than `HARD_BRAKING_MPS2`
+    to arrive after the ego has left, or does arrive within `NARROW_S` of that. Constant
+    deceleration from a distance d at speed v: v² / 2d to stop, 2 (v T - d) / T² to be there no
+    sooner than in T. A movement whose signal is not green has no priority.
+    """
+    rules = _rules(scene)
+    futures, _, users = scene.there.shape
+    wronged = np.zeros((futures, users), dtype=bool)
+    for conflict in rules.conflicts:
+        enters, leaves = _own_passage(scene, conflict)
+        rows = np.flatnonzero(np.isfinite(enters) & scene.valid)
+        group = conflict.other_group_id
+        if group is not None:
+            colours = [_colour(scene, group, enters[row]) for row in rows]
+            rows = rows[[colour in ("green", "unknown", "dark") for colour in colours]]
+        if len(rows):
+            wronged[rows] |= _forced(scene, conflict, rows, enters[rows], leaves[rows])
+    return scene.measure(wronged.sum(axis=1).astype(np.float64))
+
+
+def _rules(scene: Scene) -> RouteRules:
+    if scene.context.rules is None:
+        raise ValueError("rules of the road need a World and a path")
+    return scene.context.rules
+
+
+def _colour(scene: Scene, group_id: str, at_s: float) -> SignalColour:
+    context = scene.context
+    world = _rules(scene).world
+    colours = world_colours_at(world, context.start_s + at_s, context.live)
+    return colours.get(group_id, "unknown")
+
+
+def _line_crossings(front: Array, ends_m: Array, time_s: Array) -> tuple[Indices, Array]:
+    """Return future (K,) and time (K,) of each crossing of a line, in the direction of travel.
+
+    The line runs from left to right as its driver sees it: who crosses comes from its right-hand
+    side, seen along it, to the left.
+    """
+    left, right = ends_m
+    line = right - left
+    length = float(np.hypot(*line))
+    line = line / max(length, 1e-9)
+    offset = front - left
+    along = offset @ line
+    beyond = offset[..., 1] * line[0] - offset[..., 0] * line[1]
+    crossed = (beyond[:, :-1] < 0.0) & (beyond[:, 1:] >= 0.0)
+    future, step = np.nonzero(crossed)
+    share = beyond[future, step] / (beyond[future, step] - beyond[future, step + 1])
+    at = along[future, step] + share * (along[future, step + 1] - along[future, step])
+    within = (at >= -0.5) & (at <= length + 0.5)
+    when = time_s[step] + share * (time_s[step + 1] - time_s[step])
+    return future[within], when[within]
+
+
+def _own_passage(scene: Scene, conflict: PriorityConflict) -> tuple[Array, Array]:
+    """Return when (S,) the ego enters shared ground, NaN where it does not or was there already,
+    and when it has left it, infinite where it stays."""
+    offset = scene.centre_m - conflict.point_m
+    way = conflict.own_way
+    along = offset @ way
+    cos, sin = scene.heading
+    on_way: Flags = (np.abs(offset[..., 1] * way[0] - offset[..., 0] * way[1]) < _AT_POINT_M) & (
+        cos * way[0] + sin * way[1] > _ALONG_COS
+    )
+    enters = _first_above(along + scene.half_length_m, conflict.own_from_m, scene.time_s, on_way)
+    leaves = _first_above(along - scene.half_length_m, conflict.own_until_m, scene.time_s, on_way)
+    return enters, np.where(np.isnan(leaves), np.inf, leaves)
+
+
+def _first_above(values: Array, level: float, time_s: Array, counts: Flags) -> Array:
+    """Return when (S,) `values` (S, N) first rise above `level` where `counts` holds, else NaN."""
+    rises = (values[:, :-1] <= level) & (values[:, 1:] > level) & counts[:, 1:]
+    step = rises.argmax(axis=1)
+    row = np.arange(len(values))
+    low, high = values[row, step], values[row, step + 1]
+    rising = rises.any(axis=1)
+    share = (level - low) / np.where(rising, high - low, 1.0)
+    return np.where(rising, time_s[step] + share * (time_s[step + 1] - time_s[step]), np.nan)
+
+
+def _forced(
+    scene: Scene, conflict: PriorityConflict, rows: Indices, enters: Array, leaves: Array
+) -> Flags:
+    """Return (K, R) whether road users of futures `rows` (K,) are not given way to."""
+    x, y, yaw, speeds = scene.users
+    instant = np.searchsorted(scene.time_s, enters).clip(0, len(scene.time_s) - 1)
+    users = x.shape[2]
+    place = conflict.way.locate(
+        np.stack([x[rows, instant].ravel(), y[rows, instant].ravel()], axis=-1)
+    )
+    direction = conflict.way.pose_at(place.arc_m).yaw_rad
+    along = np.cos(yaw[rows, instant].ravel() - direction)
+    on_way = (np.abs(place.offset_m) < _ON_WAY_M) & (along > _ALONG_COS)
+    half_length = scene.user_half_m[0][rows, 0].ravel()
+    distance = conflict.way_from_m - place.arc_m - half_length
+    candidate = np.flatnonzero(on_way & (distance > 0.0) & scene.there[rows, instant].ravel())
+    row, user = np.divmod(candidate, users)
+    ahead, speed = distance[candidate], speeds[rows, instant].ravel()[candidate]
+    needed = _needed_deceleration(ahead, speed, (leaves - enters)[row])
+    arrives = _arrival(scene, conflict, rows[row], user)
+    narrow = (arrives - leaves[row] < NARROW_S) & (arrives > enters[row])
+    found = np.zeros((len(rows), users), dtype=bool)
+    found[row, user] = (needed > HARD_BRAKING_MPS2) | narrow
+    return found
+
+
+def _needed_deceleration(distance_m: Array, speed_mps: Array, within_s: Array) -> Array:
+    """Return the constant deceleration (K,) with which a distance lasts for `within_s`."""
+    stopping = np.square(speed_mps) / (2.0 * distance_m)
+    late = np.isfinite(within_s) & (2.0 * distance_m >= speed_mps * within_s)
+    time_s = np.where(late, within_s, 1.0)
+    slowing = 2.0 * (speed_mps * time_s - distance_m) / np.square(time_s)
+    return np.maximum(np.where(late, slowing, stopping), 0.0)
+
+
+def _arrival(scene: Scene, conflict: PriorityConflict, future: Indices, user: Indices) -> Array:
+    """Return when (K,) the fronts of road users reach shared ground, infinite where never."""
+    x, y, _, _ = scene.users
+    half = scene.user_half_m[0][future, 0, user]
+    start = conflict.way.point_at(np.array([conflict.way_from_m]))[0]
+    yaw = float(conflict.way.pose_at(np.array([conflict.way_from_m])).yaw_rad[0])
+    dx, dy = x[future, :, user] - start[0], y[future, :, user] - start[1]
+    along = np.cos(yaw) * dx + np.sin(yaw) * dy + half[:, None]
+    aside = np.abs(np.cos(yaw) * dy - np.sin(yaw) * dx)
+    counts = (aside < _AT_POINT_M) & scene.there[future, :, user]
+    arrived = _first_above(along, 0.0, scene.time_s, counts)
+    return np.where(np.isnan(arrived), np.inf, arrived)
