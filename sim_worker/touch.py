@@ -192,7 +192,7 @@ def _describe(motion: _Motion, share: Array, step: float, tick_s: float) -> Touc
     return Touches(
         future=motion.future,
         user=motion.user,
-        time_s=tick_s * (early + motion.tick),
+        time_s=np.asarray((motion.tick + early) * tick_s, dtype=np.float64),
         ego_states=states,
         user_poses=poses,
         user_velocities=motion.pose_change / tick_s,
