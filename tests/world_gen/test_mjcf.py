@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from itertools import product
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
+from lxml import etree
 
 from contracts.world import ATTRIBUTION, World
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
@@ -120,3 +122,11 @@ def test_the_file_loads_and_carries_the_attribution(world, tmp_path):
     model = mujoco.MjModel.from_xml_path(str(path))
     assert model.ngeom == world_spec(world).compile().ngeom
     mujoco.mj_step(model, mujoco.MjData(model))
+
+
+def test_a_name_that_xml_cannot_hold_leaves_the_file_whole(world, tmp_path):
+    place = msgspec.structs.replace(world.intersection, name="Gate\x01 -- <Lane>")
+    path = tmp_path / "world.xml"
+    write_mjcf(msgspec.structs.replace(world, intersection=place), path)
+    comment = etree.parse(str(path)).getroot().getprevious()
+    assert "Gate -  <Lane>" in comment.text

@@ -25,6 +25,7 @@ from world_gen.export.commonroad_signs import DEFAULT_COUNTRY, traffic_signs
 from world_gen.export.lane_borders import Borders, lane_borders
 from world_gen.export.lane_markings import Marking, lane_markings
 from world_gen.export.lanelets import URBAN_MPS, crosswalk_edges, is_marked, narrower_lane
+from world_gen.export.xml_text import in_comment
 
 VERSION = "2020a"
 TIME_STEP_S = 0.1
@@ -72,7 +73,7 @@ def write_commonroad(
         xml.write_declaration()
         with xml.element("commonRoad", root):
             xml.write("\n")
-            put(xml, etree.Comment(f"{world.attribution}; world {world.id}".replace("--", "- ")))
+            put(xml, etree.Comment(in_comment(f"{world.attribution}; world {world.id}")))
             for element in elements:
                 put(xml, element)
 

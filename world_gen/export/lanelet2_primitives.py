@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -13,10 +12,9 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.frames import LocalFrame, geo_from_local
 from contracts.world import ATTRIBUTION, World
+from world_gen.export.xml_text import in_comment, legal
 
 Tags = Mapping[str, str]
-_NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What an XML file cannot hold; names in a PBF map may."""
 LICENSE_URL = "https://opendatacommons.org/licenses/odbl/1-0/"
 
 
@@ -102,10 +100,10 @@ class Lanelet2Map:
         root = {"version": "0.6", "generator": "foretwin", "attribution": world.attribution}
         if world.attribution == ATTRIBUTION:
             root["license"] = LICENSE_URL
-        note = f"{world.attribution}; world {world.id}".replace("--", "- ")
+        note = in_comment(f"{world.attribution}; world {world.id}")
         with path.open("w", encoding="utf-8", newline="\n") as file:
             file.write('<?xml version="1.0" encoding="utf-8"?>\n')
-            file.write(f"<osm{_attributes(root)}>\n<!-- {_legal(note)} -->\n")
+            file.write(f"<osm{_attributes(root)}>\n<!-- {note} -->\n")
             meta = {"format_version": "1", "map_version": world.id}
             file.write(f"<MetaInfo{_attributes(meta)}/>\n")
             file.writelines(self._node_lines(world.frame))
@@ -142,8 +140,4 @@ def _tags(tags: Tags) -> str:
 
 
 def _attributes(values: Mapping[str, str]) -> str:
-    return "".join([f" {name}={quoteattr(_legal(value))}" for name, value in values.items()])
-
-
-def _legal(value: str) -> str:
-    return _NOT_IN_XML.sub("", value)
+    return "".join([f" {name}={quoteattr(legal(value))}" for name, value in values.items()])

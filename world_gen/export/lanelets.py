@@ -19,7 +19,7 @@ def narrower_lane(connection: Connection, lanes: Mapping[str, Lane]) -> Lane:
 
 
 def indicated(turn: Turn, side: DrivingSide) -> Turn:
-    """Return the turn that is indicated: for a U-turn, of which neither format knows, the one across the road."""
+    """Return the turn as it is indicated: neither format knows U-turns, which lead across."""
     across: Turn = "left" if side == "right" else "right"
     return across if turn == "u_turn" else turn
 

@@ -19,6 +19,7 @@ from shapely.geometry import Polygon
 from contracts.arrays import Array
 from contracts.world import Building, World
 from world_gen.convex_parts import convex_cover, polygons_from
+from world_gen.export.xml_text import in_comment
 from world_gen.islands import RING_ISLAND
 from world_gen.reflex_cuts import polygons_of
 
@@ -83,7 +84,7 @@ def write_mjcf(world: World, path: Path) -> None:
     text = spec.to_xml()
     place = world.intersection
     about = f"{world.attribution}; world {world.id}, {place.kind} {place.name}"
-    comment = f"<!-- {about.replace('--', '- ')} -->\n"
+    comment = f"<!-- {in_comment(about)} -->\n"
     path.write_text(comment + text, encoding="utf-8")
 
 

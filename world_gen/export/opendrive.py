@@ -13,6 +13,7 @@ from world_gen.export.opendrive_junctions import junction_elements, ring_element
 from world_gen.export.opendrive_objects import add_objects
 from world_gen.export.opendrive_places import network_of
 from world_gen.export.opendrive_signals import add_signals
+from world_gen.export.xml_text import in_comment
 
 
 def write_opendrive(world: World, path: Path, *, version: Version = "1.8") -> None:
@@ -34,9 +35,7 @@ def opendrive_element(world: World, *, version: Version = "1.8") -> etree._Eleme
     if not network.roads:
         raise ValueError(f"world {world.id}: no road with lanes to write as OpenDRIVE")
     root = etree.Element("OpenDRIVE")
-    root.append(
-        etree.Comment(f" Made by foretwin from map data: {_in_comment(world.attribution)} ")
-    )
+    root.append(etree.Comment(f" Made by foretwin from map data: {in_comment(world.attribution)} "))
     root.append(_header(world, version))
     elements = {
         road.id: road_element(road, side=network.side, version=version) for road in network.roads
@@ -95,7 +94,3 @@ def _header(world: World, version: Version) -> etree._Element:
     ):
         etree.SubElement(header, "userData", code=code, value=value)
     return header
-
-
-def _in_comment(words: str) -> str:
-    return text(words).replace("--", "- -").rstrip("-")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Literal
 
 from lxml import etree
@@ -11,6 +10,7 @@ from lxml import etree
 from contracts.world import DrivingSide, Lane
 from world_gen.export.opendrive_curve import Curve
 from world_gen.export.opendrive_roads import Cubic, OdrLane, OdrRoad
+from world_gen.export.xml_text import legal
 
 Version = Literal["1.8", "1.4"]
 LANE_TYPE = {
@@ -45,12 +45,9 @@ LINE_M = 0.12
 """Width of a lane marking."""
 
 
-_UNFIT = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
 def text(words: str) -> str:
     """Return words from a map with what XML 1.0 cannot hold as question marks."""
-    return _UNFIT.sub("?", words)
+    return legal(words, instead="?")
 
 
 def number(value: float) -> str:

@@ -27,6 +27,7 @@ from world_gen.export.sdformat_shapes import (
     numbers,
 )
 from world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
+from world_gen.export.xml_text import in_comment
 from world_gen.road_surface import RING_ISLAND
 
 SDF_VERSION = "1.7"
@@ -83,8 +84,7 @@ def write_sdf(
         add_vehicle(element, vehicle, simulator)
     place = world.intersection
     about = f" {world.attribution}; world {world.id}, {place.kind} {place.name} ({place.id}) "
-    printable = "".join(c for c in about if c.isprintable())  # names come from the map
-    root.insert(0, etree.Comment(printable.replace("--", "- ")))
+    root.insert(0, etree.Comment(in_comment(about)))
     tree = etree.ElementTree(root)
     etree.indent(tree, space=" ")
     with path.open("wb") as file:  # lxml would not say which file cannot be written
