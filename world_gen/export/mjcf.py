@@ -19,8 +19,18 @@ from shapely.geometry import Polygon
 from contracts.arrays import Array
 from contracts.world import Building, World
 from world_gen.convex_parts import convex_cover, polygons_from
+from world_gen.export.solids import (
+    BUILDING,
+    GROUND,
+    ISLAND,
+    ROAD,
+    ROAD_TOP_M,
+    THINNEST_M,
+    Rgba,
+    island_height_m,
+    stops_cars,
+)
 from world_gen.export.xml_text import in_comment
-from world_gen.islands import RING_ISLAND
 from world_gen.reflex_cuts import polygons_of
 
 STATIC = 1
@@ -31,17 +41,9 @@ ROAD_USER = 4
 """Contype of mocap road users and shadows; their conaffinity is VEHICLE. A ghost has 0 and 0."""
 
 TIMESTEP_S = 0.01
-RING_ISLAND_HEIGHT_M = 1.0
-"""A roundabout's middle is a mound with plants: a car that drives straight on must hit it."""
-TRAFFIC_ISLAND_HEIGHT_M = 0.12
 WORKER_REACH_M = 20.0
 """Without visuals, buildings farther than this from the road are left out."""
 VISUAL_GROUP, COLLISION_GROUP = 2, 1
-
-_ROAD_RGBA = (0.25, 0.25, 0.27, 1.0)
-_ISLAND_RGBA = (0.45, 0.55, 0.35, 1.0)
-_BUILDING_RGBA = (0.72, 0.68, 0.62, 1.0)
-_GROUND_RGBA = (0.55, 0.58, 0.52, 1.0)
 
 
 def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
@@ -59,7 +61,7 @@ def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
     ground.name = "ground"
     ground.type = mujoco.mjtGeom.mjGEOM_PLANE
     ground.size = [world.radius_m, world.radius_m, 1.0]
-    ground.rgba = _GROUND_RGBA
+    ground.rgba = GROUND
     # A planar car has no vertical joint: touching the plane would only cost time.
     ground.contype = ground.conaffinity = 0
     if visual:
@@ -71,7 +73,7 @@ def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
         "building",
         [(b.outline, b.holes) for b in buildings],
         [(b.id, b.min_height_m, b.height_m.value) for b in buildings],
-        _block_default(spec, "building", _BUILDING_RGBA, solid=True),
+        _block_default(spec, "building", BUILDING, solid=True),
     )
     _add_islands(spec, world, visual=visual)
     return spec
@@ -112,23 +114,21 @@ def _near_road(world: World) -> list[Building]:
 
 def _add_islands(spec: mujoco.MjSpec, world: World, *, visual: bool) -> None:
     for solid in (True, False):
-        chosen = [i for i in world.islands if i.id.startswith(RING_ISLAND) is solid]
+        chosen = [i for i in world.islands if stops_cars(i) is solid]
         if not chosen or not (solid or visual):
             continue
-        height = RING_ISLAND_HEIGHT_M if solid else TRAFFIC_ISLAND_HEIGHT_M
+        height = island_height_m(solid=solid)
         name = "mound" if solid else "island"
         _add_blocks(
             spec,
             "",
             [(island.outline, island.holes) for island in chosen],
             [(island.id, 0.0, height) for island in chosen],
-            _block_default(spec, name, _ISLAND_RGBA, solid=solid),
+            _block_default(spec, name, ISLAND, solid=solid),
         )
 
 
-def _block_default(
-    spec: mujoco.MjSpec, name: str, rgba: tuple[float, float, float, float], *, solid: bool
-) -> mujoco.MjsDefault:
+def _block_default(spec: mujoco.MjSpec, name: str, rgba: Rgba, *, solid: bool) -> mujoco.MjsDefault:
     block = spec.add_default(name, spec.default)
     block.geom.type = mujoco.mjtGeom.mjGEOM_BOX
     block.geom.rgba = rgba
@@ -154,7 +154,7 @@ def _add_blocks(
     owners, boxes = parts.owner.tolist(), parts.is_box.tolist()
     for k, (owner, is_box) in enumerate(zip(owners, boxes, strict=True)):
         given, low, high = extents[owner]
-        if high - low < 0.01:
+        if high - low < THINNEST_M:
             continue
         count[owner] = n = count.get(owner, -1) + 1
         name = f"{prefix}:{given}:{n}" if prefix else f"{given}:{n}"
@@ -218,13 +218,13 @@ def _add_road(spec: mujoco.MjSpec, world: World) -> None:
     faces = np.where(cross[:, None] < 0.0, faces[:, ::-1], faces)[np.abs(cross) > 1e-4]
     mesh = spec.add_mesh()
     mesh.name = "road"
-    mesh.uservert = np.column_stack([corners, np.full(len(corners), 0.01)]).ravel()
+    mesh.uservert = np.column_stack([corners, np.full(len(corners), ROAD_TOP_M)]).ravel()
     mesh.userface = faces.ravel()
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     geom = spec.worldbody.add_geom()
     geom.name = "road"
     geom.type = mujoco.mjtGeom.mjGEOM_MESH
     geom.meshname = "road"
-    geom.rgba = _ROAD_RGBA
+    geom.rgba = ROAD
     geom.group = VISUAL_GROUP
     geom.contype = geom.conaffinity = 0

@@ -20,30 +20,34 @@ from world_gen.export.formats import SIMULATORS, Simulator
 from world_gen.export.sdformat_plugins import HEADING_DEG, world_plugins
 from world_gen.export.sdformat_shapes import (
     Element,
-    Rgba,
     StaticLink,
     child,
     extrusions,
     numbers,
 )
 from world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
+from world_gen.export.solids import (
+    BUILDING,
+    GROUND,
+    ISLAND,
+    ROAD,
+    ROAD_TOP_M,
+    THINNEST_M,
+    Rgba,
+    island_height_m,
+    stops_cars,
+)
 from world_gen.export.xml_text import in_comment
-from world_gen.road_surface import RING_ISLAND
 
 SDF_VERSION = "1.7"
 NAMESPACE = "urn:foretwin:sdformat"
 """Of our own elements, which SDFormat lets pass and keeps because they have a namespace."""
-ROAD_TOP_M, MARKING_TOP_M, SIDEWALK_TOP_M = 0.01, 0.02, 0.03
-RING_ISLAND_HEIGHT_M, TRAFFIC_ISLAND_HEIGHT_M = 1.0, 0.12
+MARKING_TOP_M, SIDEWALK_TOP_M = 0.02, 0.03
 BUILDING_TOLERANCE_M, AREA_TOLERANCE_M = 0.1, 0.02
 STOP_LINE_WIDTH_M, YIELD_LINE_WIDTH_M = 0.5, 0.3
 STEP_S = 0.002
 
-_GROUND: Rgba = (0.55, 0.58, 0.52, 1.0)
-_ROAD: Rgba = (0.25, 0.25, 0.27, 1.0)
 _SIDEWALK: Rgba = (0.62, 0.61, 0.58, 1.0)
-_ISLAND: Rgba = (0.45, 0.55, 0.35, 1.0)
-_BUILDING: Rgba = (0.72, 0.68, 0.62, 1.0)
 _PAINT: Rgba = (0.92, 0.92, 0.9, 1.0)
 _CROSSING: Rgba = (0.8, 0.8, 0.74, 1.0)
 _SIGNAL: Rgba = (0.1, 0.1, 0.1, 1.0)
@@ -137,21 +141,19 @@ def _ground(element: Element, world: World) -> None:
         child(shape, "size", numbers(2 * world.radius_m, 2 * world.radius_m))
         if tag == "visual":
             paint = child(part, "material")
-            child(paint, "ambient", numbers(*_GROUND))
-            child(paint, "diffuse", numbers(*_GROUND))
+            child(paint, "ambient", numbers(*GROUND))
+            child(paint, "diffuse", numbers(*GROUND))
 
 
 def _road(element: Element, world: World) -> None:
     link = StaticLink(element, "road")
     for area in world.road_surface:
-        _area(link, area, ROAD_TOP_M, _ROAD)
+        _area(link, area, ROAD_TOP_M, ROAD)
     for area in world.sidewalks:
         _area(link, area, SIDEWALK_TOP_M, _SIDEWALK)
     for island in world.islands:
-        # As in the MuJoCo model: a roundabout's middle stops a car, a refuge does not.
-        solid = island.id.startswith(RING_ISLAND)
-        height = RING_ISLAND_HEIGHT_M if solid else TRAFFIC_ISLAND_HEIGHT_M
-        _area(link, island, height, _ISLAND, solid=solid)
+        solid = stops_cars(island)
+        _area(link, island, island_height_m(solid=solid), ISLAND, solid=solid)
 
 
 def _area(link: StaticLink, area: Area, top_m: float, rgba: Rgba, *, solid: bool = False) -> None:
@@ -202,8 +204,8 @@ def _buildings(element: Element, world: World) -> None:
     link = StaticLink(element, "buildings")
     for building in world.buildings:
         low, high = building.min_height_m, building.height_m.value
-        if high - low < 0.01:
+        if high - low < THINNEST_M:
             continue
         rings = extrusions(building.outline, building.holes, tolerance_m=BUILDING_TOLERANCE_M)
         for number, ring in enumerate(rings):
-            link.prism(f"{building.id}.{number}", ring, low, high, rgba=_BUILDING, solid=True)
+            link.prism(f"{building.id}.{number}", ring, low, high, rgba=BUILDING, solid=True)

@@ -12,8 +12,8 @@ from lxml import etree
 from shapely.geometry import Polygon
 
 from contracts.arrays import Array
+from world_gen.export.solids import Rgba
 
-Rgba = tuple[float, float, float, float]
 Element = etree._Element
 
 GRID_M = 0.001

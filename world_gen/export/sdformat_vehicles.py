@@ -17,7 +17,8 @@ from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from world_gen.export.formats import Simulator, VehicleKind
 from world_gen.export.sdformat_plugins import ackermann_plugin, gps_sensor
-from world_gen.export.sdformat_shapes import Element, Rgba, child, material, numbers, pose
+from world_gen.export.sdformat_shapes import Element, child, material, numbers, pose
+from world_gen.export.solids import Rgba
 from world_gen.polyline import direction_at, length, points_at
 
 WHEEL_RADIUS_M, WHEEL_WIDTH_M = 0.33, 0.2

@@ -1,0 +1,32 @@
+"""What the models for MuJoCo and for Gazebo make of a World alike: heights, colours, what is solid.
+
+Apart from both, so that neither writer loads the other's libraries.
+"""
+
+from __future__ import annotations
+
+from contracts.world import Area
+from world_gen.islands import RING_ISLAND
+
+Rgba = tuple[float, float, float, float]
+
+GROUND: Rgba = (0.55, 0.58, 0.52, 1.0)
+ROAD: Rgba = (0.25, 0.25, 0.27, 1.0)
+ISLAND: Rgba = (0.45, 0.55, 0.35, 1.0)
+BUILDING: Rgba = (0.72, 0.68, 0.62, 1.0)
+ROAD_TOP_M = 0.01
+RING_ISLAND_HEIGHT_M = 1.0
+"""A roundabout's middle is a mound with plants: a car that drives straight on must hit it."""
+TRAFFIC_ISLAND_HEIGHT_M = 0.12
+THINNEST_M = 0.01
+"""Buildings that are lower from underside to top are left out."""
+
+
+def stops_cars(island: Area) -> bool:
+    """Return whether a car that drives on must hit an island: a roundabout's, not a refuge."""
+    return island.id.startswith(RING_ISLAND)
+
+
+def island_height_m(*, solid: bool) -> float:
+    """Return how high islands stand that stop cars, or those that do not."""
+    return RING_ISLAND_HEIGHT_M if solid else TRAFFIC_ISLAND_HEIGHT_M
