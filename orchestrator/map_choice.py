@@ -56,8 +56,7 @@ def read_route(route: Path) -> Array:
     """Return a GPX or GeoJSON line as (N, 2) latitudes and longitudes in degrees."""
     from telemetry.logs import read_line
 
-    line = read_line(route)
-    return np.stack([line.lat_deg, line.lon_deg], axis=-1)
+    return read_line(route).lat_lon_deg
 
 
 class AlongRoute(NamedTuple):

@@ -7,8 +7,6 @@ import os
 import shutil
 from pathlib import Path
 
-import numpy as np
-
 from contracts.errors import UserError
 from orchestrator.overpass import OverpassConfig, fetch_map, load_overpass_config
 from orchestrator.overpass_query import box_filter, line_filter, overpass_query, parse_bbox
@@ -57,8 +55,7 @@ def area_filter(area: str, *, margin_m: float) -> str:
         return box_filter(parse_bbox(area))
     from telemetry.logs import read_line
 
-    line = read_line(Path(area))
-    return line_filter(np.stack([line.lat_deg, line.lon_deg], axis=-1), margin_m)
+    return line_filter(read_line(Path(area)).lat_lon_deg, margin_m)
 
 
 def _fetch(settings: OverpassConfig, query: str, answer: Path) -> None:

@@ -170,7 +170,7 @@ def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
     except LogError as error:
         end = "its end" if config.end_s is None else f"--end {config.end_s:g}"
         raise UserError(f"{log_file} from --start {config.start_s:g} to {end}: {error}") from error
-    return log.info, np.stack([line.lat_deg, line.lon_deg], axis=-1)
+    return log.info, line.lat_lon_deg
 
 
 def _check_in_map(positions: Array, log_file: Path, index: RoadIndex, map_file: Path) -> None:
@@ -199,8 +199,7 @@ def _given_line(config: DriveConfig, positions: Array | None) -> Array | None:
         route_file = str(EMBEDDED_ROUTE)
     if route_file is None:
         return None
-    line = read_line(Path(route_file))
-    return np.stack([line.lat_deg, line.lon_deg], axis=-1)
+    return read_line(Path(route_file)).lat_lon_deg
 
 
 def _routes(

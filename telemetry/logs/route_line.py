@@ -20,6 +20,11 @@ class RouteLine(msgspec.Struct, frozen=True, kw_only=True):
     lat_deg: Array
     lon_deg: Array
 
+    @property
+    def lat_lon_deg(self) -> Array:
+        """The line as (N, 2) latitudes and longitudes."""
+        return np.stack([self.lat_deg, self.lon_deg], axis=-1)
+
 
 def read_line(path: Path) -> RouteLine:
     """Read a route from GPX (trk, else rte) or GeoJSON.
