@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,6 +17,13 @@ class MapHeader(NamedTuple):
 
     attribution: str
     bounds: LatLonBounds | None
+
+    @classmethod
+    def of(cls, generator: str, bounds: Sequence[float] | None) -> MapHeader:
+        """Return what follows from a file's generator and its south, west, north and east."""
+        drawn = generator.startswith(DRAWN_GENERATOR)
+        attribution = DRAWN_ATTRIBUTION if drawn else ATTRIBUTION
+        return cls(attribution, LatLonBounds(*bounds) if bounds else None)
 
 
 def format_of(path: Path, head: bytes) -> str:
@@ -35,13 +43,12 @@ def format_of(path: Path, head: bytes) -> str:
 
 def header_of(header: Any) -> MapHeader:
     """Return what matters of osmium's header of an open file."""
-    drawn = header.get("generator").startswith(DRAWN_GENERATOR)
     box = header.box()
     bounds = None
     if box.valid():
         low, high = box.bottom_left, box.top_right
-        bounds = LatLonBounds(low.lat, low.lon, high.lat, high.lon)
-    return MapHeader(DRAWN_ATTRIBUTION if drawn else ATTRIBUTION, bounds)
+        bounds = low.lat, low.lon, high.lat, high.lon
+    return MapHeader.of(header.get("generator"), bounds)
 
 
 def unreadable(path: Path, error: BaseException) -> MapError:

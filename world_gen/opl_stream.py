@@ -13,10 +13,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
-from contracts.world import ATTRIBUTION, DRAWN_ATTRIBUTION, DRAWN_GENERATOR
+from contracts.world import ATTRIBUTION
 from world_gen.map_file import HEAD_BYTES, MapHeader, file_fault, format_of, unreadable
 from world_gen.opl import OPL_OPTIONS
-from world_gen.osm_map import LatLonBounds, MapError
+from world_gen.osm_map import MapError
 
 Progress = Callable[[int, int], None]
 """Called with the bytes read and the bytes of the file, from another thread."""
@@ -96,9 +96,7 @@ class OplStream:
             reason = (rest if first.startswith(b"{") else self._said).decode(errors="replace")
             raise unreadable(self.path, RuntimeError(reason or f"decoder ended with {code}"))
         said = json.loads(first)
-        drawn = said["generator"].startswith(DRAWN_GENERATOR)
-        bounds = LatLonBounds(*said["bounds"]) if said["bounds"] else None
-        self.header = MapHeader(DRAWN_ATTRIBUTION if drawn else ATTRIBUTION, bounds)
+        self.header = MapHeader.of(said["generator"], said["bounds"])
 
     def _feed(self) -> None:
         target = _pipe(self._process.stdin)
