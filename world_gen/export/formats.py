@@ -31,11 +31,10 @@ class ExportOptions:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format: how its files end, who reads them, and what writes them."""
+    """A format: how its files end, and what writes them."""
 
     name: str
     suffix: str
-    read_by: str
     write: Callable[[World, Path, ExportOptions], None]
     told_by_suffix: bool = False
     """Whether the writer goes by the file's suffix."""
@@ -89,13 +88,13 @@ def _picture(world: World, path: Path, _: ExportOptions) -> None:
 FORMATS: dict[str, Format] = {
     format_.name: format_
     for format_ in (
-        Format("mjcf", ".xml", "MuJoCo", _mjcf),
-        Format("sdf", ".sdf", "Gazebo Classic and Gazebo (SDFormat 1.7)", _sdf),
-        Format("opendrive", ".xodr", "esmini, CARLA, SUMO (OpenDRIVE 1.8 or 1.4)", _opendrive),
-        Format("lanelet2", ".osm", "Lanelet2 and Autoware", _lanelet2),
-        Format("commonroad", ".xml", "commonroad-io and CommonRoad's tools", _commonroad),
-        Format("geojson", ".geojson", "QGIS and other maps (RFC 7946)", _geojson),
-        Format("svg", ".svg", "browsers: the top-down picture", _picture, True),
-        Format("png", ".png", "everyone: the top-down picture", _picture, True),
+        Format("mjcf", ".xml", _mjcf),
+        Format("sdf", ".sdf", _sdf),
+        Format("opendrive", ".xodr", _opendrive),
+        Format("lanelet2", ".osm", _lanelet2),
+        Format("commonroad", ".xml", _commonroad),
+        Format("geojson", ".geojson", _geojson),
+        Format("svg", ".svg", _picture, True),
+        Format("png", ".png", _picture, True),
     )
 }  # fmt: skip

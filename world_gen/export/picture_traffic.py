@@ -38,7 +38,6 @@ _TURN_DEG: Mapping[Turn, float] = {"straight": 0.0, "left": 75.0, "right": -75.0
 _GENERAL: frozenset[YieldRule] = frozenset(("near_side", "order", "merge_order"))
 """Rules under which two roads wait for each other: neither has priority."""
 _ACROSS: frozenset[YieldRule] = frozenset(("turn_across", "u_turn"))
-Above = dict[bool, float]
 
 
 def draw_traffic(axes: Axes, world: World, view: View) -> None:
