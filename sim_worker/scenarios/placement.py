@@ -1,0 +1,281 @@
+"""Puts scenarios where they can take place: on the junctions and roads of any World."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
+from contracts.frames import wrap_angle
+from contracts.scenario import Scenario
+from contracts.vehicle import VehicleParameters
+from contracts.world import IntersectionSummary, World, WorldJunction
+from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.beyond_junctions import other_places
+from sim_worker.scenarios.casting import cast
+from sim_worker.scenarios.drawing import Values, draw_cases
+from sim_worker.scenarios.places import Place, Placement, Unplaced
+from sim_worker.scenarios.relations import ways_of
+from sim_worker.scenarios.roads import Passage, RoadNetwork, Way
+from sim_worker.vehicle.parameters import load_vehicle
+
+_ON_CONNECTION_M = 3.0
+"""Who drives no farther on average from a connection's middle takes it."""
+_HEADS_ALIKE_RAD = math.radians(35.0)
+_SAMPLES = 9
+_NEAR_PATH_M = 60.0
+_BEHIND_PATH_M = 15.0
+
+
+def places(
+    scenario: Scenario,
+    world: World,
+    *,
+    network: RoadNetwork | None = None,
+    vehicle: VehicleParameters | None = None,
+    most: int | None = None,
+) -> Placement:
+    """Return where a scenario can take place: on the World's own junction, in a region on all.
+
+    A place counts when the middle one of the scenario's cases can be cast there. `most` ends the
+    search of a junction after so many places.
+    """
+    network = network or RoadNetwork(world)
+    vehicle = vehicle or load_vehicle()
+    cases = draw_cases(scenario)
+    case = cases[len(cases) // 2]
+    if scenario.where.setting != "junction":
+        found, reason = other_places(scenario, network)
+        return _cast_ones(scenario, case, vehicle, world.intersection.id, iter(found), reason, most)
+    results = [
+        _at_junction(scenario, network, junction, vehicle, case, most)
+        for junction in _junctions(world)
+    ]
+    return Placement(
+        tuple(place for result in results for place in result.places),
+        tuple(unplaced for result in results for unplaced in result.unplaced),
+    )
+
+
+def _junctions(world: World) -> tuple[WorldJunction, ...]:
+    if world.intersection.kind == "region":
+        return world.junctions
+    return tuple(j for j in world.junctions if j.summary.id == world.intersection.id)
+
+
+def _at_junction(
+    scenario: Scenario,
+    network: RoadNetwork,
+    junction: WorldJunction,
+    vehicle: VehicleParameters,
+    case: Values,
+    most: int | None,
+) -> Placement:
+    refused = _refused(scenario, junction.summary)
+    if refused:
+        return Placement((), (Unplaced(junction.summary.id, refused, False),))
+    passages = [p for p in network.passages(junction.summary.id) if p.turn == scenario.ego.turn]
+    if not passages:
+        reason = f"no way through it for an ego that {_TURNS[scenario.ego.turn]}"
+        return Placement((), (Unplaced(junction.summary.id, reason, False),))
+    candidates = (
+        place
+        for passage in passages
+        for place in _places_of(scenario, network, passage, network.way(passage))
+    )
+    nobody = _nobody(scenario)
+    return _cast_ones(scenario, case, vehicle, junction.summary.id, candidates, nobody, most)
+
+
+_TURNS = {"straight": "goes straight on", "across": "turns across", "near": "turns near"}
+
+
+def _cast_ones(
+    scenario: Scenario,
+    case: Values,
+    vehicle: VehicleParameters,
+    junction_id: str,
+    candidates: Iterator[Place],
+    nobody: str,
+    most: int | None,
+) -> Placement:
+    """Return the candidates on which the case can be cast, or why there is none."""
+    found: list[Place] = []
+    failure: Unplaced | None = None
+    for place in candidates:
+        played = cast(scenario, case, place, vehicle=vehicle)
+        if isinstance(played, Unplaced):
+            failure = failure or played
+            continue
+        found.append(place)
+        if most is not None and len(found) >= most:
+            break
+    if found:
+        return Placement(tuple(found), ())
+    return Placement((), (failure or Unplaced(junction_id, nobody, False),))
+
+
+def _refused(scenario: Scenario, summary: IntersectionSummary) -> str:
+    where = scenario.where
+    if where.kinds and summary.kind not in where.kinds:
+        return f"its kind is {summary.kind}; the scenario is for {', '.join(where.kinds)}"
+    if where.controls and summary.control not in where.controls:
+        return f"its control is {summary.control}; the scenario is for {', '.join(where.controls)}"
+    return ""
+
+
+def _nobody(scenario: Scenario) -> str:
+    parts = [
+        a for a in scenario.actors if a.relation not in ("ahead", "behind", "beside", "parked")
+    ]
+    what = " and ".join(
+        f"{part.relation.replace('_', ' ')} {part.turn}".replace(" straight", " straight on")
+        for part in parts
+    )
+    return f"nobody can come {what} and meet the ego's path"
+
+
+def _places_of(
+    scenario: Scenario, network: RoadNetwork, passage: Passage, ego: Way
+) -> Iterator[Place]:
+    """Yield a place for each way of the first other road user, with all ways of the rest."""
+    along = ("ahead", "behind", "beside", "parked")
+    ways = [
+        () if part.relation in along else tuple(ways_of(part, network, passage, ego))
+        for part in scenario.actors
+    ]
+    needs = [i for i, part in enumerate(scenario.actors) if part.relation not in along]
+    if any(not ways[i] for i in needs):
+        return
+    first = needs[0] if needs else None
+    for way in (None,) if first is None else ways[first]:
+        chosen = tuple(
+            (way,) if i == first and way is not None else each for i, each in enumerate(ways)
+        )
+        yield Place(
+            scenario_id=scenario.id,
+            world_id=network.world.id,
+            junction_id=passage.junction_id,
+            name=passage.name if way is None else f"{passage.name}/{way.name}",
+            driving_side=network.driving_side,
+            ego=ego,
+            actor_ways=chosen,
+        )
+
+
+def place_on_path(
+    scenario: Scenario, network: RoadNetwork, ego_path: FrenetPath, ego_arc_m: float
+) -> Place | Unplaced:
+    """Return the place of a scenario at the next junction on a path that a car is driving.
+
+    The path's shape tells which way through the junction it takes; the ego then follows the path
+    itself. What cannot be cast from the car's state says so when it is cast.
+    """
+    own = network.world.intersection.id
+    if scenario.where.setting != "junction":
+        found, reason = other_places(scenario, network, ego_path=ego_path, ego_arc_m=ego_arc_m)
+        return found[0] if found else Unplaced(own, reason, False)
+    taken = passage_on_path(network, ego_path, ego_arc_m)
+    if taken is None:
+        return Unplaced(own, "the path leads through no junction of the World ahead", False)
+    passage, way = taken
+    summary = next(
+        j.summary for j in network.world.junctions if j.summary.id == passage.junction_id
+    )
+    refused = _refused(scenario, summary)
+    if refused:
+        return Unplaced(summary.id, refused, False)
+    if passage.turn != scenario.ego.turn and not _any_turn(scenario):
+        turns = _TURNS[passage.turn] if passage.turn else "turns back"
+        wanted = _TURNS[scenario.ego.turn]
+        return Unplaced(summary.id, f"the path {turns}; the scenario's ego {wanted}", False)
+    found_places = list(_places_of(scenario, network, passage, way))
+    if not found_places:
+        return Unplaced(summary.id, _nobody(scenario), False)
+    first = found_places[0]
+    merged = tuple(
+        tuple(dict.fromkeys(way for place in found_places for way in place.actor_ways[i]))
+        if first.actor_ways[i]
+        else ()
+        for i in range(len(first.actor_ways))
+    )
+    return first._replace(actor_ways=merged)
+
+
+def _any_turn(scenario: Scenario) -> bool:
+    """Return whether which way the ego turns does not matter."""
+    along = ("ahead", "behind", "beside", "parked", "crosses_entry")
+    return all(part.relation in along for part in scenario.actors)
+
+
+def passage_on_path(
+    network: RoadNetwork, ego_path: FrenetPath, ego_arc_m: float
+) -> tuple[Passage, Way] | None:
+    """Return the first passage ahead that a path takes, and the path as the way that takes it."""
+    length = ego_path.length_m
+    arcs = np.arange(max(0.0, ego_arc_m - _BEHIND_PATH_M), max(length, ego_arc_m + 1.0), 2.0)
+    ahead = shapely.LineString(ego_path.point_at(arcs))
+    best: tuple[float, float, Passage, Way] | None = None
+    for junction in network.world.junctions:
+        passages = network.passages(junction.summary.id)
+        near = [
+            (p, line)
+            for p in passages
+            if ahead.distance(shapely.Point((line := _line(p))[len(line) // 2])) < _NEAR_PATH_M
+        ]
+        matches = [m for p, line in near if (m := _match(p, line, ego_path, ego_arc_m))]
+        if not matches:
+            continue
+        off, entry, exit_, passage = min(matches, key=lambda match: (match[0], match[3].name))
+        if best is not None and best[1] <= entry:
+            continue
+        best = (off, entry, passage, _live_way(passage.name, ego_path, entry, exit_))
+    return None if best is None else (best[2], best[3])
+
+
+def _line(passage: Passage) -> Array:
+    return np.concatenate([connection.centerline for connection in passage.connections])
+
+
+def _match(
+    passage: Passage, line: Array, path: FrenetPath, ego_arc_m: float
+) -> tuple[float, float, float, Passage] | None:
+    """Return how far a path lies from a passage, and where it enters and leaves; None if too far.
+
+    The headings count as metres over half the junction, so that of ways that part late the right
+    one wins.
+    """
+    pick = np.linspace(0, len(line) - 1, _SAMPLES).round().astype(int)
+    points = line[pick]
+    place = path.locate(points)
+    entry, exit_ = float(place.arc_m[0]), float(place.arc_m[-1])
+    if exit_ <= max(entry, ego_arc_m + 1.0) or exit_ > path.length_m + 1.0:
+        return None
+    step = np.gradient(points, axis=0)
+    heading = np.arctan2(step[:, 1], step[:, 0])
+    turned = np.abs(wrap_angle(heading - path.pose_at(place.arc_m).yaw_rad))
+    off = float(np.abs(place.offset_m).mean())
+    if off > _ON_CONNECTION_M or float(turned.mean()) > _HEADS_ALIKE_RAD:
+        return None
+    score = off + 5.0 * float(turned.mean()) + 2.0 * float(turned[-1])
+    return score, entry, exit_, passage
+
+
+def _live_way(name: str, path: FrenetPath, entry_m: float, exit_m: float) -> Way:
+    """Return the car's own path as a way; it is taken as it comes, on lanes or not."""
+    arcs = np.arange(0.0, path.length_m + 1e-6, 1.0)
+    if path.length_m - arcs[-1] > 1e-3:
+        arcs = np.append(arcs, path.length_m)
+    return Way(
+        name=name,
+        xy_m=path.point_at(arcs),
+        speed_limit_mps=path.at_nodes(path.speed_limit_mps, arcs),
+        path=path,
+        entry_m=entry_m,
+        exit_m=exit_m,
+        first_m=0.0,
+        last_m=path.length_m,
+    )

@@ -1,0 +1,50 @@
+"""What a placement says: where a scenario takes place, or why it does not."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from contracts.world import DrivingSide
+from sim_worker.scenarios.roads import Way
+
+
+class Place(NamedTuple):
+    """Where a scenario can take place: the ego's way, and by which ways the others may come.
+
+    `actor_ways` has one entry for each actor of the scenario: the ways it may take, the likeliest
+    first; none for those who move along the ego's own path.
+    """
+
+    scenario_id: str
+    world_id: str
+    junction_id: str
+    name: str
+    """The connections that the ego takes and, after a `/`, those of the first other road user."""
+    driving_side: DrivingSide
+    ego: Way
+    actor_ways: tuple[tuple[Way, ...], ...]
+    reverse: bool = False
+    """The ego drives its way backwards."""
+
+    @property
+    def near_sign(self) -> float:
+        """Return +1 where the near side is the right one, else -1."""
+        return 1.0 if self.driving_side == "right" else -1.0
+
+
+class Unplaced(NamedTuple):
+    """Why a scenario does not take place at a junction.
+
+    `applies` is false where the junction is none that the scenario is for.
+    """
+
+    junction_id: str
+    reason: str
+    applies: bool
+
+
+class Placement(NamedTuple):
+    """Every place of a scenario in a World, and the reason for each junction without one."""
+
+    places: tuple[Place, ...]
+    unplaced: tuple[Unplaced, ...]

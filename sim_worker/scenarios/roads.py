@@ -1,0 +1,356 @@
+"""A World's lanes and connections as a network of ways that road users may take."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.frames import wrap_angle
+from contracts.scenario import TrafficTurn
+from contracts.world import Connection, DrivingSide, Lane, World
+from sim_worker.planners.path import FrenetPath
+from world_gen.polyline import arc_lengths
+
+APPROACH_M, DEPARTURE_M = 150.0, 120.0
+"""How far ways are led back and on along the lanes."""
+_HEADING_OVER_M = 8.0
+_LONGEST_CHAIN = 16
+"""Connections through one ring: more are a drive in circles."""
+_STRAIGHT_RAD, _BACK_RAD = math.radians(45.0), math.radians(150.0)
+
+
+class Passage(NamedTuple):
+    """A way through one junction: one connection, or on a ring a chain of them.
+
+    Headings are those of the lanes that it comes by and leaves by. `turn` is None for U-turns.
+    """
+
+    junction_id: str
+    connections: tuple[Connection, ...]
+    turn: TrafficTurn | None
+    entry_heading_rad: float
+    exit_heading_rad: float
+
+    @property
+    def name(self) -> str:
+        """Return the ids of its connections."""
+        return "+".join(connection.id for connection in self.connections)
+
+
+class Way(NamedTuple):
+    """A path for a road user: `xy_m` (N, 2), arc length 0 at its first point.
+
+    `speed_limit_mps` (N,). The junction lies between `entry_m` and `exit_m`; lanes of the World
+    carry it from `first_m` to `last_m`, beyond which it goes on straight.
+    """
+
+    name: str
+    xy_m: Array
+    speed_limit_mps: Array
+    path: FrenetPath
+    entry_m: float
+    exit_m: float
+    first_m: float
+    last_m: float
+
+
+class RoadNetwork:
+    """What a World's lanes offer: passages of its junctions, and the ways that take them."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.driving_side: DrivingSide = world.intersection.driving_side
+        self.lanes = {lane.id: lane for lane in world.lanes}
+        self.connections = {c.id: c for c in world.connections}
+        self.road_of_lane = {lane.id: lane.road_id for lane in world.lanes}
+        self.roads = {road.id: road for road in world.roads}
+        self._into: dict[str, list[str]] = {}
+        self._out_of: dict[str, list[str]] = {}
+        for connection in world.connections:
+            self._link(connection.from_lane_id, connection.id)
+            self._link(connection.id, connection.to_lane_id)
+        for lane in world.lanes:
+            for successor in lane.successor_ids:
+                self._link(lane.id, successor)
+        self._passages: dict[str, tuple[Passage, ...]] = {}
+        self._ways: dict[str, Way] = {}
+
+    def _link(self, before: str, after: str) -> None:
+        known = self._out_of.setdefault(before, [])
+        if after not in known:
+            known.append(after)
+            self._into.setdefault(after, []).append(before)
+
+    @property
+    def near_sign(self) -> float:
+        """Return +1 where the near side is the right one, else -1."""
+        return 1.0 if self.driving_side == "right" else -1.0
+
+    def passages(self, junction_id: str) -> tuple[Passage, ...]:
+        """Return the passages for cars through a junction, in the World's order."""
+        if junction_id not in self._passages:
+            inside = [c for c in self.world.connections if c.junction_id == junction_id]
+            self._passages[junction_id] = tuple(
+                self._passage(junction_id, chain)
+                for connection in inside
+                if self._car(connection.from_lane_id) and not self._ring(connection.from_lane_id)
+                for chain in self._chains((connection,))
+            )
+        return self._passages[junction_id]
+
+    def _car(self, lane_id: str) -> bool:
+        lane = self.lanes.get(lane_id)
+        return lane is not None and lane.kind == "driving"
+
+    def _ring(self, lane_id: str) -> bool:
+        return self.lanes[lane_id].role == "ring"
+
+    def _chains(self, chain: tuple[Connection, ...]) -> Iterator[tuple[Connection, ...]]:
+        """Yield every way on round the ring until it is left, at most once round."""
+        last = chain[-1]
+        if not self._car(last.to_lane_id):
+            return
+        if not self._ring(last.to_lane_id):
+            yield chain
+            return
+        passed = {c.from_lane_id for c in chain} | {last.to_lane_id}
+        if len(chain) >= _LONGEST_CHAIN:
+            return
+        for after in self._after_ring(last.to_lane_id):
+            if after.junction_id == last.junction_id and after.to_lane_id not in passed:
+                yield from self._chains((*chain, after))
+
+    def _after_ring(self, lane_id: str) -> list[Connection]:
+        """Return the connections at the end of a ring's lane, over lanes that merely go on."""
+        found = []
+        for after in self._out_of.get(lane_id, ()):
+            if after in self.connections:
+                found.append(self.connections[after])
+            elif after in self.lanes and self._ring(after) and after != lane_id:
+                found.extend(
+                    self.connections[c]
+                    for c in self._out_of.get(after, ())
+                    if c in self.connections
+                )
+        return found
+
+    def _passage(self, junction_id: str, chain: tuple[Connection, ...]) -> Passage:
+        entry = self._heading_at_end(chain[0].from_lane_id, chain[0])
+        leave = self._heading_at_start(chain[-1].to_lane_id, chain[-1])
+        if len(chain) == 1:
+            turn = traffic_turn(chain[0].turn, self.driving_side)
+        else:
+            turn = _turn_by_heading(float(wrap_angle(leave - entry)), self.driving_side)
+        return Passage(junction_id, chain, turn, entry, leave)
+
+    def _heading_at_end(self, lane_id: str, connection: Connection) -> float:
+        """Return where a lane heads at its end; that of the connection if it is short."""
+        line = self.lanes[lane_id].centerline
+        if len(line) < 2 or arc_lengths(line)[-1] < 1.0:
+            line = connection.centerline[:2]
+        return _heading(line[::-1], backwards=True)
+
+    def _heading_at_start(self, lane_id: str, connection: Connection) -> float:
+        line = self.lanes[lane_id].centerline
+        if len(line) < 2 or arc_lengths(line)[-1] < 1.0:
+            line = connection.centerline[-2:]
+        return _heading(line, backwards=False)
+
+    def way(self, passage: Passage) -> Way:
+        """Return the way that takes a passage, led back and on along the lanes around it."""
+        if passage.name not in self._ways:
+            ids = [passage.connections[0].id]
+            for before, after in zip(passage.connections, passage.connections[1:], strict=False):
+                ids.extend(self._between(before, after))
+            self._ways[passage.name] = self.way_along(
+                passage.name,
+                before=self._upstream(passage.connections[0].from_lane_id),
+                middle=ids,
+                after=self._downstream(passage.connections[-1].to_lane_id),
+            )
+        return self._ways[passage.name]
+
+    def way_round(self, entering: Connection) -> Way | None:
+        """Return the way of who circulates where `entering` joins the ring; None where none does.
+
+        It comes round as often as it is long, and goes on round the ring.
+        """
+        name = f"ring>{entering.id}"
+        if name not in self._ways:
+            ring = entering.to_lane_id
+            back = self._round(ring, self._into, APPROACH_M, entering)
+            if not back:
+                return None
+            on = self._round(ring, self._out_of, DEPARTURE_M, entering)
+            self._ways[name] = self.way_along(
+                name, before=back[:0:-1], middle=back[:1], after=[ring, *on]
+            )
+        return self._ways[name]
+
+    def _round(
+        self, lane_id: str, links: dict[str, list[str]], length_m: float, entering: Connection
+    ) -> list[str]:
+        """Return what follows on a ring's lane by `links`, for so many metres, nearest first."""
+        chain: list[str] = []
+        last, walked = lane_id, 0.0
+        while walked < length_m:
+            onward = [i for i in links.get(last, ()) if self._on_ring(i, entering)]
+            if not onward:
+                break
+            last = onward[0]
+            chain.append(last)
+            walked += max(0.5, float(arc_lengths(self._line(last))[-1]))
+        return chain
+
+    def _on_ring(self, id_: str, entering: Connection) -> bool:
+        if id_ in self.lanes:
+            return self._ring(id_)
+        connection = self.connections[id_]
+        ring = self._ring(connection.from_lane_id) and self._ring(connection.to_lane_id)
+        return ring and connection.junction_id == entering.junction_id
+
+    def way_along(
+        self, name: str, *, before: Sequence[str], middle: Sequence[str], after: Sequence[str]
+    ) -> Way:
+        """Return the way along lanes and connections; `middle` is what lies in the junction."""
+        parts = [self._line(i) for i in (*before, *middle, *after)]
+        limits = [np.full(len(self._line(i)), self._limit(i)) for i in (*before, *middle, *after)]
+        xy, limit = np.concatenate(parts), np.concatenate(limits)
+        keep = np.concatenate([[True], np.hypot(*np.diff(xy, axis=0).T) > 0.02])
+        count = sum(len(part) for part in parts[: len(before)])
+        inside = sum(len(part) for part in parts[len(before) : len(before) + len(middle)])
+        arc_all = arc_lengths(xy)
+        entry = float(arc_all[count]) if middle else float(arc_all[-1])
+        exit_ = float(arc_all[count + inside - 1]) if middle else entry
+        xy, limit = xy[keep], limit[keep]
+        return lengthened(name, xy, limit, entry, exit_)
+
+    def _between(self, before: Connection, after: Connection) -> list[str]:
+        """Return what leads from one connection of a ring to the next, the next included."""
+        lane = before.to_lane_id
+        if lane == after.from_lane_id:
+            return [lane, after.id]
+        return [lane, after.from_lane_id, after.id]
+
+    def _line(self, id_: str) -> Array:
+        lane = self.lanes.get(id_)
+        return lane.centerline if lane is not None else self.connections[id_].centerline
+
+    def _limit(self, id_: str) -> float:
+        lane = self.lanes.get(id_)
+        if lane is None:
+            lane = self.lanes[self.connections[id_].from_lane_id]
+        return float(lane.speed_limit_mps.value)
+
+    def _upstream(self, lane_id: str) -> list[str]:
+        """Return a lane and what leads to it, the straightest way back, first things first."""
+        chain, walked = [lane_id], float(arc_lengths(self._line(lane_id))[-1])
+        while walked < APPROACH_M:
+            back = [i for i in self._into.get(chain[0], ()) if i not in chain and self._drivable(i)]
+            if not back:
+                break
+            best = min(back, key=lambda i: _bend(self._line(i), self._line(chain[0])))
+            chain.insert(0, best)
+            walked += float(arc_lengths(self._line(best))[-1])
+        return chain
+
+    def _downstream(self, lane_id: str) -> list[str]:
+        chain, walked = [lane_id], float(arc_lengths(self._line(lane_id))[-1])
+        while walked < DEPARTURE_M:
+            on = [
+                i for i in self._out_of.get(chain[-1], ()) if i not in chain and self._drivable(i)
+            ]
+            if not on:
+                break
+            best = min(on, key=lambda i: _bend(self._line(chain[-1]), self._line(i)))
+            chain.append(best)
+            walked += float(arc_lengths(self._line(best))[-1])
+        return chain
+
+    def _drivable(self, id_: str) -> bool:
+        if id_ in self.lanes:
+            return self._car(id_)
+        return id_ in self.connections and self._car(self.connections[id_].from_lane_id)
+
+    def lane_way(self, lane: Lane) -> Way:
+        """Return the way along a lane of an open road; it counts as within no junction."""
+        back, on = self._upstream(lane.id), self._downstream(lane.id)[1:]
+        return self.way_along(lane.id, before=back[:-1], middle=[lane.id], after=on)
+
+
+def lengthened(name: str, xy: Array, limit: Array, entry_m: float, exit_m: float) -> Way:
+    """Return the way along a polyline, led straight on at either end as far as ways go."""
+    arc = arc_lengths(xy)
+    before = max(0.0, APPROACH_M - entry_m)
+    after = max(0.0, DEPARTURE_M - (float(arc[-1]) - exit_m))
+    # Ends clipped at the World's edge can be short: a few metres tell where the road heads.
+    first = _unit(xy[0] - _point_at(xy, arc, _HEADING_OVER_M / 2))
+    last = _unit(xy[-1] - _point_at(xy, arc, float(arc[-1]) - _HEADING_OVER_M / 2))
+    parts, limits = [xy], [limit]
+    if before > 0.5:
+        parts.insert(0, (xy[0] + before * first)[None])
+        limits.insert(0, limit[:1])
+    else:
+        before = 0.0
+    if after > 0.5:
+        parts.append((xy[-1] + after * last)[None])
+        limits.append(limit[-1:])
+    line = np.concatenate(parts)
+    return Way(
+        name=name,
+        xy_m=line,
+        speed_limit_mps=np.concatenate(limits),
+        path=FrenetPath(line, np.concatenate(limits)),
+        entry_m=entry_m + before,
+        exit_m=exit_m + before,
+        first_m=before,
+        last_m=before + float(arc[-1]),
+    )
+
+
+def traffic_turn(turn: str, side: DrivingSide) -> TrafficTurn | None:
+    """Name a turn by the traffic: left is across where one drives on the right."""
+    if turn == "straight":
+        return "straight"
+    if turn == "u_turn":
+        return None
+    return "across" if (turn == "left") == (side == "right") else "near"
+
+
+def _turn_by_heading(change_rad: float, side: DrivingSide) -> TrafficTurn | None:
+    if abs(change_rad) >= _BACK_RAD:
+        return None
+    if abs(change_rad) < _STRAIGHT_RAD:
+        return "straight"
+    return traffic_turn("left" if change_rad > 0.0 else "right", side)
+
+
+def _heading(line: Array, *, backwards: bool) -> float:
+    """Return where a line heads at its first point, looked at over a few metres."""
+    arc = arc_lengths(line)
+    step = _point_at(line, arc, _HEADING_OVER_M) - line[0]
+    if backwards:
+        step = -step
+    return math.atan2(float(step[1]), float(step[0]))
+
+
+def _bend(before: Array, after: Array) -> float:
+    """Return by how much one turns from the end of one line into the other."""
+    if len(before) < 2 or len(after) < 2:
+        return math.pi
+    turn = _heading(after, backwards=False) - _heading(before[::-1], backwards=True)
+    return abs(float(wrap_angle(turn)))
+
+
+def _point_at(line: Array, arc: Array, at_m: float) -> Array:
+    at = min(max(at_m, 0.0), float(arc[-1]))
+    return np.array([np.interp(at, arc, line[:, 0]), np.interp(at, arc, line[:, 1])])
+
+
+def _unit(vector: Array) -> Array:
+    norm = float(np.hypot(*vector))
+    return vector / norm if norm > 1e-9 else np.array([1.0, 0.0])
