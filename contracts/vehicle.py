@@ -17,7 +17,8 @@ class VehicleParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     """What a planar vehicle model needs, in SI units, with base_link at the rear-axle centre.
 
     Cornering stiffnesses are per axle. `steering_ratio` is steering wheel over tyre angle,
-    `steering_offset_rad` is added at the tyre. Delays are from command to actuator.
+    `steering_offset_rad` is added at the tyre. Delays are from command to actuator, lags those of
+    the actuator itself; a file without them means none.
     """
 
     name: str
@@ -41,6 +42,14 @@ class VehicleParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     """Achieved over commanded acceleration when driving."""
     brake_gain: Parameter
     """Achieved over commanded deceleration when braking."""
+    drive_lag_s: Parameter = Parameter(0.0)
+    """Time constant with which the drive force follows its command."""
+    brake_lag_s: Parameter = Parameter(0.0)
+    """Time constant with which the brake force follows its command."""
+    accel_delay_s: Parameter = Parameter(0.0)
+    """Dead time before drive and brake begin to follow."""
+    steering_lag_s: Parameter = Parameter(0.0)
+    """Time constant with which the tyre angle follows its command, after `steering_delay_s`."""
     max_drive_accel_mps2: Parameter
     max_brake_decel_mps2: Parameter
     wheel_inertia_mass_factor: Parameter
