@@ -13,6 +13,7 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
+from sim_worker.vehicle.lag import ForceLag, lags_of_force
 from sim_worker.vehicle.parameters import GRAVITY_MPS2
 from sim_worker.vehicle.planar import DRIVE, STEER, TYRE_FRONT, TYRE_REAR
 
@@ -44,7 +45,9 @@ class Actuation:
 
     `ctrl` (S, nu), `biasprm` (S, nu, k) and `forcerange` (S, nu, 2) are written in place;
     `friction` (S,) stays. The actuator along the road is a brake, a strong damper within ± its
-    force, shifted by the drive force: at speed drive minus brake, at standstill a hold.
+    force, shifted by the drive force: at speed drive minus brake, at standstill a hold. With
+    `tick_s`, the time between two calls of `apply`, forces lag as the vehicle's parameters say,
+    from `accel_mps2` (S,) on; without, they are immediate.
     """
 
     def __init__(
@@ -56,6 +59,8 @@ class Actuation:
         ctrl: Array,
         biasprm: Array,
         forcerange: Array,
+        tick_s: float | None = None,
+        accel_mps2: Array | None = None,
     ) -> None:
         tyres = slice(ids.tyre_front, ids.tyre_rear + 1)
         if ids.tyre_rear != ids.tyre_front + 1:
@@ -89,6 +94,10 @@ class Actuation:
         self._friction = np.asarray(friction, dtype=np.float64)
         self._grip = self._friction * GRAVITY_MPS2
         self._grip_square = self._grip**2
+        self._lag: ForceLag | None = None
+        if tick_s is not None and lags_of_force(vehicle):
+            start = np.zeros(len(self._friction)) if accel_mps2 is None else accel_mps2
+            self._lag = ForceLag(vehicle, tick_s=tick_s, accel_mps2=start)
 
     def apply(self, *, speed_mps: Array, accel_mps2: Array) -> None:
         """Set the forces of the next control tick from body speed and command, each (S,).
@@ -97,7 +106,11 @@ class Actuation:
         inertia to the chassis, which would add it sideways too.
         """
         command = np.minimum(np.maximum(accel_mps2, -self._max_brake), self._max_drive)
-        accel = command * np.where(command > 0.0, self._drive_gain, self._brake_gain)
+        if self._lag is None:
+            accel = command * np.where(command > 0.0, self._drive_gain, self._brake_gain)
+        else:
+            drive, brake = self._lag.follow(command)
+            accel = drive * self._drive_gain + brake * self._brake_gain
         accel = np.minimum(np.maximum(accel, -self._grip), self._grip)
         share = np.maximum(1.0 - accel * accel / self._grip_square, _MIN_LATERAL_SHARE**2)
         loads = np.maximum(self._loads_n + self._transfer_kg * accel, _TINY_N)

@@ -11,26 +11,43 @@ import msgspec
 from contracts.errors import UserError
 from contracts.vehicle import Parameter, VehicleParameters
 
-DEFAULT_FILE = Path(__file__).with_name("bmw_320i.toml")
+_FOLDER = Path(__file__).parent
+DEFAULT_FILE = _FOLDER / "bmw_320i.toml"
 GRAVITY_MPS2 = 9.81
 MAX_VEHICLE_DELAY_S = 0.6
 """Futures add up to 0.4 s, and the sample buffer of the steering actuator holds 1 s."""
 
-_MAY_BE_ZERO = {"drag_npv2", "rolling_resistance_n", "steering_delay_s", "rear_overhang_m"}
+MAX_FORCE_DELAY_S = 1.0
+"""Beyond it, nobody would speak of an actuator's dead time."""
+
+_MAY_BE_ZERO = {
+    "drag_npv2", "rolling_resistance_n", "steering_delay_s", "rear_overhang_m", "drive_lag_s",
+    "brake_lag_s", "accel_delay_s", "steering_lag_s",
+}  # fmt: skip
 _ANY_SIGN = {"steering_offset_rad"}
 
 
-def load_vehicle(path: Path | None = None) -> VehicleParameters:
-    """Read a vehicle's parameters; None gives the bundled BMW 320i.
+def bundled_vehicles() -> tuple[str, ...]:
+    """Return the names of the vehicles that come along, for `load_vehicle`."""
+    return tuple(sorted(file.stem for file in _FOLDER.glob("*.toml")))
 
-    Raises FileNotFoundError for a missing file and ValueError, in one line with the file and the
-    field, for anything that is no vehicle.
+
+def load_vehicle(path: Path | str | None = None) -> VehicleParameters:
+    """Read the parameters of a bundled vehicle by its name, or of a file; None is the BMW 320i.
+
+    Raises FileNotFoundError for neither a name nor a file and ValueError, in one line with the
+    file and the field, for anything that is no vehicle.
     """
-    source = DEFAULT_FILE if path is None else path
+    source = DEFAULT_FILE if path is None else Path(path)
+    if str(source) in bundled_vehicles():
+        source = _FOLDER / f"{source}.toml"
     try:
         text = source.read_text(encoding="utf-8")
     except (FileNotFoundError, IsADirectoryError) as error:
-        raise FileNotFoundError(f"no vehicle file {source}") from error
+        names = ", ".join(bundled_vehicles())
+        raise FileNotFoundError(
+            f"no vehicle file {source}, and no bundled vehicle of that name: {names}"
+        ) from error
     except UnicodeDecodeError as error:
         raise UserError(f"vehicle file {source} is no UTF-8 text") from error
     try:
@@ -68,6 +85,10 @@ def check_vehicle(vehicle: VehicleParameters) -> VehicleParameters:
         raise ValueError(
             f"steering_delay_s {vehicle.steering_delay_s.value} must be at most "
             f"{MAX_VEHICLE_DELAY_S}: futures add to it"
+        )
+    if vehicle.accel_delay_s.value > MAX_FORCE_DELAY_S:
+        raise ValueError(
+            f"accel_delay_s {vehicle.accel_delay_s.value} must be at most {MAX_FORCE_DELAY_S}"
         )
     if vehicle.max_tire_angle_rad.value >= math.pi / 2:
         raise ValueError(f"max_tire_angle_rad {vehicle.max_tire_angle_rad.value} must be below π/2")

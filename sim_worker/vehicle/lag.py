@@ -1,0 +1,49 @@
+"""Drive and brake follow their command late: a dead time, then a first-order lag each."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.vehicle import VehicleParameters
+
+
+class ForceLag:
+    """What drive and brakes of S vehicles exert, tick by tick, of what they were told to.
+
+    Commands change once a tick. Within one, the mean of the exponential is what acts, so that
+    speeds after a tick are exact; dead times need not be whole ticks.
+    """
+
+    def __init__(self, vehicle: VehicleParameters, *, tick_s: float, accel_mps2: Array) -> None:
+        """Start with `accel_mps2` (S,) acting, and commanded all along."""
+        lags = (vehicle.drive_lag_s.value, vehicle.brake_lag_s.value)
+        decays = [math.exp(-tick_s / lag) if lag > 0.0 else 0.0 for lag in lags]
+        self._decay = np.array(decays)[:, None]
+        self._mean = np.array([lag / tick_s * (1 - d) for lag, d in zip(lags, decays, strict=True)])
+        self._mean = self._mean[:, None]
+        late = vehicle.accel_delay_s.value / tick_s
+        self._whole = math.floor(late + 1e-9)
+        self._part = max(late - self._whole, 0.0)
+        start = np.asarray(accel_mps2, dtype=np.float64)
+        self._acting = np.stack([np.maximum(start, 0.0), np.minimum(start, 0.0)])
+        self._commands = [start] * (self._whole + 2)
+
+    def follow(self, command_mps2: Array) -> tuple[Array, Array]:
+        """Return what drive (≥ 0) and brakes (≤ 0) exert over the next tick, each (S,)."""
+        self._commands = [command_mps2.copy(), *self._commands[:-1]]
+        newer, older = self._commands[self._whole : self._whole + 2]
+        due = newer if self._part == 0.0 else newer + self._part * (older - newer)
+        wanted = np.stack([np.maximum(due, 0.0), np.minimum(due, 0.0)])
+        behind = self._acting - wanted
+        self._acting = wanted + self._decay * behind
+        drive, brake = wanted + self._mean * behind
+        return drive, brake
+
+
+def lags_of_force(vehicle: VehicleParameters) -> bool:
+    """Whether drive or brakes of `vehicle` are anything but immediate."""
+    late = (vehicle.drive_lag_s, vehicle.brake_lag_s, vehicle.accel_delay_s)
+    return any(parameter.value > 0.0 for parameter in late)
