@@ -1,0 +1,89 @@
+"""Where a road merely goes on, so does each of its lanes: into the next one or by a connection."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contracts.world import World
+from tests.world_gen.drawn_maps import STREET, drawn_map, world_of
+
+WIDE = {"highway": "secondary", "name": "Street"}
+ONE_WAY = WIDE | {"oneway": "yes", "lanes": "2"}
+
+
+def _world(first, second, *, at=(60.0, 0.0), far=(120.0, 0.0)) -> World:
+    """Return the World of a T whose eastern road changes its tags at node 1."""
+    nodes = {0: (0.0, 0.0), 1: at, 2: far, 3: (-90.0, 0.0), 4: (0.0, -90.0)}
+    ways = [(11, [0, 1], first), (12, [1, 2], second), (13, [3, 0], WIDE), (14, [4, 0], STREET)]
+    return world_of(drawn_map(nodes, ways))
+
+
+def _leading_on(world: World) -> dict[str, set[str]]:
+    """Return which lane leads to which beyond node 1; what meets there meets to 2 mm."""
+    lanes = {lane.id: lane for lane in world.lanes}
+    paths = {c.id: c for c in world.connections}
+    onward: dict[str, set[str]] = {}
+    for road in world.roads:
+        for lane in (lanes[i] for i in road.lane_ids):
+            if (road.from_place if lane.reverse else road.to_place) != "1":
+                continue
+            onward[lane.id] = set()
+            for name in lane.successor_ids:
+                target = lanes[name] if name in lanes else lanes[paths[name].to_lane_id]
+                begin = (lanes | paths)[name].centerline[0]
+                np.testing.assert_allclose(begin, lane.centerline[-1], atol=2e-3)
+                onward[lane.id].add(target.id)
+    return {_short(a): {_short(b) for b in bs} for a, bs in onward.items()}
+
+
+def _short(lane_id: str) -> str:
+    way, *_, lane = lane_id.split(".")
+    return f"{way}.{lane}"
+
+
+def test_a_turn_lane_becomes_the_centre_lane_for_turns():
+    first = WIDE | {"lanes": "3", "lanes:forward": "2", "lanes:backward": "1",
+                    "turn:lanes:forward": "left|through;right"}  # fmt: skip
+    second = WIDE | {"lanes": "3", "lanes:both_ways": "1", "turn:lanes:both_ways": "left"}
+    assert _leading_on(_world(first, second)) == {
+        "w11.f0": {"w12.centre"}, "w11.f1": {"w12.f0"}, "w12.b0": {"w11.b0"},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("more", [{"width:lanes": "3|3|3.5"}, {"lanes": "4"}])
+def test_arrows_for_what_comes_next_end_no_lane(more):
+    first = ONE_WAY | {"lanes": "3", "turn:lanes": "left|through|right"}
+    onward = _leading_on(_world(first, first | {"turn:lanes": ""} | more))
+    assert onward.keys() == {"w11.f0", "w11.f1", "w11.f2"}
+    assert all(onward.values())
+    lanes = int(more.get("lanes", 3))
+    assert set().union(*onward.values()) == {f"w12.f{i}" for i in range(lanes)}
+
+
+def test_a_lane_whose_side_road_the_map_lacks_leads_back():
+    first = ONE_WAY | {"lanes": "3", "turn:lanes": "left|through|right"}
+    assert _leading_on(_world(first, WIDE | {"oneway": "yes", "lanes": "1"})) == {
+        "w11.f0": {"w12.f0"}, "w11.f1": {"w12.f0"}, "w11.f2": {"w12.f0"},
+    }  # fmt: skip
+
+
+def test_a_bus_lane_ends_in_a_lane_for_all_but_none_for_all_in_it():
+    buses = ONE_WAY | {"bus:lanes": "|designated"}
+    assert _leading_on(_world(buses, ONE_WAY))["w11.f1"] == {"w12.f1"}
+    assert _leading_on(_world(ONE_WAY, buses))["w11.f1"] == set()
+
+
+@pytest.mark.parametrize("bend_m", [0.0, 12.0, -12.0])
+def test_a_transition_around_a_bend_leaves_along_the_next_lanes(bend_m):
+    moving = ONE_WAY | {"placement": "transition"}
+    before = ONE_WAY | {"placement": "right_of:1"}
+    world = _world(before, moving, at=(60.0, 0.0), far=(100.0, bend_m))
+    assert _leading_on(world) == {"w11.f0": {"w12.f0"}, "w11.f1": {"w12.f1"}}
+    world = _world(moving, ONE_WAY | {"placement": "right_of:2"}, far=(100.0, bend_m))
+    assert _leading_on(world) == {"w11.f0": {"w12.f0"}, "w11.f1": {"w12.f1"}}
+
+
+def test_lanes_meet_in_a_bend_between_two_short_pieces():
+    world = _world(ONE_WAY, ONE_WAY, at=(25.0, -1.0), far=(25.4, 20.0))
+    assert _leading_on(world) == {"w11.f0": {"w12.f0"}, "w11.f1": {"w12.f1"}}
