@@ -10,6 +10,7 @@ import numpy as np
 from contracts.arrays import Array
 from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
+from world_gen.lane_plans import LanePlan
 from world_gen.polyline import length, offset, points_at, without_repeats
 from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
 
@@ -33,6 +34,9 @@ def paths_along_inner_lanes(
     Each leads through its lane of every long road inside, and turns where the roads meet; left
     out are those with a turn tighter than a car can drive.
     """
+    starts: dict[int, set[int]] = {}
+    for c in connections:
+        starts.setdefault(id(c.movement), set()).add(c.start.plan.number)
     known: dict[tuple[int, bool, float], list[_Pose]] = {}
     poses: list[_Pose] = []
     ends: list[_Pose] = []
@@ -43,7 +47,7 @@ def paths_along_inner_lanes(
         first, last = c.start.centerline, c.end.centerline
         chain = [
             _Pose(first[-1], _unit(first[-1] - first[-2])),
-            *_poses_inside(c, around, known),
+            *_poses_inside(c, sorted(starts[id(c.movement)]), around, known),
             _Pose(last[0], _unit(last[1] - last[0])),
         ]
         poses += chain[:-1]
@@ -71,20 +75,41 @@ def paths_along_inner_lanes(
 
 
 def _poses_inside(
-    c: ConnectionDraft, around: Surroundings, known: dict[tuple[int, bool, float], list[_Pose]]
+    c: ConnectionDraft,
+    starts: list[int],
+    around: Surroundings,
+    known: dict[tuple[int, bool, float], list[_Pose]],
 ) -> list[_Pose]:
+    """Return where a path enters and leaves its lanes inside; `starts` are its movement's lanes."""
     found: list[_Pose] = []
     for part in c.movement.inside:
         plans = around.section(part).driven(reverse=part.reverse)
         if part.edge.length_m < _LONG_EDGE_M or not plans:
             continue
-        number = {"left": 0, "u_turn": 0, "right": -1}.get(c.turn, c.start.plan.number)
-        left_m = plans[min(number, len(plans) - 1)].left_m
+        left_m = _driver_left_m(plans, _lane_inside(c, starts, len(plans)))
         key = (part.edge.index, part.reverse, left_m)
         if key not in known:
-            known[key] = _poses_along(part.xy_m, -left_m if part.reverse else left_m)
+            known[key] = _poses_along(part.xy_m, left_m)
         found += known[key]
     return found
+
+
+def _lane_inside(c: ConnectionDraft, starts: list[int], room: int) -> float:
+    """Return which of `room` lanes inside a connection takes, from the left; each of its movement
+    another, those that the map has no lane for beside the rest, away from what they turn across.
+    """
+    number = c.start.plan.number
+    rank, spare = starts.index(number), room - len(starts)
+    if c.turn == "straight":
+        return min(number, rank + spare) if spare >= 0 else rank + spare / 2
+    return rank + spare if c.turn == "right" else rank
+
+
+def _driver_left_m(plans: tuple[LanePlan, ...], number: float) -> float:
+    """Return how far left of the way its driver finds a lane, be it one beside those there are."""
+    plan = plans[int(min(max(number, 0), len(plans) - 1))]
+    at_m = -plan.left_m if plan.reverse else plan.left_m
+    return at_m - (number - plans.index(plan)) * plan.width_m.value
 
 
 def _poses_along(way: Array, left_m: float) -> list[_Pose]:
