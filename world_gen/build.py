@@ -29,7 +29,7 @@ from world_gen.road_surface import areas
 from world_gen.sidewalks import sidewalk_areas
 from world_gen.tram_tracks import tram_tracks
 
-GENERATOR_VERSION = 5
+GENERATOR_VERSION = 6
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 
