@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from orchestrator.map_opening import OpenMap
 from world_gen.intersections import Junction
 from world_gen.osm_map import LatLonBounds
 
+_JUNCTION_ID = re.compile(r"n-?\d{1,18}", re.ASCII)
 FARTHEST_M = 200.0
 """A place farther than this from every junction names none."""
 
@@ -25,8 +27,18 @@ def junction_by_id(opened: OpenMap, junction_id: str) -> Junction:
             return junction
     raise UserError(
         f"--id {junction_id}: {opened.file} holds no such intersection; "
-        f"`foretwin intersections {opened.file}` lists its {len(opened.junctions)}"
+        f"`foretwin intersections {opened.file}` lists all"
     )
+
+
+def node_of_id(junction_id: str) -> int:
+    """Return the node that a junction is named by; UserError where no junction is named so."""
+    if not _JUNCTION_ID.fullmatch(junction_id):
+        raise UserError(
+            f"--id {junction_id}: intersections are named n and a number, as n25; "
+            "`foretwin intersections MAP` lists all"
+        )
+    return int(junction_id[1:])
 
 
 def nearest_junction(opened: OpenMap, lat: float, lon: float) -> Junction:

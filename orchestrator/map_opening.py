@@ -14,7 +14,7 @@ from contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
-from world_gen.osm_map import LatLonBounds, OsmMap
+from world_gen.osm_map import LatLonBounds, NoRoadsError, OsmMap
 from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
 from world_gen.service_roads import with_service_roads
@@ -47,10 +47,18 @@ class Clip:
     margin_m: float
 
 
+@dataclass(frozen=True, slots=True)
+class NodeClip:
+    """The part of a map that is needed: what lies within `margin_m` of one of its nodes."""
+
+    node: int
+    margin_m: float
+
+
 def open_map(
     file: Path,
     *,
-    clip: Clip | LatLonBounds | None = None,
+    clip: Clip | NodeClip | LatLonBounds | None = None,
     service_roads: bool = False,
     large_bytes: int = LARGE_MAP_BYTES,
 ) -> OpenMap:
@@ -104,15 +112,23 @@ def _words(bounds: LatLonBounds) -> str:
     )
 
 
-def _clipped(file: Path, clip: Clip | LatLonBounds) -> OsmMap:
+def _clipped(file: Path, clip: Clip | NodeClip | LatLonBounds) -> OsmMap:
     # Imported here: most maps are small, and commands on them are to start fast.
     from orchestrator.map_index_command import open_index
 
     store = open_index(file, None)
     try:
-        if isinstance(clip, Clip):
-            return store.clip_route(clip.line_deg, clip.margin_m + CLIP_MARGIN_M)
-        return store.clip(_widened(region_on_map(file, store.bounds, clip)))
+        if isinstance(clip, LatLonBounds):
+            return store.clip(_widened(region_on_map(file, store.bounds, clip)))
+        if isinstance(clip, NodeClip):
+            place = store.position_of(clip.node)
+            if place is None:
+                raise UserError(f"{file}: no way has a node {clip.node}")
+            clip = Clip(np.array([place]), clip.margin_m)
+        return store.clip_route(clip.line_deg, clip.margin_m + CLIP_MARGIN_M)
+    except NoRoadsError:
+        spans = _words(store.bounds)
+        raise UserError(f"{file}: no road at the place asked for; the map spans {spans}") from None
     finally:
         store.close()
 

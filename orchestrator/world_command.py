@@ -17,11 +17,12 @@ from orchestrator.map_choice import (
     junction_by_id,
     junctions_along,
     nearest_junction,
+    node_of_id,
     parse_bbox,
     parse_place,
     read_route,
 )
-from orchestrator.map_opening import Clip, OpenMap, open_map, region_on_map
+from orchestrator.map_opening import Clip, NodeClip, OpenMap, open_map, region_on_map
 from orchestrator.world_files import write_each, write_report
 from world_gen.build import build_region, build_world
 from world_gen.export.formats import (
@@ -78,7 +79,8 @@ def write_worlds(request: WorldRequest) -> int:
         opened = _open(request, Clip(np.array([[lat, lon]]), request.radius_m + FARTHEST_M))
         return _single(opened, nearest_junction(opened, lat, lon), request, format_, options)
     if request.junction_id is not None:
-        opened = _open(request)
+        clip = NodeClip(node_of_id(request.junction_id), request.radius_m)
+        opened = _open(request, clip)
         junction = junction_by_id(opened, request.junction_id)
         return _single(opened, junction, request, format_, options)
     if request.route is not None:
@@ -93,7 +95,7 @@ def write_worlds(request: WorldRequest) -> int:
     return _write_many(opened, junctions, request, format_, options)
 
 
-def _open(request: WorldRequest, clip: Clip | LatLonBounds | None = None) -> OpenMap:
+def _open(request: WorldRequest, clip: Clip | NodeClip | LatLonBounds | None = None) -> OpenMap:
     return open_map(request.map_file, clip=clip, service_roads=request.service_roads)
 
 

@@ -98,6 +98,29 @@ def clip_map(
     )  # fmt: skip
 
 
+def find_node(tables: TableReader, node: int) -> tuple[float, float] | None:
+    """Return latitude and longitude of a node of a way; None where no way has it.
+
+    Nothing says in which cell a node lies: all are looked through, one after another.
+    """
+    for body in tables.all_of(WAYS):
+        ways = _unpacked(body)
+        found = np.flatnonzero(ways.nodes == node)
+        if len(found):
+            lat, lon = ways.lat[found[0]], ways.lon[found[0]]
+            return float(lat) / UNITS_PER_DEG, float(lon) / UNITS_PER_DEG
+    return None
+
+
+def _unpacked(body: bytes) -> _Ways:
+    w = unpack(body, CellWays)
+    counts = np.frombuffer(w.counts, dtype="<i4").astype(np.int64)
+    return _Ways(
+        sums(w.ids, "<i8"), counts, sums(w.nodes, "<i8"), sums(w.lat, "<i4"), sums(w.lon, "<i4"),
+        w.tags.split("\n"),
+    )  # fmt: skip
+
+
 def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagReader) -> _Cells:
     ways: list[_Ways] = []
     nodes: list[NodePositions] = []
@@ -106,12 +129,7 @@ def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagRe
     note_places: dict[str, tuple[float, float]] = {}
     for kind, body in tables.pieces(ranges):
         if kind == WAYS:
-            w = unpack(body, CellWays)
-            counts = np.frombuffer(w.counts, dtype="<i4").astype(np.int64)
-            ways.append(
-                _Ways(sums(w.ids, "<i8"), counts, sums(w.nodes, "<i8"), sums(w.lat, "<i4"),
-                      sums(w.lon, "<i4"), w.tags.split("\n"))
-            )  # fmt: skip
+            ways.append(_unpacked(body))
         elif kind == NODES:
             n = unpack(body, CellNodes)
             nodes.append(NodePositions(sums(n.ids, "<i8"), sums(n.lat, "<i4"), sums(n.lon, "<i4")))

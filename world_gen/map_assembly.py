@@ -15,7 +15,7 @@ from contracts.arrays import Array
 from contracts.frames import GeoPoint, LocalFrame
 from world_gen.node_locations import NodeLocations
 from world_gen.opl import NO_POSITION, IntArray, NodePositions, WayNodes
-from world_gen.osm_map import LatLonBounds, MapError, OsmMap, OsmRelation, OsmWay
+from world_gen.osm_map import LatLonBounds, MapError, NoRoadsError, OsmMap, OsmRelation, OsmWay
 
 BoolArray = npt.NDArray[np.bool_]
 UNITS_PER_DEG = 10_000_000
@@ -55,7 +55,8 @@ def assemble_map(
 ) -> OsmMap:
     """Return the map; `frame` and `bounds` are those of its roads unless given.
 
-    Raises `MapError` where there is no road with positions, or roads all over the Earth.
+    Raises `NoRoadsError` where there is no road with positions, `MapError` where roads lie all
+    over the Earth.
     """
     table = objects.positions
     is_road = np.array(["highway" in tags for tags in objects.way_tags], dtype=bool)
@@ -93,7 +94,9 @@ def assemble_map(
     locations = NodeLocations(table.ids[used], lat_lon)
     road_nodes = [node for way in ways.values() if "highway" in way.tags for node in way.nodes]
     if not road_nodes:
-        raise MapError(f"{file}: the map holds no roads (no way with a highway tag and positions)")
+        raise NoRoadsError(
+            f"{file}: the map holds no roads (no way with a highway tag and positions)"
+        )
     if frame is None or bounds is None:
         box = bounds_of(file, locations.of(road_nodes))
         bounds = bounds or box

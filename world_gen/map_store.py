@@ -20,7 +20,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.frames import GeoPoint, LocalFrame
 from world_gen.build_map_store import build_map_store
-from world_gen.clip import clip_map
+from world_gen.clip import clip_map, find_node
 from world_gen.map_file import file_fault
 from world_gen.map_tables import FORMAT_VERSION, MapMeta, TableReader
 from world_gen.opl_stream import Progress
@@ -90,13 +90,20 @@ class MapStore:
     def clip(self, bounds: LatLonBounds) -> OsmMap:
         """Return the part of the map that touches a box, every way with all its nodes.
 
-        Raises `MapError` where no road does.
+        Raises `NoRoadsError` where no road does.
         """
         return self._clip([bounds])
 
     def clip_route(self, lat_lon_deg: Array, margin_m: float) -> OsmMap:
         """Return the part of the map within some `margin_m` of a line (N, 2) of degrees."""
         return self._clip(route_boxes(lat_lon_deg, margin_m))
+
+    def position_of(self, node: int) -> tuple[float, float] | None:
+        """Return latitude and longitude of a node of a way; None where no way has it."""
+        try:
+            return find_node(self._tables, node)
+        except DAMAGED as error:
+            raise self._damaged(error) from error
 
     def _clip(self, areas: Sequence[LatLonBounds]) -> OsmMap:
         box = _around(areas)
@@ -105,7 +112,10 @@ class MapStore:
                 self._tables, areas, box, file=str(self.map_file), frame=self._frame_for(box)
             )
         except DAMAGED as error:
-            raise MapError(f"{self.path}: the map index is damaged; remove it: {error}") from error
+            raise self._damaged(error) from error
+
+    def _damaged(self, error: Exception) -> MapError:
+        return MapError(f"{self.path}: the map index is damaged; remove it: {error}")
 
     def _frame_for(self, box: LatLonBounds) -> LocalFrame:
         if self.meta.origin is not None:

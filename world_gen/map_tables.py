@@ -88,6 +88,11 @@ class TableReader:
                 (first, last),
             )
 
+    def all_of(self, kind: int) -> Iterator[bytes]:
+        """Yield the bodies of all pieces of one kind."""
+        for (body,) in self._db.execute("SELECT body FROM piece WHERE kind = ?", (kind,)):
+            yield body
+
     def cells_of(self, ways: Sequence[int]) -> set[int]:
         """Return the cells in which ways stand that relations name."""
         found = set()

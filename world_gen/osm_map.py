@@ -19,6 +19,10 @@ class MapError(UserError):
     """A map that cannot be used; the message names the file and what is wrong."""
 
 
+class NoRoadsError(MapError):
+    """A map, or what was clipped of one, without a single road."""
+
+
 class OsmWay(NamedTuple):
     """One way: its id, its nodes in order, its tags."""
 
