@@ -1,4 +1,4 @@
-"""Polylines as (N, 2) arrays of metres: lengths, cuts, offsets, and the curves of turns."""
+"""Polylines as (N, 2) arrays of metres: lengths, places along them, cuts and offsets."""
 
 from __future__ import annotations
 
