@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.arrays import Array
 from contracts.frames import LocalFrame, target_from_source
 from contracts.world import Building
 from world_gen.building_outlines import (
@@ -25,6 +24,7 @@ from world_gen.building_parts import resolve_parts
 from world_gen.building_tags import building_extent
 from world_gen.extent import box_deg
 from world_gen.osm_map import OsmMap
+from world_gen.polygon_areas import rings_of
 
 GRID_M = 0.001
 """Outlines are written in millimetres."""
@@ -233,18 +233,9 @@ def _mended(
 
 def _buildings(of: Sequence[Footprint], pieces: npt.NDArray[np.object_]) -> tuple[Building, ...]:
     """Return buildings of valid polygons; the second piece of a footprint is named `-1`."""
-    oriented = shapely.orient_polygons(pieces)
-    rings, owner = shapely.get_rings(oriented, return_index=True)
-    points = np.round(shapely.get_coordinates(rings), 3)
-    ends = np.cumsum(shapely.get_num_coordinates(rings))
-    outlines_of: list[list[Array]] = [[] for _ in of]
-    begin = 0
-    for k, end in zip(owner.tolist(), ends.tolist(), strict=True):
-        outlines_of[k].append(points[begin : end - 1].copy())
-        begin = end
     found: list[Building] = []
     count: dict[str, int] = {}
-    for footprint, (outline, *holes) in zip(of, outlines_of, strict=True):
+    for footprint, (outline, *holes) in zip(of, rings_of(pieces), strict=True):
         n = count[footprint.id] = count.get(footprint.id, -1) + 1
         found.append(
             Building(

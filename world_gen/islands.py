@@ -9,7 +9,8 @@ from shapely.geometry import Polygon
 from contracts.world import Area
 from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneSet
-from world_gen.paved import GRID_M, Paved, area_of
+from world_gen.paved import GRID_M, Paved
+from world_gen.polygon_areas import area_of
 
 MIN_ISLAND_M2 = 2.5
 MAX_ISLAND_M2 = 2500.0

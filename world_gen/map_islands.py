@@ -10,7 +10,8 @@ from world_gen.beside_roads import BesideRoads, in_frame
 from world_gen.clusters import Surroundings
 from world_gen.islands import MIN_ISLAND_M2
 from world_gen.osm_map import OsmMap
-from world_gen.paved import GRID_M, area_of
+from world_gen.paved import GRID_M
+from world_gen.polygon_areas import areas_of
 
 
 def mapped_islands(
@@ -26,13 +27,9 @@ def mapped_islands(
         tree = tree or shapely.STRtree(driven)
         over = driven[tree.query(shape, predicate="intersects")]
         left = shapely.set_precision(shape.difference(shapely.union_all(over)), GRID_M)
-        parts = [
-            part
-            for part in shapely.get_parts(left)
-            if isinstance(part, shapely.Polygon) and part.area >= MIN_ISLAND_M2
-        ]
-        for i, part in enumerate(sorted(parts, key=lambda p: (-round(p.area, 3), p.bounds))):
-            name = f"island:traffic:w{way.id}"
-            area = area_of(name if i == 0 else f"{name}-{i}", part)
-            found.append(Area(id=area.id, outline=area.outline, holes=area.holes, source="tagged"))
+        name = f"island:traffic:w{way.id}"
+        (islands,) = areas_of(
+            [name], np.array([left], dtype=object), smallest_m2=MIN_ISLAND_M2, sources=["tagged"]
+        )
+        found.extend(islands)
     return tuple(found)

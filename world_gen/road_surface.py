@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import chain
 from typing import NamedTuple
 
 import msgspec
@@ -23,8 +24,9 @@ from world_gen.islands import RING_ISLAND as RING_ISLAND
 from world_gen.islands import island_areas
 from world_gen.kerbs import kerb_lines
 from world_gen.lanes import LaneSet
-from world_gen.paved import GRID_M, Paved, area_of
+from world_gen.paved import GRID_M, Paved
 from world_gen.place_outlines import simple_outlines
+from world_gen.polygon_areas import areas_of
 from world_gen.polyline_batch import Polylines, cut, offset, without_repeats
 
 CORNER_FILLET_M = 3.0
@@ -201,16 +203,12 @@ def _node_discs(around: Surroundings, done: frozenset[int]) -> tuple[np.ndarray,
 
 def _surface(paved: Paved, lanes: LaneSet) -> tuple[list[Area], list[list[Area]]]:
     """Return the areas of all roads, and those of each place."""
-    of_road = [
-        area
-        for road, shape in zip(lanes.roads, paved.roads, strict=True)
-        for area in _areas(f"road:{road.layer}:{road.id}", shape)
-    ]
-    of_place = [
-        _areas(f"road:{max(leg.edge.layer for leg in cluster.legs)}:{cluster.key}", shape)
-        for cluster, shape in zip(paved.place_of, paved.places, strict=True)
-    ]
-    return of_road, of_place
+    names = [f"road:{road.layer}:{road.id}" for road in lanes.roads]
+    names += [f"road:{max(leg.edge.layer for leg in c.legs)}:{c.key}" for c in paved.place_of]
+    shapes = np.concatenate([paved.roads, paved.places])
+    found = areas_of(names, shapes, smallest_m2=SMALLEST_M2)
+    count = len(lanes.roads)
+    return list(chain.from_iterable(found[:count])), found[count:]
 
 
 def _junction_areas(
@@ -237,19 +235,9 @@ def _junction_areas(
             pieces.setdefault(junction.summary.id, []).append(shape)
     names = list(pieces)
     whole = np.array([shapely.union_all(pieces[name]) for name in names], dtype=object)
-    for name, shape in zip(names, shapely.set_precision(whole, GRID_M), strict=True):
-        parts = _areas(f"junction:{name}", shape)
-        if parts:
-            found[name] = parts[0]
-    return found
-
-
-def _areas(name: str, shape: shapely.Geometry) -> list[Area]:
-    """Return the polygons of a shape as areas in a fixed order, largest first."""
-    if isinstance(shape, Polygon):
-        parts = [shape] if shape.area > SMALLEST_M2 else []
-    else:
-        found = shapely.get_parts(shape)
-        parts = [p for p in found if isinstance(p, Polygon) and p.area > SMALLEST_M2]
-        parts.sort(key=lambda p: (-round(p.area, 3), p.bounds))
-    return [area_of(name if i == 0 else f"{name}-{i}", part) for i, part in enumerate(parts)]
+    parts = areas_of(
+        [f"junction:{name}" for name in names],
+        shapely.set_precision(whole, GRID_M),
+        smallest_m2=SMALLEST_M2,
+    )
+    return found | {name: mine[0] for name, mine in zip(names, parts, strict=True) if mine}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 
 import numpy as np
 import shapely
@@ -15,7 +16,8 @@ from world_gen.clusters import Surroundings
 from world_gen.lane_plans import metres
 from world_gen.lanes import LaneSet
 from world_gen.osm_map import OsmMap
-from world_gen.paved import GRID_M, area_of
+from world_gen.paved import GRID_M
+from world_gen.polygon_areas import areas_of
 from world_gen.polyline_batch import Polylines, offset
 
 WIDTH_M = 2.0
@@ -55,17 +57,8 @@ def sidewalk_areas(
         return ()
     free = _without(np.array(shapes, dtype=object), _polygons(road_surface))
     free = shapely.set_precision(shapely.simplify(free, 0.02), GRID_M)
-    found: list[Area] = []
-    for name, source, shape in zip(names, sources, free, strict=True):
-        parts = [
-            part
-            for part in shapely.get_parts(shape)
-            if isinstance(part, shapely.Polygon) and part.area > _SMALLEST_M2
-        ]
-        for i, part in enumerate(sorted(parts, key=lambda p: (-round(p.area, 3), p.bounds))):
-            area = area_of(name if i == 0 else f"{name}-{i}", part)
-            found.append(Area(id=area.id, outline=area.outline, holes=area.holes, source=source))
-    return tuple(found)
+    found = areas_of(names, free, smallest_m2=_SMALLEST_M2, sources=sources)
+    return tuple(chain.from_iterable(found))
 
 
 def _beside_kerbs(
