@@ -73,7 +73,7 @@ def write_worlds(request: WorldRequest) -> int:
     many = request.everything or request.route is not None
     _check_out(request.out, format_, many=many)
     if request.bbox is not None:
-        return _region(request, format_, options)
+        return _region(request, parse_bbox("--bbox", request.bbox), format_, options)
     if request.at is not None:
         lat, lon = parse_place(request.at)
         opened = _open(request, Clip(np.array([[lat, lon]]), request.radius_m + FARTHEST_M))
@@ -99,8 +99,9 @@ def _open(request: WorldRequest, clip: Clip | NodeClip | LatLonBounds | None = N
     return open_map(request.map_file, clip=clip, service_roads=request.service_roads)
 
 
-def _region(request: WorldRequest, format_: Format, options: ExportOptions) -> int:
-    bounds = parse_bbox("--bbox", request.bbox or "")
+def _region(
+    request: WorldRequest, bounds: LatLonBounds, format_: Format, options: ExportOptions
+) -> int:
     opened = _open(request, bounds)
     part = region_on_map(opened.file, opened.osm.bounds, bounds)
     world = build_region(opened.osm, opened.graph, part, index=_index(opened))
@@ -180,8 +181,6 @@ def _format(request: WorldRequest) -> Format:
         raise UserError(
             f"--radius {request.radius_m}: {MIN_RADIUS_M:.0f} to {MAX_RADIUS_M:.0f} metres"
         )
-    if request.bbox is not None:  # before the map is read, which may take long
-        parse_bbox("--bbox", request.bbox)
     return FORMATS[request.file_format]
 
 
