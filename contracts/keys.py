@@ -5,6 +5,7 @@ Keys are full expressions under `foretwin/v1/`, each with the vehicle's or the r
 
 from __future__ import annotations
 
+import functools
 from typing import Literal, NamedTuple
 
 import msgspec
@@ -117,6 +118,7 @@ ALIVE_KEY = f"{PREFIX}/{_RUN}/alive/{{process}}"
 """Liveliness token of each process of a run."""
 
 
+@functools.lru_cache(maxsize=1024)
 def key(name: str, *, vehicle: str | None = None, run: str | None = None,
         process: str | None = None) -> str:  # fmt: skip
     """Return the full key of channel `name`; `process` may be `*` in subscriptions.
