@@ -81,16 +81,12 @@ class AlongRoute(NamedTuple):
 def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> AlongRoute:
     """Return the junctions along a route's line; the service roads that it uses count there."""
     from orchestrator.line_matching import match_line
-    from world_gen.find_intersections import find_intersections
     from world_gen.route_junctions import junctions_on_route
-    from world_gen.service_roads import open_service_roads, with_roads
+    from world_gen.service_roads import open_service_roads
 
     matched = match_line(opened.graph, line_deg, name=f"--route {route}")
     used = (item.edge for stretch in matched.routes for item in stretch.edges)
-    added = open_service_roads(used)
-    if added:
-        graph = with_roads(opened.graph, added)
-        opened = OpenMap(opened.file, opened.osm, graph, find_intersections(opened.osm, graph))
+    opened = opened.with_roads(open_service_roads(used))
     junctions = tuple(
         passage.junction
         for stretch in matched.routes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from world_gen.intersections import Junction
 from world_gen.osm_map import LatLonBounds, NoRoadsError, OsmMap
 from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
-from world_gen.service_roads import with_service_roads
+from world_gen.service_roads import with_roads, with_service_roads
 
 LARGE_MAP_BYTES = 64_000_000
 """Of larger files, what is needed is clipped from an index on disk, made on first use."""
@@ -37,6 +38,13 @@ class OpenMap:
     osm: OsmMap
     graph: RoadGraph
     junctions: tuple[Junction, ...]
+
+    def with_roads(self, added: Sequence[int]) -> OpenMap:
+        """Return the map where the edges of these indices count as car roads as well."""
+        if not added:
+            return self
+        graph = with_roads(self.graph, added)
+        return OpenMap(self.file, self.osm, graph, find_intersections(self.osm, graph))
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,11 +27,10 @@ from orchestrator.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import load_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line
-from world_gen.find_intersections import find_intersections
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
-from world_gen.service_roads import open_service_roads, with_roads
+from world_gen.service_roads import open_service_roads
 
 EMBEDDED = Path(__file__).parent / "embedded"
 EMBEDDED_MAP = EMBEDDED / "drawn_town.osm"
@@ -128,9 +127,9 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     added = open_service_roads(graph.edges if config.service_roads else used)
     if added:
         # Only now is it known where the route leaves the streets; what it meets there counts.
-        graph = with_roads(graph, added)
+        opened = opened.with_roads(added)
+        graph, junctions = opened.graph, opened.junctions
         index = RoadIndex(graph)
-        junctions = find_intersections(osm, graph)
         routes, route_source = _routes(config, graph, index, given)
     standin = None
     if source == "standin":

@@ -13,9 +13,7 @@ from contracts.process import ProcessLife, run_process
 from contracts.setup import BuilderSetup
 from contracts.simulation import BuildReply
 from orchestrator.map_opening import Clip, open_map
-from world_gen.find_intersections import find_intersections
 from world_gen.map_index import index_map
-from world_gen.service_roads import with_roads
 from world_gen.world_store import WorldStore, cached_build
 
 log = logging.getLogger("builder")
@@ -25,9 +23,9 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     """Read the map once, then answer build requests until the run ends."""
     near = np.array(setup.near_deg, dtype=np.float64).reshape(-1, 2)
     opened = open_map(Path(setup.map), clip=Clip(near, setup.margin_m) if len(near) else None)
-    osm, graph = opened.osm, with_roads(opened.graph, setup.added_roads)
-    found = opened.junctions if not setup.added_roads else find_intersections(osm, graph)
-    junctions = {j.summary.id: j for j in found}
+    opened = opened.with_roads(setup.added_roads)
+    osm, graph = opened.osm, opened.graph
+    junctions = {j.summary.id: j for j in opened.junctions}
     index = index_map(osm, graph, junctions.values())
     cache, run_worlds = WorldStore(Path(setup.cache_dir)), WorldStore(Path(setup.worlds_dir))
     mailbox = Mailbox(256)
