@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+import collections
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
 from contracts.scenario import Scenario
+from contracts.world import Lane
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.places import Place
-from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.scenarios.relations import ways_over
+from sim_worker.scenarios.roads import APPROACH_M, DEPARTURE_M, RoadNetwork, Way
+from world_gen.polyline import arc_lengths
 
-_LEAST_M = {"motorway": 150.0, "road": 60.0, "circuit": 200.0, "parking_bay": 30.0}
-_CLASSES = {
-    "motorway": ("motorway", "trunk"),
-    "circuit": ("raceway",),
-}
-_TWO_LANES = ("motorway",)
+_CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
+_FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")
+_LEAST_M = {"motorway": 120.0, "road": 60.0, "circuit": 150.0, "parking_bay": 32.0}
+_END_M = 10.0
+_ON_LANE_M = 2.5
+
+_BAY_RADIUS_M = 6.0
+"""Of the rear axle's path: a compact car turns within 10.5 to 11 m from kerb to kerb."""
+_BAY_WIDTH_M = 2.2
+_BACKS_STRAIGHT_M = 24.0
+_BAY_LENGTH_M = 6.0
+_BEND_RAD = math.radians(6.0)
 
 
 def other_places(
@@ -21,6 +38,203 @@ def other_places(
     *,
     ego_path: FrenetPath | None = None,
     ego_arc_m: float = 0.0,
-) -> tuple[list[Place], str]:
-    """Return the places of a scenario that needs no junction, or else why there are none."""
-    return [], "not yet"
+) -> tuple[Iterator[Place], str]:
+    """Return the places of a scenario that needs no junction, and why there is none if so.
+
+    With `ego_path` the car's own path is taken, where it runs on such a road.
+    """
+    setting = scenario.where.setting
+    if setting == "parking_bay":
+        if ego_path is not None:
+            return iter(()), "a car that drives on does not back into a bay"
+        return _bays(scenario, network)
+    lanes = [lane for lane in network.world.lanes if _fits(lane, setting, network)]
+    if not lanes:
+        return iter(()), f"no {_WORDS[setting]} in the World"
+    if ego_path is not None:
+        way = _live(ego_path, ego_arc_m, lanes)
+        if way is None:
+            return iter(()), f"the path does not run on a {_WORDS[setting]} here"
+        return iter((_place(scenario, network, way),)), ""
+    ways = _laps(network, lanes) if setting == "circuit" else _stretches(network, lanes)
+    long_enough = (way for way in ways if way.last_m - way.first_m >= _LEAST_M[setting])
+    places = (_place(scenario, network, way) for way in long_enough)
+    return places, f"each {_WORDS[setting]} is shorter than {_LEAST_M[setting]:g} m"
+
+
+_WORDS = {
+    "motorway": "motorway or trunk road with a second lane to overtake on",
+    "road": "road for cars",
+    "circuit": "race track",
+}
+
+
+def _fits(lane: Lane, setting: str, network: RoadNetwork) -> bool:
+    if lane.kind != "driving" or lane.role == "ring":
+        return False
+    road = network.roads.get(lane.road_id)
+    road_class = "" if road is None else road.road_class
+    if setting == "motorway":
+        across = lane.left_id if network.near_sign > 0.0 else lane.right_id
+        return road_class in _CLASSES["motorway"] and across is not None
+    return setting != "circuit" or road_class in _CLASSES["circuit"]
+
+
+def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> Place:
+    return Place(
+        scenario_id=scenario.id,
+        world_id=network.world.id,
+        junction_id=network.world.intersection.id,
+        name=way.name,
+        driving_side=network.driving_side,
+        ego=way,
+        actor_ways=tuple(() for _ in scenario.actors),
+    )
+
+
+def _stretches(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
+    """Yield the way along each lane, the longest lanes first, to be driven up to its end."""
+    order = sorted(lanes, key=lambda lane: (-arc_lengths(lane.centerline)[-1], lane.id))
+    for lane in order:
+        way = network.lane_way(lane)
+        yield way._replace(entry_m=max(way.entry_m, way.last_m - DEPARTURE_M))
+
+
+def _laps(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
+    """Yield the way along each race track: round once and on, or as far as the World has it."""
+    left = {lane.id: lane for lane in sorted(lanes, key=lambda lane: lane.id)}
+    while left:
+        first = next(iter(left))
+        chain = [first]
+        while (after := network.onward(chain[-1], among=left, passed=chain)) is not None:
+            chain.append(after)
+        while (before := network.backward(chain[0], among=left, passed=chain)) is not None:
+            chain.insert(0, before)
+        for id_ in chain:
+            left.pop(id_, None)
+        closed = chain[0] in network.after(chain[-1])
+        name = f"lap from {chain[0]}" if closed else f"part of a lap from {chain[0]}"
+        way = network.way_along(name, before=[], middle=chain, after=chain if closed else [])
+        entry = way.first_m + min(APPROACH_M, (way.last_m - way.first_m) / 2.0)
+        yield way._replace(entry_m=max(entry, APPROACH_M))
+
+
+def _live(path: FrenetPath, arc_m: float, lanes: list[Lane]) -> Way | None:
+    """Return the car's own path as a way, if it is on one of the lanes."""
+    here = shapely.Point(path.point_at(np.array([arc_m]))[0])
+    lines = [shapely.LineString(lane.centerline) for lane in lanes if len(lane.centerline) > 1]
+    if not lines or min(line.distance(here) for line in lines) > _ON_LANE_M:
+        return None
+    arcs = np.linspace(0.0, path.length_m, max(2, math.ceil(path.length_m) + 1))
+    return Way(
+        name="the car's own path",
+        xy_m=path.point_at(arcs),
+        speed_limit_mps=path.at_nodes(path.speed_limit_mps, arcs),
+        path=path,
+        entry_m=path.length_m,
+        exit_m=path.length_m,
+        first_m=0.0,
+        last_m=path.length_m,
+    )
+
+
+def _bays(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], str]:
+    """Return a bay at the near side of each lane that is straight, long and clear enough."""
+    reasons = {lane.id: _no_bay(lane, network) for lane in network.world.lanes}
+    fitting = [lane for lane in network.world.lanes if not reasons[lane.id]]
+    counted = collections.Counter(reason for reason in reasons.values() if reason)
+    why = counted.most_common(1)[0][0] if counted else "there is none"
+    if fitting:
+        why = "buildings stand beside those that are long enough"
+    walls = shapely.STRtree([shapely.Polygon(b.outline) for b in network.world.buildings])
+    bays = (_Bay(lane, network) for lane in fitting)
+    clear = (bay for bay in bays if not len(walls.query(bay.box, "intersects")))
+    places = (bay.place(scenario, network) for bay in clear)
+    return places, f"no lane has room for a bay beside it: {why}"
+
+
+def _no_bay(lane: Lane, network: RoadNetwork) -> str:
+    road = network.roads.get(lane.road_id)
+    if lane.kind != "driving" or lane.role == "ring":
+        return "none is for cars"
+    if road is not None and road.road_class in _FAST:
+        return "nobody parks at fast roads"
+    if (lane.right_id if network.near_sign > 0.0 else lane.left_id) is not None:
+        return "another lane lies between"
+    arc = arc_lengths(lane.centerline)
+    if arc[-1] < _LEAST_M["parking_bay"]:
+        return f"shorter than {_LEAST_M['parking_bay']:g} m"
+    middle = FrenetPath(lane.centerline).pose_at(
+        arc[-1] / 2.0 + np.arange(-_LEAST_M["parking_bay"] / 2.0, _LEAST_M["parking_bay"] / 2.0)
+    )
+    return "not straight" if float(np.ptp(middle.yaw_rad)) > _BEND_RAD else ""
+
+
+class _Bay:
+    """A parking bay beside the middle of a lane, and the way backwards into it.
+
+    Two arcs of one radius lead from the lane's middle to that of the bay, a shift of
+    2 R (1 - cos φ) over a length of 2 R sin φ.
+    """
+
+    def __init__(self, lane: Lane, network: RoadNetwork) -> None:
+        self._lane = lane
+        self._path = FrenetPath(lane.centerline, before_m=60.0)
+        self._limit_mps = float(lane.speed_limit_mps.value)
+        self._to_near = -network.near_sign
+        self.shift_m = max(float(lane.width_m.value) / 2.0, 1.3) + _BAY_WIDTH_M / 2.0
+        self._angle_rad = math.acos(1.0 - self.shift_m / (2.0 * _BAY_RADIUS_M))
+        self.reach_m = 2.0 * _BAY_RADIUS_M * math.sin(self._angle_rad)
+        self._middle_m = float(arc_lengths(lane.centerline)[-1]) / 2.0
+        ends = self._middle_m + _BAY_LENGTH_M / 2.0 * np.array([-1.0, 1.0])
+        half = _BAY_WIDTH_M / 2.0
+        sides = self._to_near * (self.shift_m + half * np.array([-1.0, 1.0]))
+        corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
+        self.box = shapely.Polygon([self._at(ends[i], sides[j])[0] for i, j in corners])
+
+    def _at(self, arc_m: Array | float, left_m: Array | float) -> Array:
+        arc, left = np.broadcast_arrays(np.atleast_1d(arc_m), np.atleast_1d(left_m))
+        return self._path.point_at(arc, left)
+
+    def place(self, scenario: Scenario, network: RoadNetwork) -> Place:
+        """Return the place: base_link backs along the ego's way to a metre behind the middle."""
+        stop_m = self._middle_m - 1.3
+        turn = np.linspace(0.0, self._angle_rad, 9)
+        along = _BAY_RADIUS_M * np.sin(turn)
+        aside = _BAY_RADIUS_M * (1.0 - np.cos(turn))
+        # From where it stands in the lane to the bay; the second arc is the first one turned.
+        back = np.concatenate([along, (self.reach_m - along[::-1])[1:]])
+        side = np.concatenate([aside, (self.shift_m - aside[::-1])[1:]])
+        start_m = stop_m + self.reach_m
+        xy = np.concatenate(
+            [
+                self._at(start_m + np.array([_BACKS_STRAIGHT_M, _BACKS_STRAIGHT_M / 2.0]), 0.0),
+                self._at(start_m - back, self._to_near * side),
+            ]
+        )
+        arc = arc_lengths(xy)
+        ego = _way(f"into a bay at {self._lane.id}", xy, self._limit_mps, arc[2], arc[-1])
+        line = self._at(self._middle_m + np.array([-20.0, 0.0, 20.0]), self._to_near * self.shift_m)
+        bay = _way("in the bays beside it", line, self._limit_mps, 20.0, 20.0)
+        across = self._at(self._middle_m, self._to_near * np.array([-1.0, self.shift_m + 2.0]))
+        ways = tuple(
+            tuple(ways_over(across, "straight", ego, network.near_sign))
+            if part.relation == "crosses_exit"
+            else (bay,)
+            for part in scenario.actors
+        )
+        return _place(scenario, network, ego)._replace(actor_ways=ways, reverse=True)
+
+
+def _way(name: str, xy: Array, limit_mps: float, entry_m: float, exit_m: float) -> Way:
+    limit = np.full(len(xy), limit_mps)
+    return Way(
+        name=name,
+        xy_m=xy,
+        speed_limit_mps=limit,
+        path=FrenetPath(xy, limit),
+        entry_m=float(entry_m),
+        exit_m=float(exit_m),
+        first_m=0.0,
+        last_m=float(arc_lengths(xy)[-1]),
+    )

@@ -12,6 +12,7 @@ from contracts.drive import RoadUserKind
 from contracts.scenario import EGO, ActorPart, Conduct, Relation, Scenario
 from contracts.vehicle import VehicleParameters
 from sim_worker.actors.kinds import KINDS, KindTraits
+from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.drawing import Values
 from sim_worker.scenarios.impact import (
     TOLERANCE_M,
@@ -33,7 +34,7 @@ LEAST_TIME_S = 0.8
 _LEAST_SPEED_MPS = 2.0
 """A car that stands is taken to set off with this speed."""
 _SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)
-_AROUND_M = 40.0
+_AROUND_M, _MOUTH_M = 40.0, 15.0
 _PARKED_CLEAR_M = 0.3
 """Between the ego's side and what is parked beside its path, at least."""
 _LEAD_BACK_M = 200.0
@@ -124,12 +125,14 @@ def cast(
             why = f"no way of {part.name} touches the ego's front before anything else"
             return Unplaced(place.junction_id, why, True)
         impacts[part.name] = found
-    start = _start_arc(scenario, place, ego, box, impacts, ego_arc_m)
+    start = _start_arc(scenario, place, numbers, ego, box, impacts, ego_arc_m)
     actors = [
         _incoming(part, numbers, *impacts[part.name], start, speed)
         if part.name in impacts
+        else _beside_bay(part, numbers, box, ways[0])
+        if place.reverse and part.conduct == "parked" and ways
         else _along(part, scenario, numbers, ego, box, place, start, impacts)
-        for part in scenario.actors
+        for part, ways in zip(scenario.actors, place.actor_ways, strict=True)
     ]
     time_s, point, share, other = _planned(
         scenario, numbers, ego, box, place, start, actors, impacts
@@ -178,6 +181,12 @@ def _meet(
 ) -> tuple[Impact, Way] | None:
     """Return where and by which way an actor meets the ego, as near the wished share as can be."""
     low, high = place.ego.entry_m - _AROUND_M, place.ego.exit_m + _AROUND_M
+    if place.reverse:
+        low, high = place.ego.first_m, place.ego.exit_m
+    elif part.relation == "crosses_exit":
+        low = place.ego.exit_m - _MOUTH_M
+    elif part.relation == "crosses_entry":
+        high = place.ego.entry_m + _MOUTH_M
     lead = scenario.lead_time_s
     if ego_arc_m is not None:
         low = max(low, ego_arc_m + ego.speed_mps * LEAST_TIME_S)
@@ -201,6 +210,7 @@ def _meet(
 def _start_arc(
     scenario: Scenario,
     place: Place,
+    numbers: _Numbers,
     ego: Moving,
     box: EgoBox,
     impacts: dict[str, tuple[Impact, Way]],
@@ -209,11 +219,37 @@ def _start_arc(
     """Return where base_link starts: given, or so long before the impact or the junction."""
     if ego_arc_m is not None:
         return ego_arc_m
-    end = place.ego.entry_m - box.front_m
-    for impact, _ in list(impacts.values())[:1]:
-        end = impact.ego_arc_m
+    end, time_s = place.ego.entry_m - box.front_m, scenario.lead_time_s
+    for part in scenario.actors:
+        if part.name in impacts:
+            end = impacts[part.name][0].ego_arc_m
+            break
+        if part.relation == "ahead" and not place.reverse:
+            time_s = _closing_time_s(part, numbers, ego.speed_mps, scenario.horizon_s) or time_s
+            break
     room_s = (end - place.ego.first_m - box.length_m) / ego.speed_mps
-    return end - ego.speed_mps * min(scenario.lead_time_s, max(room_s, 2 * LEAST_TIME_S))
+    return end - ego.speed_mps * min(time_s, max(room_s, 2 * LEAST_TIME_S))
+
+
+def _closing_time_s(
+    part: ActorPart, numbers: _Numbers, speed_mps: float, horizon_s: float
+) -> float | None:
+    """Return after how many seconds a steady ego closes the gap to who is ahead, if it does."""
+    time = np.arange(0.0, horizon_s, 0.01)
+    ahead = Moving(_NOWHERE, numbers.of(part, "speed_mps"), 0.0, *_braking(part, numbers))
+    gap = numbers.of(part, "gap_m") + ahead.travelled_m(time) - speed_mps * time
+    closed = np.flatnonzero(gap <= 0.0)
+    return float(time[closed[0]]) if len(closed) else None
+
+
+def _braking(part: ActorPart, numbers: _Numbers) -> tuple[float, float]:
+    """Return when an actor begins to brake, and how hard."""
+    stops = part.conduct == "stops"
+    after = numbers.of(part, "acts_after_s") if stops else math.inf
+    return after, numbers.of(part, "decel_mps2")
+
+
+_NOWHERE = FrenetPath(np.array([[0.0, 0.0], [1.0, 0.0]]))
 
 
 def _incoming(
@@ -265,6 +301,13 @@ def _along(
 
 
 _LANE_HALF_M = 1.5
+
+
+def _beside_bay(part: ActorPart, numbers: _Numbers, box: EgoBox, way: Way) -> CastActor:
+    """Return a car in the bay behind the ego's or ahead of it."""
+    away = box.length_m / 2.0 + numbers.of(part, "gap_m") + KINDS[part.kind].length_m / 2.0
+    arc = way.entry_m + (away if part.relation == "ahead" else -away)
+    return _actor(part, numbers, way.xy_m, arc, 0.0, way.name)
 
 
 def _actor(

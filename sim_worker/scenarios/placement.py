@@ -49,7 +49,7 @@ def places(
     case = cases[len(cases) // 2]
     if scenario.where.setting != "junction":
         found, reason = other_places(scenario, network)
-        return _cast_ones(scenario, case, vehicle, world.intersection.id, iter(found), reason, most)
+        return _cast_ones(scenario, case, vehicle, world.intersection.id, found, reason, most)
     results = [
         _at_junction(scenario, network, junction, vehicle, case, most)
         for junction in _junctions(world)
@@ -78,6 +78,8 @@ def _at_junction(
     if refused:
         return Placement((), (Unplaced(junction.summary.id, refused, False),))
     passages = [p for p in network.passages(junction.summary.id) if p.turn == scenario.ego.turn]
+    if any(part.relation == "parked" for part in scenario.actors):
+        passages.sort(key=network.lanes_to_kerb)
     if not passages:
         reason = f"no way through it for an ego that {_TURNS[scenario.ego.turn]}"
         return Placement((), (Unplaced(junction.summary.id, reason, False),))
@@ -177,7 +179,7 @@ def place_on_path(
     own = network.world.intersection.id
     if scenario.where.setting != "junction":
         found, reason = other_places(scenario, network, ego_path=ego_path, ego_arc_m=ego_arc_m)
-        return found[0] if found else Unplaced(own, reason, False)
+        return next(found, None) or Unplaced(own, reason, False)
     taken = passage_on_path(network, ego_path, ego_arc_m)
     if taken is None:
         return Unplaced(own, "the path leads through no junction of the World ahead", False)

@@ -10,7 +10,7 @@ import shapely
 
 from contracts.arrays import Array
 from contracts.frames import wrap_angle
-from contracts.scenario import ActorPart, Relation
+from contracts.scenario import ActorPart, Relation, TrafficTurn
 from contracts.world import Crossing
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.roads import Passage, RoadNetwork, Way
@@ -106,13 +106,12 @@ def _walking(
         low, high = ego_way.entry_m - outside, ego_way.entry_m + inside
         mouth = ego_way.entry_m - _BEYOND_MOUTH_M
     mapped = _mapped(network.world.crossings, ego_way, low, high)
-    lines = [line for _, line in sorted(mapped, key=lambda item: abs(item[0] - mouth))]
+    nearest = sorted(mapped, key=lambda item: abs(item[0] - mouth))
+    lines = [line for _, line in nearest]
     # Where the mapped crossing does not do, people cross beside it.
-    for at, line in [(None, line) for line in lines] + [(mouth, None), (mouth + 4.0, None)]:
-        if line is None:
-            assert at is not None
-            line = _line_across(ego_way.path, at)
-        yield from _both_ways(actor, line, ego_way, network)
+    lines += [_line_across(ego_way.path, mouth + beyond) for beyond in (0.0, 4.0)]
+    for line in lines:
+        yield from ways_over(line, actor.turn, ego_way, network.near_sign)
 
 
 def _mapped(
@@ -137,8 +136,11 @@ def _line_across(path: FrenetPath, at_m: float) -> Array:
     return np.asarray(pose.xy_m + np.array([[-3.0], [3.0]]) * direction)
 
 
-def _both_ways(actor: ActorPart, line: Array, ego_way: Way, network: RoadNetwork) -> Iterator[Way]:
-    """Yield the way along a line towards the across side, the near side, or both."""
+def ways_over(line: Array, turn: TrafficTurn, ego_way: Way, near_sign: float) -> Iterator[Way]:
+    """Yield the way along a line (2, 2) over the ego's: to the across side, the near side, or both.
+
+    `turn` names the side; `straight` stands for either.
+    """
     middle = line.mean(axis=0)
     arc = float(ego_way.path.locate(middle[None]).arc_m[0])
     heading = float(ego_way.path.pose_at(np.array([arc])).yaw_rad[0])
@@ -146,9 +148,9 @@ def _both_ways(actor: ActorPart, line: Array, ego_way: Way, network: RoadNetwork
     length = float(np.hypot(*step))
     direction = step / length
     left = float(direction @ np.array([-math.sin(heading), math.cos(heading)]))
-    to_across = direction if left * network.near_sign > 0.0 else -direction
+    to_across = direction if left * near_sign > 0.0 else -direction
     directions = {"across": (to_across,), "near": (-to_across,)}
-    for towards in directions.get(actor.turn, (to_across, -to_across)):
+    for towards in directions.get(turn, (to_across, -to_across)):
         ends = middle + np.array([[-1.0], [1.0]]) * (length / 2 + WALKS_M) * towards
         side = "across" if towards is to_across else "near"
         yield Way(

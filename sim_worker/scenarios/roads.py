@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -94,10 +94,14 @@ class RoadNetwork:
         """Return the passages for cars through a junction, in the World's order."""
         if junction_id not in self._passages:
             inside = [c for c in self.world.connections if c.junction_id == junction_id]
+            # At a roundabout streets also part into their carriageways, and slip roads pass it by.
+            on_ring = any(self._ring(c.to_lane_id) for c in inside)
             self._passages[junction_id] = tuple(
                 self._passage(junction_id, chain)
                 for connection in inside
-                if self._car(connection.from_lane_id) and not self._ring(connection.from_lane_id)
+                if self._car(connection.from_lane_id)
+                and not self._ring(connection.from_lane_id)
+                and self._ring(connection.to_lane_id) == on_ring
                 for chain in self._chains((connection,))
             )
         return self._passages[junction_id]
@@ -159,6 +163,16 @@ class RoadNetwork:
         if len(line) < 2 or arc_lengths(line)[-1] < 1.0:
             line = connection.centerline[-2:]
         return _heading(line, backwards=False)
+
+    def lanes_to_kerb(self, passage: Passage) -> int:
+        """Return how many lanes driven the same way lie between a passage's entry and the kerb."""
+        lane, count = self.lanes[passage.connections[0].from_lane_id], 0
+        while count < len(self.lanes):
+            near = lane.right_id if self.near_sign > 0.0 else lane.left_id
+            if near is None or near not in self.lanes:
+                break
+            lane, count = self.lanes[near], count + 1
+        return count
 
     def way(self, passage: Passage) -> Way:
         """Return the way that takes a passage, led back and on along the lanes around it."""
@@ -270,6 +284,36 @@ class RoadNetwork:
             chain.append(best)
             walked += float(arc_lengths(self._line(best))[-1])
         return chain
+
+    def after(self, id_: str) -> tuple[str, ...]:
+        """Return the lanes and connections that begin where a lane or connection ends."""
+        return tuple(self._out_of.get(id_, ()))
+
+    def onward(self, id_: str, *, among: Container[str], passed: Container[str]) -> str | None:
+        """Return the straightest way on to a lane `among` these, or to a connection to one."""
+        return self._straightest(id_, self._out_of, among, passed)
+
+    def backward(self, id_: str, *, among: Container[str], passed: Container[str]) -> str | None:
+        """Return the straightest way back, as `onward` does."""
+        return self._straightest(id_, self._into, among, passed)
+
+    def _straightest(
+        self,
+        id_: str,
+        links: dict[str, list[str]],
+        among: Container[str],
+        passed: Container[str],
+    ) -> str | None:
+        found = [
+            other
+            for other in links.get(id_, ())
+            if other not in passed
+            and (other in among or any(lane in among for lane in links.get(other, ())))
+        ]
+        line = self._line(id_)
+        if links is self._into:
+            return min(found, key=lambda i: _bend(self._line(i), line), default=None)
+        return min(found, key=lambda i: _bend(line, self._line(i)), default=None)
 
     def _drivable(self, id_: str) -> bool:
         if id_ in self.lanes:
