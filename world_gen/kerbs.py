@@ -43,7 +43,7 @@ def _road_edges(
     sides = Polylines.of([line for road in lanes.roads for line in lanes.edges[road.id]])
     lines = shapely.linestrings(sides.xy_m, indices=sides.line)
     road = np.repeat(np.arange(len(lanes.roads)), 2)
-    row, piece = tree.query(lines, predicate="intersects")
+    row, piece = tree.query(lines)
     place_row = {c.key: len(paved.roads) + k for k, c in enumerate(paved.place_of)}
     own = np.array(
         [
@@ -55,6 +55,9 @@ def _road_edges(
     wanted = (road[row] != piece) & (own != piece[:, None]).all(axis=1)
     wanted &= layer[road[row]] == layer[piece]
     row, piece = row[wanted], piece[wanted]
+    # Looking closely only now is cheaper: most of what is near is a road's own.
+    meet = shapely.intersects(lines[row], tree.geometries[piece])
+    row, piece = row[meet], piece[meet]
     # Line by line would take a call each: in round k every line loses its k-th neighbour.
     turn = np.arange(len(row)) - np.searchsorted(row, row)
     for k in range(int(turn.max(initial=-1)) + 1):
@@ -72,10 +75,13 @@ def _place_borders(paved: Paved, tree: shapely.STRtree, layer: Array) -> list[sh
     inside = ring[1:] == ring[:-1]
     a, b = points[:-1][inside], points[1:][inside]
     mine = len(paved.roads) + owner[ring[1:][inside]]
-    row, piece = tree.query(shapely.points((a + b) / 2), predicate="dwithin", distance=OVERLAP_M)
+    middle = (a + b) / 2
+    row, piece = tree.query(shapely.box(*(middle - OVERLAP_M).T, *(middle + OVERLAP_M).T))
     other = (mine[row] != piece) & (layer[mine[row]] == layer[piece])
+    row, piece = row[other], piece[other]
+    near = shapely.dwithin(shapely.points(middle[row]), tree.geometries[piece], OVERLAP_M)
     open_ = np.ones(len(a), dtype=bool)
-    open_[row[other]] = False
+    open_[row[near]] = False
     segments = shapely.linestrings(np.stack([a, b], axis=1)[open_])
     used, indices = np.unique(mine[open_], return_inverse=True)
     return list(shapely.multilinestrings(segments, indices=indices)) if len(used) else []
