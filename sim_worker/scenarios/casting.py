@@ -398,13 +398,15 @@ def _length(xy: Array) -> float:
 def _out_of_bounds(scenario: Scenario, place: Place, actors: list[CastActor], time_s: float) -> str:
     if time_s > scenario.horizon_s:
         return f"the impact would be in {time_s:.1f} s, after the end at {scenario.horizon_s:g} s"
+    left, right = place.edges_m
     for actor in actors:
-        if abs(actor.lateral_m) > _OFF_ROAD_M:
+        if not right - _VERGE_M <= actor.lateral_m <= left + _VERGE_M:
             return (
-                f"{actor.name} would be {abs(actor.lateral_m):.1f} m beside the ego's path, "
-                "off the road"
+                f"{actor.name} would be {abs(actor.lateral_m):.1f} m beside the ego's path, off "
+                f"the road, which reaches {left if actor.lateral_m > 0.0 else -right:.1f} m there"
             )
     return ""
 
 
-_OFF_ROAD_M = 12.0
+_VERGE_M = 4.0
+"""Beside the road, where one may still stand or park."""

@@ -165,6 +165,7 @@ def _places_of(
             driving_side=network.driving_side,
             ego=ego,
             actor_ways=chosen,
+            edges_m=network.edges_beside(passage.connections[0].from_lane_id),
         )
 
 

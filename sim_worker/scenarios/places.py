@@ -25,6 +25,8 @@ class Place(NamedTuple):
     actor_ways: tuple[tuple[Way, ...], ...]
     reverse: bool = False
     """The ego drives its way backwards."""
+    edges_m: tuple[float, float] = (10.0, -10.0)
+    """How far left and, negative, right of the ego's way the road reaches where it comes from."""
 
     @property
     def near_sign(self) -> float:

@@ -164,6 +164,19 @@ class RoadNetwork:
             line = connection.centerline[-2:]
         return _heading(line, backwards=False)
 
+    def edges_beside(self, lane_id: str) -> tuple[float, float]:
+        """Return how far left and right of a lane's middle its road's edges lie, as drivers see it.
+
+        The right one is negative. A lane of no known road reaches half its width.
+        """
+        lane = self.lanes[lane_id]
+        road = self.roads.get(lane.road_id)
+        if road is None:
+            return float(lane.width_m.value) / 2.0, -float(lane.width_m.value) / 2.0
+        left = road.left_m - lane.left_of_reference_m
+        right = road.right_m - lane.left_of_reference_m
+        return (-right, -left) if lane.reverse else (left, right)
+
     def lanes_to_kerb(self, passage: Passage) -> int:
         """Return how many lanes driven the same way lie between a passage's entry and the kerb."""
         lane, count = self.lanes[passage.connections[0].from_lane_id], 0
