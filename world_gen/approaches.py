@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+
+import msgspec
 
 from contracts.provenance import Choice
 from contracts.world import LineControl, YieldRule
@@ -32,8 +33,7 @@ _SIGN_NEAR_M = 25.0
 _CROSSING_NEAR_M = 16.0
 
 
-@dataclass(slots=True, kw_only=True)
-class Approach:
+class Approach(msgspec.Struct, kw_only=True):
     """One leg driven toward a junction, and how it is controlled there.
 
     `line_m` is where vehicles stop, metres along the leg from its node; None: where lanes end.
@@ -64,8 +64,7 @@ class Approach:
         return self.toward.edge.index, self.toward.reverse
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Draft:
+class _Draft(msgspec.Struct, frozen=True, kw_only=True):
     """What is known of an approach before the junction's roads are compared."""
 
     cluster: Cluster

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from world_gen.osm_map import OsmMap
@@ -81,8 +81,7 @@ class Chain(NamedTuple):
         return math.atan2(y1 - y0, x1 - x0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ring:
+class Ring(msgspec.Struct, frozen=True, kw_only=True):
     """Ways tagged as one roundabout or circular junction; `nodes` are its graph nodes."""
 
     kind: str
@@ -90,8 +89,7 @@ class Ring:
     edges: tuple[RoadEdge, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CarRoads:
+class CarRoads(msgspec.Struct, frozen=True, kw_only=True):
     """Branchings of car roads with the chains that leave them, and the rings."""
 
     chains_from: Mapping[int, tuple[Chain, ...]]

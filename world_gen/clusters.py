@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 import shapely
 import shapely.ops
@@ -29,8 +28,7 @@ from world_gen.turn_restrictions import restriction_notes
 _REPEAT_M = 0.01
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cluster:
+class Cluster(msgspec.Struct, frozen=True, kw_only=True):
     """Graph nodes where lanes end and begin: one junction, one node of a ring, or a lone node.
 
     `legs` leave the cluster outward; `inner` edges lie within and have no lanes of their own.
@@ -52,8 +50,7 @@ class Cluster:
         return len(self.legs) == 2 and len(self.nodes) == 1 and not self.whole
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Surroundings:
+class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
     """Everything around a place in the World's frame; edges and sections by edge index.
 
     `junctions` are all that lie whole in the World, the one it is made for first.
@@ -201,7 +198,7 @@ def _in_frame(
     moved = Polylines(target_from_source(frame, map_frame, lines.xy_m, 0.0).xy_m, lines.first)
     step_m = np.maximum.reduceat(moved.steps[1] * ~moved.is_last, moved.first[:-1]).tolist()
     return {
-        edge.index: dataclasses.replace(edge, xy_m=xy)
+        edge.index: msgspec.structs.replace(edge, xy_m=xy)
         for edge, xy, longest_m in zip(edges, moved.split(), step_m, strict=True)
         if longest_m > _REPEAT_M
     }

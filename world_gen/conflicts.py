@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ _MITRE_LIMIT = 2.0
 Indices = NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Meetings:
+class Meetings(msgspec.Struct, frozen=True, kw_only=True):
     """M pairs of connections, by their indices (M,), `first` before `second`.
 
     `merging` (M,) tells that both end in one lane; `points` (M, 2) is where their middles cross

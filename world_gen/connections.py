@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
-
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
@@ -21,8 +19,7 @@ _UNDRAWN = np.zeros((0, 2))
 _FROM_LEFT: tuple[Turn, ...] = ("left", "straight", "right")
 
 
-@dataclass(slots=True)
-class ConnectionDraft:
+class ConnectionDraft(msgspec.Struct):
     """A connection while the World is being built."""
 
     id: str
@@ -129,7 +126,7 @@ def _by_tags(ways: list[Movement], starts: list[LaneDraft]) -> list[Movement]:
         turn_of = {id(m): turn for m, turn in named}
     else:
         turn_of = {id(m): _free_name(m, tagged, have) for m in forward if m.turn not in tagged}
-    return [dataclasses.replace(m, turn=turn_of.get(id(m), m.turn)) for m in ways]
+    return [msgspec.structs.replace(m, turn=turn_of.get(id(m), m.turn)) for m in ways]
 
 
 def _free_name(movement: Movement, tagged: set[Turn], have: set[Turn]) -> Turn:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
+
+import msgspec
 
 from contracts.provenance import Quantity
 from contracts.world import DrivingSide
@@ -59,7 +60,7 @@ def cross_section(
     edge_left, lanes = left, []
     for lane in (*reversed(beside.left), *ordered, *beside.right):
         half = lane.width_m.value / 2
-        lanes.append(dataclasses.replace(lane, left_m=left - half))
+        lanes.append(msgspec.structs.replace(lane, left_m=left - half))
         left -= 2 * half
     return CrossSection(lanes=tuple(lanes), left_m=edge_left, right_m=left, notes=tuple(notes))
 
@@ -111,7 +112,7 @@ def _fit_total_width(edge: RoadEdge, lanes: list[LanePlan]) -> list[LanePlan]:
     return [
         lane
         if lane.kind == "bicycle"
-        else dataclasses.replace(
+        else msgspec.structs.replace(
             lane, width_m=Quantity(round(min(each, 1.5 * lane.width_m.value), 3), "inferred")
         )
         for lane in lanes

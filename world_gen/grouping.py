@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+
+import msgspec
 
 from world_gen.chains import CarRoads, Chain, Ring
 
 
-@dataclass(slots=True)
-class Cluster:
+class Cluster(msgspec.Struct):
     """Branchings of one junction; `core` without the far ends of flares and slip roads."""
 
     core: set[int]
     nodes: set[int]
     ring: Ring | None = None
-    chains: set[tuple[int, int]] = field(default_factory=set)
+    chains: set[tuple[int, int]] = msgspec.field(default_factory=set)
     """Keys of the chains that joined it."""
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import msgspec
 
 from contracts.arrays import Array
 from contracts.world import IntersectionSummary
 from world_gen.road_graph import DirectedEdge
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JunctionArm:
+class JunctionArm(msgspec.Struct, frozen=True, kw_only=True):
     """One road that meets a junction.
 
     `outward` are the directed edges that leave the junction's nodes along this road, whichever
@@ -22,8 +21,7 @@ class JunctionArm:
     outward: tuple[DirectedEdge, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Junction:
+class Junction(msgspec.Struct, frozen=True, kw_only=True):
     """One junction: `nodes` are all OSM graph nodes inside it, `inner` the edges between them."""
 
     summary: IntersectionSummary

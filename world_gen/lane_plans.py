@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+import msgspec
 
 from contracts.provenance import Provenance, Quantity
 from contracts.world import LaneChange, LaneKind, Turn
@@ -13,8 +14,7 @@ from contracts.world import LaneChange, LaneKind, Turn
 _NUMBER = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*(m|ft|')?\s*$")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LanePlan:
+class LanePlan(msgspec.Struct, frozen=True, kw_only=True):
     """One lane of a cross-section.
 
     `number` counts from the left as its driver sees it, as `lanes` and `placement` do: lanes for
@@ -38,8 +38,7 @@ class LanePlan:
     counted: bool = True
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CrossSection:
+class CrossSection(msgspec.Struct, frozen=True, kw_only=True):
     """Lanes from left to right along the way's nodes, and the carriageway's edges.
 
     `left_m` and `right_m` are the distances of the edges to the left of the way, so `right_m` is

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
@@ -29,8 +29,7 @@ class LaneKey(NamedTuple):
     number: int
 
 
-@dataclass(slots=True)
-class LaneDraft:
+class LaneDraft(msgspec.Struct):
     """A lane while the World is being built."""
 
     id: str
@@ -43,7 +42,7 @@ class LaneDraft:
     road_id: str
     left_id: str | None = None
     right_id: str | None = None
-    successors: list[str] = field(default_factory=list)
+    successors: list[str] = msgspec.field(default_factory=list)
 
     @property
     def kind(self) -> LaneKind:
@@ -81,8 +80,7 @@ class LaneDraft:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class LaneSet:
+class LaneSet(msgspec.Struct, frozen=True):
     """All lanes of a World; `begins` and `ends` hold those not cut off by the World's edge."""
 
     lanes: Mapping[str, LaneDraft]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import heapq
 import math
-from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from contracts.world import DrivingSide, Turn
@@ -22,8 +22,7 @@ Heads = dict[tuple[int, bool], tuple[float, ...]]
 _NOSE_COS = math.cos(math.radians(60.0))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Movement:
+class Movement(msgspec.Struct, frozen=True, kw_only=True):
     """One legal way through a cluster; `toward` ends at it, `away` begins there."""
 
     toward: DirectedEdge

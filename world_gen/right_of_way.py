@@ -25,9 +25,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
@@ -54,8 +54,7 @@ class Answer(NamedTuple):
     source: Provenance
 
 
-@dataclass(slots=True, kw_only=True)
-class Way:
+class Way(msgspec.Struct, kw_only=True):
     """What the rules ask about one connection."""
 
     id: str

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
@@ -14,8 +14,7 @@ from contracts.provenance import Quantity
 from contracts.world import DrivingSide
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RoadEdge:
+class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     """A stretch of one way between two graph nodes; `xy_m` (N, 2) in the map's frame.
 
     `forward` and `backward` say whether cars may drive along and against the node order.
@@ -74,8 +73,7 @@ class DirectedEdge(NamedTuple):
         return self.edge.lanes_backward if self.reverse else self.edge.lanes_forward
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RoadGraph:
+class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
     """All edges of a map with who leaves from which node (both directions, allowed or not)."""
 
     frame: LocalFrame

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable
+
+import msgspec
 
 from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
 
@@ -43,12 +44,12 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
         leaving[node] = tuple(
             DirectedEdge(changed[item.edge.index], item.reverse) for item in graph.leaving[node]
         )
-    return dataclasses.replace(graph, edges=changed, leaving=leaving)
+    return msgspec.structs.replace(graph, edges=changed, leaving=leaving)
 
 
 def _opened(edge: RoadEdge) -> RoadEdge:
     if edge.forward or edge.backward:
-        return dataclasses.replace(edge, car=True)
+        return msgspec.structs.replace(edge, car=True)
     against = edge.tags.get("oneway") in ("-1", "reverse")
     along = edge.tags.get("oneway") in ("yes", "true", "1")
-    return dataclasses.replace(edge, car=True, forward=not against, backward=not along)
+    return msgspec.structs.replace(edge, car=True, forward=not against, backward=not along)

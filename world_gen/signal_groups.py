@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+
+import msgspec
 
 from contracts.signals import SignalGroup
 from contracts.world import Crossing
@@ -17,15 +18,14 @@ from world_gen.stop_lines import entering
 CROSSING_WITHIN_M = 25.0
 
 
-@dataclass(slots=True, kw_only=True)
-class LaneGroup:
+class LaneGroup(msgspec.Struct, kw_only=True):
     """Lanes of one approach with lights of their own; `turning` ones turn across alone."""
 
     id: str
     approach: Approach
     lanes: tuple[LaneDraft, ...]
     turning: bool
-    connections: list[ConnectionDraft] = field(default_factory=list)
+    connections: list[ConnectionDraft] = msgspec.field(default_factory=list)
 
     def finished(self) -> SignalGroup:
         """Return the group as the World holds it."""
@@ -88,8 +88,7 @@ def lane_groups(
     return [group for groups in by_junction.values() for group in groups]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WalkGroup:
+class WalkGroup(msgspec.Struct, frozen=True, kw_only=True):
     """A crossing with lights for those on foot, and the groups that may not drive meanwhile."""
 
     id: str

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
+
+import msgspec
 
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import DirectedEdge, RoadEdge
@@ -34,8 +35,7 @@ class WayRule(NamedTuple):
     only: bool
 
 
-@dataclass(frozen=True, slots=True)
-class TurnRestrictions:
+class TurnRestrictions(msgspec.Struct, frozen=True):
     """All restrictions for cars, by via node, and those with via ways."""
 
     at_node: Mapping[int, tuple[NodeRule, ...]]

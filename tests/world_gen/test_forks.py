@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-
+import msgspec
 import pytest
 
 from contracts.world import World
@@ -118,7 +117,7 @@ def test_a_lane_too_short_to_be_drawn_does_not_shift_its_neighbours():
     (plain,) = (c for c in around.clusters if c.plain)
     (second,) = {key.edge for key, name in lanes.begins.items() if name.startswith("w2.")}
     begins = {key: name for key, name in lanes.begins.items() if key != LaneKey(second, False, 0)}
-    assert join_straight_on(plain, around, dataclasses.replace(lanes, begins=begins))
+    assert join_straight_on(plain, around, msgspec.structs.replace(lanes, begins=begins))
     (first,) = {lane.key.edge for lane in lanes.lanes.values()
                 if lane.id.startswith("w1.") and LaneKey(lane.key.edge, False, 0) in lanes.ends
                 and any(leg.edge.index == lane.key.edge for leg in plain.legs)}  # fmt: skip
