@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +32,9 @@ from telemetry.vehicle_process import main as process_main
 DEPTH = 20_000
 """Messages that may wait: more than a minute of a car at 300 messages a second."""
 _WAIT_S = 0.1
+_GATHER_S = 0.05
+"""Messages are taken in portions: waking up for each of them costs more than writing it."""
+_NICENESS = 10
 _AT_ONCE = 500
 _FLUSH_EVERY_S = 1.0
 _ASK_EVERY_S = 1.0
@@ -60,6 +65,7 @@ class RecorderProcess:
         self._run_id = run_id
         self._vehicle_id = vehicle_id
         self._mono_s = mono_s
+        self._lossless = lossless
         self._messages = Mailbox(DEPTH, when_full="block" if lossless else "drop_oldest")
         # Apart, so that a flood of samples never drops the end of the run.
         self._control = Mailbox(64)
@@ -88,7 +94,8 @@ class RecorderProcess:
         """Record until the run ends, the orchestrator is gone, or `stop` was called."""
         parent = os.getppid()
         while self.step() and os.getppid() == parent:
-            pass
+            if not self._lossless:
+                time.sleep(_GATHER_S)
         self.finish()
 
     def step(self) -> bool:
@@ -209,7 +216,17 @@ def record(setup: RecorderSetup) -> None:
             process.stop()
 
         signal.signal(signal.SIGTERM, leave)
+        _give_way()
         process.run()
+
+
+def _give_way() -> None:
+    """Let this thread, which writes for later, give way to who is waited for.
+
+    Not the bus's threads: a message that they do not fetch in time is lost.
+    """
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
 
 
 if __name__ == "__main__":
