@@ -123,9 +123,9 @@ def _cast_ones(
 def _refused(scenario: Scenario, summary: IntersectionSummary) -> str:
     where = scenario.where
     if where.kinds and summary.kind not in where.kinds:
-        return f"its kind is {summary.kind}; the scenario is for {', '.join(where.kinds)}"
+        return f"its kind is {summary.kind}"
     if where.controls and summary.control not in where.controls:
-        return f"its control is {summary.control}; the scenario is for {', '.join(where.controls)}"
+        return f"its control is {summary.control}"
     return ""
 
 
