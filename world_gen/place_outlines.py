@@ -6,7 +6,6 @@ the most expensive step of a World. Most places are simple: kerb to kerb, with a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -14,12 +13,11 @@ import numpy as np
 import shapely
 
 from contracts.arrays import Array
-from world_gen.clusters import Cluster, Surroundings
+from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.lanes import LaneSet
 from world_gen.polyline import left_of
 from world_gen.polyline_batch import Polylines, points_at
-from world_gen.road_graph import DirectedEdge
 
 CORNER_STEPS = 6
 SHARPEST_CORNER_M = 0.3
@@ -38,33 +36,41 @@ class Outlines(NamedTuple):
     polygons: np.ndarray
 
 
-class _Mouth(NamedTuple):
-    """Where a road begins at a place, seen outward: its edges' ends and their way inward."""
+class _Mouths(NamedTuple):
+    """Where roads begin at places, seen outward: their edges' first points and those after."""
 
-    angle_rad: float
-    right: Array
-    right_inward: Array
     left: Array
-    left_inward: Array
+    left_next: Array
+    right: Array
+    right_next: Array
 
 
 def simple_outlines(
     around: Surroundings, lanes: LaneSet, connections: Sequence[ConnectionDraft]
 ) -> Outlines:
     """Return the outlines of places with one node whose paths all lie well inside."""
-    ends = _road_ends(lanes)
+    row_of, ends = _road_ends(lanes)
     rows: list[int] = []
-    rings: list[list[_Mouth]] = []
+    mouths: list[int] = []
+    nodes: list[Array] = []
     for i, cluster in enumerate(around.clusters):
         if len(cluster.nodes) > 1 or cluster.ring or cluster.inner:
             continue
-        mouths = _mouths(cluster, lanes, ends)
-        if mouths is not None:
+        mine = [row_of.get((leg.edge.index, leg.reverse), -1) for leg in cluster.legs]
+        if -1 not in mine:
             rows.append(i)
-            rings.append(mouths)
+            mouths += mine
+            nodes.append(cluster.legs[0].xy_m[0])
     if not rows:
         return Outlines((), np.array([], dtype=object))
-    shapes = shapely.simplify(_polygons(rings), 0.02, preserve_topology=False)
+    count = np.array([len(around.clusters[i].legs) for i in rows])
+    at = _Mouths(*(points[mouths] for points in ends))
+    outward = at.left + at.right - 2.0 * np.repeat(nodes, count, axis=0)
+    turn = np.lexsort(
+        (np.arctan2(outward[:, 1], outward[:, 0]), np.repeat(np.arange(len(rows)), count))
+    )
+    at = _Mouths(*(points[turn] for points in at))
+    shapes = shapely.simplify(_polygons(at, count), 0.02, preserve_topology=False)
     fits = shapely.is_valid(shapes) & (shapely.area(shapes) > 1.0)
     place = {around.clusters[i].key: k for k, i in enumerate(rows)}
     fits &= ~_left_by_a_path(shapes, place, connections)
@@ -72,50 +78,45 @@ def simple_outlines(
     return Outlines(tuple(rows[k] for k in kept), shapes[kept])
 
 
-def _road_ends(lanes: LaneSet) -> dict[tuple[int, bool], tuple[Array, Array]]:
-    """Return (left, right) edges, outward from it, at each end of an edge that has a place."""
-    found: dict[tuple[int, bool], tuple[Array, Array]] = {}
+def _road_ends(lanes: LaneSet) -> tuple[dict[tuple[int, bool], int], _Mouths]:
+    """Return the mouths of all roads, and the row of that at each end of an edge with a place."""
+    row_of: dict[tuple[int, bool], int] = {}
+    edges: list[Array] = []
     for road in lanes.roads:
         if not road.lane_ids:
             continue
         edge = lanes.lanes[road.lane_ids[0]].key.edge
-        left, right = lanes.edges[road.id]
         if road.from_place is not None:
-            found[edge, False] = left, right
+            row_of[edge, False] = len(edges)
         if road.to_place is not None:
-            found[edge, True] = right[::-1], left[::-1]
-    return found
+            row_of[edge, True] = len(edges) + 1
+        edges += lanes.edges[road.id]
+    lines = Polylines.of(edges)
+    xy, first, last = lines.xy_m, lines.first[:-1], lines.first[1:] - 1
+    # A road's left edge and its right one; from its end, what was right is left.
+    ends, after = np.stack([xy[first], xy[last]], 1), np.stack([xy[first + 1], xy[last - 1]], 1)
+    left, right = slice(0, None, 2), slice(1, None, 2)
+
+    def outward(points: Array, start: slice, stop: slice) -> Array:
+        return np.stack([points[start, 0], points[stop, 1]], axis=1).reshape(-1, 2)
+
+    return row_of, _Mouths(
+        left=outward(ends, left, right), left_next=outward(after, left, right),
+        right=outward(ends, right, left), right_next=outward(after, right, left),
+    )  # fmt: skip
 
 
-def _mouths(
-    cluster: Cluster, lanes: LaneSet, ends: dict[tuple[int, bool], tuple[Array, Array]]
-) -> list[_Mouth] | None:
-    """Return the mouths of a place counter-clockwise; None where a road is missing or folded."""
-    found = []
-    for leg in cluster.legs:
-        edges = ends.get((leg.edge.index, leg.reverse))
-        if edges is None:
-            return None
-        found.append(_mouth(leg, *edges))
-    return sorted(found, key=lambda mouth: mouth.angle_rad)
+def _polygons(mouths: _Mouths, count: np.ndarray) -> np.ndarray:
+    """Return polygons that go from mouth to mouth, round each corner between two kerbs.
 
-
-def _mouth(leg: DirectedEdge, left: Array, right: Array) -> _Mouth:
-    x, y = (left[0] + right[0] - 2.0 * leg.xy_m[0]).tolist()
-    return _Mouth(math.atan2(y, x), right[0], right[0] - right[1], left[0], left[0] - left[1])
-
-
-def _polygons(rings: list[list[_Mouth]]) -> np.ndarray:
-    """Return polygons that go from mouth to mouth, round each corner between two kerbs."""
-    count = np.array([len(mouths) for mouths in rings])
+    Place k has the next `count[k]` mouths, counter-clockwise.
+    """
     first = np.concatenate([[0], np.cumsum(count)])
-    flat = [mouth for mouths in rings for mouth in mouths]
-    after = np.arange(1, len(flat) + 1)
+    after = np.arange(1, first[-1] + 1)
     after[first[1:] - 1] = first[:-1]
-    right = np.array([mouth.right for mouth in flat])
-    a = np.array([mouth.left for mouth in flat])
-    u = np.array([mouth.left_inward for mouth in flat])
-    v = np.array([mouth.right_inward for mouth in flat])[after]
+    right, a = mouths.right, mouths.left
+    u = a - mouths.left_next
+    v = (right - mouths.right_next)[after]
     b = right[after]
     u /= np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-9)[:, None]
     v /= np.maximum(np.hypot(v[:, 0], v[:, 1]), 1e-9)[:, None]
@@ -139,7 +140,7 @@ def _polygons(rings: list[list[_Mouth]]) -> np.ndarray:
     curve /= p0 + p1 + p2
     # Each mouth gives its right end, its left end and the curve on the way to the next.
     pieces = np.concatenate([right[:, None], a[:, None], curve], axis=1).round(3)
-    owner = np.repeat(np.repeat(np.arange(len(rings)), count), CORNER_STEPS + 3)
+    owner = np.repeat(np.repeat(np.arange(len(count)), count), CORNER_STEPS + 3)
     shapes: np.ndarray = shapely.polygons(shapely.linearrings(pieces.reshape(-1, 2), indices=owner))
     return shapes
 
