@@ -9,10 +9,12 @@ from contracts.arrays import Array
 from contracts.provenance import Quantity
 from contracts.world import Connection, DrivingSide, LineControl, Turn
 from world_gen.clusters import Cluster, Surroundings
+from world_gen.cross_section import LanePlan
 from world_gen.forks import beside_at_fork, merged_ends, merges
 from world_gen.lanes import LaneDraft, LaneSet
 from world_gen.movements import Movement
 from world_gen.polyline import unit
+from world_gen.road_graph import DirectedEdge
 from world_gen.turn_curves import LEAST_RADIUS_M
 
 _UNDRAWN = np.zeros((0, 2))
@@ -74,17 +76,19 @@ def connect(
         if not mine:
             continue
         toward = mine[0].toward
-        plans = around.section(toward).driven(reverse=toward.reverse)
+        plans = _plans(cluster, toward, around)
         starts = lanes.incoming(toward, plans)
         middle = lanes.incoming(toward, around.section(toward).turning(reverse=toward.reverse))
         named = _by_tags(mine, starts)
         beside = beside_at_fork(cluster, named, around)
         for unnamed, movement in zip(mine, named, strict=True):
             away = movement.away
-            ends = lanes.outgoing(away, around.section(away).driven(reverse=away.reverse))
+            ends = lanes.outgoing(away, _plans(cluster, away, around))
             if not starts or not ends:
                 continue
-            chosen = [lane for lane in middle if movement.turn in lane.turns]
+            # Where a road merely goes on its lanes do, whatever their arrows say of what follows.
+            chosen = starts if cluster.plain else []
+            chosen = chosen or [lane for lane in middle if movement.turn in lane.turns]
             chosen = chosen or _starting_lanes(
                 movement, starts, mine, len(ends), beside, around.driving_side
             )
@@ -106,6 +110,14 @@ def connect(
             turns = dict.fromkeys((*connection.start.turns, connection.turn))
             connection.start.turns = tuple(turns)
     return found
+
+
+def _plans(cluster: Cluster, edge: DirectedEdge, around: Surroundings) -> tuple[LanePlan, ...]:
+    """Return the lanes that lead into a cluster, or out of it, along an edge, from the left."""
+    section = around.section(edge)
+    if cluster.plain:
+        return section.abreast(reverse=edge.reverse)
+    return section.driven(reverse=edge.reverse)
 
 
 def _by_tags(ways: list[Movement], starts: list[LaneDraft]) -> list[Movement]:

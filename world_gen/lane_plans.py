@@ -76,6 +76,11 @@ class CrossSection(msgspec.Struct, frozen=True, kw_only=True):
         lanes = (lane for lane in self.lanes if lane.reverse == reverse and lane.counted)
         return tuple(sorted(lanes, key=lambda lane: lane.number))
 
+    def abreast(self, *, reverse: bool) -> tuple[LanePlan, ...]:
+        """Return all lanes of one direction that cars or buses drive, from their drivers' left."""
+        lanes = (p for p in self.lanes if p.kind in ("driving", "bus") and p.reverse == reverse)
+        return tuple(sorted(lanes, key=lambda lane: lane.left_m, reverse=not reverse))
+
     def cycled(self, *, reverse: bool) -> tuple[LanePlan, ...]:
         """Return the bicycle lanes of one direction, from left to right along the way."""
         return tuple(p for p in self.lanes if p.kind == "bicycle" and p.reverse == reverse)

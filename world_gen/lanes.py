@@ -262,11 +262,11 @@ def join_straight_on(cluster: Cluster, around: Surroundings, lanes: LaneSet) -> 
         before, behind = around.section(leg), around.section(other)
         # Plans are paired, not lanes: a lane too short to be drawn must not shift its neighbours.
         for mine, its in (
-            (before.driven(reverse=toward.reverse), behind.driven(reverse=other.reverse)),
+            (before.abreast(reverse=toward.reverse), behind.abreast(reverse=other.reverse)),
             (before.cycled(reverse=toward.reverse), behind.cycled(reverse=other.reverse)),
         ):
             for a, b in zip(mine, its, strict=False):
                 start, end = lanes.ending(toward, a), lanes.beginning(other, b)
-                if start is not None and end is not None and a.kind == b.kind:
+                if start is not None and end is not None and a.kind in (b.kind, "bus"):
                     start.successors.append(end.id)
     return True

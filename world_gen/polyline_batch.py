@@ -111,10 +111,13 @@ def points_at(lines: Polylines, which: Indices, at_m: Array) -> Array:
 
 
 def without_repeats(lines: Polylines, *, tolerance_m: float = 0.01) -> Polylines:
-    """Drop points closer than `tolerance_m` to the one before, as `polyline.without_repeats`."""
-    before = np.concatenate([[np.inf], lines.steps[1][:-1]])
-    before[lines.first[:-1]] = np.inf
-    return lines.keep(before > tolerance_m)
+    """Drop points closer than `tolerance_m` to the one before; in place of an end, that one."""
+    wanted = np.concatenate([[True], lines.steps[1][:-1] > tolerance_m])
+    first, last = lines.first[:-1], lines.first[1:] - 1
+    wanted[first] = True
+    at_end = last[~wanted[last] & (last - first > 1)]
+    wanted[at_end], wanted[at_end - 1] = True, False
+    return lines.keep(wanted)
 
 
 def cut(lines: Polylines, from_m: Array, to_m: Array) -> Polylines:

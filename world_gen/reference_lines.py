@@ -13,13 +13,14 @@ from contracts.arrays import Array
 from world_gen.bends import Rounded, rounded_through, thinned, without_end_kinks
 from world_gen.clusters import Surroundings
 from world_gen.extent import stretches_inside
-from world_gen.polyline import cut, left_of, length, points_at
+from world_gen.polyline import cut, left_of, points_at
 from world_gen.polyline_batch import Polylines
 from world_gen.polyline_batch import cut as cut_all
 
 MIN_LANE_M = 0.05
 INNER_RADIUS_M = 4.0
 """Where a road bends sharply, the radius of its inner edge."""
+_STUB_M = 0.25
 _NOWHERE = np.array([np.nan, np.nan])
 
 
@@ -95,14 +96,31 @@ def _shifted(rounded: Rounded, indices: list[int], around: Surroundings) -> Roun
     lines = rounded.lines.split()
     for row in moving:
         begin, end = around.shifts_m[indices[row]]
-        total = length(lines[row])
-        share = np.linspace(0.0, 1.0, max(int(total), 2) + 1)
-        line = points_at(lines[row], share * total)
-        shift = begin + (end - begin) * share * share * (3.0 - 2.0 * share)
-        ahead = np.gradient(line, axis=0)
-        norm = np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)
-        lines[row] = line + left_of(ahead) * (shift / norm)[:, None]
+        line, aside = _evenly(lines[row], rounded.before[row], rounded.after[row])
+        # Flat at both ends, so that lanes leave along those of the next road.
+        share = np.linspace(0.0, 1.0, len(line) - 2)
+        share = np.concatenate([[0.0], share * share * (3.0 - 2.0 * share), [1.0]])
+        lines[row] = line + aside * (begin + (end - begin) * share)[:, None]
     return rounded._replace(lines=Polylines.of(lines))
+
+
+def _evenly(line: Array, before: Array, after: Array) -> tuple[Array, Array]:
+    """Return points about every metre of a line, and where a metre to its left lies from each.
+
+    The first and last piece are short ones of the line's own, square to which other roads go on.
+    """
+    steps = np.hypot(*np.diff(line, axis=0).T)
+    total, first, last = steps.sum(), min(_STUB_M, steps[0] / 3), min(_STUB_M, steps[-1] / 3)
+    at_m = np.linspace(first, total - last, max(int(total), 2) + 1)
+    points = points_at(line, np.concatenate([[0.0], at_m, [total]]))
+    ahead = np.diff(points, axis=0)
+    ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    into = np.concatenate([[ahead[0] if np.isnan(before[0]) else before], ahead])
+    out = np.concatenate([ahead, [ahead[-1] if np.isnan(after[0]) else after]])
+    # Square to the first and last piece, as the road beside them is.
+    into[1], out[-2] = ahead[0], ahead[-1]
+    cos = (into * out).sum(axis=1)
+    return points, left_of(into + out) / np.maximum(1.0 + cos, 0.5)[:, None]
 
 
 def _points_beyond(
