@@ -7,6 +7,7 @@ side. Planar: nobody is thrown up or run over, and cars do not deform.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -27,12 +28,13 @@ from sim_worker.overlap import Rectangles, separations
 from sim_worker.touch import Indices, Touches
 from sim_worker.vehicle.planar import base_from_cog, cog_from_base
 
-_REFRESH_S = 0.01
-"""Between two looks at the ground forces and at whether the two are near each other."""
-_STIFF = Crush(400.0, 0.0005)
-_SOFT = Crush(100.0, 0.002)
-_STIFF_FOR_S = 0.1
+_STIFF, _STIFF_LOOK_S = Crush(400.0, 0.0005), 0.01
+_SOFT, _SOFT_LOOK_S = Crush(100.0, 0.0025), 0.025
+"""Contacts, and the longest time between two looks at the ground forces and at who is near."""
+_STIFF_FOR_S = 0.05
 """The first impact is over by then; what follows is slower and may be less stiff."""
+_APART_STEP_S = 0.01
+"""For those who cannot touch before the next look."""
 DELTA_V_WITHIN_S = 0.25
 """Delta-v is that within 250 ms of the touch, as event data recorders have it (49 CFR 563.7)."""
 
@@ -83,13 +85,14 @@ def run_accidents(
     `kinds` of the road users touched, one for each; `friction_factor` of the ground and
     `user_decel_mps2` at which those with wheels brake, one for all or (A,). Results are `step_s`
     apart. Without `ground` nothing but the impact acts. Raises ValueError where the numbers of
-    touches and kinds differ, or where a time is no multiple of 10 ms.
+    touches and kinds differ, or where `duration_s` is no multiple of `step_s`.
     """
     count = len(touches.time_s)
     if len(kinds) != count:
         raise ValueError(f"{len(kinds)} kinds of road users for {count} touches")
-    every = _multiple(step_s, "step_s")
-    ticks = _multiple(duration_s, "duration_s")
+    steps = duration_s / step_s
+    if steps < 1.0 - 1e-9 or abs(steps - round(steps)) > 1e-6:
+        raise ValueError(f"duration_s {duration_s:g} must be a multiple of step_s {step_s:g}")
     bodies = accident_bodies(
         vehicle,
         touches,
@@ -106,8 +109,8 @@ def run_accidents(
         velocities[:, apart],
         impact=Impact() if impact is None else impact,
         ground=ground,
-        ticks=ticks,
-        every=every,
+        steps=round(steps),
+        step_s=step_s,
         threads=threads,
     )
     return _results(vehicle, touches, apart, tracks, velocities, step_s)
@@ -128,41 +131,35 @@ def _run(
     *,
     impact: Impact,
     ground: bool,
-    ticks: int,
-    every: int,
+    steps: int,
+    step_s: float,
     threads: int,
 ) -> _Tracks:
     count = poses.shape[1]
-    track = np.empty((2, ticks // every + 1, 2, count, 3))
+    track = np.empty((2, steps + 1, 2, count, 3))
     impulse = np.zeros((2, count, 3))
     if not count:
         return _Tracks(track[0], track[1], impulse[..., :2])
     batch = AccidentBatch(bodies, impact, threads=threads)
     batch.place(poses, velocities)
+    track[0, 0], track[1, 0] = poses, velocities
     if not ground:
         nothing = np.zeros((3, *bodies.mass_kg.shape))
         batch.set_ground(GroundForces(nothing, nothing))
-    crush = _STIFF
-    batch.set_crush(crush)
-    for tick in range(ticks + 1):
-        if tick % every == 0:
-            track[0, tick // every], track[1, tick // every] = batch.poses, batch.velocities
-        if tick == ticks:
-            break
-        if crush is _STIFF and tick * _REFRESH_S >= _STIFF_FOR_S - 1e-9:
-            crush = _SOFT
-            batch.set_crush(crush)
-        if ground:
-            batch.set_ground(_ground(bodies, batch))
-        near = _may_touch(bodies, batch)
-        ids, others = np.flatnonzero(near), np.flatnonzero(~near)
-        if len(ids):
-            steps = round(_REFRESH_S / crush.timestep_s)
-            given = batch.advance(ids, steps=steps, timestep_s=crush.timestep_s)
-            if tick * _REFRESH_S < DELTA_V_WITHIN_S - 1e-9:
-                impulse[:, ids] += given
-        if len(others):
-            batch.advance(others, steps=1, timestep_s=_REFRESH_S)
+    for step in range(steps):
+        stiff = step * step_s < _STIFF_FOR_S - 1e-9
+        crush, longest = (_STIFF, _STIFF_LOOK_S) if stiff else (_SOFT, _SOFT_LOOK_S)
+        batch.set_crush(crush)
+        looks = math.ceil(step_s / longest - 1e-9)
+        for look in range(looks):
+            if ground:
+                batch.set_ground(_ground(bodies, batch))
+            near = _may_touch(bodies, batch, within_s=step_s / looks)
+            given = batch.advance(near, step_s / looks, crush.timestep_s)
+            batch.advance(~near, step_s / looks, _APART_STEP_S)
+            if (step + look / looks) * step_s < DELTA_V_WITHIN_S - 1e-9:
+                impulse[:, near] += given
+        track[0, step + 1], track[1, step + 1] = batch.poses, batch.velocities
     return _Tracks(track[0], track[1], impulse[..., :2] / bodies.mass_kg[..., None])
 
 
@@ -174,7 +171,7 @@ def _ground(bodies: Bodies, batch: AccidentBatch) -> GroundForces:
     return ground_forces(bodies, np.stack([ahead, aside], axis=-1))
 
 
-def _may_touch(bodies: Bodies, batch: AccidentBatch) -> npt.NDArray[np.bool_]:
+def _may_touch(bodies: Bodies, batch: AccidentBatch, *, within_s: float) -> npt.NDArray[np.bool_]:
     """(A,) bool: whether the two cannot be ruled out to meet before the next look."""
     poses, velocities = batch.poses, batch.velocities
     yaw = poses[..., 2]
@@ -186,7 +183,7 @@ def _may_touch(bodies: Bodies, batch: AccidentBatch) -> npt.NDArray[np.bool_]:
     between = velocities[1] - velocities[0]
     fastest = np.hypot(between[:, 0], between[:, 1])
     fastest += (np.abs(velocities[..., 2]) * (bodies.length_m + bodies.width_m)).sum(axis=0)
-    return np.asarray(gap < fastest * _REFRESH_S + 0.02)
+    return np.asarray(gap < fastest * within_s + 0.02)
 
 
 def _start(vehicle: VehicleParameters, touches: Touches) -> tuple[Array, Array]:
@@ -251,10 +248,3 @@ def _base_states(vehicle: VehicleParameters, tracks: _Tracks, start: Array, step
     states[:, 1:, 7] = np.diff(states[:, :, 3], axis=1) / step_s
     states[:, 0, 7] = start[:, 7]
     return states
-
-
-def _multiple(time_s: float, name: str) -> int:
-    times = time_s / _REFRESH_S
-    if times < 1.0 - 1e-9 or abs(times - round(times)) > 1e-6:
-        raise ValueError(f"{name} {time_s:g} must be a multiple of {_REFRESH_S:g} s")
-    return round(times)

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
 from contracts.arrays import Array
@@ -149,14 +150,21 @@ class AccidentBatch:
         limits = np.maximum(forces.limit_n.transpose(2, 1, 0), _TINY_N)
         self._range[..., 0], self._range[..., 1] = -limits, limits
 
-    def advance(self, ids: Any, *, steps: int, timestep_s: float) -> Array:
-        """Step the simulations `ids`; return (2, len(ids), 3) impulses of the contact on each.
+    def advance(
+        self, which: npt.NDArray[np.bool_], duration_s: float, longest_step_s: float
+    ) -> Array:
+        """Step the simulations `which` (A,); return (2, N, 3) impulses of their contact.
 
-        Force times time in the frame of the poses, and its moment about the centre of gravity.
+        Force times time on either body in the frame of the poses, and its moment about the centre
+        of gravity.
         """
-        self._timestep[ids] = timestep_s
+        ids = np.flatnonzero(which)
+        if not len(ids):
+            return np.zeros((2, 0, 3))
+        steps = math.ceil(duration_s / longest_step_s - 1e-9)
+        self._timestep[ids] = duration_s / steps
         record = self._batch.rollout(steps, record=("qfrc_constraint",), ids=ids)
-        impulse = record["qfrc_constraint"].sum(axis=1) * timestep_s
+        impulse = record["qfrc_constraint"].sum(axis=1) * (duration_s / steps)
         return np.asarray(impulse.reshape(len(ids), 2, 3).transpose(1, 0, 2))
 
 

@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from contracts.arrays import Array
 from contracts.drive import RoadUserKind
@@ -11,7 +13,8 @@ from sim_worker.accident import Accidents, run_accidents
 from sim_worker.accident_bodies import accident_bodies
 from sim_worker.accident_model import Impact
 from sim_worker.actors.kinds import KINDS
-from sim_worker.touch import Touches, first_touches
+from sim_worker.overlap import Rectangles, separations
+from sim_worker.touch import Touches, ego_rectangles, first_touches
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.vehicle.planar import cog_from_base
 from tests.sim_worker.rigid_impact import Body, impact
@@ -40,17 +43,20 @@ MEETINGS = {
 }
 
 
+def scene(meeting: Meeting, time_s: Array) -> tuple[Array, Array, Array]:
+    """States (1, T, 8), the other's poses (1, T, 1, 3) and its size (1, 1, 2)."""
+    states, users = np.zeros((1, len(time_s), 8)), np.zeros((1, len(time_s), 1, 3))
+    states[0, :, 0], states[0, :, 3] = meeting.ego_mps * time_s, meeting.ego_mps
+    way = np.array([np.cos(meeting.yaw_rad), np.sin(meeting.yaw_rad)])
+    users[0, :, 0, :2] = (meeting.x_m, meeting.y_m) + meeting.user_mps * time_s[:, None] * way
+    users[0, :, 0, 2] = meeting.yaw_rad
+    size = np.array([[[KINDS[meeting.kind].length_m, KINDS[meeting.kind].width_m]]])
+    return states, users, size
+
+
 def touches(*meetings: Meeting) -> Touches:
-    time_s = TICK_S * np.arange(80)
-    states = np.zeros((len(meetings), 80, 8))
-    users = np.zeros((len(meetings), 80, 1, 3))
-    size = np.zeros((len(meetings), 1, 2))
-    for i, meeting in enumerate(meetings):
-        states[i, :, 0], states[i, :, 3] = meeting.ego_mps * time_s, meeting.ego_mps
-        way = np.array([np.cos(meeting.yaw_rad), np.sin(meeting.yaw_rad)])
-        users[i, :, 0, :2] = (meeting.x_m, meeting.y_m) + meeting.user_mps * time_s[:, None] * way
-        users[i, :, 0, 2] = meeting.yaw_rad
-        size[i, 0] = KINDS[meeting.kind].length_m, KINDS[meeting.kind].width_m
+    scenes = [scene(meeting, TICK_S * np.arange(80)) for meeting in meetings]
+    states, users, size = (np.concatenate(parts) for parts in zip(*scenes, strict=True))
     found = first_touches(CAR, states, users, size, tick_s=TICK_S)
     assert len(found.time_s) == len(meetings)
     return found
@@ -203,3 +209,38 @@ def test_a_kind_for_each_touch_is_asked_for() -> None:
 def test_a_restitution_that_no_contact_has_is_refused() -> None:
     with pytest.raises(ValueError, match=r"restitution 0\.0 must be within"):
         run_accidents(CAR, touches(MEETINGS["head-on"]), kinds=["car"], impact=Impact(0.0))
+
+
+def test_a_duration_that_is_no_whole_number_of_steps_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"duration_s 1 must be a multiple of step_s 0\.3"):
+        run_accidents(CAR, touches(MEETINGS["head-on"]), kinds=["car"], step_s=0.3)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(0.5, 25.0), st.floats(10.0, 20.0), st.floats(-1.0, 1.0), st.floats(-3.1, 3.1),
+    st.floats(0.0, 15.0), st.sampled_from(list(KINDS)),
+)  # fmt: skip
+def test_whoever_meets_they_part_without_lying_in_each_other(
+    ego_mps: float, x: float, y: float, yaw: float, user_mps: float, kind: RoadUserKind
+) -> None:
+    time_s = TICK_S * np.arange(80)
+    # Whoever it is comes to x, y after a second.
+    back = user_mps * np.array([np.cos(yaw), np.sin(yaw)])
+    meeting = Meeting(ego_mps, x - back[0], y - back[1], yaw, user_mps, kind)
+    states, users, size = scene(meeting, time_s)
+    touch = first_touches(CAR, states, users, size, tick_s=TICK_S)
+    assume(len(touch.time_s) == 1 and not touch.from_start[0])
+    after = run_accidents(CAR, touch, kinds=[kind], step_s=0.02)
+    assert after.valid.all()
+    assert after.closing_mps[0] > -1e-6
+    poses = after.user_poses[0]
+    gap = separations(
+        ego_rectangles(CAR, after.ego_states[0]),
+        Rectangles(poses[:, :2], poses[:, 2], *touch.user_size_m[0]),
+    )
+    assert gap.max(axis=0).min() > -0.1
+    # What one wins the other loses, and nobody is pushed harder than the two can.
+    push = CAR.mass_kg.value * after.ego_delta_v_mps[0]
+    assert KINDS[kind].mass_kg * after.user_delta_v_mps[0] == pytest.approx(-push, abs=1e-6)
+    assert np.hypot(*after.ego_delta_v_mps[0]) < 1.2 * (ego_mps + user_mps)
