@@ -14,6 +14,7 @@ from contracts.world import World
 from sim_worker.stage_model import world_spec
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
+from sim_worker.vehicle.lag import without_lags
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
 from sim_worker.vehicle.planar import (
     JOINTS,
@@ -46,9 +47,11 @@ class MirrorWorld:
         twin_meets_shadow: bool = False,
         steering_delay_s: float | None = None,
     ) -> None:
-        """Compile; `steering_delay_s` replaces the vehicle's."""
+        """Compile; `steering_delay_s` replaces the vehicle's, whose lags then do not count."""
         silence_step_clock()
         log_mujoco_warnings()
+        if steering_delay_s is not None:
+            vehicle = without_lags(vehicle)
         self.vehicle = vehicle
         spec = world_spec(world)
         spec.attach(vehicle_spec(vehicle), prefix=TWIN, frame=spec.worldbody.add_frame())
@@ -58,25 +61,31 @@ class MirrorWorld:
             spec.add_exclude(name="own_shadow", bodyname1=TWIN + "chassis", bodyname2=SHADOW)
         self.model = model = spec.compile()
         self.data = mujoco.MjData(model)
-        ids = actuator_ids(model, TWIN)
+        self._actuators = ids = actuator_ids(model, TWIN)
         if steering_delay_s is not None:
             check_steering_delay(steering_delay_s)
             model.actuator_delay[ids.steer] = steering_delay_s
         self._steer = ids.steer
-        self._actuation = Actuation(
-            vehicle,
-            ids,
-            friction=np.array([vehicle.friction.value]),
-            ctrl=self.data.ctrl[None],
-            biasprm=model.actuator_biasprm[None],
-            forcerange=model.actuator_forcerange[None],
-        )
         self._joints = np.array([model.joint(TWIN + name).qposadr[0] for name in JOINTS])
         self._dofs = np.array([model.joint(TWIN + name).dofadr[0] for name in JOINTS])
         self._mocap = {name: int(model.body(name).mocapid[0]) for name in (SHADOW, GHOST)}
         self._state = np.zeros((1, 8))
         self._tire_command = 0.0
         self._steps = 0
+        self._actuation = self._fresh_actuation()
+
+    def _fresh_actuation(self) -> Actuation:
+        """Return the actuation of a twin that exerts what its state says, and did before."""
+        return Actuation(
+            self.vehicle,
+            self._actuators,
+            friction=np.array([self.vehicle.friction.value]),
+            ctrl=self.data.ctrl[None],
+            biasprm=self.model.actuator_biasprm[None],
+            forcerange=self.model.actuator_forcerange[None],
+            tick_s=_REFRESH_STEPS * TIMESTEP_S,
+            accel_mps2=self._state[:, 7],
+        )
 
     @property
     def history_samples(self) -> int:
@@ -105,6 +114,7 @@ class MirrorWorld:
         data.history[first : first + len(history)] = history
         self._tire_command = float(history[-1])
         self._steps = 0
+        self._actuation = self._fresh_actuation()
 
     def place(self, name: str, pose: Array) -> None:
         """Put the shadow or the ghost at x, y, yaw (3,)."""

@@ -164,7 +164,8 @@ def _near(
     near = []
     # Some futures at a time: fresh memory for all at once takes longer than the arithmetic, and so
     # does nonzero on three axes.
-    for first in range(0, len(states), _FUTURES_AT_ONCE):
+    pairs = states.shape[1] * users.shape[2]
+    for first in range(0, max(len(states), 1), _FUTURES_AT_ONCE):
         rows = slice(first, first + _FUTURES_AT_ONCE)
         distance = users[rows, :, :, 0] - centre[rows, :, None, 0]
         np.square(distance, out=distance)
@@ -172,7 +173,7 @@ def _near(
         np.square(across, out=across)
         distance += across
         close = np.flatnonzero(distance < reach_square[rows, None])
-        near.append(close + first * distance[0].size)
+        near.append(close + first * pairs)
     future, tick, user = np.unravel_index(np.concatenate(near), users.shape[:3])
     return future, tick, user
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
+from contracts.vehicle import Parameter, VehicleParameters
 
 
 class ForceLag:
@@ -47,3 +48,14 @@ def lags_of_force(vehicle: VehicleParameters) -> bool:
     """Whether drive or brakes of `vehicle` are anything but immediate."""
     late = (vehicle.drive_lag_s, vehicle.brake_lag_s, vehicle.accel_delay_s)
     return any(parameter.value > 0.0 for parameter in late)
+
+
+def without_lags(vehicle: VehicleParameters) -> VehicleParameters:
+    """Return `vehicle` with actuators that follow at once, but for the delay of the steering.
+
+    For commands that were estimated from the motion: these have the lags in them already.
+    """
+    none = Parameter(0.0, None, "commands estimated from the motion have the lags in them")
+    return msgspec.structs.replace(
+        vehicle, drive_lag_s=none, brake_lag_s=none, accel_delay_s=none, steering_lag_s=none
+    )

@@ -5,6 +5,7 @@ import pytest
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
+from sim_worker.mirror_world import MirrorWorld
 from sim_worker.stage import Stage
 from sim_worker.vehicle.lag import ForceLag, lags_of_force
 from sim_worker.vehicle.parameters import load_vehicle
@@ -67,3 +68,26 @@ def test_tyres_turn_with_the_steering_lag_after_the_delay(lag: float) -> None:
     time_s = TICK_S * np.arange(21)
     wanted = 0.1 * (1 - np.exp(-np.maximum(time_s - 0.1, 0.0) / lag))
     assert tire == pytest.approx(wanted, abs=0.01 * 0.1 + 0.05 * 0.1)
+
+
+def test_the_twin_brakes_with_the_lag_of_its_vehicle() -> None:
+    car = altered(CAR, brake_lag_s=0.3, wheel_inertia_mass_factor=1.0)
+    late, prompt = MirrorWorld(None, car), MirrorWorld(None, car, steering_delay_s=0.0)
+    for twin in (late, prompt):
+        twin.seed_twin(states(1, speed=15.0)[0])
+        for _ in range(100):
+            twin.step(accel_mps2=-4.0, tire_angle_rad=0.0)
+    won = 4.0 * 0.3 * (1 - np.exp(-1.0 / 0.3))
+    assert prompt.twin_state[3] == pytest.approx(11.0, abs=0.01)
+    assert late.twin_state[3] == pytest.approx(11.0 + won, abs=0.01)
+
+
+def test_a_twin_put_back_forgets_the_brakes_it_was_on() -> None:
+    car = altered(CAR, brake_lag_s=0.5, wheel_inertia_mass_factor=1.0)
+    twin = MirrorWorld(None, car)
+    for _ in range(2):
+        twin.seed_twin(states(1, speed=15.0)[0])
+        twin.step(accel_mps2=0.0, tire_angle_rad=0.0)
+        assert twin.twin_state[3] == pytest.approx(15.0)
+        for _ in range(50):
+            twin.step(accel_mps2=-8.0, tire_angle_rad=0.0)
