@@ -9,6 +9,8 @@ from sim_worker.metrics.displacement import known, nowhere
 from sim_worker.metrics.rollout import Measure
 from sim_worker.metrics.scene import Scene
 
+_ROWS = 4
+
 
 def frechet_distance(curves: Array, reference: Array) -> Array:
     """Return (S,) discrete Fréchet distances in metres of curves (S, N, 2) from one (M, 2).
@@ -28,14 +30,19 @@ def warping_distance(curves: Array, reference: Array) -> Array:
 
 
 def _distances(curves: Array, reference: Array) -> Array:
-    """Return (N, M, S) distances in metres of all pairs of points."""
-    squared, across = (
-        np.ascontiguousarray(curves[..., k].T)[:, None] - reference[:, k, None] for k in range(2)
-    )
-    squared *= squared
-    across *= across
-    squared += across
-    return np.sqrt(squared, out=squared)
+    """Return (N, M, S) distances in metres of all pairs of points, a few rows at a time: what
+    stays in the cache takes a third of the time."""
+    x, y = (np.ascontiguousarray(curves[..., k].T)[:, None] for k in range(2))
+    distances = np.empty((len(x), len(reference), len(curves)))
+    for first in range(0, len(x), _ROWS):
+        rows = slice(first, first + _ROWS)
+        squared = np.subtract(x[rows], reference[:, 0, None], out=distances[rows])
+        squared *= squared
+        across = y[rows] - reference[:, 1, None]
+        across *= across
+        squared += across
+        np.sqrt(squared, out=squared)
+    return distances
 
 
 def _cheapest_walk(distances: Array, accumulate: np.ufunc) -> Array:

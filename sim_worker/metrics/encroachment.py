@@ -15,6 +15,7 @@ _CHUNK = 8
 """Steps whose bounding boxes are compared before their lines are."""
 _PARALLEL_SIN = 0.17
 """Ways that never differ by 10° follow or meet each other; they do not cross."""
+_HALF_STEP = 0.5 + 1e-9
 Indices = npt.NDArray[np.intp]
 
 
@@ -137,7 +138,8 @@ def crossings(scene: Scene) -> Crossings:
     turn[np.abs(turn) < 1e-12] = np.nan
     along_ego = (from_x * way_y - from_y * way_x) / turn
     along_other = (from_x * step_y - from_y * step_x) / turn
-    cross = (along_ego >= 0.0) & (along_ego < 1.0) & (along_other >= 0.0) & (along_other < 1.0)
+    # Ends count for both neighbours: a crossing found twice does no harm, one missed does.
+    cross = (np.abs(along_ego - 0.5) <= _HALF_STEP) & (np.abs(along_other - 0.5) <= _HALF_STEP)
     cross &= (there[:, 1:] & there[:, :-1])[:, None]
     pair, a, b = np.nonzero(cross)
     ego_way = np.stack([step_x[pair, a, 0], step_y[pair, a, 0]], axis=-1)

@@ -15,6 +15,7 @@ from contracts.arrays import Array
 from sim_worker.metrics.rollout import Measure
 from sim_worker.metrics.scene import Scene
 
+Indices = npt.NDArray[np.intp]
 _SLOW_MPS = 1.0
 """Below this speed a yaw rate says nothing about the course, which is then taken as straight."""
 _MAX_CURVATURE_PM = 0.25
@@ -34,7 +35,7 @@ class Leaders(NamedTuple):
     widths; speeds (K,) along and across the course; `accel_mps2` (K,) of the other along it.
     """
 
-    row: npt.NDArray[np.intp]
+    row: Indices
     gap_m: Array
     left_m: Array
     reach_m: Array
@@ -123,42 +124,43 @@ def leaders(scene: Scene) -> Leaders:
     users = near.shape[2]
     row = pair // users
 
-    def of_pairs(values: Array) -> Array:
-        return np.asarray(np.broadcast_to(values, near.shape).reshape(-1)[pair])
-
-    kappa, x, inward = of_pairs(curvature), of_pairs(x), of_pairs(inward)
+    future, user = row // scene.states.shape[1], pair - row * users
+    flat = [values.reshape(-1)[pair] for values in (x, inward, sideways, seen.cos, seen.sin)]
+    x, inward, sideways, cos, sin = flat
+    kappa = curvature.reshape(-1)[row]
     straight = np.abs(kappa) < 1e-6
-    safe = np.where(straight, 1.0, kappa)
     angle = np.arctan2(kappa * x, inward)
-    along = np.where(straight, x, angle / safe)
-    left = of_pairs(sideways) / (1.0 + np.hypot(kappa * x, inward))
-    cos, sin = of_pairs(seen.cos), of_pairs(seen.sin)
+    along = np.where(straight, x, angle / np.where(straight, 1.0, kappa))
+    left = sideways / (1.0 + np.hypot(kappa * x, inward))
     turned_cos = cos * np.cos(angle) + sin * np.sin(angle)
     turned_sin = sin * np.cos(angle) - cos * np.sin(angle)
-    a, b = of_pairs(half_length), of_pairs(half_width)
+    a, b = half_length[future, 0, user], half_width[future, 0, user]
     reach = scene.half_width_m + a * np.abs(turned_sin) + b * np.abs(turned_cos)
     front = scene.centre_ahead_m + scene.half_length_m
     gap = along - front - a * np.abs(turned_cos) - b * np.abs(turned_sin)
-    other = of_pairs(seen.speed_mps)
+    other = seen.speed_mps.reshape(-1)[pair]
     kept = (np.abs(left) < reach) & (along > front)
     kept &= (turned_cos >= _ALONG_COS) | (np.abs(other) < _STANDS_MPS)
-    accel = of_pairs(scene.keep(_user_acceleration)) if kept.any() else np.zeros(len(pair))
     return Leaders(
         row=row[kept],
         gap_m=np.maximum(gap[kept], 0.0),
         left_m=left[kept],
         reach_m=reach[kept],
-        ego_mps=np.broadcast_to(speed[..., None], near.shape).reshape(-1)[pair[kept]],
+        ego_mps=speed.reshape(-1)[row[kept]],
         other_mps=(other * turned_cos)[kept],
         other_left_mps=(other * turned_sin)[kept],
-        accel_mps2=(accel * turned_cos)[kept],
+        accel_mps2=_user_acceleration(scene, row[kept], user[kept]) * turned_cos[kept],
     )
 
 
-def _user_acceleration(scene: Scene) -> Array:
-    """Return (S, N, R) accelerations of road users, 0 where they come or go."""
-    accel = np.gradient(scene.rollout.user_speed_mps, scene.time_s, axis=1)
-    return np.nan_to_num(np.asarray(accel, dtype=np.float64))
+def _user_acceleration(scene: Scene, row: Indices, user: Indices) -> Array:
+    """Return the accelerations (K,) of road users, 0 where they come or go."""
+    instants = len(scene.time_s)
+    future, instant = np.divmod(row, instants)
+    before, after = np.maximum(instant - 1, 0), np.minimum(instant + 1, instants - 1)
+    speed = scene.rollout.user_speed_mps
+    gain = speed[future, after, user] - speed[future, before, user]
+    return np.asarray(np.nan_to_num(gain / (scene.time_s[after] - scene.time_s[before])))
 
 
 def _closing(ahead: Leaders) -> Array:

@@ -38,16 +38,19 @@ def minimum_clearance(scene: Scene) -> Measure:
     """Least distance (S,) between the ego's outline and anybody's, infinite where nobody is there.
 
     Boxes are at least as far apart as their centres less the half diagonals, and at most as their
-    centres less the half widths: only pairs that can be the nearest are measured.
+    centres less the half widths: only pairs that can be the nearest are measured. 0 where they
+    touch, be it between instants.
     """
     distance = scene.centre_distance_m
     half_length, half_width = scene.user_half_m
+    touched = scene.keep(impacts).collided
     ego_diagonal = np.hypot(scene.half_length_m, scene.half_width_m)
     least = distance - (np.hypot(half_length, half_width) + ego_diagonal)
     inner = np.minimum(half_length, half_width) + min(scene.half_length_m, scene.half_width_m)
     most = (distance - inner).min(axis=(1, 2), initial=np.inf)
+    most[touched] = -np.inf
     users = least.shape[2]
-    pair = np.flatnonzero((least <= np.maximum(most, 0.0)[:, None, None]) & scene.there)
+    pair = np.flatnonzero((least <= most[:, None, None]) & scene.there)
     row, user = np.divmod(pair, max(users, 1))
     future = row // len(scene.time_s)
     x, y, yaw, _ = (values.reshape(-1)[pair] for values in scene.users)
@@ -61,7 +64,7 @@ def minimum_clearance(scene: Scene) -> Measure:
             2.0 * half_length[future, 0, user], 2.0 * half_width[future, 0, user],
         ),
     )  # fmt: skip
-    found = np.full(len(scene.valid), np.inf)
+    found = np.where(touched, 0.0, np.inf)
     np.minimum.at(found, future, apart)
     return scene.measure(found)
 
@@ -123,21 +126,22 @@ def impacts(scene: Scene) -> Impacts:
     pair = np.flatnonzero(scene.centre_distance_m < reach + _travel_m(scene))
     row, user = np.divmod(pair, max(users, 1))
     future, instant = np.divmod(row, instants)
-    after = np.minimum(instant + 1, instants - 1)
-    x, y, _, _ = scene.users
-    cos, sin = (values[future, instant] for values in scene.heading)
-    here = np.stack([x[future, instant, user], y[future, instant, user]], axis=-1)
-    there = np.stack([x[future, after, user], y[future, after, user]], axis=-1)
-    both = scene.there[future, instant, user]
-    there = np.where((both & scene.there[future, after, user])[:, None], there, here)
-    before = here - scene.centre_m[future, instant]
-    move = there - scene.centre_m[future, after] - before
+    # Where there is no next instant, or nobody at it, nothing moves.
+    goes_on = instant < instants - 1
+    next_row, next_pair = row + goes_on, pair + users * goes_on
+    both, then = (scene.there.reshape(-1)[which] for which in (pair, next_pair))
+    next_row, next_pair = np.where(then, next_row, row), np.where(then, next_pair, pair)
+    x, y = (values.reshape(-1) for values in scene.users[:2])
+    ego_x, ego_y = (np.ascontiguousarray(scene.centre_m[..., k]).reshape(-1) for k in range(2))
+    cos, sin = (values.reshape(-1)[row] for values in scene.heading)
+    move_x = x[next_pair] - x[pair] - (ego_x[next_row] - ego_x[row])
+    move_y = y[next_pair] - y[pair] - (ego_y[next_row] - ego_y[row])
     half_length, half_width = scene.user_half_m
     touch = meeting(
         Pairs(
-            cos * before[:, 0] + sin * before[:, 1], cos * before[:, 1] - sin * before[:, 0],
-            cos * move[:, 0] + sin * move[:, 1], cos * move[:, 1] - sin * move[:, 0],
-            seen.cos[future, instant, user], seen.sin[future, instant, user],
+            seen.ahead_m.reshape(-1)[pair], seen.left_m.reshape(-1)[pair],
+            cos * move_x + sin * move_y, cos * move_y - sin * move_x,
+            seen.cos.reshape(-1)[pair], seen.sin.reshape(-1)[pair],
             (scene.half_length_m, scene.half_width_m),
             (half_length[future, 0, user], half_width[future, 0, user]),
         )
@@ -145,7 +149,7 @@ def impacts(scene: Scene) -> Impacts:
     # In units of the step: 0 at this instant, 1 at the next.
     share = np.maximum(touch.from_s, 0.0)
     hit = both & (touch.from_s <= touch.until_s) & (touch.until_s >= 0.0)
-    hit &= (share < 1.0) & ((instant < after) | (share == 0.0))
+    hit &= share < np.where(goes_on, 1.0, 1e-300)
     return _first(scene, future[hit], instant[hit], user[hit], share[hit])
 
 

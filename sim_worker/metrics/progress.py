@@ -49,8 +49,10 @@ def off_road_share(scene: Scene) -> Measure:
 
     The ground is 0.3 m wider than drawn: nuPlan, drivable_area_compliance.
     """
-    share: Array = scene.keep(_off_road).astype(np.float64).mean(axis=1, keepdims=True)
-    return scene.measure(share[:, 0])
+    off = scene.keep(_off_road)
+    share: Array = np.empty(len(off))
+    np.mean(off, axis=1, out=share)
+    return scene.measure(share)
 
 
 def on_road(scene: Scene) -> Measure:

@@ -130,9 +130,9 @@ class Scene:
         speed = np.array(self.rollout.user_speed_mps, dtype=np.float64)
         if not self.there.all():
             gone = ~self.there
-            x[gone] = _FAR_M
+            np.copyto(x, _FAR_M, where=gone)
             for values in (y, yaw, speed):
-                values[gone] = 0.0
+                np.copyto(values, 0.0, where=gone)
         return x, y, yaw, speed
 
     @functools.cached_property

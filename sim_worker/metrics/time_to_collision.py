@@ -96,8 +96,9 @@ def time_to_collision(scene: Scene) -> Array:
             (scene.half_length_m, scene.half_width_m), scene.user_half_m,
         )
     )  # fmt: skip
-    ahead = (touch.from_s <= touch.until_s) & (touch.until_s >= 0.0)
-    return np.where(ahead, np.maximum(touch.from_s, 0.0), np.inf)
+    until = np.maximum(touch.from_s, 0.0)
+    until[touch.until_s < until] = np.inf
+    return until
 
 
 def ttc_series(scene: Scene) -> Measure:
@@ -129,4 +130,9 @@ def time_integrated(scene: Scene) -> Measure:
 
 
 def _least_at_each_instant(scene: Scene) -> Array:
-    return np.asarray(time_to_collision(scene).min(axis=2, initial=np.inf))
+    until = time_to_collision(scene)
+    least = np.full(until.shape[:2], np.inf)
+    # One road user after another: reducing a short last axis is five times slower.
+    for k in range(until.shape[2]):
+        np.minimum(least, until[..., k], out=least)
+    return least

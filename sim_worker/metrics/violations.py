@@ -61,7 +61,7 @@ def right_of_way_violations(scene: Scene) -> Measure:
         if group is not None:
             colours = [_colour(scene, group, enters[row]) for row in rows]
             rows = rows[[colour in ("green", "unknown", "dark") for colour in colours]]
-        if len(rows):
+        if len(rows) and users:
             wronged[rows] |= _forced(scene, conflict, rows, enters[rows], leaves[rows])
     return scene.measure(wronged.sum(axis=1).astype(np.float64))
 

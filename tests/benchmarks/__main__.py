@@ -25,6 +25,7 @@ BENCHMARKS = (
     "world_monaco_vs_netconvert",
     "world_liechtenstein_vs_netconvert",
     "state_to_result",
+    "metrics_64x80x10",
     "help_startup",
 )
 """Each is a module of this package with a function `measure() -> Measurement`."""

@@ -41,7 +41,7 @@ def steady_poses(mover: Mover, time_s: Array) -> Array:
 
 
 def states_of_centre(poses: Array, time_s: Array, vehicle: VehicleParameters = VEHICLE) -> Array:
-    """(N, 8) states of base_link for poses (N, 3) of the middle of the box, speeds by difference."""
+    """(N, 8) states of base_link for poses (N, 3) of the box's middle, speeds by difference."""
     back = box_centre_from_base_m(vehicle)
     states = np.zeros((len(poses), 8))
     states[:, 0] = poses[:, 0] - back * np.cos(poses[:, 2])
@@ -63,7 +63,8 @@ def rollout(
     users = np.zeros((len(time), len(others), 3))
     for k, other in enumerate(others):
         users[:, k] = steady_poses(other, time)
-    speeds = np.tile([other.speed for other in others], (len(time), 1)).reshape(len(time), -1)
+    speeds = np.tile([float(other.speed) for other in others], (len(time), 1))
+    speeds = speeds.reshape(len(time), -1)
     sizes = np.array([[other.length, other.width] for other in others]).reshape(-1, 2)
     return Rollout(
         time_s=time,

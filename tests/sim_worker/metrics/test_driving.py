@@ -1,0 +1,203 @@
+"""Comfort, progress, drivable ground, rules of the road, and the score."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+import shapely
+
+from contracts.world import Area
+from sim_worker.metrics.ground import DrivableGround
+from sim_worker.metrics.rollout import Rollout
+from sim_worker.metrics.scene import Context
+from sim_worker.metrics.table import METRICS, computable, evaluate
+from sim_worker.planners.path import FrenetPath
+from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context
+from tests.sim_worker.metrics.motions import LENGTH_M, Mover, rollout, times
+from tests.sim_worker.places import box, crossroads, turning_path
+
+HALF_M = LENGTH_M / 2
+
+
+def value(driven: Rollout, name: str, given: Context | None = None) -> float:
+    return float(evaluate(driven, (name,), context=given)[name].values[0])
+
+
+def braking(decel: float) -> np.ndarray:
+    time_s = times()
+    x = 20.0 * time_s - decel * time_s**2 / 2
+    return np.column_stack([x, 0 * x, 0 * x])
+
+
+def test_braking_hard_is_uncomfortable_and_gently_is_not() -> None:
+    gentle, hard = rollout(braking(2.0)), rollout(braking(4.3))
+
+    assert value(gentle, "max_deceleration") == pytest.approx(2.0, abs=0.05)
+    assert value(gentle, "comfortable") == 1.0
+    assert value(hard, "max_deceleration") == pytest.approx(4.3, abs=0.1)
+    assert value(hard, "comfortable") == 0.0
+
+
+def test_a_bend_gives_lateral_acceleration_and_yaw_rate() -> None:
+    time_s, radius, speed = times(), 20.0, 8.0
+    angle = speed / radius * time_s
+    driven = rollout(Mover(0, 0, 0, speed))
+    driven.states[0, :, :3] = np.column_stack(
+        [
+            radius * np.sin(angle),
+            radius * (1 - np.cos(angle)),
+            (angle + np.pi) % (2 * np.pi) - np.pi,
+        ]
+    )
+    driven.states[0, :, 3:6] = (speed, 0.0, speed / radius)
+
+    assert value(driven, "max_lateral_acceleration") == pytest.approx(speed**2 / radius)
+    assert value(driven, "max_yaw_rate") == pytest.approx(speed / radius)
+    assert value(driven, "max_yaw_acceleration") == pytest.approx(0.0, abs=1e-6)
+    assert value(driven, "max_jerk") == pytest.approx(0.0, abs=1e-6)
+
+
+def test_jerk_is_the_rate_of_the_acceleration() -> None:
+    time_s = times()
+    driven = rollout(Mover(0, 0, 0, 5.0))
+    driven.states[0, :, 3] = 5.0 + 0.5 * 0.8 * time_s**2
+
+    assert value(driven, "max_longitudinal_jerk") == pytest.approx(0.8, abs=1e-6)
+
+
+def test_progress_counts_along_the_path_and_backwards_is_told() -> None:
+    path = FrenetPath(turning_path().xy_m)
+    along = path.pose_at(np.linspace(20.0, 90.0, 81))
+    poses = np.column_stack([along.xy_m, along.yaw_rad])
+    driven = rollout(Mover(0, 0), futures=2)
+    driven.states[0, :, :3] = poses
+    driven.states[1, :, :3] = poses[::-1]
+
+    found = evaluate(driven, ("progress", "backwards"), context=Context(path=path))
+
+    assert found["progress"].values == pytest.approx([70.0, -70.0], abs=0.1)
+    assert found["backwards"].values == pytest.approx([0.0, 70.0], abs=0.1)
+
+
+def test_ground_beyond_the_tolerance_and_islands_are_not_driven_on() -> None:
+    island = Area(id="refuge", outline=box(40.0, 0.0, 3.0, 1.0).outline)
+    ground = DrivableGround(msgspec.structs.replace(crossroads(), islands=(island,)))
+    x = np.array([0.0, 60.0, 60.0, 60.0, 30.0, 40.0, 40.0, 1e6])
+    y = np.array([0.0, 3.9, 4.29, 4.31, 30.0, 0.0, 0.8, 0.0])
+
+    expected = [True, True, True, False, False, False, True, False]
+
+    assert ground.contains(x, y).tolist() == expected
+    assert ground.contains(x, y).tolist() == expected
+    assert ground.contains(x[::-1], y[::-1]).tolist() == expected[::-1]
+
+
+def test_look_up_says_what_the_polygon_says() -> None:
+    ground = DrivableGround(crossroads())
+    random = np.random.default_rng(0)
+    x, y = random.uniform(-160, 160, (2, 4000))
+    exact = shapely.intersects_xy(ground.surface, x, y).tolist()
+
+    assert ground.contains(x, y).tolist() == exact
+
+
+def test_leaving_the_road_is_told_by_its_share() -> None:
+    given = context()
+    stays = rollout(Mover(-50, -1.5, 0, 8))
+    leaves = rollout(Mover(-50, -1.5, -0.1, 8))
+
+    assert value(stays, "off_road_share", given) == 0.0
+    assert value(stays, "on_road", given) == 1.0
+    assert 0.3 < value(leaves, "off_road_share", given) < 1.0
+    assert value(leaves, "on_road", given) == 0.0
+
+
+def crossing_at(time_s: float) -> Mover:
+    """An ego whose front is at the stop line at `time_s`."""
+    return Mover(STOP_X - HALF_M - 10.0 * time_s, -1.5, 0.0, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("start_s", "violations"),
+    [(0.0, 0), (GREEN_S - 2.1, 0), (GREEN_S + AMBER_S - 2.1, 0), (GREEN_S + AMBER_S - 1.9, 1)],
+)
+def test_crossing_the_line_at_red_is_a_violation(start_s: float, violations: int) -> None:
+    given = context(lights=True, start_s=start_s)
+
+    assert value(rollout(crossing_at(2.0)), "red_light_violations", given) == violations
+
+
+def test_stopping_before_the_line_or_turning_off_elsewhere_is_none() -> None:
+    given = context(lights=True, start_s=GREEN_S + AMBER_S)
+    stops = rollout(Mover(STOP_X - HALF_M - 0.2, -1.5))
+    other_way = rollout(Mover(40.0, 1.5, math.pi, 10.0))
+
+    assert value(stops, "red_light_violations", given) == 0.0
+    assert value(other_way, "red_light_violations", given) == 0.0
+
+
+def test_a_path_takes_the_connection_it_runs_along() -> None:
+    rules = context().rules
+    assert rules is not None
+    assert rules.connections == ("east",)
+    assert [line.line_id for line in rules.lines] == ["stop"]
+    assert [c.other_id for c in rules.conflicts] == ["north", "south"]
+
+
+def test_forcing_who_has_priority_to_brake_is_a_violation() -> None:
+    """The ego is on the shared ground from 2.5 to 2.5 s + (length + 2 m) / 8."""
+    given = context()
+    ego = Mover(0.5 - HALF_M - 8.0 * 2.5, -1.5, 0.0, 8.0)
+
+    def from_south(seconds: float, speed: float = 10.0) -> Mover:
+        """Whose front is at the shared ground at that time."""
+        return Mover(1.5, -2.5 - 2.0 - speed * seconds, math.pi / 2, speed)
+
+    near = rollout(ego, from_south(2.9))
+    far = rollout(ego, from_south(6.0))
+    gone = rollout(ego, from_south(1.0))
+    both = rollout(ego, from_south(2.9), Mover(-1.5, -0.5 + 2.0 + 30.0, -math.pi / 2, 10.0))
+
+    assert value(near, "right_of_way_violations", given) == 1.0
+    assert value(far, "right_of_way_violations", given) == 0.0
+    assert value(gone, "right_of_way_violations", given) == 0.0
+    assert value(both, "right_of_way_violations", given) == 2.0
+
+
+def test_who_has_red_has_no_priority() -> None:
+    given = context(lights=True, start_s=0.0)
+    ego = Mover(0.5 - HALF_M - 8.0 * 2.5, -1.5, 0.0, 8.0)
+    late = rollout(ego, Mover(1.5, -33.0, math.pi / 2, 10.0))
+
+    assert value(late, "right_of_way_violations", given) == 0.0
+    assert value(late, "right_of_way_violations", context()) == 1.0
+
+
+def test_the_score_weighs_progress_and_is_closed_by_a_collision() -> None:
+    given = context()
+    fast, slow = rollout(Mover(-50, -1.5, 0, 10)), rollout(Mover(-50, -1.5, 0, 5))
+    crashes = rollout(Mover(-50, -1.5, 0, 10), Mover(0, -1.5))
+    together = fast._replace(
+        states=np.concatenate([fast.states, slow.states]),
+        users=np.zeros((2, 81, 0, 3)), user_speed_mps=np.zeros((2, 81, 0)),
+        user_size_m=np.zeros((2, 0, 2)), valid=np.ones(2, dtype=bool),
+    )  # fmt: skip
+
+    score = evaluate(together, ("driving_score",), context=given)["driving_score"].values
+
+    assert score == pytest.approx([1.0, (5 + 2.5 + 2) / 12], abs=1e-3)
+    assert value(crashes, "driving_score", given) == 0.0
+
+
+def test_the_table_says_what_is_computable() -> None:
+    assert "ttc" in computable(Context())
+    assert "ade" not in computable(Context())
+    given = context()._replace(reference=np.zeros((81, 3)), user_mass_kg=np.zeros((1, 0)))
+    assert computable(given) == tuple(METRICS)
+    driven = rollout(Mover(-50, -1.5, 0, 8), futures=1)
+    for name, measure in evaluate(driven, context=given).items():
+        shape = (1, 81) if METRICS[name].series else (1,)
+        assert measure.values.shape == measure.valid.shape == shape, name

@@ -1,0 +1,219 @@
+"""Time to collision, encroachment, headway and required decelerations against closed forms."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from contracts.arrays import Array
+from sim_worker.metrics.rollout import Rollout
+from sim_worker.metrics.table import evaluate
+from sim_worker.overlap import Rectangles, clearance
+from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
+
+FROZEN = json.loads((Path(__file__).parents[2] / "data/metrics/crime.json").read_text())
+HALF_M = LENGTH_M / 2
+speeds = st.floats(2.0, 25.0)
+sizes = st.tuples(st.floats(0.5, 12.0), st.floats(0.4, 2.5))
+yaws = st.floats(-math.pi, math.pi)
+
+
+def value(driven: Rollout, name: str) -> float:
+    return float(evaluate(driven, (name,))[name].values[0])
+
+
+def values(driven: Rollout, *names: str) -> dict[str, float]:
+    return {name: float(found.values[0]) for name, found in evaluate(driven, names).items()}
+
+
+def turned(mover: Mover, yaw: float) -> Mover:
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return mover._replace(
+        x=cos * mover.x - sin * mover.y, y=sin * mover.x + cos * mover.y, yaw=mover.yaw + yaw
+    )
+
+
+@settings(max_examples=60)
+@given(speeds, speeds, st.floats(20.0, 60.0), sizes, yaws)
+def test_following_in_any_direction(
+    speed: float, leader_mps: float, ahead: float, size: tuple[float, float], yaw: float
+) -> None:
+    ego, leader = Mover(0, 0, 0, speed), Mover(ahead, 0.3, 0, leader_mps, *size)
+    driven = rollout(turned(ego, yaw), turned(leader, yaw), time_s=times(0.1))
+    gap, closing = ahead - HALF_M - size[0] / 2, speed - leader_mps
+    gaps = gap - closing * times(0.1)
+
+    found = values(
+        driven, "thw", "ttc", "drac", "required_deceleration", "required_lateral_acceleration",
+        "required_acceleration",
+    )  # fmt: skip
+
+    assert found["thw"] == pytest.approx(gaps.min() / speed, abs=1e-6)
+    if closing > 1e-3:
+        until = gaps.min() / closing
+        brake, swerve = closing / (2 * until), 2 * ((WIDTH_M + size[1]) / 2 - 0.3) / until**2
+        assert found["ttc"] == pytest.approx(until, rel=1e-6)
+        assert found["drac"] == pytest.approx(brake, abs=1e-6)
+        assert found["required_deceleration"] == pytest.approx(brake, abs=1e-6)
+        assert found["required_lateral_acceleration"] == pytest.approx(swerve, rel=1e-6)
+        assert found["required_acceleration"] == pytest.approx(math.hypot(brake, swerve), rel=1e-6)
+    elif closing <= 0.0:
+        assert found["drac"] == pytest.approx(0.0, abs=1e-6)
+        assert found["ttc"] > 1e4
+
+
+@settings(max_examples=60)
+@given(speeds, speeds, st.floats(15.0, 70.0), st.floats(15.0, 70.0), sizes, yaws)
+def test_crossing_at_right_angles(
+    speed: float, other_mps: float, away: float, other_away: float, size: tuple[float, float],
+    yaw: float,
+) -> None:  # fmt: skip
+    ego, other = Mover(-away, 0, 0, speed), Mover(0, -other_away, math.pi / 2, other_mps, *size)
+    time_s = times(60.0, 0.25)
+    driven = rollout(turned(ego, yaw), turned(other, yaw), time_s=time_s)
+    enters = (away - HALF_M - size[1] / 2) / speed
+    leaves = (away + HALF_M + size[1] / 2) / speed
+    comes = (other_away - size[0] / 2 - WIDTH_M / 2) / other_mps
+    goes = (other_away + size[0] / 2 + WIDTH_M / 2) / other_mps
+    assume(leaves < time_s[-1] and goes < time_s[-1])
+    # Whole steps on the other's path: what is between two instants is not seen.
+    assume(leaves - enters > 0.25 and goes - comes > 0.25)
+    pet = max(comes - leaves, enters - goes, 0.0)
+
+    found = evaluate(driven, ("pet", "ttc_series"))
+    first = found["ttc_series"].values[0, 0]
+    assert found["pet"].values == pytest.approx([pet], abs=1e-6)
+    if pet > 0.0:
+        assert first == math.inf
+    else:
+        assert first == pytest.approx(max(comes, enters), abs=1e-6)
+
+
+@settings(max_examples=60)
+@given(st.floats(-3.0, 3.0), yaws, speeds, sizes)
+def test_time_to_collision_is_when_outlines_come_to_touch(
+    aim: float, yaw: float, speed: float, size: tuple[float, float]
+) -> None:
+    """Whatever the angle: a standing ego, and who comes from 30 m away past its middle."""
+    away = 30.0
+    other = Mover(
+        -away * math.cos(yaw) - aim * math.sin(yaw), -away * math.sin(yaw) + aim * math.cos(yaw),
+        yaw, speed, *size,
+    )  # fmt: skip
+    found = evaluate(rollout(Mover(0, 0), other, time_s=times(0.1)), ("ttc_series",))
+    ttc = found["ttc_series"].values[0, 0]
+    ego = Rectangles(np.zeros(2), np.zeros(()), LENGTH_M, WIDTH_M)
+
+    def apart(time_s: float) -> float:
+        way = speed * time_s
+        centre = np.array([other.x + way * math.cos(yaw), other.y + way * math.sin(yaw)])
+        return float(clearance(ego, Rectangles(centre, np.asarray(yaw), *size)))
+
+    if math.isfinite(ttc):
+        assert apart(ttc) == pytest.approx(0.0, abs=1e-6)
+        assert apart(ttc - 1e-3) > 0.0
+    else:
+        assert min(apart(t) for t in np.linspace(0.0, 60.0 / speed, 300)) > 0.0
+
+
+@pytest.mark.parametrize(("name", "scene"), FROZEN["scenes"].items())
+def test_ten_scenes_are_what_commonroad_crime_finds(name: str, scene: dict[str, object]) -> None:
+    """It works with whole steps and rounds to 0.01."""
+    step_s, found = FROZEN["step_s"], scene["found"]
+    expected = {
+        key: math.inf if value is None else abs(value)
+        for key, value in found.items()  # type: ignore[attr-defined]
+    }
+    if "PET" in expected:
+        driven = frozen_rollout(scene, times(FROZEN["until_s"], step_s))
+        assert value(driven, "pet") == pytest.approx(expected["PET"], abs=2 * step_s)
+        return
+    driven = frozen_rollout(scene, np.array([0.0, 1e-6]))
+    # Theirs follows the leader's rear of now with the ego's later states, in whole steps.
+    assert value(driven, "thw") == pytest.approx(expected["THW"], abs=step_s + 0.005)
+    if name == "faster_leader":
+        # Theirs squares the speed at which the gap grows.
+        assert value(driven, "required_acceleration") == 0.0
+        return
+    assert value(driven, "required_deceleration") == pytest.approx(expected["ALongReq"], abs=0.0051)
+    if name != "accelerating_leader":
+        # There theirs is the time with constant accelerations. Below it enters rounded.
+        assert value(driven, "ttc") == pytest.approx(expected["TTC"], abs=0.0051)
+        for ours, theirs in (
+            ("required_lateral_acceleration", "ALatReq"), ("required_acceleration", "AReq"),
+        ):  # fmt: skip
+            assert value(driven, ours) == pytest.approx(expected[theirs], abs=0.0071)
+
+
+def frozen_rollout(scene: dict[str, object], time_s: Array) -> Rollout:
+    x, y, yaw, speed, _ = scene["ego"]  # type: ignore[misc]
+    ox, oy, other_yaw, other_mps, accel, length, width = scene["other"]  # type: ignore[misc]
+    other = Mover(ox, oy, other_yaw, other_mps, length, width)
+    driven = rollout(Mover(x, y, yaw, speed), other, time_s=time_s)
+    way = accel * time_s**2 / 2
+    driven.users[0, :, 0, 0] += way * math.cos(other_yaw)
+    driven.users[0, :, 0, 1] += way * math.sin(other_yaw)
+    driven.user_speed_mps[0, :, 0] += accel * time_s
+    size = scene["ego_size_m"]
+    changed = {
+        "length_m": msgspec.structs.replace(VEHICLE.length_m, value=size[0]),  # type: ignore[index]
+        "width_m": msgspec.structs.replace(VEHICLE.width_m, value=size[1]),  # type: ignore[index]
+    }
+    vehicle = msgspec.structs.replace(VEHICLE, **changed)
+    moved = VEHICLE.length_m.value / 2 - size[0] / 2  # type: ignore[index]
+    driven.states[0, :, 0] += moved * math.cos(yaw)
+    driven.states[0, :, 1] += moved * math.sin(yaw)
+    return driven._replace(vehicle=vehicle)
+
+
+def test_who_comes_towards_or_crosses_is_no_leader() -> None:
+    oncoming = rollout(Mover(0, 0, 0, 10), Mover(60, 0, math.pi, 10), time_s=times(1.0))
+    crossing = rollout(Mover(0, 0, 0, 10), Mover(30, -2, math.pi / 2, 4), time_s=times(1.0))
+    beside = rollout(Mover(0, 0, 0, 10), Mover(20, 3.2, 0, 5), time_s=times(1.0))
+    behind = rollout(Mover(0, 0, 0, 10), Mover(-20, 0, 0, 15), time_s=times(1.0))
+
+    for driven in (oncoming, crossing, beside, behind):
+        assert value(driven, "thw") == math.inf
+        assert value(driven, "drac") == 0.0
+
+
+def test_a_leader_in_a_bend_is_found_along_the_bend() -> None:
+    time_s, radius, speed = times(1.0), 30.0, 9.0
+    angle = speed * time_s / radius
+    base = np.column_stack([radius * np.sin(angle), radius * (1 - np.cos(angle)), angle])
+    driven = rollout(Mover(0, 0, 0, speed), Mover(0, 0, 0, speed), time_s=time_s)
+    driven.states[0, :, :3] = base
+    driven.states[0, :, 3:6] = (speed, 0.0, speed / radius)
+    ahead = angle + 1.0
+    driven.users[0, :, 0] = np.column_stack(
+        [radius * np.sin(ahead), radius * (1 - np.cos(ahead)), ahead]
+    )
+    front = LENGTH_M - VEHICLE.rear_overhang_m.value
+
+    assert value(driven, "thw") == pytest.approx((radius * 1.0 - front - 2.0) / speed, abs=1e-6)
+
+
+def test_exposure_counts_the_time_below_the_threshold() -> None:
+    driven = rollout(
+        Mover(0, 0, 0, 10), Mover(12 + HALF_M, 0, 0, 5, length=4), time_s=times(1.0, 0.01)
+    )
+
+    # The gap of 10 m lasts for 2 s: after half a second less than 1.5 s are left.
+    assert value(driven, "ttc") == pytest.approx(1.0)
+    assert value(driven, "time_exposed") == pytest.approx(0.5, abs=0.011)
+    assert value(driven, "time_integrated") == pytest.approx(0.125, abs=0.006)
+
+
+def test_ways_that_do_not_cross_have_no_encroachment() -> None:
+    parallel = rollout(Mover(0, 0, 0, 10), Mover(10, 3, 0, 8))
+    waits = rollout(Mover(0, 0, 0, 10), Mover(30, -8, math.pi / 2, 0))
+
+    assert value(parallel, "pet") == math.inf
+    assert value(waits, "pet") == math.inf
