@@ -10,19 +10,21 @@ import numpy as np
 import shapely
 
 from contracts.arrays import Array
+from contracts.frames import wrap_angle
 from contracts.scenario import Scenario
 from contracts.world import Lane
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.places import Place
 from sim_worker.scenarios.relations import ways_over
 from sim_worker.scenarios.roads import APPROACH_M, DEPARTURE_M, RoadNetwork, Way
-from world_gen.polyline import arc_lengths
+from world_gen.polyline import arc_lengths, points_at
 
 _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
 _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")
 _LEAST_M = {"motorway": 120.0, "road": 60.0, "circuit": 150.0, "parking_bay": 32.0}
 _END_M = 10.0
 _ON_LANE_M = 2.5
+_JOINT_M = 1.5
 
 _BAY_RADIUS_M = 6.0
 """Of the rear axle's path: a compact car turns within 10.5 to 11 m from kerb to kerb."""
@@ -101,22 +103,44 @@ def _stretches(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
 
 
 def _laps(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
-    """Yield the way along each race track: round once and on, or as far as the World has it."""
+    """Yield the way along each race track: round once and on, or as far as the World has it.
+
+    Of a track on which nothing else meets, the map tells not where it begins: lanes whose ends lie
+    at another's start go on there, connected or not.
+    """
     left = {lane.id: lane for lane in sorted(lanes, key=lambda lane: lane.id)}
+    onward = {id_: _onward(left[id_], left, network) for id_ in left}
+    before = {then[-1]: id_ for id_, then in onward.items() if then}
     while left:
-        first = next(iter(left))
-        chain = [first]
-        while (after := network.onward(chain[-1], among=left, passed=chain)) is not None:
-            chain.append(after)
-        while (before := network.backward(chain[0], among=left, passed=chain)) is not None:
-            chain.insert(0, before)
-        for id_ in chain:
-            left.pop(id_, None)
-        closed = chain[0] in network.after(chain[-1])
-        name = f"lap from {chain[0]}" if closed else f"part of a lap from {chain[0]}"
-        way = network.way_along(name, before=[], middle=chain, after=chain if closed else [])
+        first = start = next(iter(left))
+        while before.get(first) in left and before[first] != start:
+            first = before[first]
+        chain, lane_id = [first], first
+        while (then := onward[lane_id]) and then[-1] != first and then[-1] in left:
+            left.pop(lane_id)
+            chain.extend(then)
+            lane_id = then[-1]
+        closed = bool(then) and then[-1] == first
+        left.pop(lane_id)
+        after = [*then[:-1], *chain] if closed else []
+        name = f"{'lap' if closed else 'part of a lap'} from {first}"
+        way = network.way_along(name, before=[], middle=chain, after=after)
         entry = way.first_m + min(APPROACH_M, (way.last_m - way.first_m) / 2.0)
         yield way._replace(entry_m=max(entry, APPROACH_M))
+
+
+def _onward(lane: Lane, among: dict[str, Lane], network: RoadNetwork) -> list[str]:
+    """Return what follows on a lane: the next lane, last, and the connection to it, if any."""
+    for after in network.after(lane.id):
+        if after in among:
+            return [after]
+        for then in network.after(after):
+            if then in among:
+                return [after, then]
+    end = lane.centerline[-1]
+    apart = {id_: float(np.hypot(*(other.centerline[0] - end))) for id_, other in among.items()}
+    nearest = min(apart, key=lambda id_: apart[id_])
+    return [nearest] if apart[nearest] <= _JOINT_M else []
 
 
 def _live(path: FrenetPath, arc_m: float, lanes: list[Lane]) -> Way | None:
@@ -161,13 +185,13 @@ def _no_bay(lane: Lane, network: RoadNetwork) -> str:
         return "nobody parks at fast roads"
     if (lane.right_id if network.near_sign > 0.0 else lane.left_id) is not None:
         return "another lane lies between"
-    arc = arc_lengths(lane.centerline)
-    if arc[-1] < _LEAST_M["parking_bay"]:
+    half = _LEAST_M["parking_bay"] / 2.0
+    middle = float(arc_lengths(lane.centerline)[-1]) / 2.0
+    if middle < half:
         return f"shorter than {_LEAST_M['parking_bay']:g} m"
-    middle = FrenetPath(lane.centerline).pose_at(
-        arc[-1] / 2.0 + np.arange(-_LEAST_M["parking_bay"] / 2.0, _LEAST_M["parking_bay"] / 2.0)
-    )
-    return "not straight" if float(np.ptp(middle.yaw_rad)) > _BEND_RAD else ""
+    steps = np.diff(points_at(lane.centerline, middle + np.linspace(-half, half, 9)), axis=0)
+    turn = wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0])))
+    return "not straight" if float(np.abs(np.cumsum(turn)).max()) > _BEND_RAD else ""
 
 
 class _Bay:

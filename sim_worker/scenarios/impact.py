@@ -23,9 +23,13 @@ from sim_worker.planners.path import FrenetPath
 TOLERANCE_M = 0.08
 """How far from its plan the first touch may be, in place and from the front's point."""
 _SPACING_M = 0.25
-_TICK_S = 0.02
+_TICK_S, _EARLY_TICK_S = 0.02, 0.1
+_FINE_FOR_S = 0.6
+"""Ticks are fine just before the end of a search: there, boxes come near each other."""
 _AFTER_S = 0.06
 _BISECTIONS = 9
+_PRESS_S, _BRUSH_M = 0.1, 0.04
+"""So soon after the touch boxes overlap by more than half of this, or they merely brush."""
 _OUTLINE = np.array([
     (0.25, 0.5), (0.25, -0.5), (0.0, 0.5), (0.0, -0.5), (0.5, 0.5), (0.5, -0.5), (0.5, 0.0),
     (0.5, 0.25), (0.5, -0.25), (-0.25, 0.5), (-0.25, -0.5), (-0.5, 0.5), (-0.5, -0.5),
@@ -142,16 +146,31 @@ def find_impact(
     touch = first_touch(
         ego, box, actor, traits, ego_arc_m=ego_arc - ego.speed_mps * lead_time_s,
         actor_arc_m=actor_arc - actor.speed_mps * lead_time_s, until_s=lead_time_s + _AFTER_S,
+        early_ticks=True,
     )  # fmt: skip
     planned = front_point(ego, box, ego_arc, share, near_sign)
     met = front_point(ego, box, touch.ego_arc_m, share, near_sign)
     good = np.isfinite(touch.time_s) & (np.hypot(*(met - planned).T) <= TOLERANCE_M)
     good &= gap_m(met, actor, traits, touch.actor_arc_m) <= TOLERANCE_M
+    good &= _goes_on(ego, box, actor, traits, touch)
     if not good.any():
         return None
     order = np.lexsort((ego_arc, which, ~good))
     best = int(order[0])
     return Impact(float(ego_arc[best]), float(actor_arc[best]), planned[best], share)
+
+
+def _goes_on(
+    ego: Moving, box: EgoBox, actor: Moving, traits: KindTraits, touch: Touch
+) -> npt.NDArray[np.bool_]:
+    """Return (C,) whether boxes press into each other after the touch, and do not merely brush."""
+    smaller = traits._replace(
+        length_m=traits.length_m - _BRUSH_M, width_m=traits.width_m - _BRUSH_M
+    )
+    return overlapping(
+        ego_rectangles(ego, box, touch.ego_arc_m + ego.speed_mps * _PRESS_S),
+        rectangles(actor, smaller, touch.actor_arc_m + actor.speed_mps * _PRESS_S),
+    )
 
 
 def _meetings(front: Array, x: Array, y: Array) -> tuple[npt.NDArray[np.intp], Array, Array] | None:
@@ -194,9 +213,16 @@ def first_touch(
     ego_arc_m: Array,
     actor_arc_m: Array,
     until_s: float,
+    early_ticks: bool = False,
 ) -> Touch:
-    """Return the first touch of boxes that start at arc lengths (C,) and keep their speeds."""
-    ticks = np.arange(0.0, until_s + _TICK_S, _TICK_S)
+    """Return the first touch of boxes that start at arc lengths (C,) before `until_s`.
+
+    With `early_ticks` only what happens shortly before the end is looked at closely.
+    """
+    fine_from_s = max(0.0, until_s - _FINE_FOR_S) if early_ticks else 0.0
+    ticks = np.concatenate(
+        [np.arange(0.0, fine_from_s, _EARLY_TICK_S), np.arange(fine_from_s, until_s, _TICK_S)]
+    )
 
     def touching(time_s: Array, rows: slice | npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
         ego_at = ego_arc_m[rows, None] + ego.travelled_m(time_s)

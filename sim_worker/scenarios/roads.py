@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -301,32 +301,6 @@ class RoadNetwork:
     def after(self, id_: str) -> tuple[str, ...]:
         """Return the lanes and connections that begin where a lane or connection ends."""
         return tuple(self._out_of.get(id_, ()))
-
-    def onward(self, id_: str, *, among: Container[str], passed: Container[str]) -> str | None:
-        """Return the straightest way on to a lane `among` these, or to a connection to one."""
-        return self._straightest(id_, self._out_of, among, passed)
-
-    def backward(self, id_: str, *, among: Container[str], passed: Container[str]) -> str | None:
-        """Return the straightest way back, as `onward` does."""
-        return self._straightest(id_, self._into, among, passed)
-
-    def _straightest(
-        self,
-        id_: str,
-        links: dict[str, list[str]],
-        among: Container[str],
-        passed: Container[str],
-    ) -> str | None:
-        found = [
-            other
-            for other in links.get(id_, ())
-            if other not in passed
-            and (other in among or any(lane in among for lane in links.get(other, ())))
-        ]
-        line = self._line(id_)
-        if links is self._into:
-            return min(found, key=lambda i: _bend(self._line(i), line), default=None)
-        return min(found, key=lambda i: _bend(line, self._line(i)), default=None)
 
     def _drivable(self, id_: str) -> bool:
         if id_ in self.lanes:

@@ -1,0 +1,72 @@
+"""Cases: every combination of listed values, ranges filled evenly, the same from the same seed."""
+
+from __future__ import annotations
+
+import collections
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contracts.scenario import ActorPart, EgoPart, Scenario, Span
+from sim_worker.scenarios.drawing import draw_cases
+from sim_worker.scenarios.reading import catalogue
+
+
+def scenario(ego: Span | float = 5.0, other: Span | float = 8.0, **more: int) -> Scenario:
+    actors = (ActorPart(name="other", relation="oncoming", speed_mps=other),)
+    return Scenario(
+        id="x", title="x", shows="x.", source="x", ego=EgoPart(speed_mps=ego), actors=actors, **more
+    )  # type: ignore[arg-type]
+
+
+def test_listed_values_are_combined_fully() -> None:
+    cases = draw_cases(catalogue()["ccftap"])
+    pairs = [(c["ego.speed_mps"], c["oncoming_car.speed_mps"]) for c in cases]
+    assert len(pairs) == len(set(pairs)) == 9
+    assert set(pairs) == set(itertools.product({p[0] for p in pairs}, {p[1] for p in pairs}))
+
+
+def test_every_number_of_a_case_has_a_name() -> None:
+    case = draw_cases(scenario())[0]
+    assert case["ego.speed_mps"] == 5.0
+    assert case["other.gap_m"] == 20.0
+    assert case["faults.friction_factor"] == 1.0
+    assert all(type(value) is float for value in case.values())
+
+
+def test_samples_are_drawn_for_each_combination() -> None:
+    cases = draw_cases(scenario(Span(values=(1.0, 2.0, 3.0)), Span(min=4.0, max=6.0), samples=5))
+    counted = collections.Counter(case["ego.speed_mps"] for case in cases)
+    assert counted == {1.0: 5, 2.0: 5, 3.0: 5}
+    assert len({case["other.speed_mps"] for case in cases}) == 15
+
+
+@given(seed=st.integers(0, 2**31), other=st.integers(0, 2**31))
+def test_the_seed_alone_decides(seed: int, other: int) -> None:
+    drawn = draw_cases(catalogue()["scp"], seed=seed)
+    assert drawn == draw_cases(catalogue()["scp"], seed=seed)
+    if other != seed:
+        assert drawn != draw_cases(catalogue()["scp"], seed=other)
+
+
+@given(seed=st.integers(0, 2**31), low=st.floats(0.0, 10.0), width=st.floats(0.1, 10.0))
+def test_ranges_are_filled_evenly(seed: int, low: float, width: float) -> None:
+    """Each 16th of the range holds exactly one of 16 draws, as Sobol's sequence promises."""
+    cases = draw_cases(scenario(other=Span(min=low, max=low + width), samples=16), seed=seed)
+    shares = (np.array([case["other.speed_mps"] for case in cases]) - low) / width
+    assert sorted(np.clip(shares * 16.0, 0.0, 15.999).astype(int).tolist()) == list(range(16))
+
+
+def test_normal_numbers_have_their_mean_and_stay_within_bounds() -> None:
+    span = Span(mean=10.0, std=2.0, min=7.0, max=13.0)
+    drawn = np.array(
+        [case["other.speed_mps"] for case in draw_cases(scenario(other=span, samples=512))]
+    )
+    assert drawn.min() >= 7.0
+    assert drawn.max() <= 13.0
+    assert drawn.mean() == pytest.approx(10.0, abs=0.05)
+    # Of a normal distribution cut at 1.5 standard deviations: 2 · √(1 - 3 φ(1.5) / (2 Φ(1.5) - 1)).
+    assert drawn.std() == pytest.approx(2.0 * 0.7423, abs=0.05)

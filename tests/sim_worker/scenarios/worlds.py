@@ -1,0 +1,70 @@
+"""Small Worlds to place scenarios in, each built once."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+from contracts.frames import GeoPoint
+from contracts.world import World
+from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, roundabout, world_of
+from world_gen.build import build_region
+from world_gen.build_graph import build_road_graph
+
+SIGNALS = {"highway": "traffic_signals"}
+ROAD = {"highway": "secondary", "name": "High Road", "lanes": "2"}
+
+
+@functools.cache
+def cross(*, left_hand: bool = False, signals: bool = False) -> World:
+    """Four arms of 100 m to the east, north, west and south."""
+    tags = {0: SIGNALS} if signals else None
+    return world_of(crossing(origin=_origin(left_hand), node_tags=tags))
+
+
+@functools.cache
+def tee(bearings_deg: tuple[float, ...] = (0.0, 180.0, 270.0), *, left_hand: bool = False) -> World:
+    """Arms of 120 m at these bearings, counter-clockwise from east."""
+    nodes = {0: (0.0, 0.0)}
+    for i, bearing in enumerate(bearings_deg, start=1):
+        angle = math.radians(bearing)
+        nodes[i] = (120.0 * math.cos(angle), 120.0 * math.sin(angle))
+    ways = [
+        (10 + i, [i, 0], {"highway": "residential", "name": f"Arm {i}"}) for i in list(nodes)[1:]
+    ]
+    return world_of(drawn_map(nodes, ways, origin=_origin(left_hand)))
+
+
+@functools.cache
+def ring(*, left_hand: bool = False) -> World:
+    return world_of(roundabout(origin=_origin(left_hand), clockwise=left_hand))
+
+
+@functools.cache
+def motorway() -> World:
+    """Two lanes to the east, a slip road that leaves them, 600 m in all."""
+    nodes = {1: (-300.0, 0.0), 2: (0.0, 0.0), 3: (300.0, 0.0), 4: (250.0, -40.0), 5: (60.0, -6.0)}
+    tags = {"highway": "motorway", "lanes": "2", "oneway": "yes", "maxspeed": "130"}
+    link = {"highway": "motorway_link", "oneway": "yes", "lanes": "1"}
+    osm = drawn_map(nodes, [(1, [1, 2, 3], tags), (2, [2, 5, 4], link)])
+    return build_region(osm, build_road_graph(osm), osm.bounds)
+
+
+@functools.cache
+def race_track() -> World:
+    """An oval, 300 m by 120 m."""
+    nodes = {}
+    for i in range(48):
+        angle = 2 * math.pi * i / 48
+        nodes[100 + i] = (
+            90.0 * math.copysign(1.0, math.cos(angle)) * (abs(math.cos(angle)) > 1e-9)
+            + 60.0 * math.cos(angle),
+            60.0 * math.sin(angle),
+        )
+    way = [*nodes, 100]
+    osm = drawn_map(nodes, [(1, way, {"highway": "raceway", "oneway": "yes", "name": "Oval"})])
+    return build_region(osm, build_road_graph(osm), osm.bounds)
+
+
+def _origin(left_hand: bool) -> GeoPoint:
+    return ENGLAND if left_hand else GERMANY
