@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from collections.abc import Mapping
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -35,13 +36,15 @@ class SharedGround(NamedTuple):
     """Ground on the ego's path that other movements of the junction cross or join; C pieces.
 
     Between `enter_arc_m` and `leave_arc_m` (C,) the ego is on it; `point_m` (C, 2) is its middle;
-    `waits` (C,) where the ego has to give way there, wherever no light says otherwise.
+    `waits` (C,) where the ego has to give way there, wherever no light says otherwise;
+    `their_yaw_rad` (C,) which way the others cross it, where that is known.
     """
 
     enter_arc_m: Array
     leave_arc_m: Array
     point_m: Array
     waits: npt.NDArray[np.bool_]
+    their_yaw_rad: Array | None = None
 
 
 class KnownPlan(NamedTuple):
@@ -83,17 +86,37 @@ class PlannerView(NamedTuple):
 
 
 class PlannerOutput(NamedTuple):
-    """Commands of one control tick: acceleration (S,), angle at the tyres (S,), positive left."""
+    """Commands of one control tick: acceleration (S,) in the direction of travel, angle at the
+    tyres (S,), positive left."""
 
     accel_mps2: Array
     tire_angle_rad: Array
 
 
 class Planner(Protocol):
-    """A planner holds no state between ticks: its answer is a function of the view alone."""
+    """A planner holds no state between ticks: its answer is a function of the view alone.
+
+    One whose class says `drives_backwards = True` has its cars driven in reverse.
+    """
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
+
+
+class JobDriver(Planner, Protocol):
+    """Drives one job's cars from its first tick to its last, and may remember in between."""
+
+    @property
+    def remarks(self) -> Mapping[int, str]:
+        """What there is to say of rows: why one's answers are NaN, or what else happened to it."""
+
+
+@runtime_checkable
+class RemembersWithinJob(Protocol):
+    """A planner that remembers from tick to tick: `begin` is called as each job begins."""
+
+    def begin(self, count: int) -> JobDriver:
+        """Return what drives the `count` cars of one job."""
 
 
 def rows_of(view: PlannerView, rows: npt.NDArray[np.intp]) -> PlannerView:

@@ -6,7 +6,7 @@ import numpy as np
 
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import pure_pursuit, turning_speed
+from sim_worker.planners.tracking import front_from_base_m, pure_pursuit, turning_speed
 from sim_worker.vehicle.actuation import resistance_mps2
 
 MAX_ACCEL_MPS2 = 1.5
@@ -18,13 +18,17 @@ LATERAL_ACCEL_MPS2 = 2.5
 TURNING_ACCEL_MPS2 = 4.0
 """Of the wheels' own curvature: more than that of the path, which alone governs on it."""
 EXPONENT = 4.0
+LINE_GAP_M = 1.0
+"""Between the front and the line at which it has stopped."""
+LINE_DECEL_MPS2 = 4.0
+"""Who would have to brake harder for a line goes on, as behind a light that has just changed."""
 _CURVE_TIME_S = 0.5
 _HOLD_SPEED_MPS = 0.3
 _HOLD_MPS2 = -2.0
 
 
 class PurePursuitIdm:
-    """Keeps its lane, slows for curves, follows what is ahead, and holds where it has stopped."""
+    """Keeps its lane, slows for curves, follows what is ahead, stops at lights, and holds there."""
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
@@ -74,4 +78,17 @@ class PurePursuitIdm:
             speed * TIME_GAP_S + approach / (2.0 * np.sqrt(MAX_ACCEL_MPS2 * COMFORT_DECEL_MPS2)),
             0.0,
         )
-        return np.asarray(MAX_ACCEL_MPS2 * np.square(wanted / gap))
+        following = np.asarray(MAX_ACCEL_MPS2 * np.square(wanted / gap))
+        if view.stop_arc_m is None:
+            return following
+        return np.asarray(np.maximum(following, self._stopping(view, view.stop_arc_m, speed)))
+
+    def _stopping(self, view: PlannerView, stop_arc_m: Array, speed: Array) -> Array:
+        """IDM deceleration for a line, as for somebody who stands a little behind it."""
+        ahead = np.maximum(stop_arc_m - view.arc_m - front_from_base_m(view.vehicle), 0.1)
+        wanted = STANDSTILL_GAP_M + speed * (
+            TIME_GAP_S + speed / (2.0 * np.sqrt(MAX_ACCEL_MPS2 * COMFORT_DECEL_MPS2))
+        )
+        braking = MAX_ACCEL_MPS2 * np.square(wanted / (ahead + STANDSTILL_GAP_M - LINE_GAP_M))
+        stops = np.square(speed) < 2.0 * LINE_DECEL_MPS2 * ahead
+        return np.where(stops, braking, 0.0)

@@ -9,15 +9,21 @@ from __future__ import annotations
 import functools
 from importlib.metadata import entry_points
 
+from sim_worker.planners.as_planned import AsPlanned
 from sim_worker.planners.base import Planner
 from sim_worker.planners.constant_speed import ConstantSpeed
+from sim_worker.planners.gap_acceptance import GapAcceptance
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from sim_worker.planners.reverse_pursuit import ReversePursuit
 
 GROUP = "foretwin.planners"
 
 _BUILT_IN: dict[str, type[Planner]] = {
     "pure_pursuit_idm": PurePursuitIdm,
     "constant_speed": ConstantSpeed,
+    "gap_acceptance": GapAcceptance,
+    "as_planned": AsPlanned,
+    "reverse_pursuit": ReversePursuit,
 }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contracts.arrays import Array
+from contracts.vehicle import VehicleParameters
 from sim_worker.planners.base import PlannerView
 
 MIN_LOOKAHEAD_M = 4.0
@@ -28,7 +29,15 @@ def pure_pursuit(view: PlannerView) -> Array:
     lookahead = np.maximum(MIN_LOOKAHEAD_M, LOOKAHEAD_TIME_S * states[:, 3])
     aside = np.abs(view.offset_m - view.desired_offset_m) - _KEPT_M
     lookahead = lookahead + _LOOKAHEAD_ASIDE * np.maximum(aside, 0.0)
-    goal = view.path.point_at(view.arc_m + lookahead, view.desired_offset_m)
+    return steer_towards(view, view.path.point_at(view.arc_m + lookahead, view.desired_offset_m))
+
+
+def steer_towards(view: PlannerView, goal: Array) -> Array:
+    """Return tyre angles (S,) of the circular arcs that lead base_link to goals (S, 2).
+
+    Goals behind the car are those of one that drives backwards.
+    """
+    states = view.states
     dx, dy = goal[:, 0] - states[:, 0], goal[:, 1] - states[:, 1]
     cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
     left = cos * dy - sin * dx
@@ -37,6 +46,11 @@ def pure_pursuit(view: PlannerView) -> Array:
     most = wheelbase * MAX_LATERAL_ACCEL_MPS2 / np.square(np.maximum(states[:, 3], 1.0))
     most = np.minimum(most, np.tan(view.vehicle.max_tire_angle_rad.value))
     return np.arctan(np.minimum(np.maximum(slope, -most), most))
+
+
+def front_from_base_m(vehicle: VehicleParameters) -> float:
+    """Return how far the front bumper lies ahead of base_link."""
+    return vehicle.length_m.value - vehicle.rear_overhang_m.value
 
 
 def turning_speed(view: PlannerView, tire_angle_rad: Array, *, lateral_accel_mps2: float) -> Array:

@@ -60,7 +60,7 @@ def offered(monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
 
 def test_an_entry_point_adds_a_planner(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
     offered(_Coasting)
-    assert planner_names() == ("pure_pursuit_idm", "constant_speed", "theirs")
+    assert planner_names()[-1] == "theirs"
     variants = (Variant(index=0, name="a"), Variant(index=1, name="b", planner="theirs"))
     result = run_job(job(variants, cruise=12.0), stage)
     assert result.outcome.progress_m[1] == pytest.approx(64.0, abs=0.1)

@@ -1,0 +1,213 @@
+"""Where a car has to wait: ground of others, ground it could not leave, those who walk.
+
+Gap acceptance: who waits enters once the next of those with priority is farther away in time than
+the critical gap, and than the own way out takes; behind a car that has just entered, than the
+follow-up time. Brilon, Wu, Bondzio (1997), Unsignalized Intersections in Germany: at entries of
+compact roundabouts 4.1 s and 2.9 s; Highway Capacity Manual, 6th ed., exhibits 20-11 and 20-12:
+4.1 s and 2.2 s for turns across oncoming traffic. Other manoeuvres take longer to clear, which the
+own way out accounts for.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from contracts.arrays import Array
+from contracts.frames import wrap_angle
+from sim_worker.planners.base import PlannerView, SeenUsers, SharedGround, rows_of
+from sim_worker.planners.tracking import front_from_base_m
+
+Flags = npt.NDArray[np.bool_]
+
+CRITICAL_GAP_S = 4.1
+FOLLOW_UP_S = 2.9
+LAG_S, LEAD_S = 1.0, 0.5
+"""Others reach the ground so long after the car has left it, or have left before it enters."""
+ACCEL_MPS2 = 1.5
+_LATERAL_ACCEL_MPS2 = 2.5
+_COMFORT_DECEL_MPS2 = 2.0
+_LOOKS_M = 15.0
+"""Beyond its way to a stop a car looks so far for ground where it has to wait."""
+_STANDING_MPS = 0.5
+_AIMS_BESIDE_M = 2.0
+_AIMS_WITHIN_RAD = 0.6
+_BEARS_WITHIN_RAD = 1.2
+_OWN_LANE_M, _OWN_LANE_RAD = 2.0, 0.6
+_ROOM_M = 1.5
+_CHAIN_M = 25.0
+"""Ground follows ground without room to stop between for no longer than this."""
+_SLOW_MPS = 3.0
+_VULNERABLE_WIDTH_M = 1.0
+_VULNERABLE_MPS = 8.0
+_WALKER_MARGIN_M = 0.6
+_WALKER_AHEAD_S = 4.0
+
+
+class GroundLines(NamedTuple):
+    """For each of C pieces of shared ground (C,): where to stop before it, where all is left."""
+
+    stop_arc_m: Array
+    clear_arc_m: Array
+
+
+def ground_lines(ground: SharedGround, *, length_m: float) -> GroundLines:
+    """Join pieces of ground between which a car of that length has no room to stand."""
+    enter, leave = ground.enter_arc_m, ground.leave_arc_m
+    stop, clear = enter.copy(), leave.copy()
+    first = 0
+    for piece in range(1, len(enter)):
+        room = enter[piece] - clear[first:piece].max()
+        if room < length_m + _ROOM_M and enter[piece] - enter[first] < _CHAIN_M:
+            stop[piece] = stop[first]
+        else:
+            clear[first:piece] = clear[first:piece].max()
+            first = piece
+    clear[first:] = clear[first:].max()
+    return GroundLines(stop, clear)
+
+
+def wait_arcs(view: PlannerView) -> Array:
+    """Return (S,) the arc length before which a car's front has to wait, infinite where it may go.
+
+    Who is past the line, or can no more stop before it, has to be out of the way: it goes on.
+    """
+    arcs = np.full(len(view.arc_m), np.inf)
+    if view.ground is None or not len(view.ground.enter_arc_m):
+        return arcs
+    lines = ground_lines(view.ground, length_m=view.vehicle.length_m.value)
+    front = view.arc_m + front_from_base_m(view.vehicle)
+    ahead = lines.stop_arc_m - front[:, None]
+    speed = np.maximum(view.states[:, 3], 0.0)
+    reach = np.square(speed) / (2.0 * _COMFORT_DECEL_MPS2) + _LOOKS_M
+    concerns = (ahead > 0.0) & (ahead < reach[:, None])
+    rows = np.flatnonzero(concerns.any(axis=1))
+    if not len(rows):
+        return arcs
+    some = rows_of(view, rows)
+    waits = concerns[rows] & _no_room_beyond(some, lines, front[rows])
+    if view.users is not None:
+        waits |= concerns[rows] & view.ground.waits & _taken(some, view.ground, front[rows])
+    arcs[rows] = np.where(waits, lines.stop_arc_m, np.inf).min(axis=1)
+    return arcs
+
+
+def _no_room_beyond(view: PlannerView, lines: GroundLines, front_arc_m: Array) -> Flags:
+    """(S, C) bool: whether who drives slowly ahead leaves no room beyond the ground."""
+    rear = (front_arc_m + view.lead_gap_m + view.lead_speed_mps)[:, None]
+    full = rear < lines.clear_arc_m + view.vehicle.length_m.value + _ROOM_M
+    return np.asarray(full & (view.lead_speed_mps < _SLOW_MPS)[:, None])
+
+
+def _taken(view: PlannerView, ground: SharedGround, front_arc_m: Array) -> Flags:
+    """(S, C) bool: whether somebody with priority needs the ground too soon."""
+    users = view.users
+    assert users is not None
+    speed = np.maximum(view.states[:, 3], 0.0)
+    pace = _pace(view, ground)
+    enter_s = _time_to(ground.enter_arc_m - front_arc_m[:, None], speed, pace)
+    clear_s = _time_to(
+        ground.leave_arc_m + view.vehicle.length_m.value - front_arc_m[:, None], speed, pace
+    )
+    heads, arrive_s, gone_s = _heading_for(users, ground, front_arc_m)
+    needed_s = clear_s + LAG_S
+    stands = (speed < _STANDING_MPS)[:, None]
+    follows = ((view.lead_gap_m < 12.0) & (view.lead_speed_mps > 1.0))[:, None]
+    needed_s = np.maximum(
+        needed_s, np.where(stands, np.where(follows, FOLLOW_UP_S, CRITICAL_GAP_S), 0.0)
+    )
+    meets = heads & (arrive_s < needed_s[..., None]) & (gone_s > enter_s[..., None] - LEAD_S)
+    return np.asarray(meets.any(axis=2))
+
+
+def _pace(view: PlannerView, ground: SharedGround) -> Array:
+    """Return (S, C) the speed at which the ground is crossed, as bends allow."""
+    middle = 0.5 * (ground.enter_arc_m + ground.leave_arc_m)
+    profile = view.path.speed_profile(
+        lateral_accel_mps2=_LATERAL_ACCEL_MPS2, decel_mps2=_COMFORT_DECEL_MPS2
+    )
+    bend = view.path.at_nodes(profile, middle)
+    pace = np.minimum(view.target_speed_mps[:, None], view.speed_factor[:, None] * bend)
+    return np.asarray(np.maximum(pace, 1.0))
+
+
+def _time_to(distance_m: Array, speed_mps: Array, pace_mps: Array) -> Array:
+    """Return (S, C) the time for a way that begins at a speed and goes on at a pace."""
+    speed = speed_mps[:, None]
+    pace = np.maximum(pace_mps, speed)
+    distance = np.maximum(distance_m, 0.0)
+    gaining = (np.square(pace) - np.square(speed)) / (2.0 * ACCEL_MPS2)
+    short = (np.sqrt(np.square(speed) + 2.0 * ACCEL_MPS2 * distance) - speed) / ACCEL_MPS2
+    long = (pace - speed) / ACCEL_MPS2 + (distance - gaining) / pace
+    return np.where(distance < gaining, short, long)
+
+
+def _heading_for(
+    users: SeenUsers, ground: SharedGround, front_arc_m: Array
+) -> tuple[Flags, Array, Array]:
+    """Return (S, C, R) who heads for which ground, when they arrive and when they are gone.
+
+    Others keep their speed, and head for ground that lies on their straight course or, where
+    it is known how the ground is crossed, on a circular arc that ends in that direction.
+    """
+    x, y, yaw = np.moveaxis(users.poses[:, None], -1, 0)
+    dx, dy = ground.point_m[:, 0, None] - x, ground.point_m[:, 1, None] - y
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    ahead, beside = cos * dx + sin * dy, np.abs(cos * dy - sin * dx)
+    far = np.hypot(dx, dy)
+    half = 0.5 * users.size_m[:, None, :, 0]
+    half_ground = np.clip(0.5 * (ground.leave_arc_m - ground.enter_arc_m), 1.0, 6.0)[:, None]
+    speed = users.speed_mps[:, None]
+    within = far < half + half_ground
+    heads = (ahead > 0.0) & (beside < _AIMS_BESIDE_M)
+    if ground.their_yaw_rad is not None:
+        bearing = np.arctan2(dy, dx)
+        arrives = wrap_angle(2.0 * bearing - yaw - ground.their_yaw_rad[:, None])
+        turns = np.abs(wrap_angle(bearing - yaw))
+        heads = (np.abs(arrives) < _AIMS_WITHIN_RAD) & (turns < _BEARS_WITHIN_RAD)
+    own_lane = (
+        (np.abs(users.offset_m) < _OWN_LANE_M)
+        & (np.abs(wrap_angle(users.turned_rad)) < _OWN_LANE_RAD)
+        & (users.arc_m < front_arc_m[:, None] + users.size_m[..., 0])
+    )
+    counts = ~(own_lane | users.walks)[:, None]
+    moves = speed > _STANDING_MPS
+    pace = np.maximum(speed, _STANDING_MPS)
+    arrive_s = np.where(within, 0.0, (far - half - half_ground) / pace)
+    gone_s = np.where(moves, (ahead + half + half_ground) / pace, np.inf)
+    found = counts & ((heads & moves) | (within & (gone_s > 0.0)))
+    return np.asarray(found), arrive_s, gone_s
+
+
+def walker_gap_m(view: PlannerView) -> Array:
+    """Return (S,) from the front to whoever walks or rides over the path, infinite for nobody.
+
+    It counts who is in the car's way, or will be within 4 s and before the car has passed.
+    """
+    users = view.users
+    if users is None:
+        return np.full(len(view.arc_m), np.inf)
+    slow = (users.size_m[..., 1] < _VULNERABLE_WIDTH_M) & (users.speed_mps < _VULNERABLE_MPS)
+    sideways = users.speed_mps * np.sin(users.turned_rad)
+    counts = users.walks | (slow & (np.abs(sideways) > 0.5 * users.speed_mps))
+    if not counts.any():
+        return np.full(len(view.arc_m), np.inf)
+    vehicle = view.vehicle
+    half = 0.5 * users.size_m.max(axis=2)
+    front = view.arc_m + front_from_base_m(vehicle)
+    ahead = users.arc_m - half - front[:, None]
+    left = users.offset_m - view.offset_m[:, None]
+    corridor = 0.5 * vehicle.width_m.value + half + _WALKER_MARGIN_M
+    away, rate = np.abs(left), np.abs(sideways)
+    comes = left * sideways < 0.0
+    inside = away < corridor
+    with np.errstate(divide="ignore", invalid="ignore"):
+        in_s = np.where(inside, 0.0, np.where(comes, (away - corridor) / rate, np.inf))
+        out_s = np.where(comes, corridor + away, corridor - away) / rate
+    speed = np.maximum(view.states[:, 3], 1.5)[:, None]
+    passed_s = (ahead + 2.0 * half + vehicle.length_m.value) / speed
+    meets = counts & (ahead > -1.0) & (in_s < _WALKER_AHEAD_S)
+    meets &= (in_s < passed_s + LAG_S) & (out_s > ahead / speed - LEAD_S)
+    return np.asarray(np.where(meets, np.maximum(ahead, 0.1), np.inf).min(axis=1))

@@ -1,0 +1,48 @@
+"""A planner that drives backwards along the path: into parking bays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contracts.arrays import Array
+from sim_worker.planners.base import PlannerOutput, PlannerView
+from sim_worker.planners.tracking import front_from_base_m, steer_towards
+from sim_worker.vehicle.actuation import resistance_mps2
+
+_LOOKAHEAD_M, _LOOKAHEAD_S = 1.8, 0.5
+_ACCEL_MPS2, _DECEL_MPS2, _MAX_DECEL_MPS2 = 1.0, 1.0, 6.0
+_GAP_M = 0.6
+"""From the rear to whoever is behind, or crosses behind, where it stops for them."""
+_TIME_CONSTANT_S = 0.5
+_HOLD_MPS, _HOLD_MPS2 = 0.2, -2.0
+
+
+class ReversePursuit:
+    """Leads base_link backwards along the path at its target speed and stops at the path's end,
+    or for who is in the way behind. The car's yaw is against the path's heading."""
+
+    drives_backwards = True
+
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        """Answer one control tick; accelerations are along the direction of travel."""
+        speed = np.maximum(-view.states[:, 3], 0.0)
+        goal = view.path.point_at(
+            view.arc_m + _LOOKAHEAD_M + _LOOKAHEAD_S * speed, view.desired_offset_m
+        )
+        room = np.minimum(view.path.length_m - view.arc_m, self._free_m(view))
+        allowed = np.sqrt(2.0 * _DECEL_MPS2 * np.maximum(room, 0.0))
+        wanted = np.minimum(np.maximum(view.target_speed_mps, 0.0), allowed)
+        accel = (wanted - speed) / _TIME_CONSTANT_S
+        braking = np.square(speed) / (2.0 * np.maximum(room, 0.05))
+        accel = np.where(braking > _DECEL_MPS2, np.minimum(accel, -braking), accel)
+        accel = np.minimum(np.maximum(accel, -_MAX_DECEL_MPS2), _ACCEL_MPS2)
+        hold = (speed < _HOLD_MPS) & (accel <= _HOLD_MPS)
+        hold &= (wanted < _HOLD_MPS) | (room <= 0.0)
+        command = accel + resistance_mps2(view.vehicle, speed)
+        return PlannerOutput(np.where(hold, _HOLD_MPS2, command), steer_towards(view, goal))
+
+    def _free_m(self, view: PlannerView) -> Array:
+        """Return (S,) how far the rear may go: gaps are given for a front that leads."""
+        behind = view.lead_gap_m + front_from_base_m(view.vehicle)
+        behind = behind - view.vehicle.rear_overhang_m.value - _GAP_M
+        return np.where(view.lead_speed_mps > 0.0, behind + view.lead_speed_mps, behind)
