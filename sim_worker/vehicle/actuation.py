@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
@@ -47,7 +48,8 @@ class Actuation:
     `friction` (S,) stays. The actuator along the road is a brake, a strong damper within ± its
     force, shifted by the drive force: at speed drive minus brake, at standstill a hold. With
     `tick_s`, the time between two calls of `apply`, forces lag as the vehicle's parameters say,
-    from `accel_mps2` (S,) on; without, they are immediate.
+    from `accel_mps2` (S,) on; without, they are immediate. Where `backwards` (S,) is true, the
+    gear is in reverse: commands count in that direction.
     """
 
     def __init__(
@@ -61,6 +63,7 @@ class Actuation:
         forcerange: Array,
         tick_s: float | None = None,
         accel_mps2: Array | None = None,
+        backwards: npt.NDArray[np.bool_] | None = None,
     ) -> None:
         tyres = slice(ids.tyre_front, ids.tyre_rear + 1)
         if ids.tyre_rear != ids.tyre_front + 1:
@@ -94,6 +97,9 @@ class Actuation:
         self._friction = np.asarray(friction, dtype=np.float64)
         self._grip = self._friction * GRAVITY_MPS2
         self._grip_square = self._grip**2
+        self._gear: Array | None = None
+        if backwards is not None and backwards.any():
+            self._gear = np.where(backwards, -1.0, 1.0)
         self._lag: ForceLag | None = None
         if tick_s is not None and lags_of_force(vehicle):
             start = np.zeros(len(self._friction)) if accel_mps2 is None else accel_mps2
@@ -113,7 +119,8 @@ class Actuation:
             accel = drive * self._drive_gain + brake * self._brake_gain
         accel = np.minimum(np.maximum(accel, -self._grip), self._grip)
         share = np.maximum(1.0 - accel * accel / self._grip_square, _MIN_LATERAL_SHARE**2)
-        loads = np.maximum(self._loads_n + self._transfer_kg * accel, _TINY_N)
+        forward = accel if self._gear is None else accel * self._gear
+        loads = np.maximum(self._loads_n + self._transfer_kg * forward, _TINY_N)
         speed = np.abs(speed_mps)
         np.copyto(self._damping, self._stiffness_prad * loads / np.maximum(speed, _MIN_SPEED_MPS))
         lateral = self._friction * np.sqrt(share) * loads
@@ -121,6 +128,8 @@ class Actuation:
         np.negative(lateral, out=self._lateral_low)
         drive = self._mass * np.maximum(accel, 0.0)
         brake = drive - self._mass * accel + self._rolling
+        if self._gear is not None:
+            drive *= self._gear
         drive -= self._drag * speed_mps * speed
         np.copyto(self._drive_n, drive)
         np.subtract(drive, brake, out=self._along_low)
