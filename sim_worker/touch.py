@@ -68,12 +68,14 @@ def first_touches(
     near = _near(vehicle, states, users, user_size_m, tick_s=tick_s)
     motion = _Motion(vehicle, states, users, user_size_m, *near)
     motion = motion.only(motion.may_touch())
+    steps = max(math.ceil(tick_s / _SEARCH_STEP_S - 1e-9), 1)
+    if not len(motion.future):
+        return _describe(motion, np.zeros(0), 1.0 / steps, tick_s)
     # What comes after a tick that ends in a touch does not matter.
     ends = np.full(len(states), states.shape[1])
     overlapped = motion.overlapping(np.ones(1))
     np.minimum.at(ends, motion.future[overlapped], motion.tick[overlapped])
     motion = motion.only(np.flatnonzero(motion.tick <= ends[motion.future]))
-    steps = max(math.ceil(tick_s / _SEARCH_STEP_S - 1e-9), 1)
     share = np.arange(steps + 1.0) / steps
     touching = motion.overlapping(share[:, None])
     hit = np.flatnonzero(touching.any(axis=0))
