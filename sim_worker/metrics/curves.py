@@ -9,15 +9,13 @@ from sim_worker.metrics.displacement import known, nowhere
 from sim_worker.metrics.rollout import Measure
 from sim_worker.metrics.scene import Scene
 
-_ROWS = 4
-
 
 def frechet_distance(curves: Array, reference: Array) -> Array:
     """Return (S,) discrete Fréchet distances in metres of curves (S, N, 2) from one (M, 2).
 
     Eiter and Mannila (1994), Computing Discrete Fréchet Distance, table 1.
     """
-    return _cheapest_walk(_distances(curves, reference), np.maximum)
+    return _cheapest_walks(curves, reference, (np.maximum,))[0]
 
 
 def warping_distance(curves: Array, reference: Array) -> Array:
@@ -26,64 +24,63 @@ def warping_distance(curves: Array, reference: Array) -> Array:
     Dynamic time warping: Sakoe and Chiba (1978), Dynamic Programming Algorithm Optimization for
     Spoken Word Recognition, equation 11, with weight 1 for every pair and no window.
     """
-    return _cheapest_walk(_distances(curves, reference), np.add)
+    return _cheapest_walks(curves, reference, (np.add,))[0]
 
 
-def _distances(curves: Array, reference: Array) -> Array:
-    """Return (N, M, S) distances in metres of all pairs of points, a few rows at a time: what
-    stays in the cache takes a third of the time."""
-    x, y = (np.ascontiguousarray(curves[..., k].T)[:, None] for k in range(2))
-    distances = np.empty((len(x), len(reference), len(curves)))
-    for first in range(0, len(x), _ROWS):
-        rows = slice(first, first + _ROWS)
-        squared = np.subtract(x[rows], reference[:, 0, None], out=distances[rows])
-        squared *= squared
-        across = y[rows] - reference[:, 1, None]
-        across *= across
-        squared += across
-        np.sqrt(squared, out=squared)
-    return distances
+def _cheapest_walks(
+    curves: Array, reference: Array, accumulates: tuple[np.ufunc, ...]
+) -> list[Array]:
+    """Return (S,), for each way to accumulate distances, the cheapest walk that never goes back.
 
-
-def _cheapest_walk(distances: Array, accumulate: np.ufunc) -> Array:
-    """Return (S,) the cost of the cheapest way through (N, M, S) that never goes back.
-
-    An entry needs the row before and the column before: all entries of one diagonal are computed
-    at once. Entry i of a diagonal stands at place i + 1 of its buffer, with nothing below.
+    An entry of the matrix of all pairs of points needs the row before and the column before: all
+    entries of one diagonal are computed at once, distances too, which so stay in the cache.
+    Entry i of a diagonal stands at place i + 1 of its buffer, with nothing below.
     """
-    rows, columns, count = distances.shape
-    flat = distances.reshape(rows * columns, count)
-    before = np.full((rows + 1, count), np.inf)
-    earlier = np.full((rows + 1, count), np.inf)
-    before[1] = flat[0]
-    for diagonal in range(1, rows + columns - 1):
+    x, y = (np.ascontiguousarray(curves[..., k].T) for k in range(2))
+    back_x, back_y = (np.ascontiguousarray(reference[::-1, k, None]) for k in range(2))
+    rows, count = x.shape
+    columns = len(reference)
+    buffers = [
+        [np.full((rows + 1, count), np.inf), np.full((rows + 1, count), np.inf)]
+        for _ in accumulates
+    ]
+    values, across = np.empty((rows, count)), np.empty((rows, count))
+    for diagonal in range(rows + columns - 1):
         low, high = max(0, diagonal - columns + 1), min(diagonal, rows - 1) + 1
-        start = low * columns + diagonal - low
-        values = flat[start :: max(columns - 1, 1)][: high - low]
-        now = np.minimum(before[low + 1 : high + 1], before[low:high])
-        np.minimum(now, earlier[low:high], out=now)
-        accumulate(now, values, out=earlier[low + 1 : high + 1])
-        before, earlier = earlier, before
-    return np.array(before[rows])
+        other = slice(columns - 1 - diagonal + low, columns - 1 - diagonal + high)
+        here, aside = values[: high - low], across[: high - low]
+        np.subtract(x[low:high], back_x[other], out=here)
+        np.subtract(y[low:high], back_y[other], out=aside)
+        here *= here
+        aside *= aside
+        here += aside
+        np.sqrt(here, out=here)
+        for pair, accumulate in zip(buffers, accumulates, strict=True):
+            before, earlier = pair
+            if diagonal:
+                np.minimum(before[low + 1 : high + 1], before[low:high], out=aside)
+                np.minimum(aside, earlier[low:high], out=aside)
+                accumulate(aside, here, out=earlier[low + 1 : high + 1])
+            else:
+                earlier[1] = here[0]
+            pair[0], pair[1] = earlier, before
+    return [np.array(pair[0][rows]) for pair in buffers]
 
 
 def frechet(scene: Scene) -> Measure:
     """Discrete Fréchet distance (S,) from the reference's course."""
-    return _of(scene, np.maximum)
+    found = scene.keep(_from_reference)
+    return scene.measure(found[0]) if found else nowhere(scene)
 
 
 def dtw(scene: Scene) -> Measure:
     """Time warping distance (S,) from the reference's course, a sum over pairs of points."""
-    return _of(scene, np.add)
+    found = scene.keep(_from_reference)
+    return scene.measure(found[1]) if found else nowhere(scene)
 
 
-def _of(scene: Scene, accumulate: np.ufunc) -> Measure:
-    distances = scene.keep(_from_reference)
-    if not distances.size:
-        return nowhere(scene)
-    return scene.measure(_cheapest_walk(distances, accumulate))
-
-
-def _from_reference(scene: Scene) -> Array:
+def _from_reference(scene: Scene) -> list[Array]:
     predicted, reference = known(scene)
-    return _distances(predicted[..., :2], reference[:, :2])
+    if not len(reference):
+        return []
+    return _cheapest_walks(predicted[..., :2], reference[:, :2], (np.maximum, np.add))

@@ -194,13 +194,15 @@ class _Bounds(NamedTuple):
 
 
 def _bounds(x: Array, y: Array) -> _Bounds:
-    steps = x.shape[1] - 1
-    starts = np.arange(0, steps, _CHUNK)
+    chunks = -(-(x.shape[1] - 1) // _CHUNK)
+    nodes = np.minimum(np.arange(chunks * _CHUNK + 1), x.shape[1] - 1)
 
     def extreme(values: Array, of: np.ufunc) -> Array:
-        inner = of.reduceat(values[:, :-1], starts, axis=1)
-        ends = np.minimum(starts + _CHUNK, steps)
-        return np.asarray(of(inner, values[:, ends]))
+        padded = values.take(nodes, axis=1) if len(nodes) > x.shape[1] else values
+        found = of(padded[:, :-1:_CHUNK], padded[:, _CHUNK::_CHUNK])
+        for k in range(1, _CHUNK):
+            of(found, padded[:, k::_CHUNK], out=found)
+        return np.asarray(found)
 
     return _Bounds(
         extreme(x, np.minimum), extreme(x, np.maximum),

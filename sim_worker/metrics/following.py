@@ -109,36 +109,38 @@ def leaders(scene: Scene) -> Leaders:
     )
     curvature = np.clip(curvature, -_MAX_CURVATURE_PM, _MAX_CURVATURE_PM)[..., None]
     half_length, half_width = scene.user_half_m
-    x = seen.ahead_m + scene.centre_ahead_m
-    # (1 - r) / κ = (2 y - κ (x² + y²)) / (1 + r), and 1 + r is at least 1: a bound without a root.
-    square = np.square(x)
-    square += np.square(seen.left_m)
-    square *= curvature
-    sideways = 2.0 * seen.left_m - square
-    inward = 1.0 - curvature * seen.left_m
     widest = scene.half_width_m + np.hypot(half_length, half_width)
-    # r ≤ 1 + |κ| widest wherever the road user can overlap the strip at all.
-    bound = widest * (2.0 + np.abs(curvature) * widest)
-    near = (np.abs(sideways) < bound) & (seen.ahead_m > 0.0) & (inward > 0.0)
-    pair = np.flatnonzero(near)
-    users = near.shape[2]
-    row = pair // users
-
-    future, user = row // scene.states.shape[1], pair - row * users
-    flat = [values.reshape(-1)[pair] for values in (x, inward, sideways, seen.cos, seen.sin)]
-    x, inward, sideways, cos, sin = flat
+    near = [
+        rows.start * seen.ahead_m[0].size
+        + _near_course(
+            seen.ahead_m[rows], seen.left_m[rows], scene.centre_ahead_m, curvature[rows],
+            widest[rows],
+        )
+        for rows in scene.blocks
+    ]  # fmt: skip
+    pair = np.concatenate(near) if near else np.zeros(0, dtype=np.intp)
+    users = seen.ahead_m.shape[2]
+    row, user = np.divmod(pair, max(users, 1))
+    future = row // scene.states.shape[1]
+    x, y = (values.reshape(-1)[pair] for values in (seen.ahead_m, seen.left_m))
+    x = x + scene.centre_ahead_m
     kappa = curvature.reshape(-1)[row]
+    inward, across = 1.0 - kappa * y, kappa * x
+    radius = np.sqrt(across * across + inward * inward)
+    left = (2.0 * y - kappa * (x * x + y * y)) / (1.0 + radius)
+    close = np.flatnonzero(np.abs(left) < widest[future, 0, user])
+    pair, row, user, future = pair[close], row[close], user[close], future[close]
+    x, left, kappa, radius = x[close], left[close], kappa[close], radius[close]
+    inward, across = inward[close], across[close]
     straight = np.abs(kappa) < 1e-6
-    angle = np.arctan2(kappa * x, inward)
-    along = np.where(straight, x, angle / np.where(straight, 1.0, kappa))
-    left = sideways / (1.0 + np.hypot(kappa * x, inward))
-    turned_cos = cos * np.cos(angle) + sin * np.sin(angle)
-    turned_sin = sin * np.cos(angle) - cos * np.sin(angle)
+    along = np.where(straight, x, np.arctan2(across, inward) / np.where(straight, 1.0, kappa))
+    cos, sin, other = (v.reshape(-1)[pair] for v in (seen.cos, seen.sin, seen.speed_mps))
+    turned_cos = (cos * inward + sin * across) / radius
+    turned_sin = (sin * inward - cos * across) / radius
     a, b = half_length[future, 0, user], half_width[future, 0, user]
     reach = scene.half_width_m + a * np.abs(turned_sin) + b * np.abs(turned_cos)
     front = scene.centre_ahead_m + scene.half_length_m
     gap = along - front - a * np.abs(turned_cos) - b * np.abs(turned_sin)
-    other = seen.speed_mps.reshape(-1)[pair]
     kept = (np.abs(left) < reach) & (along > front)
     kept &= (turned_cos >= _ALONG_COS) | (np.abs(other) < _STANDS_MPS)
     return Leaders(
@@ -151,6 +153,25 @@ def leaders(scene: Scene) -> Leaders:
         other_left_mps=(other * turned_sin)[kept],
         accel_mps2=_user_acceleration(scene, row[kept], user[kept]) * turned_cos[kept],
     )
+
+
+def _near_course(
+    ahead_m: Array, left_m: Array, centre_ahead_m: float, curvature: Array, widest_m: Array
+) -> Indices:
+    """Return the flat indices of all who may overlap the ego's strip and are ahead.
+
+    (1 - r) / κ = (2 y - κ (x² + y²)) / (1 + r), and r is at most 1 + |κ| widest where a road user
+    reaches the strip at all: a bound without a root.
+    """
+    sideways = np.square(ahead_m + centre_ahead_m)
+    sideways += np.square(left_m)
+    sideways *= -curvature
+    sideways += left_m
+    sideways += left_m
+    near = np.abs(sideways, out=sideways) < widest_m * (2.0 + np.abs(curvature) * widest_m)
+    near &= ahead_m > 0.0
+    near &= curvature * left_m < 1.0
+    return np.flatnonzero(near)
 
 
 def _user_acceleration(scene: Scene, row: Indices, user: Indices) -> Array:

@@ -123,7 +123,12 @@ def impacts(scene: Scene) -> Impacts:
     seen = scene.relative
     _, instants, users = seen.ahead_m.shape
     reach = np.hypot(*scene.user_half_m) + np.hypot(scene.half_length_m, scene.half_width_m)
-    pair = np.flatnonzero(scene.centre_distance_m < reach + _travel_m(scene))
+    near = [
+        np.flatnonzero(scene.centre_distance_m[rows] < reach[rows] + _travel_m(scene, rows))
+        + rows.start * instants * users
+        for rows in scene.blocks
+    ]
+    pair = np.concatenate(near) if near else np.zeros(0, dtype=np.intp)
     row, user = np.divmod(pair, max(users, 1))
     future, instant = np.divmod(row, instants)
     # Where there is no next instant, or nobody at it, nothing moves.
@@ -185,11 +190,12 @@ def _first(scene: Scene, future: Indices, instant: Indices, user: Indices, share
     )
 
 
-def _travel_m(scene: Scene) -> Array:
-    """Return (S, N, R) no less than the two move together until the next instant."""
-    travel = np.zeros(scene.centre_distance_m.shape)
-    moved = np.abs(np.diff(scene.centre_m, axis=1)).sum(axis=-1)
-    for values in scene.users[:2]:
-        travel[:, :-1] += np.abs(np.diff(values, axis=1))
+def _travel_m(scene: Scene, rows: slice) -> Array:
+    """Return (…, N, R) no less than the two move together until the next instant."""
+    x, y, _, _ = scene.users
+    travel = np.zeros(x[rows].shape)
+    moved = np.abs(np.diff(scene.centre_m[rows], axis=1)).sum(axis=-1)
+    for values in (x[rows], y[rows]):
+        travel[:, :-1] += np.abs(values[:, 1:] - values[:, :-1])
     travel[:, :-1] += moved[..., None]
     return travel

@@ -8,7 +8,7 @@ from contracts.arrays import Array
 from sim_worker.metrics.rollout import Flags, Measure
 from sim_worker.metrics.scene import Scene
 
-_LOOK_AGAIN_M = 8.0
+_LOOK_AGAIN_M = 10.0
 """The path is searched near the place known last, so no farther than this between looks."""
 _CORNERS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
 
@@ -35,7 +35,7 @@ def arc_along_path(scene: Scene) -> Array:
         raise ValueError("progress needs a path")
     xy = scene.states[..., :2]
     last = xy.shape[1] - 1
-    moved = np.abs(np.diff(xy, axis=1)).sum(axis=2).max(initial=0.0)
+    moved = np.hypot(*np.moveaxis(np.diff(xy, axis=1), 2, 0)).max(initial=0.0)
     stride = max(int(_LOOK_AGAIN_M / max(float(moved), 1e-3)), 1)
     looks = [*range(0, last, stride), last]
     arcs = [path.locate(xy[:, 0]).arc_m]
@@ -57,7 +57,7 @@ def off_road_share(scene: Scene) -> Measure:
 
 def on_road(scene: Scene) -> Measure:
     """Whether all corners stay on drivable ground at all instants (S,): 1 or 0."""
-    return scene.measure((~scene.keep(_off_road).any(axis=1)).astype(np.float64))
+    return scene.measure((~np.asarray(scene.keep(_off_road).any(axis=1))).astype(np.float64))
 
 
 def _off_road(scene: Scene) -> Flags:

@@ -89,16 +89,19 @@ def time_to_collision(scene: Scene) -> Array:
     Hayward (1972), Near-miss determination through use of a scale of danger, with the shapes of
     the road users instead of a common lane: both keep their velocity and heading.
     """
-    seen = scene.relative
-    touch = meeting(
-        Pairs(
-            seen.ahead_m, seen.left_m, seen.ahead_mps, seen.left_mps, seen.cos, seen.sin,
-            (scene.half_length_m, scene.half_width_m), scene.user_half_m,
-        )
-    )  # fmt: skip
-    until = np.maximum(touch.from_s, 0.0)
-    until[touch.until_s < until] = np.inf
-    return until
+    found = np.empty(scene.relative.ahead_m.shape)
+    half_length, half_width = scene.user_half_m
+    for rows in scene.blocks:
+        ahead, left, cos, sin, ahead_mps, left_mps, _ = (v[rows] for v in scene.relative)
+        touch = meeting(
+            Pairs(
+                ahead, left, ahead_mps, left_mps, cos, sin,
+                (scene.half_length_m, scene.half_width_m), (half_length[rows], half_width[rows]),
+            )
+        )  # fmt: skip
+        until = np.maximum(touch.from_s, 0.0, out=found[rows])
+        until[touch.until_s < until] = np.inf
+    return found
 
 
 def ttc_series(scene: Scene) -> Measure:
