@@ -68,9 +68,11 @@ def list_scenarios(*, as_json: bool) -> None:
         _print_json([_described(scenario) for scenario in found])
         return
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("id", "title", "cases", "where", "source", title="scenarios")
+    table = Table(
+        Column("id", no_wrap=True), "title", "cases", "where", "source", title="scenarios"
+    )
     for scenario in found:
         table.add_row(
             scenario.id, scenario.title, str(len(draw_cases(scenario))),
@@ -161,9 +163,11 @@ def _with_progress(junctions: Sequence[Junction]) -> Iterable[Junction]:
 
 def _print_table(map_file: Path, found: list[PlacedScenario]) -> None:
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("id", "placed", "applies to", "of", "elsewhere", title=str(map_file))
+    table = Table(
+        Column("id", no_wrap=True), "placed", "applies to", "of", "elsewhere", title=str(map_file)
+    )
     for row in found:
         reasons = collections.Counter(row.unplaced.values())
         lines = [f"{count} unplaced: {reason}" for reason, count in reasons.most_common()]

@@ -153,7 +153,7 @@ def _live(path: FrenetPath, arc_m: float, lanes: list[Lane]) -> Way | None:
     return Way(
         name="the car's own path",
         xy_m=path.point_at(arcs),
-        speed_limit_mps=path.at_nodes(path.speed_limit_mps, arcs),
+        speed_limit_mps=path.speed_limit_mps[np.searchsorted(path.arc_m, arcs - 0.5)],
         path=path,
         entry_m=path.length_m,
         exit_m=path.length_m,

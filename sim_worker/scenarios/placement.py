@@ -200,9 +200,7 @@ def place_on_path(
         return Unplaced(summary.id, _nobody(scenario), False)
     first = found_places[0]
     merged = tuple(
-        tuple(dict.fromkeys(way for place in found_places for way in place.actor_ways[i]))
-        if first.actor_ways[i]
-        else ()
+        tuple({id(way): way for place in found_places for way in place.actor_ways[i]}.values())
         for i in range(len(first.actor_ways))
     )
     return first._replace(actor_ways=merged)
@@ -225,9 +223,9 @@ def passage_on_path(
     for junction in network.world.junctions:
         passages = network.passages(junction.summary.id)
         near = [
-            (p, line)
+            (p, _line(p, network))
             for p in passages
-            if ahead.distance(shapely.Point((line := _line(p))[len(line) // 2])) < _NEAR_PATH_M
+            if ahead.distance(shapely.Point(p.connections[0].centerline[-1])) < _NEAR_PATH_M
         ]
         matches = [m for p, line in near if (m := _match(p, line, ego_path, ego_arc_m))]
         if not matches:
@@ -239,8 +237,10 @@ def passage_on_path(
     return None if best is None else (best[2], best[3])
 
 
-def _line(passage: Passage) -> Array:
-    return np.concatenate([connection.centerline for connection in passage.connections])
+def _line(passage: Passage, network: RoadNetwork) -> Array:
+    """Return the line of what a passage's way has between entering and leaving the junction."""
+    way = network.way(passage)
+    return way.path.point_at(np.linspace(way.entry_m, way.exit_m, _SAMPLES))
 
 
 def _match(
@@ -251,13 +251,11 @@ def _match(
     The headings count as metres over half the junction, so that of ways that part late the right
     one wins.
     """
-    pick = np.linspace(0, len(line) - 1, _SAMPLES).round().astype(int)
-    points = line[pick]
-    place = path.locate(points)
+    place = path.locate(line)
     entry, exit_ = float(place.arc_m[0]), float(place.arc_m[-1])
     if exit_ <= max(entry, ego_arc_m + 1.0) or exit_ > path.length_m + 1.0:
         return None
-    step = np.gradient(points, axis=0)
+    step = np.gradient(line, axis=0)
     heading = np.arctan2(step[:, 1], step[:, 0])
     turned = np.abs(wrap_angle(heading - path.pose_at(place.arc_m).yaw_rad))
     off = float(np.abs(place.offset_m).mean())
@@ -275,7 +273,7 @@ def _live_way(name: str, path: FrenetPath, entry_m: float, exit_m: float) -> Way
     return Way(
         name=name,
         xy_m=path.point_at(arcs),
-        speed_limit_mps=path.at_nodes(path.speed_limit_mps, arcs),
+        speed_limit_mps=path.speed_limit_mps[np.searchsorted(path.arc_m, arcs - 0.5)],
         path=path,
         entry_m=entry_m,
         exit_m=exit_m,

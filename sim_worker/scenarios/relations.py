@@ -101,15 +101,15 @@ def _walking(
     inside, outside = _CROSSING_AROUND_M
     if at_exit:
         low, high = ego_way.exit_m - inside, ego_way.exit_m + outside
-        mouth = ego_way.exit_m + _BEYOND_MOUTH_M
+        mouth, farther_m = ego_way.exit_m + _BEYOND_MOUTH_M, _BEYOND_MOUTH_M
     else:
         low, high = ego_way.entry_m - outside, ego_way.entry_m + inside
-        mouth = ego_way.entry_m - _BEYOND_MOUTH_M
+        mouth, farther_m = ego_way.entry_m - _BEYOND_MOUTH_M, -_BEYOND_MOUTH_M
     mapped = _mapped(network.world.crossings, ego_way, low, high)
     nearest = sorted(mapped, key=lambda item: abs(item[0] - mouth))
     lines = [line for _, line in nearest]
     # Where the mapped crossing does not do, people cross beside it.
-    lines += [_line_across(ego_way.path, mouth + beyond) for beyond in (0.0, 4.0)]
+    lines += [_line_across(ego_way.path, mouth + beyond) for beyond in (0.0, farther_m)]
     for line in lines:
         yield from ways_over(line, actor.turn, ego_way, network.near_sign)
 

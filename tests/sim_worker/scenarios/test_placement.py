@@ -1,0 +1,208 @@
+"""Placing: who comes from where, on either side of the road, and why some junctions have none."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from contracts.frames import wrap_angle
+from contracts.scenario import ActorPart, EgoPart, Scenario, Where
+from contracts.world import World
+from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.casting import Cast, cast
+from sim_worker.scenarios.drawing import draw_cases
+from sim_worker.scenarios.placement import passage_on_path, place_on_path, places
+from sim_worker.scenarios.places import Place, Unplaced
+from sim_worker.scenarios.reading import catalogue
+from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
+
+VEHICLE = load_vehicle()
+
+
+def placed(id_: str, world: World) -> tuple[Place, ...]:
+    result = places(catalogue()[id_], world, vehicle=VEHICLE)
+    assert not result.unplaced, result.unplaced
+    return result.places
+
+
+def why_not(id_: str, world: World) -> Unplaced:
+    result = places(catalogue()[id_], world, vehicle=VEHICLE)
+    assert not result.places
+    return result.unplaced[0]
+
+
+def relative_heading_deg(place: Place, *, at_m: float = 20.0) -> float:
+    """Return how far the first actor's heading is turned left of the ego's, before the junction."""
+    ego, way = place.ego, place.actor_ways[0][0]
+    own = ego.path.pose_at(np.array([ego.entry_m - at_m])).yaw_rad
+    other = way.path.pose_at(np.array([way.entry_m - at_m])).yaw_rad
+    return math.degrees(float(wrap_angle(other - own)[0]))
+
+
+@pytest.mark.parametrize(
+    ("id_", "angle_deg"),
+    [("ccftap", 180.0), ("ltap_od", 180.0), ("cccscp", 90.0), ("scp", -90.0), ("ltip", 90.0),
+     ("rtip", -90.0), ("emergency_vehicle", 90.0)],
+)  # fmt: skip
+@pytest.mark.parametrize("left_hand", [False, True])
+def test_others_come_from_where_the_relation_says(
+    id_: str, angle_deg: float, left_hand: bool
+) -> None:
+    """Who comes from the near side, the right one where traffic keeps right, heads left."""
+    found = placed(id_, cross(left_hand=left_hand))
+    assert len(found) == 4
+    for place in found:
+        wanted = -angle_deg if left_hand else angle_deg
+        off = float(wrap_angle(math.radians(relative_heading_deg(place) - wanted)))
+        assert abs(off) < math.radians(5.0)
+
+
+def test_a_t_junction_takes_what_its_arms_allow() -> None:
+    """Arms to the east, west and south: one way to turn across oncoming traffic, none to cross."""
+    world = tee()
+    assert len(placed("ccftap", world)) == 1
+    assert len(placed("rtip", world)) == 1
+    assert why_not("scp", world) == (world.intersection.id, "its kind is t_junction", False)
+    crossing = catalogue()["scp"]
+    anywhere = Scenario(
+        id="x", title="x", shows="x.", source="x", ego=crossing.ego, actors=crossing.actors
+    )
+    result = places(anywhere, world, vehicle=VEHICLE)
+    reason = "nobody can come from across straight on and meet the ego's path"
+    assert result.unplaced == ((world.intersection.id, reason, False),)
+
+
+def test_controls_and_turns_are_asked_for() -> None:
+    assert why_not("red_light", cross()).reason == "its control is uncontrolled"
+    assert len(placed("red_light", cross(signals=True))) == 4
+    assert why_not("roundabout_entry", cross()).reason == "its kind is crossing"
+
+
+@pytest.mark.parametrize("left_hand", [False, True])
+def test_who_is_on_the_ring_comes_round_to_the_egos_entry(left_hand: bool) -> None:
+    for place in placed("roundabout_entry", ring(left_hand=left_hand)):
+        way = place.actor_ways[0][0]
+        radius = np.hypot(*way.path.point_at(np.arange(way.first_m, way.last_m)).T)
+        assert radius.max() < 20.0
+
+
+def test_people_cross_the_arm_that_the_ego_leaves_or_enters_by() -> None:
+    for id_, mouth in (("cpta", "exit_m"), ("occluded_pedestrian", "entry_m")):
+        for place in placed(id_, cross()):
+            way = place.actor_ways[0][0]
+            middle = way.path.point_at(np.array([(way.entry_m + way.exit_m) / 2]))
+            at = float(place.ego.path.locate(middle).arc_m[0])
+            beyond = at - getattr(place.ego, mouth)
+            assert 0.0 < (beyond if mouth == "exit_m" else -beyond) < 10.0
+
+
+def test_the_first_other_names_the_place_with_the_ego() -> None:
+    place = placed("scp", cross())[0]
+    connections = RoadNetwork(cross()).connections
+    assert all(part in connections for part in place.name.split("/"))
+
+
+def test_a_motorway_takes_overtaking_on_its_slow_lane() -> None:
+    world = motorway()
+    found = placed("overtaking_motorway", world)
+    roads = RoadNetwork(world)
+    for place in found:
+        lane = roads.lanes[place.name]
+        assert lane.left_id is not None
+        assert lane.right_id is None
+    assert "motorway" in why_not("overtaking_motorway", cross()).reason
+
+
+def test_a_closed_track_is_one_lap_and_more() -> None:
+    (place,) = placed("race_track_lap", race_track())
+    assert place.name.startswith("lap from ")
+    # 4 · 45 + … of a stadium: both straights of 180 m, both half circles of 60 m radius, twice.
+    assert place.ego.last_m - place.ego.first_m == pytest.approx(2 * 736.0, abs=15.0)
+    assert why_not("race_track_lap", cross()).reason == "no race track in the World"
+
+
+def test_bays_lie_at_the_near_side_of_the_road() -> None:
+    for left_hand in (False, True):
+        for place in placed("reversing_parking", cross(left_hand=left_hand)):
+            assert place.reverse
+            path = place.ego.path
+            start, end = path.pose_at(np.array([0.0, place.ego.exit_m])).xy_m
+            backwards = path.pose_at(np.array([0.0])).yaw_rad[0]
+            # Seen by a driver who backs, the near side lies on the other hand.
+            left = np.array([-math.sin(backwards), math.cos(backwards)])
+            aside = float((end - start) @ left)
+            assert (aside > 0.0) == (not left_hand)
+            assert 2.0 < abs(aside) < 3.5
+
+
+def live_path(world: World, turn: str) -> tuple[RoadNetwork, FrenetPath, float]:
+    """Return a car's path that wanders a little beside the lanes, and where it enters."""
+    roads = RoadNetwork(world)
+    passages = roads.passages(world.intersection.id)
+    way = roads.way(next(passage for passage in passages if passage.turn == turn))
+    arcs = np.arange(way.entry_m - 60.0, way.exit_m + 60.0, 1.0)
+    offset = 0.4 * np.sin(arcs / 9.0)
+    return roads, FrenetPath(way.path.point_at(arcs, offset)), 60.0
+
+
+@pytest.mark.parametrize("turn", ["straight", "across", "near"])
+@pytest.mark.parametrize("world", [cross(), cross(left_hand=True), ring(), tee()])
+def test_the_connection_that_a_path_takes_is_found_by_its_shape(world: World, turn: str) -> None:
+    roads, path, entry = live_path(world, turn)
+    found = passage_on_path(roads, path, 5.0)
+    assert found is not None
+    passage, way = found
+    assert passage.turn == turn
+    assert way.entry_m == pytest.approx(entry, abs=2.0)
+    assert passage_on_path(roads, path, path.length_m - 5.0) is None
+
+
+def test_a_scenario_is_placed_live_on_the_cars_own_path() -> None:
+    roads, path, _ = live_path(cross(), "across")
+    scenario = catalogue()["ccftap"]
+    place = place_on_path(scenario, roads, path, 10.0)
+    assert isinstance(place, Place)
+    played = cast(
+        scenario, draw_cases(scenario)[4], place, vehicle=VEHICLE, ego_arc_m=10.0,
+        ego_speed_mps=8.0,
+    )  # fmt: skip
+    assert isinstance(played, Cast)
+    assert played.ego_arc_m == 10.0
+    assert played.ego_speed_mps == 8.0
+    assert played.place.ego.path is path
+    # The impact lies about 45 m ahead of base_link.
+    assert 4.5 < played.impact_time_s < 7.5
+
+
+def test_what_cannot_be_placed_live_says_why() -> None:
+    roads, path, _ = live_path(cross(), "straight")
+    turned = place_on_path(catalogue()["ccftap"], roads, path, 10.0)
+    assert isinstance(turned, Unplaced)
+    assert turned.reason == "the path goes straight on; the scenario's ego turns across"
+    past = place_on_path(catalogue()["scp"], roads, path, path.length_m - 5.0)
+    assert isinstance(past, Unplaced)
+    assert past.reason == "the path leads through no junction of the World ahead"
+    ringed = place_on_path(catalogue()["roundabout_entry"], roads, path, 10.0)
+    assert isinstance(ringed, Unplaced)
+    assert ringed.reason == "its kind is crossing"
+
+
+def test_somebody_ahead_needs_no_turn() -> None:
+    roads, path, _ = live_path(cross(), "near")
+    assert isinstance(place_on_path(catalogue()["lead_stopping"], roads, path, 10.0), Place)
+
+
+def test_who_joins_the_ring_enters_where_the_ego_passes() -> None:
+    scenario = Scenario(
+        id="x", title="x", shows="x.", source="x",
+        where=Where(kinds=("roundabout",)), ego=EgoPart(turn="straight", speed_mps=6.0),
+        actors=(ActorPart(name="other", relation="joins_ring", speed_mps=6.0, impact_share=0.0),),
+    )  # fmt: skip
+    result = places(scenario, ring(), vehicle=VEHICLE)
+    assert result.places
+    for place in result.places:
+        assert place.actor_ways[0][0].name.split("+")[0] != place.ego.name.split("+")[0]
