@@ -1,4 +1,4 @@
-"""The nominal future against what the car did, and against what the car itself had planned."""
+"""Futures against what the car did, and against what the car itself had planned."""
 
 from __future__ import annotations
 
@@ -14,9 +14,13 @@ from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from contracts.simulation import Comparison, PathAhead, PlanComparison, Trajectory
 from sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
 from sim_worker.metrics.displacement import horizon_error
+from sim_worker.metrics.rollout import Measure, Rollout
+from sim_worker.metrics.scene import Context
+from sim_worker.metrics.table import evaluate
 from sim_worker.planners.path import FrenetPath
 
 HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
+PLAN_NAMES = ("ade", "fde", "lateral", "longitudinal", "heading", "frechet", "dtw")
 _MAX_GAP_S = 1.5
 """Across a longer hole in the track nothing is interpolated: no truth is known there."""
 _MIN_PLAN_S = 0.5
@@ -92,14 +96,13 @@ def compare_plan(
 
     None where the two have less than half a second in common.
     """
-    poses = _plan_poses(plan, world_frame)
-    shift_s = (trajectory.stamp_ns - plan.stamp_ns) / 1e9
-    times = trajectory.time_s + shift_s
-    begin, end = plan.time_from_stamp_s[0], plan.time_from_stamp_s[-1]
-    common = (times >= begin - 1e-6) & (times <= end + 1e-6) & (trajectory.time_s > 1e-6)
-    if not common.any() or np.ptp(times[common]) < _MIN_PLAN_S:
+    reference = planned_reference(
+        plan, stamp_ns=trajectory.stamp_ns, time_s=trajectory.time_s, world_frame=world_frame
+    )
+    common = np.isfinite(reference[:, 0]) & (trajectory.time_s > 1e-6)
+    if not common.any() or np.ptp(trajectory.time_s[common]) < _MIN_PLAN_S:
         return None
-    planned = _interpolated(times[common], plan.time_from_stamp_s, poses)
+    planned = reference[common]
     nominal = np.asarray(trajectory.states[0, common, :3], dtype=np.float64)
     offsets = FrenetPath(path.xy_m).locate(planned[:, :2]).offset_m
     return PlanComparison(
@@ -112,10 +115,39 @@ def compare_plan(
     )
 
 
-def _plan_poses(plan: PlannedTrajectory, frame: LocalFrame) -> Array:
-    xy = local_from_geo(frame, plan.lat_deg, plan.lon_deg)
-    yaw = local_from_geo_yaw(frame, plan.yaw_rad, plan.lat_deg, plan.lon_deg)
-    return np.column_stack([xy, yaw])
+def compare_plans(
+    plan: PlannedTrajectory, rollout: Rollout, *, stamp_ns: int, world_frame: LocalFrame
+) -> dict[str, Measure]:
+    """Compare each simulated plan with the car's own at the same instants.
+
+    `rollout` holds S simulated plans, its time 0 at `stamp_ns`. Returns the metrics of `PLAN_NAMES`
+    (S,) by name, seen from the car's plan: positive lateral where a simulated plan ends to its
+    left, positive longitudinal where it is ahead. All are invalid where the two have no more than
+    half a second in common.
+    """
+    reference = planned_reference(
+        plan, stamp_ns=stamp_ns, time_s=rollout.time_s, world_frame=world_frame
+    )
+    common = np.isfinite(reference[:, 0]) & (rollout.time_s > 1e-6)
+    if not common.any() or np.ptp(rollout.time_s[common]) < _MIN_PLAN_S:
+        reference = np.full_like(reference, np.nan)
+    return evaluate(rollout, PLAN_NAMES, context=Context(reference=reference))
+
+
+def planned_reference(
+    plan: PlannedTrajectory, *, stamp_ns: int, time_s: Array, world_frame: LocalFrame
+) -> Array:
+    """Return poses (N, 3) of a plan in `world_frame` at `time_s` (N,) after `stamp_ns`.
+
+    They are NaN before the plan begins and after it ends.
+    """
+    xy = local_from_geo(world_frame, plan.lat_deg, plan.lon_deg)
+    yaw = local_from_geo_yaw(world_frame, plan.yaw_rad, plan.lat_deg, plan.lon_deg)
+    at_s = time_s + (stamp_ns - plan.stamp_ns) / 1e9
+    begin, end = plan.time_from_stamp_s[0], plan.time_from_stamp_s[-1]
+    poses = _interpolated(at_s, plan.time_from_stamp_s, np.column_stack([xy, yaw]))
+    poses[(at_s < begin - 1e-6) | (at_s > end + 1e-6)] = np.nan
+    return poses
 
 
 def _poses_at(actual: ActualTrack, stamp_ns: int, time_s: Array) -> Array | None:
