@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -111,6 +112,38 @@ def cast(
     without them the ego starts `lead_time_s` before the impact with the speed in `values`, later
     where its lane begins later.
     """
+    return _cast(scenario, values, place, vehicle, ego_arc_m, ego_speed_mps, {})
+
+
+def cast_all(
+    scenario: Scenario,
+    cases: Sequence[Values],
+    place: Place,
+    *,
+    vehicle: VehicleParameters,
+    ego_arc_m: float | None = None,
+    ego_speed_mps: float | None = None,
+) -> tuple[Cast | Unplaced, ...]:
+    """Return what `cast` does for each case; cases that differ elsewhere share the search."""
+    met: _Met = {}
+    return tuple(
+        _cast(scenario, values, place, vehicle, ego_arc_m, ego_speed_mps, met) for values in cases
+    )
+
+
+_Met = dict[tuple[str, float, float, float, float], "tuple[Impact, Way] | None"]
+"""Impacts by actor, its speed and share, and the ego's speed and shift: all that they depend on."""
+
+
+def _cast(
+    scenario: Scenario,
+    values: Values,
+    place: Place,
+    vehicle: VehicleParameters,
+    ego_arc_m: float | None,
+    ego_speed_mps: float | None,
+    met: _Met,
+) -> Cast | Unplaced:
     numbers = _Numbers(values)
     box = ego_box(vehicle, reverse=place.reverse)
     speed = numbers.ego("speed_mps") if ego_speed_mps is None else ego_speed_mps
@@ -120,7 +153,13 @@ def cast(
     for part, ways in zip(scenario.actors, place.actor_ways, strict=True):
         if part.relation in _ALONG:
             continue
-        found = _meet(part, ways, numbers, ego, box, place, scenario, ego_arc_m)
+        key = (
+            part.name, numbers.of(part, "speed_mps"), numbers.of(part, "impact_share"),
+            ego.speed_mps, ego.offset_m,
+        )  # fmt: skip
+        if key not in met:
+            met[key] = _meet(part, ways, numbers, ego, box, place, scenario, ego_arc_m)
+        found = met[key]
         if found is None:
             why = f"no way of {part.name} touches the ego's front before anything else"
             return Unplaced(place.junction_id, why, True)

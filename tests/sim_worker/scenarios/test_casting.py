@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from contracts.scenario import ActorPart, EgoPart, Scenario
 from sim_worker.overlap import clearance
 from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.casting import Cast, cast
+from sim_worker.scenarios.casting import Cast, cast, cast_all
 from sim_worker.scenarios.drawing import Values, draw_cases
 from sim_worker.scenarios.placement import places
 from sim_worker.scenarios.places import Place, Unplaced
@@ -97,6 +97,19 @@ def test_impacts_happen_at_crossings_of_any_angle(
     assume(isinstance(case, Cast))
     assert isinstance(case, Cast)
     check_impact(case)
+
+
+def test_cases_are_cast_together_as_they_are_one_by_one() -> None:
+    scenario = catalogue()["latency"]
+    place = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
+    cases = draw_cases(scenario)
+    together = cast_all(scenario, cases, place, vehicle=VEHICLE)
+    for case, values in zip(together, cases, strict=True):
+        alone = played(scenario, values, place)
+        assert isinstance(case, Cast)
+        assert case.values == values
+        assert (case.ego_arc_m, case.impact_time_s) == (alone.ego_arc_m, alone.impact_time_s)
+        assert [a.start_arc_m for a in case.actors] == [a.start_arc_m for a in alone.actors]
 
 
 def test_the_ego_starts_the_lead_time_before_the_impact() -> None:
