@@ -16,7 +16,8 @@ from contracts.world import Lane
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.places import Place
 from sim_worker.scenarios.relations import ways_over
-from sim_worker.scenarios.roads import APPROACH_M, DEPARTURE_M, RoadNetwork, Way
+from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
 from world_gen.polyline import arc_lengths, points_at
 
 _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}

@@ -19,7 +19,8 @@ from sim_worker.scenarios.casting import cast
 from sim_worker.scenarios.drawing import Values, draw_cases
 from sim_worker.scenarios.places import Place, Placement, Unplaced
 from sim_worker.scenarios.relations import ways_of
-from sim_worker.scenarios.roads import Passage, RoadNetwork, Way
+from sim_worker.scenarios.roads import Passage, RoadNetwork
+from sim_worker.scenarios.ways import Way
 from sim_worker.vehicle.parameters import load_vehicle
 
 _ON_CONNECTION_M = 3.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from contracts.world import DrivingSide
-from sim_worker.scenarios.roads import Way
+from sim_worker.scenarios.ways import Way
 
 
 class Place(NamedTuple):

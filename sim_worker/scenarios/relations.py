@@ -13,7 +13,8 @@ from contracts.frames import wrap_angle
 from contracts.scenario import ActorPart, Relation, TrafficTurn
 from contracts.world import Crossing
 from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.roads import Passage, RoadNetwork, Way
+from sim_worker.scenarios.roads import Passage, RoadNetwork
+from sim_worker.scenarios.ways import Way
 
 SIDE_RAD = (math.radians(30.0), math.radians(150.0))
 """Arms at these angles to the ego's own count as side arms."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -12,15 +11,20 @@ from contracts.arrays import Array
 from contracts.frames import wrap_angle
 from contracts.scenario import TrafficTurn
 from contracts.world import Connection, DrivingSide, Lane, World
-from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.ways import (
+    APPROACH_M,
+    DEPARTURE_M,
+    Way,
+    bend_between,
+    heading_of,
+    lengthened,
+    traffic_turn,
+    turn_by_heading,
+)
 from world_gen.polyline import arc_lengths
 
-APPROACH_M, DEPARTURE_M = 150.0, 120.0
-"""How far ways are led back and on along the lanes."""
-_HEADING_OVER_M = 8.0
 _LONGEST_CHAIN = 16
 """Connections through one ring: more are a drive in circles."""
-_STRAIGHT_RAD, _BACK_RAD = math.radians(45.0), math.radians(150.0)
 
 
 class Passage(NamedTuple):
@@ -39,23 +43,6 @@ class Passage(NamedTuple):
     def name(self) -> str:
         """Return the ids of its connections."""
         return "+".join(connection.id for connection in self.connections)
-
-
-class Way(NamedTuple):
-    """A path for a road user: `xy_m` (N, 2), arc length 0 at its first point.
-
-    `speed_limit_mps` (N,). The junction lies between `entry_m` and `exit_m`; lanes of the World
-    carry it from `first_m` to `last_m`, beyond which it goes on straight.
-    """
-
-    name: str
-    xy_m: Array
-    speed_limit_mps: Array
-    path: FrenetPath
-    entry_m: float
-    exit_m: float
-    first_m: float
-    last_m: float
 
 
 class RoadNetwork:
@@ -148,7 +135,7 @@ class RoadNetwork:
         if len(chain) == 1:
             turn = traffic_turn(chain[0].turn, self.driving_side)
         else:
-            turn = _turn_by_heading(float(wrap_angle(leave - entry)), self.driving_side)
+            turn = turn_by_heading(float(wrap_angle(leave - entry)), self.driving_side)
         return Passage(junction_id, chain, turn, entry, leave)
 
     def _heading_at_end(self, lane_id: str, connection: Connection) -> float:
@@ -156,13 +143,13 @@ class RoadNetwork:
         line = self.lanes[lane_id].centerline
         if len(line) < 2 or arc_lengths(line)[-1] < 1.0:
             line = connection.centerline[:2]
-        return _heading(line[::-1], backwards=True)
+        return heading_of(line[::-1], backwards=True)
 
     def _heading_at_start(self, lane_id: str, connection: Connection) -> float:
         line = self.lanes[lane_id].centerline
         if len(line) < 2 or arc_lengths(line)[-1] < 1.0:
             line = connection.centerline[-2:]
-        return _heading(line, backwards=False)
+        return heading_of(line, backwards=False)
 
     def edges_beside(self, lane_id: str) -> tuple[float, float]:
         """Return how far left and right of a lane's middle its road's edges lie, as drivers see it.
@@ -280,7 +267,7 @@ class RoadNetwork:
             back = [i for i in self._into.get(chain[0], ()) if i not in chain and self._drivable(i)]
             if not back:
                 break
-            best = min(back, key=lambda i: _bend(self._line(i), self._line(chain[0])))
+            best = min(back, key=lambda i: bend_between(self._line(i), self._line(chain[0])))
             chain.insert(0, best)
             walked += float(arc_lengths(self._line(best))[-1])
         return chain
@@ -293,7 +280,7 @@ class RoadNetwork:
             ]
             if not on:
                 break
-            best = min(on, key=lambda i: _bend(self._line(chain[-1]), self._line(i)))
+            best = min(on, key=lambda i: bend_between(self._line(chain[-1]), self._line(i)))
             chain.append(best)
             walked += float(arc_lengths(self._line(best))[-1])
         return chain
@@ -311,77 +298,3 @@ class RoadNetwork:
         """Return the way along a lane of an open road; it counts as within no junction."""
         back, on = self._upstream(lane.id), self._downstream(lane.id)[1:]
         return self.way_along(lane.id, before=back[:-1], middle=[lane.id], after=on)
-
-
-def lengthened(name: str, xy: Array, limit: Array, entry_m: float, exit_m: float) -> Way:
-    """Return the way along a polyline, led straight on at either end as far as ways go."""
-    arc = arc_lengths(xy)
-    before = max(0.0, APPROACH_M - entry_m)
-    after = max(0.0, DEPARTURE_M - (float(arc[-1]) - exit_m))
-    # Ends clipped at the World's edge can be short: a few metres tell where the road heads.
-    first = _unit(xy[0] - _point_at(xy, arc, _HEADING_OVER_M / 2))
-    last = _unit(xy[-1] - _point_at(xy, arc, float(arc[-1]) - _HEADING_OVER_M / 2))
-    parts, limits = [xy], [limit]
-    if before > 0.5:
-        parts.insert(0, (xy[0] + before * first)[None])
-        limits.insert(0, limit[:1])
-    else:
-        before = 0.0
-    if after > 0.5:
-        parts.append((xy[-1] + after * last)[None])
-        limits.append(limit[-1:])
-    line = np.concatenate(parts)
-    return Way(
-        name=name,
-        xy_m=line,
-        speed_limit_mps=np.concatenate(limits),
-        path=FrenetPath(line, np.concatenate(limits)),
-        entry_m=entry_m + before,
-        exit_m=exit_m + before,
-        first_m=before,
-        last_m=before + float(arc[-1]),
-    )
-
-
-def traffic_turn(turn: str, side: DrivingSide) -> TrafficTurn | None:
-    """Name a turn by the traffic: left is across where one drives on the right."""
-    if turn == "straight":
-        return "straight"
-    if turn == "u_turn":
-        return None
-    return "across" if (turn == "left") == (side == "right") else "near"
-
-
-def _turn_by_heading(change_rad: float, side: DrivingSide) -> TrafficTurn | None:
-    if abs(change_rad) >= _BACK_RAD:
-        return None
-    if abs(change_rad) < _STRAIGHT_RAD:
-        return "straight"
-    return traffic_turn("left" if change_rad > 0.0 else "right", side)
-
-
-def _heading(line: Array, *, backwards: bool) -> float:
-    """Return where a line heads at its first point, looked at over a few metres."""
-    arc = arc_lengths(line)
-    step = _point_at(line, arc, _HEADING_OVER_M) - line[0]
-    if backwards:
-        step = -step
-    return math.atan2(float(step[1]), float(step[0]))
-
-
-def _bend(before: Array, after: Array) -> float:
-    """Return by how much one turns from the end of one line into the other."""
-    if len(before) < 2 or len(after) < 2:
-        return math.pi
-    turn = _heading(after, backwards=False) - _heading(before[::-1], backwards=True)
-    return abs(float(wrap_angle(turn)))
-
-
-def _point_at(line: Array, arc: Array, at_m: float) -> Array:
-    at = min(max(at_m, 0.0), float(arc[-1]))
-    return np.array([np.interp(at, arc, line[:, 0]), np.interp(at, arc, line[:, 1])])
-
-
-def _unit(vector: Array) -> Array:
-    norm = float(np.hypot(*vector))
-    return vector / norm if norm > 1e-9 else np.array([1.0, 0.0])

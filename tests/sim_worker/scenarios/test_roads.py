@@ -10,7 +10,8 @@ import pytest
 
 from contracts.frames import wrap_angle
 from contracts.world import World
-from sim_worker.scenarios.roads import APPROACH_M, DEPARTURE_M, RoadNetwork, traffic_turn
+from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, traffic_turn
 from tests.sim_worker.scenarios.worlds import cross, motorway, ring, tee
 
 

@@ -1,0 +1,57 @@
+"""Actors whose ways cross or join the ego's: where they meet it, and where they start for that."""
+
+from __future__ import annotations
+
+from contracts.scenario import ActorPart
+from sim_worker.actors.kinds import KINDS
+from sim_worker.scenarios.impact import Moving, Span, find_impact
+from sim_worker.scenarios.roles import CastActor, Meeting, Staging
+from sim_worker.scenarios.ways import Way
+
+LEAST_TIME_S = 0.8
+"""Nothing is staged that is over sooner."""
+_SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)
+"""Points of the front to meet where the wished one cannot be met first."""
+_AROUND_M, _MOUTH_M = 40.0, 15.0
+"""How far from the junction the ego may meet somebody, and how far behind an arm's mouth."""
+
+
+def meet(
+    part: ActorPart, ways: tuple[Way, ...], staging: Staging, ego_arc_m: float | None
+) -> Meeting | None:
+    """Return where and by which way an actor meets the ego, as near the wished share as can be."""
+    place, ego = staging.place, staging.ego
+    low, high = place.ego.entry_m - _AROUND_M, place.ego.exit_m + _AROUND_M
+    if place.reverse:
+        low, high = place.ego.first_m, place.ego.exit_m
+    elif part.relation == "crosses_exit":
+        low = place.ego.exit_m - _MOUTH_M
+    elif part.relation == "crosses_entry":
+        high = place.ego.entry_m + _MOUTH_M
+    lead = staging.scenario.lead_time_s
+    if ego_arc_m is not None:
+        low = max(low, ego_arc_m + ego.speed_mps * LEAST_TIME_S)
+        lead = LEAST_TIME_S
+    wished = staging.number(part, "impact_share")
+    walks = part.relation in ("crosses_exit", "crosses_entry")
+    before, after = (2.0, 2.0) if walks else (10.0, 30.0)
+    for share in sorted({wished, *_SHARES}, key=lambda other: abs(other - wished)):
+        for way in ways:
+            impact = find_impact(
+                ego, staging.box, Moving(way.path, staging.number(part, "speed_mps")),
+                KINDS[part.kind], ego_span=Span(low, high),
+                actor_span=Span(way.entry_m - before, way.exit_m + after),
+                share=share, near_sign=place.near_sign, lead_time_s=lead,
+            )  # fmt: skip
+            if impact is not None:
+                return Meeting(impact, way)
+    return None
+
+
+def incoming(part: ActorPart, staging: Staging, meeting: Meeting) -> CastActor:
+    """Return an actor that is at its place of impact when the ego is, or as much later as meant."""
+    impact, way = meeting
+    until_s = (impact.ego_arc_m - staging.start_m) / staging.ego.speed_mps
+    until_s += staging.number(part, "arrives_after_s")
+    start = impact.actor_arc_m - staging.number(part, "speed_mps") * until_s
+    return staging.actor(part, way.xy_m, start, 0.0, way.name)

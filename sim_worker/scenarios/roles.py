@@ -1,0 +1,128 @@
+"""The parts of a case: who starts where, and the case being staged while they are given out."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.drive import RoadUserKind
+from contracts.scenario import EGO, ActorPart, Conduct, Relation, Scenario
+from sim_worker.actors.kinds import KINDS, KindTraits
+from sim_worker.scenarios.drawing import Values
+from sim_worker.scenarios.impact import EgoBox, Impact, Moving
+from sim_worker.scenarios.places import Place
+from sim_worker.scenarios.ways import Way
+
+ALONG: tuple[Relation, ...] = ("ahead", "behind", "beside", "parked")
+"""Relations of those who have no way of their own: they are on the ego's path or beside it."""
+
+
+class CastActor(NamedTuple):
+    """Another road user of a case.
+
+    `xy_m` (N, 2) is its own path; its box's centre starts at `start_arc_m` of it, `lateral_m` to
+    the left. It moves with `speed_mps` until, if it stops, it brakes with `decel_mps2` after
+    `acts_after_s`.
+    """
+
+    name: str
+    kind: RoadUserKind
+    relation: Relation
+    xy_m: Array
+    start_arc_m: float
+    lateral_m: float
+    speed_mps: float
+    conduct: Conduct
+    acts_after_s: float
+    decel_mps2: float
+    hidden_by: str
+    way: str
+    """The connections or the line that it takes."""
+
+    @property
+    def traits(self) -> KindTraits:
+        """Return the sizes and limits of its kind."""
+        return KINDS[self.kind]
+
+
+class Cast(NamedTuple):
+    """Everybody's start in one case, in the World's frame.
+
+    The ego's base_link starts at `ego_arc_m` of `ego_xy_m` (N, 2), `ego_lateral_m` to its left;
+    `reverse` says that it drives backwards along it. Where a touch is planned, an ego that keeps
+    its speed touches the first road user after `impact_time_s` with its front's point
+    `impact_share` at `impact_point_m` (2,); else the three are NaN.
+    """
+
+    scenario_id: str
+    place: Place
+    values: Values
+    actors: tuple[CastActor, ...]
+    ego_xy_m: Array
+    ego_speed_limit_mps: Array
+    ego_arc_m: float
+    ego_lateral_m: float
+    ego_speed_mps: float
+    reverse: bool
+    impact_time_s: float
+    impact_point_m: Array
+    impact_share: float
+    impact_with: str
+    off_lanes_m: float
+    """How far beyond the World's lanes the ego or an actor starts, on a road prolonged."""
+
+
+class Meeting(NamedTuple):
+    """Where the ego and an actor meet, and by which way the actor comes."""
+
+    impact: Impact
+    way: Way
+
+
+class Staging(NamedTuple):
+    """A case while it is staged: the ego's motion is known, and, once placed, its start."""
+
+    scenario: Scenario
+    values: Values
+    place: Place
+    ego: Moving
+    box: EgoBox
+    start_m: float = 0.0
+
+    def number(self, part: ActorPart, field: str) -> float:
+        """Return a drawn number of an actor."""
+        return self.values[f"{part.name}.{field}"]
+
+    def ego_number(self, field: str) -> float:
+        """Return a drawn number of the ego."""
+        return self.values[f"{EGO}.{field}"]
+
+    def actor(
+        self, part: ActorPart, xy_m: Array, start_arc_m: float, lateral_m: float, way: str
+    ) -> CastActor:
+        """Return an actor that starts on a path, led straight back where it starts before it."""
+        if start_arc_m < _LEAST_ARC_M:
+            more = _LEAST_ARC_M - start_arc_m
+            back = (xy_m[0] - xy_m[1]) / max(float(np.hypot(*(xy_m[0] - xy_m[1]))), 1e-9)
+            xy_m = np.concatenate([(xy_m[0] + more * back)[None], xy_m])
+            start_arc_m = _LEAST_ARC_M
+        return CastActor(
+            name=part.name,
+            kind=part.kind,
+            relation=part.relation,
+            xy_m=xy_m,
+            start_arc_m=start_arc_m,
+            lateral_m=lateral_m,
+            speed_mps=0.0 if part.conduct == "parked" else self.number(part, "speed_mps"),
+            conduct=part.conduct,
+            acts_after_s=self.number(part, "acts_after_s"),
+            decel_mps2=self.number(part, "decel_mps2"),
+            hidden_by=part.hidden_by,
+            way=way,
+        )
+
+
+_LEAST_ARC_M = 1.0
+"""Paths begin behind whoever starts on them."""
