@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts import drive, simulation
+from contracts import drive, futures, simulation
 
 PREFIX = "foretwin/v1"
 
@@ -81,8 +81,8 @@ CHANNELS: dict[str, Channel] = {
         _row("advance", "vehicle/{vehicle}/advance", drive.AdvanceRequest, None, REQUEST,
              "lock step: go on until", drive.AdvanceReply),
         # Work.
-        _row("job", f"{_RUN}/worker/{{process}}/job", simulation.FuturesJob, 2, REQUEST,
-             "simulate futures", simulation.FuturesResult),
+        _row("job", f"{_RUN}/worker/{{process}}/job", futures.FuturesJob, 2, REQUEST,
+             "simulate futures", futures.FuturesResult),
         _row("prepare", f"{_RUN}/worker/{{process}}/prepare", simulation.PrepareRequest, None,
              REQUEST, "load a World", simulation.PrepareReply),
         _row("use_world", f"{_RUN}/worker/{{process}}/use_world", simulation.ActiveWorld, None,

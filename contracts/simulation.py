@@ -1,9 +1,4 @@
-"""Jobs and results of the simulation: futures, comparisons, and the mirror of the real car.
-
-Trajectories hold S simulations of N instants as `states` (S, N, 8): x_m, y_m, yaw_rad of
-base_link in the World's frame, vx_mps, vy_mps in the body frame, yaw_rate_radps,
-tire_angle_rad, accel_mps2. `STATE_COLUMNS` names them.
-"""
+"""What rooms tell each other about a run besides its futures: Worlds, comparisons, the mirror."""
 
 from __future__ import annotations
 
@@ -11,112 +6,7 @@ from typing import Literal
 
 import msgspec
 
-from contracts.arrays import Array, Array32
-from contracts.drive import VehicleState
-
-STATE_COLUMNS = (
-    "x_m", "y_m", "yaw_rad", "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2",
-)  # fmt: skip
-
-ActorKind = Literal["lead", "crossing", "oncoming"]
-
-
-class PathAhead(msgspec.Struct, frozen=True, kw_only=True):
-    """The lane-centre path the navigation plan foresees, in the World's frame.
-
-    `xy_m` (N, 2) begins a few metres behind the car, about 1 m apart; `speed_limit_mps` (N,).
-    """
-
-    xy_m: Array
-    speed_limit_mps: Array
-
-
-class ActorSpec(msgspec.Struct, frozen=True, kw_only=True):
-    """Another road user of a future, placed by the worker on the ego's path or across it.
-
-    `lead` drives ahead on the ego's path, `gap_m` in front; `crossing` and `oncoming` take a path
-    of the World that meets the ego's and are there `time_offset_s` after an ego that keeps its
-    speed would be.
-    """
-
-    kind: ActorKind
-    speed_mps: float
-    gap_m: float = 0.0
-    time_offset_s: float = 0.0
-    path_rank: int = 0
-    """Which of the World's crossing paths, in its order, modulo their number."""
-
-
-class Variant(msgspec.Struct, frozen=True, kw_only=True):
-    """One alternative future: what differs from the nominal one (index 0)."""
-
-    index: int
-    name: str
-    planner: str = "pure_pursuit_idm"
-    target_speed_factor: float = 1.0
-    """Of the speed that the nominal future aims at."""
-    target_speed_offset_mps: float = 0.0
-    lateral_shift_m: float = 0.0
-    friction_factor: float = 1.0
-    extra_steering_delay_s: float = 0.0
-    actor: ActorSpec | None = None
-
-
-class FuturesJob(msgspec.Struct, frozen=True, kw_only=True):
-    """Simulate `variants` from `state` for `horizon_s`; the result is a function of this alone."""
-
-    round_id: int
-    job_index: int
-    world_id: str
-    state: VehicleState
-    path: PathAhead
-    variants: tuple[Variant, ...]
-    horizon_s: float
-    step_s: float
-    """Between the instants of the result."""
-    seed: int
-    cruise_speed_mps: float
-    """The speed that the nominal future aims at where nothing is in the way."""
-
-
-class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
-    """S simulations of N instants; `time_s` (N,) from the seeding state, `states` (S, N, 8)."""
-
-    stamp_ns: int
-    time_s: Array
-    states: Array32
-
-
-class Outcome(msgspec.Struct, frozen=True, kw_only=True):
-    """What became of each of S futures; times and distances are NaN where `valid` is false.
-
-    `collided` (S,) bool, `collision_time_s` (S,), `collision_with` (S,): 0 nothing, 1 road user,
-    2 building or island; `min_clearance_m` (S,) to the road user; `progress_m` (S,) along the path.
-    """
-
-    collided: Array
-    collision_time_s: Array
-    collision_with: Array
-    min_clearance_m: Array
-    progress_m: Array
-    valid: Array
-    """(S,) bool: false where the simulation diverged."""
-
-
-class FuturesResult(msgspec.Struct, frozen=True, kw_only=True):
-    """The answer to a FuturesJob; `actors` (S, N, 3) x, y, yaw of box centres, NaN where none."""
-
-    round_id: int
-    job_index: int
-    worker_id: str
-    world_id: str
-    variant_indices: tuple[int, ...]
-    trajectory: Trajectory
-    actors: Array32
-    outcome: Outcome
-    sim_seconds: float
-    cpu_seconds: float
-    wall_seconds: float
+from contracts.arrays import Array32
 
 
 class PrepareRequest(msgspec.Struct, frozen=True, kw_only=True):

@@ -153,7 +153,7 @@ class Conductor:
             else:
                 self.unseeded_rounds += 1
             return False
-        self.rounds.start(intent, latest, self.intake.plan)
+        self.rounds.start(intent, latest, self.intake.surroundings)
         return True
 
     def finish(self) -> None:

@@ -43,6 +43,9 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     rate_hz: float = 2.0
     horizon_s: float = 8.0
     planner: str = "pure_pursuit_idm"
+    scenarios: tuple[str, ...] | None = None
+    """Ids of the catalogue or TOML files that happen in every second future; None is all that take
+    place at junctions, none at all is an empty list."""
     seed: int = 0
     vehicle: str | None = None
     vehicle_id: str = "ego"

@@ -7,7 +7,14 @@ from typing import NamedTuple
 
 from contracts.bus import Received
 from contracts.codec import SchemaMismatch
-from contracts.drive import DriveEnd, PlannedTrajectory, VehicleInfo, VehicleState
+from contracts.drive import (
+    DriveEnd,
+    PlannedTrajectory,
+    RoadUsers,
+    SignalState,
+    VehicleInfo,
+    VehicleState,
+)
 from contracts.vehicle import VehicleParameters
 from orchestrator.bookkeeping import TelemetryCount
 from telemetry.estimator import StateEstimator
@@ -20,6 +27,14 @@ class LatestState(NamedTuple):
     receipt_mono_ns: int
 
 
+class Surroundings(NamedTuple):
+    """The newest of what a car says besides its own motion; each with its own stamp."""
+
+    plan: PlannedTrajectory | None
+    road_users: RoadUsers | None
+    signals: tuple[SignalState, ...]
+
+
 class Intake:
     """Takes samples one by one; the estimator behind it is pure."""
 
@@ -29,6 +44,9 @@ class Intake:
         self.end: DriveEnd | None = None
         self.latest: LatestState | None = None
         self.plan: PlannedTrajectory | None = None
+        self.road_users: RoadUsers | None = None
+        self.signals: dict[str, SignalState] = {}
+        """The newest of each signal group."""
         self.states = 0
         self.first_stamp_ns: int | None = None
         self.refused = 0
@@ -65,6 +83,10 @@ class Intake:
         self.counts.take(key=item.key, channel=item.channel, seq=envelope.seq, age_ms=age_ms)
         if isinstance(message, PlannedTrajectory):
             self.plan = message
+        elif isinstance(message, RoadUsers):
+            self.road_users = message
+        elif isinstance(message, SignalState):
+            self.signals[message.group_id] = message
         if self._estimator is None:
             return None
         state = self._estimator.handle(item.channel, message)
@@ -72,6 +94,11 @@ class Intake:
             self.latest = LatestState(state, item.received_mono_ns)
             self.states += 1
         return state
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What the car last said of its plan, of other road users and of lights."""
+        return Surroundings(self.plan, self.road_users, tuple(self.signals.values()))
 
     @property
     def start_stamp_ns(self) -> int:

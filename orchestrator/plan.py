@@ -22,6 +22,7 @@ from orchestrator.endpoints import free_endpoint
 from orchestrator.line_matching import match_line
 from orchestrator.map_opening import Clip, open_map
 from orchestrator.road_index import RoadIndex
+from orchestrator.round_jobs import scenarios_of
 from orchestrator.route import Route
 from orchestrator.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import load_planner
@@ -107,6 +108,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         load_planner(config.planner)
     except ValueError as error:
         raise ConfigError(str(error)) from error
+    scenarios_of(config)  # an unknown one is told before anything long begins
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
     map_file = Path(config.map) if config.map else EMBEDDED_MAP
     source = config.resolved_source

@@ -9,14 +9,8 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.frames import LocalFrame, target_from_source
-from contracts.simulation import (
-    Comparison,
-    HorizonError,
-    MirrorSample,
-    PlanComparison,
-    RoundView,
-    Variant,
-)
+from contracts.futures import FuturesResult, Variant
+from contracts.simulation import Comparison, HorizonError, MirrorSample, PlanComparison, RoundView
 from orchestrator.rounds import RoundDone
 from sim_worker.metrics.displacement import distinct_count
 
@@ -68,6 +62,8 @@ def future_rows(done: RoundDone, variants: Sequence[Variant]) -> FutureRows:
                     "variant": variant_index,
                     "name": variant.name,
                     "planner": variant.planner,
+                    "scenario": _happened(result, place, variant),
+                    "failure": outcome.failures[place] if outcome.failures else "",
                     "worker_id": result.worker_id,
                     "valid": bool(outcome.valid[place]),
                     "collided": bool(outcome.collided[place]),
@@ -86,6 +82,11 @@ def future_rows(done: RoundDone, variants: Sequence[Variant]) -> FutureRows:
             number += 1
     distinct = distinct_count(futures.states[futures.valid, -1, :2], DISTINCT_M)
     return FutureRows(futures, rows, distinct)
+
+
+def _happened(result: FuturesResult, place: int, variant: Variant) -> str:
+    """Return the scenario of a future; empty where it has none, or it was left out."""
+    return "" if result.left_out and result.left_out[place] else variant.scenario_id
 
 
 def round_row(

@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 from contracts.bus import Bus, Mailbox, Reply
 from contracts.drive import PlannedTrajectory, VehicleState
-from contracts.simulation import Comparison, FuturesJob
+from contracts.futures import Variant
+from contracts.simulation import Comparison
 from contracts.world import World
 from orchestrator.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from orchestrator.comparisons import ComparisonDesk
 from orchestrator.instructions import RoundIntent
-from orchestrator.intake import LatestState
+from orchestrator.intake import LatestState, Surroundings
 from orchestrator.plan import DrivePlan
 from orchestrator.result_rows import (
     comparison_row,
@@ -23,17 +24,13 @@ from orchestrator.result_rows import (
     round_view,
 )
 from orchestrator.results import ResultTables
+from orchestrator.round_jobs import PLAN_FRESH_NS, RoundPlanner
 from orchestrator.rounds import RoundDesk, RoundDone, RoundOrder
 from sim_worker.metrics.comparison import compare_plan
-from sim_worker.variants import plan_variants
 
 log = logging.getLogger("orchestrator")
 
 JOB_TIMEOUT_S = 20.0
-STEP_S = 0.1
-HEEDLESS_PLANNER = "constant_speed"
-PLAN_FRESH_NS = 1_000_000_000
-"""An older plan of the car is not compared with a new future."""
 
 
 class _Seed(NamedTuple):
@@ -42,11 +39,7 @@ class _Seed(NamedTuple):
     state: VehicleState
     plan: PlannedTrajectory | None
     intent: RoundIntent
-
-
-def planners_of(planner: str) -> list[str]:
-    """Return who drives the futures in turn: the planner under test, and one that heeds nobody."""
-    return [planner] * 7 + ([HEEDLESS_PLANNER] if planner != HEEDLESS_PLANNER else [])
+    variants: tuple[Variant, ...]
 
 
 class RoundRunner:
@@ -78,36 +71,22 @@ class RoundRunner:
         self._on_round = on_round
         self._on_error = on_error
         self._comparison_desk = ComparisonDesk(plan.drive_frame, plan.config.horizon_s)
-        config = plan.config
-        self._variants = plan_variants(
-            count=config.futures, seed=config.seed, planners=planners_of(config.planner)
-        )
+        self._planner = RoundPlanner(plan.config, plan.vehicle)
         self._next_round_id = 0
         self._seeds: dict[int, _Seed] = {}
 
-    def start(
-        self, intent: RoundIntent, latest: LatestState, car_plan: PlannedTrajectory | None
-    ) -> None:
+    def start(self, intent: RoundIntent, latest: LatestState, said: Surroundings) -> None:
         """Open a round and give its jobs out."""
-        config = self._plan.config
         round_id, self._next_round_id = self._next_round_id, self._next_round_id + 1
-        size = config.futures_per_job
-        jobs = tuple(
-            FuturesJob(
-                round_id=round_id,
-                job_index=index,
-                world_id=intent.world_id,
-                state=latest.state,
-                path=intent.path,
-                variants=self._variants[first : first + size],
-                horizon_s=config.horizon_s,
-                step_s=STEP_S,
-                seed=config.seed,
-                cruise_speed_mps=intent.cruise_speed_mps,
-            )
-            for index, first in enumerate(range(0, config.futures, size))
+        variants, jobs = self._planner.plan(
+            round_id,
+            intent,
+            latest.state,
+            said,
+            self._world_of(intent.world_id),
+            start_stamp_ns=self.start_stamp_ns,
         )
-        self._seeds[round_id] = _Seed(latest.state, car_plan, intent)
+        self._seeds[round_id] = _Seed(latest.state, said.plan, intent, variants)
         self.desk.open(
             RoundOrder(
                 round_id=round_id,
@@ -166,7 +145,7 @@ class RoundRunner:
         for expired in [r for r in self._seeds if r < order.round_id]:
             del self._seeds[expired]
         world = self._world_of(order.world_id)
-        futures, rows, distinct = future_rows(done, self._variants)
+        futures, rows, distinct = future_rows(done, seed.variants)
         sha = self.futures.take(done, distinct=distinct)
         self._on_round(order.junction_id, len(rows))
         self._tables.add("futures", rows)
@@ -178,7 +157,7 @@ class RoundRunner:
             cruise_speed_mps=seed.intent.cruise_speed_mps,
         )
         self._tables.add("rounds", [row])
-        view = round_view(done, futures, world.frame, self._plan.drive_frame, self._variants)
+        view = round_view(done, futures, world.frame, self._plan.drive_frame, seed.variants)
         self._bus.publish("round", view, run=self._plan.run_id)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._comparison_desk.take_round(done, world.frame, seed.state)

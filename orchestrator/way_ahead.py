@@ -8,7 +8,7 @@ import numpy as np
 
 from contracts.drive import VehicleState
 from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, target_from_source
-from contracts.simulation import PathAhead
+from contracts.futures import PathAhead
 from orchestrator.arrival import DrivingPace, predict_arrivals
 from orchestrator.cruise import CruiseSpeed
 from orchestrator.driving_path import driving_path

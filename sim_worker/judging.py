@@ -1,89 +1,93 @@
-"""What became of each future: collisions, clearance, progress."""
+"""What became of each future: collisions, clearance, progress, and why one failed."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from contracts.arrays import Array, Array32
-from contracts.simulation import Outcome
+from contracts.futures import Outcome
 from contracts.vehicle import VehicleParameters
-from sim_worker.overlap import Rectangles, clearance
-from sim_worker.stage_model import ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
-from sim_worker.vehicle.planar import box_centre_from_base_m
-
-Flags = npt.NDArray[np.bool_]
+from sim_worker.accident import Accidents
+from sim_worker.closed_loop import DriveRecord
+from sim_worker.touch import Touches, first_touches
 
 NOTHING, ROAD_USER, STATIC = 0, 1, 2
 """Values of Outcome.collision_with."""
 
 
-class DriveRecord(NamedTuple):
-    """What a job recorded at T control ticks: states (S, T, 8), contacts and validity (S, T)."""
-
-    states: Array
-    static_contact: Flags
-    user_contact: Flags
-    valid: Flags
-    progress_m: Array
-
-
 def judge(
-    vehicle: VehicleParameters, drive: DriveRecord, poses: Array, *, tick_s: float
-) -> Outcome:
-    """Judge a recorded drive against road users `poses` (S, T, 3) and its static contacts.
+    vehicle: VehicleParameters,
+    drive: DriveRecord,
+    user_size_m: Array,
+    clearance_m: Array,
+    *,
+    tick_s: float,
+) -> tuple[Outcome, Touches]:
+    """Judge a recorded drive; returns the first touches of road users that count as collisions.
 
-    `min_clearance_m` is infinite where a future has no road user.
+    `user_size_m` (S, R, 2); `clearance_m` (S,) the least distance seen to any of them, infinite
+    where there is none. A touch after the car met something static, or of a future that is not
+    valid, does not count.
     """
-    states = drive.states
     # The contract has one array type; flags stay numpy booleans in it.
     valid: Any = drive.valid.all(axis=1)
-    count, ticks = states.shape[:2]
-    distance = np.full((count, ticks), np.inf)
-    there = np.flatnonzero(np.isfinite(poses[:, 0, 0]) & valid)
-    if len(there):
-        distance[there] = clearance(
-            ego_rectangles(vehicle, states[there]),
-            Rectangles(
-                poses[there, :, :2], poses[there, :, 2], ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
-            ),
-        )
-    distance[drive.user_contact] = 0.0
-    hit_user, hit_static = distance <= 0.0, drive.static_contact
-    hit = hit_user | hit_static
-    collided: Any = hit.any(axis=1) & valid
-    first = hit.argmax(axis=1)
-    rows = np.arange(count)
-    with_what = np.where(hit_user[rows, first], ROAD_USER, STATIC)
-    return Outcome(
+    count = len(drive.states)
+    touches = first_touches(vehicle, drive.states, drive.users, user_size_m, tick_s=tick_s)
+    user_s = np.full(count, np.inf)
+    user_s[touches.future] = touches.time_s
+    static_s = np.where(
+        drive.static_contact.any(axis=1), drive.static_contact.argmax(axis=1) * tick_s, np.inf
+    )
+    time_s = np.minimum(user_s, static_s)
+    collided: Any = np.isfinite(time_s) & valid
+    counts = (user_s <= static_s) & collided
+    # Between two instants they may have been nearer than at either.
+    clearance = np.where(np.isfinite(user_s), 0.0, clearance_m)
+    outcome = Outcome(
         collided=collided,
-        collision_time_s=np.where(collided, first * tick_s, np.nan),
-        collision_with=np.where(collided, with_what, NOTHING),
-        min_clearance_m=np.where(valid, distance.min(axis=1), np.nan),
+        collision_time_s=np.where(collided, time_s, np.nan),
+        collision_with=np.where(collided, np.where(counts, ROAD_USER, STATIC), NOTHING),
+        min_clearance_m=np.where(valid, clearance, np.nan),
         progress_m=np.where(valid, drive.progress_m, np.nan),
         valid=valid,
+        failures=drive.failures if any(drive.failures) else (),
     )
+    kept = counts[touches.future]
+    return outcome, Touches._make(field[kept] for field in touches)
 
 
-def ego_rectangles(vehicle: VehicleParameters, states: Array) -> Rectangles:
-    """Return the car's outline at base_link states (…, 8)."""
-    ahead = box_centre_from_base_m(vehicle)
-    yaw = states[..., 2]
-    centre = states[..., :2] + ahead * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
-    return Rectangles(centre, yaw, vehicle.length_m.value, vehicle.width_m.value)
+def with_collisions(
+    states: Array32, outcome: Outcome, accidents: Accidents | None, *, step_s: float
+) -> Array32:
+    """Return states (S, N, 8) in which a car moves as its accident has it, then stands.
 
-
-def held_from_collision(states: Array32, outcome: Outcome, *, step_s: float) -> Array32:
-    """Return states (S, N, 8) in which a car stands from its collision with a road user on.
-
-    Road users are kinematic, so to speak of infinite mass: what they would do to the car after
-    the first touch means nothing. A building or island stops the car as it should.
+    Where no accident was computed, it stands from its collision with a road user on. A building or
+    island stops the car as it should: nothing is changed there.
     """
-    held = np.array(states)
+    found = np.array(states)
+    times = step_s * np.arange(states.shape[1])
     for row in np.flatnonzero(np.asarray(outcome.collision_with) == ROAD_USER):
-        first = min(int(np.ceil(outcome.collision_time_s[row] / step_s - 1e-6)), held.shape[1] - 1)
-        held[row, first:] = held[row, first]
-        held[row, first:, [3, 4, 5, 7]] = 0.0
-    return held
+        first = int(np.ceil(outcome.collision_time_s[row] / step_s - 1e-6))
+        first = min(first, len(times) - 1)
+        after, end = found[row, first:], found[row, first].astype(np.float64)
+        one = _accident_of(int(row), accidents)
+        if accidents is not None and one is not None:
+            known = accidents.time_s[one] + accidents.after_time_s
+            motion = accidents.ego_states[one]
+            for column in range(8):
+                after[:, column] = np.interp(times[first:], known, motion[:, column])
+            over = times[first:] > known[-1]
+            after, end = after[over], motion[-1]
+        after[:] = end
+        after[:, [3, 4, 5, 7]] = 0.0
+    return found
+
+
+def _accident_of(row: int, accidents: Accidents | None) -> int | None:
+    """Return the place of a future's accident, if it has one that was computed."""
+    if accidents is None:
+        return None
+    found = np.flatnonzero((accidents.future == row) & accidents.valid)
+    return int(found[0]) if len(found) else None

@@ -1,4 +1,4 @@
-"""Where a car could touch anything at all: elsewhere, contacts need not be looked for.
+"""Where a car could touch anything static: elsewhere, contacts need not be looked for.
 
 Looking for contacts costs up to half of a physics step. Leaving it out where there can be none
 changes no bit of a result, so every bound here errs towards looking.
@@ -7,7 +7,6 @@ changes no bit of a result, so every bound here errs towards looking.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -87,43 +86,3 @@ def _outlines(model: mujoco.MjModel) -> list[Array]:
         clouds.append(world[:, :2])
     hulls = [shapely.convex_hull(shapely.MultiPoint(cloud)) for cloud in clouds]
     return [shapely.get_coordinates(shapely.orient_polygons(hull)) for hull in hulls]
-
-
-class RoadUserTick(NamedTuple):
-    """Road users of S futures over the K physics steps of a control tick.
-
-    `mocap` (S, K, 7) positions and quaternions at the end of each step; `xy_m` (2, S) and
-    `travel_m` (S,): a circle's centre and radius that hold the box centre throughout.
-    """
-
-    mocap: Array
-    xy_m: Array
-    travel_m: Array
-
-
-class RoadUserMotion:
-    """Where the road users of S futures are at every physics step, in the form a stage takes.
-
-    `poses` (S, N, 3) are x, y, yaw of the box centre at the end of each of N physics steps, NaN
-    throughout where a future has none: that one is kept at `far_m`, far away.
-    """
-
-    def __init__(self, poses: Array, *, steps_per_tick: int, far_m: float) -> None:
-        count, steps = poses.shape[:2]
-        ticks = steps // steps_per_tick
-        self._mocap = np.zeros((ticks, count, steps_per_tick, 7))
-        self._mocap[..., 0:2], self._mocap[..., 3] = far_m, 1.0
-        self._xy, self._travel = np.full((ticks, 2, count), far_m), np.zeros((ticks, count))
-        there = np.flatnonzero(np.isfinite(poses[:, 0, 0]))
-        found = poses[there].reshape(len(there), ticks, steps_per_tick, 3).swapaxes(0, 1)
-        half = 0.5 * found[..., 2]
-        self._mocap[:, there, :, 0:2] = found[..., :2]
-        self._mocap[:, there, :, 3:4] = np.cos(half)[..., None]
-        self._mocap[:, there, :, 6:7] = np.sin(half)[..., None]
-        low, high = found[..., :2].min(axis=2), found[..., :2].max(axis=2)
-        self._xy[:, :, there] = (0.5 * (low + high)).swapaxes(1, 2)
-        self._travel[:, there] = 0.5 * np.hypot(*np.moveaxis(high - low, -1, 0))
-
-    def at(self, tick: int) -> RoadUserTick:
-        """Return what a stage needs for its control tick number `tick`, counted from 0."""
-        return RoadUserTick(self._mocap[tick], self._xy[tick], self._travel[tick])

@@ -17,7 +17,7 @@ _MIN_SPEED_MPS = 1.0
 
 
 def local_state(state: VehicleState, frame: LocalFrame, vehicle: VehicleParameters) -> Array:
-    """Return (8,) base_link state in `frame`, columns as `contracts.simulation.STATE_COLUMNS`.
+    """Return (8,) base_link state in `frame`, columns as `contracts.futures.STATE_COLUMNS`.
 
     The lateral velocity of the rear axle is that of steady cornering. Raises ValueError where the
     state is not finite.

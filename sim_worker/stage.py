@@ -13,17 +13,8 @@ from mujoco import batch as mujoco_batch
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from sim_worker.nearness import NearStatics, RoadUserMotion, RoadUserTick
-from sim_worker.stage_model import (
-    FAR_M,
-    PREFIX,
-    ROAD_USER_CONTACT,
-    ROAD_USER_LENGTH_M,
-    ROAD_USER_WIDTH_M,
-    STATIC_CONTACT,
-    compile_stage,
-    world_spec,
-)
+from sim_worker.nearness import NearStatics
+from sim_worker.stage_model import PREFIX, STATIC_CONTACT, compile_stage, world_spec
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
@@ -53,7 +44,10 @@ class Controls(NamedTuple):
 
 
 class Stage:
-    """A compiled World with one vehicle and one kinematic road user, times `nsim`.
+    """A compiled World with one vehicle, times `nsim`.
+
+    Other road users are no part of it: kinematic bodies have infinite mass and would throw the
+    car. Who touches whom is found from their outlines.
 
     Belongs to one thread. Seeding with S ≤ nsim states uses the first S simulations. A result
     depends on the seeds and commands alone, not on what the stage did before.
@@ -115,7 +109,6 @@ class Stage:
         self._steer_history = slice(first, first + samples)
         self._history_samples = samples
         self._static_contact = int(model.sensor(STATIC_CONTACT).adr[0])
-        self._road_user_contact = int(model.sensor(ROAD_USER_CONTACT).adr[0])
         self._flags = batch.expand("opt.disableflags").reshape(self.nsim)
         self._looking = int(model.opt.disableflags)
         # The planar vehicle has no other constraint, and no other sensor.
@@ -123,12 +116,7 @@ class Stage:
         self._not_looking = self._looking | int(
             disable.mjDSBL_CONSTRAINT | disable.mjDSBL_CONTACT | disable.mjDSBL_SENSOR
         )
-        state = mujoco.mjtState
-        # Control, road user position and orientation, in the order of the state's bits.
-        self._control_spec = int(
-            state.mjSTATE_CTRL | state.mjSTATE_MOCAP_POS | state.mjSTATE_MOCAP_QUAT
-        )
-        self._control_size = model.nu + 7 * model.nmocap
+        self._control_spec = int(mujoco.mjtState.mjSTATE_CTRL)
 
     def _bound_reach(self) -> None:
         vehicle = self.vehicle
@@ -138,7 +126,6 @@ class Stage:
         fastest += abs(self._centre_ahead_m) * _MAX_YAW_RATE_RADPS
         reach = own + fastest * self.control_dt_s + _SLACK_M
         self._near_statics = NearStatics(self.model, reach_m=reach)
-        self._user_reach_m = reach + math.hypot(ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M) / 2.0
         self._bounds = np.array([[_MAX_SPEED_MPS], [_MAX_SLIDE_MPS], [_MAX_YAW_RATE_RADPS]])
 
     def seed(
@@ -189,11 +176,10 @@ class Stage:
             ctrl=self._ctrl[rows],
             biasprm=self._biasprm[rows],
             forcerange=self._forcerange[rows],
+            tick_s=self.control_dt_s,
+            accel_mps2=start[:, 7],
         )
-        self._controls = np.zeros((count, self.steps_per_tick, self._control_size))
-        self._road_users = self._controls[:, :, self.model.nu :]
-        self._road_users[:, :, 0:3] = (FAR_M, FAR_M, 0.0)
-        self._road_users[:, :, 3] = 1.0
+        self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
         record = np.zeros((count, self.steps_per_tick, self.model.nsensordata))
         self._record = {"sensordata": record}
         self._near = np.zeros(count, dtype=bool)
@@ -202,16 +188,8 @@ class Stage:
         """Whether contacts were looked for in any simulation during the last tick."""
         self._positions, self._velocities = np.empty((4, count)).T, np.empty((4, count)).T
 
-    def road_user_motion(self, poses: Array) -> RoadUserMotion:
-        """Prepare road users for `step`: x, y, yaw (S, N, 3) of box centres, NaN where none.
-
-        They are those at the end of each of N physics steps: a road user that jumped once a
-        control tick would hit with several times its speed.
-        """
-        return RoadUserMotion(poses, steps_per_tick=self.steps_per_tick, far_m=FAR_M)
-
-    def step(self, controls: Controls, *, road_users: RoadUserTick | None = None) -> None:
-        """Advance one control tick; `road_users` are those of `road_user_motion` at this tick."""
+    def step(self, controls: Controls) -> None:
+        """Advance one control tick."""
         rows = slice(0, self._count)
         states = self._states[rows]
         speed = states[:, 3].copy()
@@ -225,9 +203,7 @@ class Stage:
         )
         per_step[:, :, ids.steer] = spread
         self._tire_command = spread[:, -1]
-        if road_users is not None:
-            self._road_users[:] = road_users.mocap
-        self._near = self._near_anything(states, road_users)
+        self._near = self._near_statics_of(states)
         looked, self.looked = self.looked, bool(self._near.any())
         if looked or self.looked:
             self._flags[rows] = np.where(self._near, self._looking, self._not_looking)
@@ -244,20 +220,14 @@ class Stage:
         base_from_cog(self.vehicle, self._positions, self._velocities, states)
         np.divide(states[:, 3] - speed, self.control_dt_s, out=states[:, 7])
 
-    def _near_anything(
-        self, states: Array, road_users: RoadUserTick | None
-    ) -> npt.NDArray[np.bool_]:
+    def _near_statics_of(self, states: Array) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a contact during the coming tick cannot be ruled out."""
-        if self._near_statics.empty and road_users is None:
+        if self._near_statics.empty:
             return np.zeros(len(states), dtype=bool)
         yaw = states[:, 2]
         x = states[:, 0] + self._centre_ahead_m * np.cos(yaw)
         y = states[:, 1] + self._centre_ahead_m * np.sin(yaw)
         near = self._near_statics.at(x, y)
-        if road_users is not None:
-            user_x, user_y = road_users.xy_m
-            reach = road_users.travel_m + self._user_reach_m
-            near |= np.square(user_x - x) + np.square(user_y - y) < np.square(reach)
         slow = np.abs(states[:, 3:6].T) < self._bounds
         if not slow.all():
             near |= ~slow.all(axis=0)
@@ -271,15 +241,7 @@ class Stage:
     @property
     def static_contact(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether the vehicle touched a building or island during the last tick."""
-        return self._touched(self._static_contact)
-
-    @property
-    def road_user_contact(self) -> npt.NDArray[np.bool_]:
-        """(S,) bool: whether the vehicle touched its road user during the last tick."""
-        return self._touched(self._road_user_contact)
-
-    def _touched(self, sensor: int) -> npt.NDArray[np.bool_]:
-        found = self._record["sensordata"][:, :, sensor]
+        found = self._record["sensordata"][:, :, self._static_contact]
         return np.asarray((found > 0.0).any(axis=1) & self._near)
 
     def diverged(self) -> npt.NDArray[np.bool_]:

@@ -6,12 +6,14 @@ follow an additive recurrence (Roberts 2018, the R-sequence), shifted by the see
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.simulation import ActorKind, ActorSpec, Variant
+from contracts.futures import Faults, Variant
+from contracts.scenario import Scenario
+from sim_worker.scenarios.drawing import draw_cases
 
 MIN_SPEED_FACTOR, MAX_SPEED_FACTOR = 0.5, 1.3
 MAX_SPEED_OFFSET_MPS = 2.5
@@ -19,15 +21,21 @@ MIN_FRICTION_FACTOR = 0.3
 MAX_EXTRA_DELAY_S = 0.4
 MAX_SHIFT_M = 0.8
 
+MAX_EARLY_OR_LATE_S = 2.0
+"""Others come so much before or after the moment at which they would meet the car."""
+
 _DIMENSIONS = 8
-_THEMES = ("speed", "friction", "delay", "shift", "lead", "crossing", "oncoming", "mixed")
+_OWN_THEMES = ("speed", "friction", "delay", "shift", "mixed")
 
 
-def plan_variants(*, count: int, seed: int, planners: Sequence[str]) -> tuple[Variant, ...]:
+def plan_variants(
+    *, count: int, seed: int, planners: Sequence[str], scenarios: Sequence[Scenario] = ()
+) -> tuple[Variant, ...]:
     """Return `count` variants; index 0 is nominal and uses the first planner.
 
-    Every other variant has a target speed of its own; its theme says what else differs. From the
-    second on, planners take turns. Raises ValueError for no planner or a count below 1.
+    Every other variant has a target speed of its own. In every second one a scenario happens, in
+    turn, if there are any; the themes of the others say what is wrong with the car. From the second
+    on, planners take turns. Raises ValueError for no planner or a count below 1.
     """
     if count < 1:
         raise ValueError(f"{count} futures: at least 1 is needed")
@@ -36,18 +44,22 @@ def plan_variants(*, count: int, seed: int, planners: Sequence[str]) -> tuple[Va
     nominal = Variant(index=0, name="nominal", planner=planners[0])
     points = _low_discrepancy(count, seed)
     strata = np.random.default_rng(seed).permutation(count - 1)
-    return (
-        nominal,
-        *(
-            _variant(
-                index,
-                (strata[index - 1] + 0.5) / (count - 1),
-                points[index],
-                planners[index % len(planners)],
+    cases = [draw_cases(scenario, seed=seed) for scenario in scenarios]
+    variants = [nominal]
+    for index in range(1, count):
+        speed = (strata[index - 1] + 0.5) / (count - 1)
+        planner = planners[index % len(planners)]
+        if scenarios and index % 2:
+            turn, which = divmod(index // 2, len(scenarios))
+            drawn = cases[which]
+            case = drawn[(turn * 7 + int(points[index, 6] * len(drawn))) % len(drawn)]
+            variants.append(
+                _happening(index, speed, points[index], planner, scenarios[which], case)
             )
-            for index in range(1, count)
-        ),
-    )
+        else:
+            theme = _OWN_THEMES[(index // 2 if scenarios else index) % len(_OWN_THEMES)]
+            variants.append(_fault(index, speed, points[index], planner, theme))
+    return tuple(variants)
 
 
 def _low_discrepancy(count: int, seed: int) -> Array:
@@ -60,8 +72,7 @@ def _low_discrepancy(count: int, seed: int) -> Array:
     return np.asarray((start + np.arange(count)[:, None] * steps) % 1.0)
 
 
-def _variant(index: int, speed: float, point: Array, planner: str) -> Variant:
-    theme = _THEMES[index % len(_THEMES)]
+def _fault(index: int, speed: float, point: Array, planner: str, theme: str) -> Variant:
     mixed = theme == "mixed"
     factor = MIN_SPEED_FACTOR + speed * (MAX_SPEED_FACTOR - MIN_SPEED_FACTOR)
     friction = delay = shift = None
@@ -71,12 +82,10 @@ def _variant(index: int, speed: float, point: Array, planner: str) -> Variant:
         delay = round(float(point[1]) * MAX_EXTRA_DELAY_S, 3)
     if theme == "shift" or mixed:
         shift = round((2.0 * float(point[2]) - 1.0) * MAX_SHIFT_M, 3)
-    actor = _actor(theme, point)
     words = [f"speed x{factor:.2f}"]
     words += [] if friction is None else [f"friction x{friction:.2f}"]
     words += [] if delay is None else [f"delay +{delay:.2f} s"]
     words += [] if shift is None else [f"shift {shift:+.2f} m"]
-    words += [] if actor is None else [_words(actor)]
     return Variant(
         index=index,
         name=", ".join(words),
@@ -84,29 +93,29 @@ def _variant(index: int, speed: float, point: Array, planner: str) -> Variant:
         target_speed_factor=round(factor, 4),
         target_speed_offset_mps=round(speed * MAX_SPEED_OFFSET_MPS, 4),
         lateral_shift_m=shift or 0.0,
-        friction_factor=friction or 1.0,
-        extra_steering_delay_s=delay or 0.0,
-        actor=actor,
+        faults=Faults(friction_factor=friction or 1.0, extra_steering_delay_s=delay or 0.0),
     )
 
 
-def _actor(theme: str, point: Array) -> ActorSpec | None:
-    """Place the road user of the themes that have one."""
-    speed, gap, time = float(point[3]), float(point[4]), float(point[5])
-    if theme == "lead":
-        return ActorSpec(kind="lead", speed_mps=round(8.0 * speed, 2), gap_m=round(5 + 30 * gap, 2))
-    kinds: dict[str, ActorKind] = {"crossing": "crossing", "oncoming": "oncoming"}
-    if theme not in kinds:
-        return None
-    return ActorSpec(
-        kind=kinds[theme],
-        speed_mps=round(3.0 + 9.0 * speed, 2),
-        time_offset_s=round(4.0 * time - 2.0, 2),
-        path_rank=int(point[6] * 997),
+def _happening(
+    index: int,
+    speed: float,
+    point: Array,
+    planner: str,
+    scenario: Scenario,
+    case: Mapping[str, float],
+) -> Variant:
+    """Return a future in which a case of a scenario happens, a little early or late."""
+    factor = MIN_SPEED_FACTOR + speed * (MAX_SPEED_FACTOR - MIN_SPEED_FACTOR)
+    late = round((2.0 * float(point[5]) - 1.0) * MAX_EARLY_OR_LATE_S, 2)
+    times = {name: late for name in case if name.endswith(".arrives_after_s")}
+    return Variant(
+        index=index,
+        name=f"{scenario.id} {late:+.2f} s, speed x{factor:.2f}",
+        planner=planner,
+        target_speed_factor=round(factor, 4),
+        target_speed_offset_mps=round(speed * MAX_SPEED_OFFSET_MPS, 4),
+        scenario_id=scenario.id,
+        values={**case, **times},
+        place_rank=int(point[7] * 997),
     )
-
-
-def _words(actor: ActorSpec) -> str:
-    if actor.kind == "lead":
-        return f"lead {actor.gap_m:.0f} m ahead at {actor.speed_mps:.1f} m/s"
-    return f"{actor.kind} at {actor.speed_mps:.1f} m/s {actor.time_offset_s:+.1f} s"

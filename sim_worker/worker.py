@@ -15,14 +15,15 @@ import numpy as np
 from contracts.bus import Bus, Mailbox, Request
 from contracts.codec import read_message
 from contracts.frames import local_from_geo
+from contracts.futures import FuturesJob, FuturesResult
 from contracts.process import ProcessLife
 from contracts.setup import WorkerSetup
-from contracts.simulation import FuturesJob, FuturesResult, PrepareReply, PrepareRequest
+from contracts.simulation import PrepareReply, PrepareRequest
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from sim_worker.actors.conflicts import CrossingPaths
 from sim_worker.futures import run_job
 from sim_worker.planners.registry import load_planner, planner_names
+from sim_worker.scene import SceneMaker
 from sim_worker.stage import Controls, Stage
 
 NSIM = 32
@@ -35,7 +36,7 @@ log = logging.getLogger("sim_worker")
 
 class _Prepared(NamedTuple):
     stage: Stage
-    crossing_paths: CrossingPaths
+    scenes: SceneMaker
 
 
 class StageCache:
@@ -69,7 +70,7 @@ class StageCache:
             control_hz=self._control_hz,
             threads=self._threads,
         )
-        self._stages[world_id] = prepared = _Prepared(stage, CrossingPaths(world))
+        self._stages[world_id] = prepared = _Prepared(stage, SceneMaker(world))
         while len(self._stages) > self._kept:
             self._stages.popitem(last=False)
         return prepared
@@ -132,7 +133,7 @@ class FuturesWorker:
             question,
             prepared.stage,
             worker_id=self._id,
-            crossing_paths=prepared.crossing_paths,
+            scenes=prepared.scenes,
         )
 
 

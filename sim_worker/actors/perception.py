@@ -1,49 +1,32 @@
-"""Other road users as a driver sees them: places on the ego's path."""
+"""Other road users as a driver perceives them: places on the ego's path, late or lost by faults."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
-from sim_worker.planners.path import FrenetPath, FrenetPoint
-from sim_worker.stage_model import ROAD_USER_LENGTH_M, ROAD_USER_WIDTH_M
+from sim_worker.actors.path_table import PathProjection
+from sim_worker.actors.traffic import Traffic
+from sim_worker.planners.base import SeenUsers
+from sim_worker.planners.path import FrenetPoint
 from sim_worker.vehicle.planar import box_centre_from_base_m
+
+Flags = npt.NDArray[np.bool_]
 
 _MARGIN_M = 0.3
 """What passes the car's side by less than this is in its way."""
 
 
-class Leads(NamedTuple):
-    """Road users as seen from the path, each (T, S); `rear_arc_m` infinite where there is none."""
+class PerceptionFaults(NamedTuple):
+    """Each (S,): how late everybody else is seen, and from when for how long nobody is."""
 
-    rear_arc_m: Array
-    offset_m: Array
-    half_width_m: Array
-    speed_mps: Array
-
-
-def see_road_users(path: FrenetPath, poses: Array, speed_mps: Array) -> Leads:
-    """Place road users, (S, T, 3) poses with NaN where none and (S,) speeds, on the ego's path."""
-    count, ticks = poses.shape[:2]
-    arc, offset = np.full((count, ticks), np.inf), np.zeros((count, ticks))
-    half_width, speed = np.zeros((count, ticks)), np.zeros((count, ticks))
-    there = np.flatnonzero(np.isfinite(poses[:, 0, 0]))
-    if len(there):
-        found = poses[there].reshape(-1, 3)
-        place = path.locate(found[:, :2])
-        heading = path.pose_at(place.arc_m).yaw_rad
-        cos, sin = np.cos(found[:, 2] - heading), np.sin(found[:, 2] - heading)
-        along = (ROAD_USER_LENGTH_M * np.abs(cos) + ROAD_USER_WIDTH_M * np.abs(sin)) / 2.0
-        across = (ROAD_USER_LENGTH_M * np.abs(sin) + ROAD_USER_WIDTH_M * np.abs(cos)) / 2.0
-        shape = (len(there), ticks)
-        arc[there] = (place.arc_m - along).reshape(shape)
-        offset[there] = place.offset_m.reshape(shape)
-        half_width[there] = across.reshape(shape)
-        speed[there] = speed_mps[there, None] * cos.reshape(shape)
-    return Leads(arc.T.copy(), offset.T.copy(), half_width.T.copy(), speed.T.copy())
+    delay_s: Array
+    lost_from_s: Array
+    lost_for_s: Array
 
 
 class Lead(NamedTuple):
@@ -54,18 +37,87 @@ class Lead(NamedTuple):
 
 
 class Sight:
-    """Which road users are in the way of cars at their places on the path, tick by tick."""
+    """What S cars see of the traffic around them, tick by tick."""
 
-    def __init__(self, leads: Leads, vehicle: VehicleParameters) -> None:
-        self._length_m = vehicle.length_m.value
-        front = box_centre_from_base_m(vehicle) + self._length_m / 2.0
-        self._gap_from_m = leads.rear_arc_m - front
-        self._offset_m, self._speed_mps = leads.offset_m, leads.speed_mps
-        self._beside_m = leads.half_width_m + vehicle.width_m.value / 2.0 + _MARGIN_M
+    def __init__(
+        self,
+        traffic: Traffic,
+        along: PathProjection,
+        vehicle: VehicleParameters,
+        faults: PerceptionFaults,
+        *,
+        hidden_by: npt.NDArray[np.intp],
+        walks: Flags,
+        tick_s: float,
+    ) -> None:
+        """`along` projects the traffic's paths on the ego's; `hidden_by` (S, R) columns or -1."""
+        crowd = traffic.crowd
+        self._crowd, self._along, self._walks = crowd, along, walks
+        self._length_m, self._width_m = vehicle.length_m.value, vehicle.width_m.value
+        self._front_m = box_centre_from_base_m(vehicle) + self._length_m / 2.0
+        self._size = np.stack([crowd.length_m, crowd.width_m], axis=-1)
+        self._late = np.round(faults.delay_s / tick_s).astype(np.intp)
+        self._faults, self._tick_s = faults, tick_s
+        self._hidden = np.nonzero((hidden_by >= 0) & crowd.present)
+        self._hides = hidden_by[self._hidden]
+        kept = int(self._late.max(initial=0)) + 1
+        self._past = [(traffic.arc_m.copy(), traffic.speed_mps.copy(), traffic.poses)] * kept
 
-    def at(self, tick: int, place: FrenetPoint) -> Lead:
-        """Return what is ahead of base_link at `place` (S,) at a control tick."""
-        gap = self._gap_from_m[tick] - place.arc_m
-        in_way = np.abs(self._offset_m[tick] - place.offset_m) < self._beside_m[tick]
+    def look(self, tick: int, traffic: Traffic, eyes_xy_m: Array) -> SeenUsers:
+        """Return what is seen at a tick from where the cars' fronts are, (S, 2)."""
+        now = (traffic.arc_m.copy(), traffic.speed_mps.copy(), traffic.poses)
+        self._past = [now, *self._past[:-1]]
+        arc, speed, poses = now
+        if self._late.any():
+            rows = np.arange(len(arc))
+            arc, speed, poses = (
+                np.stack([past[k] for past in self._past])[self._late, rows] for k in range(3)
+            )
+        unseen = ~self._crowd.present | self._lost(tick * self._tick_s)[:, None]
+        if len(self._hides):
+            unseen = unseen.copy()
+            unseen[self._hidden] |= self._behind(poses, eyes_xy_m)
+        on_arc, offset, turned = self._along.at(self._crowd.path_of, arc)
+        offset = offset + self._crowd.lateral_m * np.cos(turned)
+        if unseen.any():
+            on_arc = np.where(unseen, np.nan, on_arc)
+            poses = np.where(unseen[..., None], np.nan, poses)
+        return SeenUsers(poses, speed, self._size, on_arc, offset, self._walks, turned)
+
+    def _lost(self, time_s: float) -> Flags:
+        since = time_s - self._faults.lost_from_s
+        return np.asarray((since >= 0.0) & (since < self._faults.lost_for_s))
+
+    def _behind(self, poses: Array, eyes_xy_m: Array) -> Flags:
+        """(H,) bool: whether the line from the eyes to a hidden one meets what hides it."""
+        s, r = self._hidden
+        hider = poses[s, self._hides]
+        cos, sin = np.cos(hider[:, 2]), np.sin(hider[:, 2])
+        half = 0.5 * self._size[s, self._hides]
+
+        def from_hider(xy: Array) -> Array:
+            dx, dy = xy[:, 0] - hider[:, 0], xy[:, 1] - hider[:, 1]
+            return np.column_stack([cos * dx + sin * dy, cos * dy - sin * dx])
+
+        start = from_hider(eyes_xy_m[s])
+        way = from_hider(poses[s, r, :2]) - start
+        with np.errstate(divide="ignore", invalid="ignore"):
+            near, far = (-half - start) / way, (half - start) / way
+        low, high = np.fmin(near, far).max(axis=1), np.fmax(near, far).min(axis=1)
+        return np.asarray((low <= high) & (high >= 0.0) & (low <= 1.0))
+
+    def lead(self, seen: SeenUsers, place: FrenetPoint) -> Lead:
+        """Return who is in the way of base_link at `place` (S,) on the ego's path."""
+        cos, sin = np.abs(np.cos(seen.turned_rad)), np.abs(np.sin(seen.turned_rad))
+        length, width = seen.size_m[..., 0], seen.size_m[..., 1]
+        gap = seen.arc_m - place.arc_m[:, None] - self._front_m
+        gap -= 0.5 * (length * cos + width * sin)
+        beside = 0.5 * (length * sin + width * cos + self._width_m) + _MARGIN_M
+        in_way = np.abs(seen.offset_m - place.offset_m[:, None]) < beside
         in_way &= gap > -self._length_m
-        return Lead(np.where(in_way, gap, np.inf), np.where(in_way, self._speed_mps[tick], 0.0))
+        gap = np.where(in_way, gap, np.inf)
+        nearest = gap.argmin(axis=1)
+        rows = np.arange(len(gap))
+        gap = gap[rows, nearest]
+        speed = seen.speed_mps[rows, nearest] * np.cos(seen.turned_rad[rows, nearest])
+        return Lead(gap, np.where(np.isfinite(gap), speed, 0.0))

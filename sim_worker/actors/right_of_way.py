@@ -13,6 +13,7 @@ from contracts.drive import SignalColour
 from contracts.frames import wrap_angle
 from contracts.world import Connection, World
 from sim_worker.actors.path_table import Indices
+from sim_worker.planners.base import SharedGround
 from sim_worker.planners.path import FrenetPath
 
 _ON_PATH_M, _ON_PATH_RAD = 1.5, 0.6
@@ -71,6 +72,23 @@ class JunctionRules:
                     for other in others:
                         self._add(meetings[p, q], one, other)
         return PathRules(meetings, *_signals(taken))
+
+    def ground(self, taken: Sequence[Taken], path: FrenetPath) -> SharedGround | None:
+        """Return what other movements cross or join of a path, in its order; None for nothing."""
+        rows = []
+        for one in taken:
+            for (wait, go), stretch in self._stretches.items():
+                for id_, span, waits in (
+                    (wait, stretch[:2], True),
+                    (go, stretch[2:], False),
+                ):
+                    if id_ == one.connection.id:
+                        rows.append((one.from_arc_m + span[0], one.from_arc_m + span[1], waits))
+        if not rows:
+            return None
+        enter, leave, waits_there = np.array(sorted(rows)).T
+        middle = path.point_at((enter + leave) / 2.0)
+        return SharedGround(enter, leave, middle, waits_there > 0.5)
 
     def _add(self, into: Array, one: Taken, other: Taken) -> None:
         stretch = self._stretches.get((one.connection.id, other.connection.id))

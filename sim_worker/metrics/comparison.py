@@ -11,7 +11,8 @@ import numpy.typing as npt
 from contracts.arrays import Array
 from contracts.drive import PlannedTrajectory
 from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.simulation import Comparison, PathAhead, PlanComparison, Trajectory
+from contracts.futures import PathAhead, Trajectory
+from contracts.simulation import Comparison, PlanComparison
 from sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
 from sim_worker.metrics.displacement import horizon_error
 from sim_worker.metrics.rollout import Measure, Rollout

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.simulation import STATE_COLUMNS
+from contracts.futures import STATE_COLUMNS
 from sim_worker.metrics.ground import DrivableGround
 from sim_worker.metrics.rollout import Flags, Measure, Rollout
 from sim_worker.metrics.route_rules import RouteRules

@@ -213,6 +213,22 @@ def _any_turn(scenario: Scenario) -> bool:
     return all(part.relation in along for part in scenario.actors)
 
 
+def places_on_passage(
+    scenario: Scenario, network: RoadNetwork, passage: Passage
+) -> tuple[Place, ...]:
+    """Return the places of a scenario for an ego that takes a passage; none where it is not for."""
+    if scenario.where.setting != "junction":
+        return ()
+    summary = next(
+        j.summary for j in network.world.junctions if j.summary.id == passage.junction_id
+    )
+    if _refused(scenario, summary):
+        return ()
+    if passage.turn != scenario.ego.turn and not _any_turn(scenario):
+        return ()
+    return tuple(_places_of(scenario, network, passage, network.way(passage)))
+
+
 def passage_on_path(
     network: RoadNetwork, ego_path: FrenetPath, ego_arc_m: float
 ) -> tuple[Passage, Way] | None:

@@ -10,8 +10,8 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, LocalFrame
+from contracts.futures import FuturesJob, PathAhead, Variant
 from contracts.provenance import Quantity
-from contracts.simulation import FuturesJob, PathAhead, Variant
 from contracts.world import Area, Building, IntersectionSummary, World
 
 FUTURES = 64
@@ -79,7 +79,7 @@ def job(world: World, variants: tuple[Variant, ...]) -> FuturesJob:
 
 def without_road_users(variants: tuple[Variant, ...]) -> tuple[Variant, ...]:
     """Return the same variants with nobody else on the road."""
-    return tuple(msgspec.structs.replace(variant, actor=None) for variant in variants)
+    return tuple(msgspec.structs.replace(variant, scenario_id="") for variant in variants)
 
 
 def _path(along_m: Array) -> tuple[Array, Array]:

@@ -16,9 +16,10 @@ import zenoh
 
 from contracts.bus import Bus, Mailbox, Reply, ZenohBus, ask, zenoh_config
 from contracts.codec import encode
+from contracts.futures import FuturesJob
 from contracts.keys import alive_key
 from contracts.setup import BusSetup, WorkerSetup, write_setup
-from contracts.simulation import FuturesJob, PrepareRequest
+from contracts.simulation import PrepareRequest
 from sim_worker.variants import plan_variants
 from sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import scenes

@@ -49,4 +49,6 @@ def same(left: Any, right: Any) -> bool:
         return all(same(getattr(left, n), getattr(right, n)) for n in left.__struct_fields__)
     if isinstance(left, tuple):
         return len(left) == len(right) and all(map(same, left, right))
+    if isinstance(left, dict):
+        return left.keys() == right.keys() and all(same(left[k], right[k]) for k in left)
     return bool(left == right)

@@ -22,8 +22,8 @@ from contracts.codec import (
 )
 from contracts.drive import GnssFix, PlannedTrajectory, SpeedSample
 from contracts.frames import GeoPoint
+from contracts.futures import FuturesResult
 from contracts.keys import CHANNELS
-from contracts.simulation import FuturesResult
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from tests.contracts.messages import messages, same

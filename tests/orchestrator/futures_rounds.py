@@ -5,11 +5,30 @@ from __future__ import annotations
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.simulation import FuturesJob, FuturesResult, Outcome, PathAhead, Trajectory, Variant
+from contracts.futures import (
+    FuturesJob,
+    FuturesResult,
+    Outcome,
+    PathAhead,
+    RoadUserTracks,
+    Trajectory,
+    Variant,
+)
 from orchestrator.rounds import RoundDone, RoundOrder
 from tests.orchestrator.trip import START_NS, states_along, town_world
 
 TIME_S = np.arange(81) * 0.1
+
+
+def nobody(count: int, instants: int) -> RoadUserTracks:
+    """The tracks of futures in which no one else is on the road."""
+    return RoadUserTracks(
+        poses=np.empty((count, instants, 0, 3), dtype=np.float32),
+        speed_mps=np.empty((count, instants, 0), dtype=np.float32),
+        size_m=np.empty((count, 0, 2), dtype=np.float32),
+        kinds=np.empty((count, 0)),
+        kind_names=(),
+    )
 
 
 def variants(count: int) -> tuple[Variant, ...]:
@@ -58,7 +77,8 @@ def round_done(
                 trajectory=Trajectory(
                     stamp_ns=stamp_ns, time_s=time_s, states=states.astype(np.float32)
                 ),
-                actors=np.full((count, len(time_s), 3), np.nan, dtype=np.float32),
+                road_users=nobody(count, len(time_s)),
+                metrics={}, accidents=(), left_out=("",) * count,
                 outcome=Outcome(**(fields | (outcome or {}))),
                 sim_seconds=8.0 * count, cpu_seconds=0.5, wall_seconds=0.5,
             )

@@ -11,25 +11,18 @@ import numpy as np
 from contracts.codec import read_message
 from contracts.drive import DriveEnd, GnssFix, VehicleInfo, VehicleState
 from contracts.frames import local_from_geo, local_from_geo_yaw
+from contracts.futures import FuturesJob, FuturesResult, Outcome, Trajectory
 from contracts.keys import alive_key
 from contracts.mailbox import Mailbox, Request
 from contracts.memory_bus import MemoryBus
-from contracts.simulation import (
-    BuildReply,
-    BuildRequest,
-    FuturesJob,
-    FuturesResult,
-    Outcome,
-    PrepareReply,
-    PrepareRequest,
-    Trajectory,
-)
+from contracts.simulation import BuildReply, BuildRequest, PrepareReply, PrepareRequest
 from contracts.world import World
 from orchestrator.conductor import Conductor
 from orchestrator.mission import Mission, MissionSettings
 from orchestrator.plan import DrivePlan
 from orchestrator.results import ResultTables
 from orchestrator.way_ahead import WayAhead
+from tests.orchestrator.futures_rounds import nobody
 from tests.orchestrator.trip import START_NS, states_along, town, town_line, town_plan, town_world
 from world_gen.world_store import WorldStore
 
@@ -60,7 +53,8 @@ def straight_futures(job: FuturesJob, world: World, worker_id: str) -> FuturesRe
         round_id=job.round_id, job_index=job.job_index, worker_id=worker_id,
         world_id=job.world_id, variant_indices=tuple(v.index for v in job.variants),
         trajectory=Trajectory(stamp_ns=job.state.stamp_ns, time_s=time_s, states=states),
-        actors=np.full((count, len(time_s), 3), np.nan, dtype=np.float32),
+        road_users=nobody(count, len(time_s)),
+        metrics={}, accidents=(), left_out=("",) * count,
         outcome=Outcome(
             collided=np.zeros(count, dtype=bool), collision_time_s=np.full(count, np.nan),
             collision_with=np.zeros(count, dtype=np.int64),

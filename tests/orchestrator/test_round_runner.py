@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.round_runner import planners_of
+from orchestrator.round_jobs import planners_of
 from tests.orchestrator.house import House
 
 

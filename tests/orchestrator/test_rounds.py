@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint
-from contracts.simulation import FuturesJob, FuturesResult, Outcome, PathAhead, Trajectory
+from contracts.futures import FuturesJob, FuturesResult, Outcome, PathAhead, Trajectory
 from orchestrator.rounds import RoundDesk, RoundOrder
+from tests.orchestrator.futures_rounds import nobody
 
 STATE = VehicleState(
     vehicle_id="ego", stamp_ns=0, position=GeoPoint(45.0, -30.0), yaw_rad=0.0, speed_mps=5.0,
@@ -43,7 +44,10 @@ def result(job: FuturesJob, worker_id: str) -> FuturesResult:
         trajectory=Trajectory(
             stamp_ns=0, time_s=none, states=np.zeros((0, 0, 8), dtype=np.float32)
         ),
-        actors=np.zeros((0, 0, 3), dtype=np.float32),
+        road_users=nobody(0, 0),
+        metrics={},
+        accidents=(),
+        left_out=(),
         outcome=Outcome(
             collided=none, collision_time_s=none, collision_with=none, min_clearance_m=none,
             progress_m=none, valid=none,

@@ -9,9 +9,19 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from contracts.futures import FuturesJob, PathAhead, Variant
 from contracts.provenance import Quantity
-from contracts.simulation import FuturesJob, PathAhead, Variant
-from contracts.world import Area, Building, Connection, IntersectionSummary, Lane, World
+from contracts.world import (
+    Area,
+    Building,
+    Connection,
+    IntersectionSummary,
+    Lane,
+    World,
+    WorldJunction,
+)
+from sim_worker.scenarios.drawing import draw_cases
+from sim_worker.scenarios.reading import catalogue
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 
@@ -48,15 +58,18 @@ def crossroads(*, buildings: tuple[Building, ...] = (), connections: bool = True
             Connection(
                 id=name, from_lane_id=f"from_{name}", to_lane_id=f"to_{name}", turn="straight",
                 centerline=right + np.linspace(-8.0, 8.0, 9)[:, None] * way,
-                width_m=Quantity(3.0, "default"),
+                width_m=Quantity(3.0, "default"), junction_id="i1",
+                conflicts_with=("north", "south") if angle % 180.0 == 0.0 else ("east", "west"),
             )
         )  # fmt: skip
+    summary = IntersectionSummary(
+        id="i1", kind="crossing", lat=52.5, lon=13.4, arms=4, control="uncontrolled",
+        driving_side="right", osm_nodes=(1,),
+    )  # fmt: skip
     return World(
         id="crossroads", frame=FRAME, radius_m=150.0, map_sha256="0" * 64,
-        intersection=IntersectionSummary(
-            id="i1", kind="crossing", lat=52.5, lon=13.4, arms=4, control="uncontrolled",
-            driving_side="right", osm_nodes=(1,),
-        ),
+        intersection=summary,
+        junctions=(WorldJunction(summary=summary, arms=(), area=None),),
         lanes=tuple(lanes), connections=tuple(links) if connections else (), stop_lines=(),
         crossings=(), signals=(), islands=(), kerbs=(),
         road_surface=(_street("ew", 150.0, 4.0), _street("ns", 4.0, 150.0)),
@@ -94,13 +107,27 @@ def state_at(
     )  # fmt: skip
 
 
+def happening(
+    index: int, scenario_id: str, *, planner: str = "pure_pursuit_idm", **values: float
+) -> Variant:
+    """A future in which a scenario of the catalogue happens; `values` with __ for the dots."""
+    case = dict(draw_cases(catalogue()[scenario_id])[0])
+    case.update({name.replace("__", "."): value for name, value in values.items()})
+    return Variant(
+        index=index, name=scenario_id, planner=planner, scenario_id=scenario_id, values=case
+    )
+
+
 def job(
     variants: tuple[Variant, ...], *, state: VehicleState | None = None,
     path: PathAhead | None = None, cruise: float = 8.0, horizon_s: float = 8.0,
+    accidents: bool = False,
 ) -> FuturesJob:  # fmt: skip
     return FuturesJob(
         round_id=1, job_index=0, world_id="crossroads",
         state=state_at(-50.0, -1.5) if state is None else state,
         path=straight_path() if path is None else path,
         variants=variants, horizon_s=horizon_s, step_s=0.1, seed=0, cruise_speed_mps=cruise,
+        scenarios=tuple(catalogue()[i] for i in sorted({v.scenario_id for v in variants} - {""})),
+        accidents=accidents,
     )  # fmt: skip

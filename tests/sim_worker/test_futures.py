@@ -10,17 +10,29 @@ import numpy as np
 import pytest
 
 from contracts.codec import content_bytes, write_message
-from contracts.simulation import ActorSpec, FuturesJob, FuturesResult, Variant
+from contracts.futures import Faults, FuturesJob, FuturesResult, Variant
 from sim_worker.futures import result_digest, run_job
 from sim_worker.metrics.displacement import distinct_count
+from sim_worker.scenarios.reading import catalogue
 from sim_worker.stage import Stage
 from sim_worker.variants import plan_variants
 from sim_worker.vehicle.parameters import load_vehicle
-from tests.sim_worker.places import box, crossroads, job, state_at, straight_path, turning_path
+from tests.sim_worker.places import (
+    box,
+    crossroads,
+    happening,
+    job,
+    state_at,
+    straight_path,
+    turning_path,
+)
 
 CAR = load_vehicle()
 PLANNERS = ("pure_pursuit_idm",)
 NOMINAL = (Variant(index=0, name="nominal"),)
+ICE, LATE = Faults(friction_factor=0.3), Faults(extra_steering_delay_s=0.4)
+TOO_LATE = Faults(extra_steering_delay_s=1.0)
+HAPPENINGS = tuple(catalogue()[name] for name in ("scp", "cccscp", "lead_stopping", "cbta"))
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +42,7 @@ def stage() -> Stage:
 
 @pytest.fixture(scope="module")
 def round_of_64() -> tuple[Variant, ...]:
-    return plan_variants(count=64, seed=0, planners=PLANNERS)
+    return plan_variants(count=64, seed=0, planners=PLANNERS, scenarios=HAPPENINGS)
 
 
 def _ends(result: FuturesResult) -> np.ndarray:  # type: ignore[type-arg]
@@ -60,7 +72,9 @@ def test_at_least_48_of_64_futures_end_apart(
 
 @pytest.mark.parametrize("seed", [1, 12345])
 def test_futures_differ_with_any_seed(stage: Stage, seed: int) -> None:
-    variants = plan_variants(count=64, seed=seed, planners=(*PLANNERS, "constant_speed"))
+    variants = plan_variants(
+        count=64, seed=seed, planners=(*PLANNERS, "constant_speed"), scenarios=HAPPENINGS
+    )
     result = run_job(job(variants), stage)
     assert distinct_count(_ends(result)) >= 48
 
@@ -86,7 +100,7 @@ def test_another_process_computes_the_same_bytes(
     write_message(stage.world, tmp_path / "world")
     program = (
         "import sys; from pathlib import Path; from contracts.codec import read_message;"
-        "from contracts.world import World; from contracts.simulation import ActorSpec, FuturesJob;"
+        "from contracts.world import World; from contracts.futures import FuturesJob;"
         "from sim_worker.futures import run_job, result_digest; from sim_worker.stage import Stage;"
         "from sim_worker.vehicle.parameters import load_vehicle; d = Path(sys.argv[1]);"
         "s = Stage(read_message(d / 'world', World), load_vehicle(), nsim=16);"
@@ -142,8 +156,8 @@ def test_only_drops_of_the_speed_limit_ahead_count(stage: Stage) -> None:
 def test_low_friction_makes_a_future_slide_and_delay_makes_it_late(stage: Stage) -> None:
     variants = (
         Variant(index=0, name="n", planner="constant_speed"),
-        Variant(index=1, name="ice", planner="constant_speed", friction_factor=0.3),
-        Variant(index=2, name="late", planner="constant_speed", extra_steering_delay_s=0.4),
+        Variant(index=1, name="ice", planner="constant_speed", faults=ICE),
+        Variant(index=2, name="late", planner="constant_speed", faults=LATE),
     )
     state = state_at(-20.0, -1.5, speed=9.0)
     question = job(variants, state=state, path=turning_path(), cruise=9.0, horizon_s=4.0)
@@ -164,18 +178,46 @@ def test_a_building_in_the_way_is_a_collision_with_a_building(
 
 
 def test_after_a_collision_with_a_road_user_the_car_stands_where_it_happened(
-    stage: Stage, round_of_64: tuple[Variant, ...]
+    stage: Stage,
 ) -> None:
-    result = run_job(job(round_of_64[32:]), stage)
-    hit = np.flatnonzero(result.outcome.collision_with == 1)
-    assert len(hit) > 0
+    variants = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
+    result = run_job(job(variants), stage)
+    assert result.outcome.collision_with.tolist() == [0, 1]
     states = result.trajectory.states
-    for row in hit:
-        after = result.trajectory.time_s > result.outcome.collision_time_s[row] + 0.1
-        assert np.ptp(states[row, after, :3], axis=0).max(initial=0.0) == 0.0
-        assert not states[row, after][:, [3, 4, 5, 7]].any()
-    free = np.flatnonzero(result.outcome.collision_with == 0)
-    assert np.ptp(states[free[0], :, 0]) > 1.0
+    after = result.trajectory.time_s > result.outcome.collision_time_s[1] + 0.1
+    assert after.sum() > 10
+    assert np.ptp(states[1, after, :3], axis=0).max() == 0.0
+    assert not states[1, after][:, [3, 4, 5, 7]].any()
+    assert np.ptp(states[0, :, 0]) > 1.0
+
+
+def test_an_accident_is_run_on_when_asked_for(stage: Stage) -> None:
+    variants = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
+    result = run_job(job(variants, accidents=True), stage)
+    (accident,) = result.accidents
+    assert (accident.future, accident.road_user) == (1, 0)
+    assert accident.time_s == pytest.approx(float(result.outcome.collision_time_s[1]))
+    assert accident.ego_delta_v_mps > 1.0
+    after = result.trajectory.time_s > accident.time_s
+    moved = np.ptp(result.trajectory.states[1, after, :2], axis=0).max()
+    assert moved > 0.5, "a car that was hit moves on"
+
+
+def test_a_planned_impact_happens_where_it_was_planned(stage: Stage) -> None:
+    """The car keeps its speed, and so does who crosses: they meet on the crossing."""
+    hit = happening(0, "cccscp", planner="constant_speed", crossing_car__impact_share=0.5)
+    outcome = run_job(job((hit,)), stage).outcome
+    assert outcome.collision_with.tolist() == [1]
+    late = happening(0, "cccscp", planner="constant_speed", crossing_car__arrives_after_s=3.0)
+    assert run_job(job((late,)), stage).outcome.collision_with.tolist() == [0]
+
+
+def test_a_scenario_behind_the_car_says_so(stage: Stage) -> None:
+    state = state_at(40.0, -1.5)
+    result = run_job(job((*NOMINAL, happening(1, "cccscp")), state=state), stage)
+    assert result.left_out[0] == ""
+    assert "no junction" in result.left_out[1] or "behind" in result.left_out[1]
+    assert result.outcome.valid.all()
 
 
 def test_a_diverged_future_is_marked_and_spoils_no_other(
@@ -210,7 +252,7 @@ def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Variant, .
     result = run_job(job(round_of_64[:8]), stage)
     back = decode(encode(result), FuturesResult).message
     assert result_digest(back) == result_digest(result)
-    assert back.actors.dtype == np.float32
+    assert back.road_users.poses.dtype == np.float32
     assert back.outcome.collided.dtype == np.bool_
 
 
@@ -226,7 +268,10 @@ def _altered(question: FuturesJob, **changes: object) -> FuturesJob:
         ({"horizon_s": 0.05}, "horizon_s 0.05 must be a multiple"),
         ({"variants": NOMINAL * 65}, "65 states for a stage of 64"),
         ({"variants": (Variant(index=0, name="x", planner="magic"),)}, "unknown planner 'magic'"),
-        ({"variants": (Variant(index=0, name="x", extra_steering_delay_s=1.0),)}, "longer than"),
+        (
+            {"variants": (Variant(index=0, name="x", faults=Faults(extra_steering_delay_s=1.0)),)},
+            "longer than",
+        ),
         ({"state": state_at(0.0, 0.0, speed=float("nan"))}, "not finite"),
     ],
 )
@@ -237,19 +282,6 @@ def test_a_job_that_cannot_be_done_says_why(
 ) -> None:
     with pytest.raises(ValueError, match=said):
         run_job(_altered(job(NOMINAL), **changes), stage)
-
-
-def test_the_log_says_once_per_world_that_it_offers_no_path(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    world = msgspec.structs.replace(crossroads(connections=False), id="bare")
-    place = Stage(world, CAR, nsim=1)
-    variant = Variant(index=0, name="x", actor=ActorSpec(kind="crossing", speed_mps=5.0))
-    question = _altered(job((variant,), horizon_s=0.5), world_id="bare")
-    with caplog.at_level("INFO"):
-        for _ in range(3):
-            run_job(question, place)
-    assert caplog.text.count("world bare offers no path") == 1
 
 
 def test_result_digest_ignores_who_computed_it(stage: Stage) -> None:

@@ -10,11 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contracts.arrays import Array
+from contracts.futures import Variant
 from contracts.provenance import Quantity
-from contracts.simulation import Variant
 from contracts.world import Building
 from sim_worker.futures import result_digest, run_job
 from sim_worker.nearness import NearStatics
+from sim_worker.scenarios.reading import catalogue
 from sim_worker.stage import Stage
 from sim_worker.variants import plan_variants
 from sim_worker.vehicle.parameters import load_vehicle
@@ -22,6 +23,7 @@ from tests.sim_worker.places import box, crossroads, job, state_at
 
 CAR = load_vehicle()
 REACH_M = 3.0
+HAPPENINGS = tuple(catalogue()[name] for name in ("scp", "cccscp", "lead_stopping"))
 
 
 def _turned(x: float, y: float, yaw: float, name: str) -> Building:
@@ -55,7 +57,7 @@ def test_places_outside_the_grid_and_no_places_at_all_are_far() -> None:
     assert not NearStatics(Stage(None, CAR, nsim=1).model, reach_m=5.0).at(places, places).any()
 
 
-def _always(states: Array, _: object) -> Any:
+def _always(states: Array) -> Any:
     return np.ones(len(states), dtype=bool)
 
 
@@ -64,7 +66,7 @@ def test_looking_for_contacts_only_where_there_can_be_some_changes_no_bit(
     monkeypatch: pytest.MonkeyPatch, planner: str
 ) -> None:
     heading = (0.0, 0.25, -0.4)
-    variants = plan_variants(count=63, seed=5, planners=[planner])
+    variants = plan_variants(count=63, seed=5, planners=[planner], scenarios=HAPPENINGS)
     jobs = [
         job((*variants, Variant(index=63, name="x", planner=planner)), cruise=cruise,
             state=state_at(-45.0, -1.5, yaw, cruise))
@@ -72,6 +74,6 @@ def test_looking_for_contacts_only_where_there_can_be_some_changes_no_bit(
     ]  # fmt: skip
     sparing = [run_job(question, STAGE) for question in jobs]
     assert {0, 1, 2} <= set(np.concatenate([r.outcome.collision_with for r in sparing]))
-    monkeypatch.setattr(STAGE, "_near_anything", _always)
+    monkeypatch.setattr(STAGE, "_near_statics_of", _always)
     thorough = [run_job(question, STAGE) for question in jobs]
     assert list(map(result_digest, sparing)) == list(map(result_digest, thorough))

@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.simulation import ActorSpec, Variant
+from contracts.futures import Variant
 from sim_worker.futures import run_job
 from sim_worker.planners import registry
 from sim_worker.planners.base import PlannerOutput, PlannerView
 from sim_worker.planners.registry import load_planner, planner_names
 from sim_worker.stage import Stage
 from sim_worker.vehicle.parameters import load_vehicle
-from tests.sim_worker.places import crossroads, job, state_at, turning_path
+from tests.sim_worker.places import crossroads, happening, job, state_at, turning_path
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +70,28 @@ def test_an_entry_point_adds_a_planner(offered, stage: Stage) -> None:  # type: 
 def test_a_planner_of_the_wrong_shape_is_named(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
     offered(_Scalar)
     variants = tuple(Variant(index=i, name="x", planner="theirs") for i in range(3))
-    with pytest.raises(ValueError, match="planner 'theirs' answers accel_mps2 of shape"):
-        run_job(job(variants), stage)
+    outcome = run_job(job((*variants, Variant(index=3, name="ours"))), stage).outcome
+    assert outcome.valid.tolist() == [False, False, False, True]
+    assert "planner 'theirs' at 0 s: ValueError: answers of shapes (1,)" in outcome.failures[0]
+    assert outcome.failures[3] == ""
+
+
+class _Raises:
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        if view.time_s >= 1.0:
+            raise KeyError("no such lane")
+        return PlannerOutput(np.zeros_like(view.arc_m), np.zeros_like(view.arc_m))
+
+
+def test_a_planner_that_raises_fails_its_futures_and_no_others(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
+    offered(_Raises)
+    variants = (Variant(index=0, name="ours"), Variant(index=1, name="x", planner="theirs"))
+    alone = run_job(job(variants[:1]), stage)
+    together = run_job(job(variants), stage)
+    assert together.outcome.valid.tolist() == [True, False]
+    assert together.outcome.failures == ("", "planner 'theirs' at 1 s: KeyError: 'no such lane'")
+    assert together.trajectory.states[0] == pytest.approx(alone.trajectory.states[0], abs=1e-6)
+    assert np.isfinite(together.trajectory.states).all()
 
 
 def test_a_planner_that_is_none_is_refused(offered) -> None:  # type: ignore[no-untyped-def]
@@ -107,10 +127,10 @@ def test_the_driver_slows_for_a_curve_and_stays_on_its_path(stage: Stage) -> Non
 def test_the_driver_stops_behind_a_standing_lead_and_the_careless_one_does_not(
     stage: Stage,
 ) -> None:
-    lead = ActorSpec(kind="lead", speed_mps=0.0, gap_m=30.0)
+    lead = {"lead__speed_mps": 0.0, "lead__gap_m": 30.0}
     variants = (
-        Variant(index=0, name="careful", actor=lead),
-        Variant(index=1, name="careless", planner="constant_speed", actor=lead),
+        happening(0, "lead_stopping", **lead),
+        happening(1, "lead_stopping", planner="constant_speed", **lead),
         Variant(index=2, name="alone"),
     )
     outcome = run_job(job(variants, horizon_s=16.0), stage).outcome

@@ -99,19 +99,6 @@ def test_a_wall_stops_the_car_and_is_felt() -> None:
     assert stage.states[1, 0] > 45.0
 
 
-def test_a_road_user_is_run_into_and_a_missing_one_is_not() -> None:
-    stage = Stage(None, CAR, nsim=2)
-    seed(stage, states(2, speed=8.0))
-    users = np.full((2, stage.steps_per_tick, 3), np.nan)
-    users[0] = (20.0, 0.0, 0.0)
-    standing = stage.road_user_motion(users).at(0)
-    for _ in range(100):
-        stage.step(Controls(np.zeros(2), np.zeros(2)), road_users=standing)
-    assert stage.states[0, 0] < 17.0
-    assert stage.states[1, 0] > 39.0
-    assert not stage.static_contact.any()
-
-
 def test_the_control_rate_must_fit_the_physics() -> None:
     with pytest.raises(ValueError, match="control rate 30 Hz"):
         Stage(None, CAR, nsim=1, control_hz=30.0)

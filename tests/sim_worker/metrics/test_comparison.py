@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from contracts.drive import PlannedTrajectory
 from contracts.frames import geo_from_local, geo_from_local_yaw
-from contracts.simulation import Trajectory
+from contracts.futures import Trajectory
 from sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
 from sim_worker.metrics.comparison import (
     ActualTrack,

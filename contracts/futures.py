@@ -1,0 +1,200 @@
+"""Futures: what a worker is asked to simulate, and what it answers.
+
+Trajectories hold S simulations of N instants as `states` (S, N, 8): x_m, y_m, yaw_rad of
+base_link in the World's frame, vx_mps, vy_mps in the body frame, yaw_rate_radps,
+tire_angle_rad, accel_mps2. `STATE_COLUMNS` names them.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from contracts.arrays import Array, Array32
+from contracts.drive import RoadUserKind, SignalState, VehicleState
+from contracts.scenario import Scenario
+
+STATE_COLUMNS = (
+    "x_m", "y_m", "yaw_rad", "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2",
+)  # fmt: skip
+
+
+class PathAhead(msgspec.Struct, frozen=True, kw_only=True):
+    """The lane-centre path the navigation plan foresees, in the World's frame.
+
+    `xy_m` (N, 2) begins a few metres behind the car, about 1 m apart; `speed_limit_mps` (N,).
+    """
+
+    xy_m: Array
+    speed_limit_mps: Array
+
+
+class Faults(msgspec.Struct, frozen=True, kw_only=True):
+    """What is wrong with the car of one future, or with the ground below it, in numbers."""
+
+    friction_factor: float = 1.0
+    extra_steering_delay_s: float = 0.0
+    steering_gain: float = 1.0
+    steering_offset_rad: float = 0.0
+    brake_gain: float = 1.0
+    perception_delay_s: float = 0.0
+    position_offset_m: float = 0.0
+    """How far to the left of the truth the planner believes to be."""
+    lost_from_s: float = 0.0
+    lost_for_s: float = 0.0
+
+
+class Variant(msgspec.Struct, frozen=True, kw_only=True):
+    """One alternative future: what differs from the nominal one (index 0).
+
+    With `scenario_id`, one of the job's scenarios happens in it: `values` are its numbers, named
+    as in `ConcreteScenario`, and `place_rank` says which of the places that fit the car's path,
+    modulo their number.
+    """
+
+    index: int
+    name: str
+    planner: str = "pure_pursuit_idm"
+    target_speed_factor: float = 1.0
+    """Of the speed that the nominal future aims at."""
+    target_speed_offset_mps: float = 0.0
+    lateral_shift_m: float = 0.0
+    faults: Faults = Faults()
+    scenario_id: str = ""
+    values: dict[str, float] = {}
+    place_rank: int = 0
+
+
+class SeenRoadUser(msgspec.Struct, frozen=True, kw_only=True):
+    """A road user that the car detected as its state was measured; x, y, yaw of its box centre in
+    the World's frame. In every future it goes on along its lane, lawfully, or else straight on."""
+
+    kind: RoadUserKind
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    length_m: float
+    width_m: float
+
+
+class CarPlan(msgspec.Struct, frozen=True, kw_only=True):
+    """The car's own plan in the World's frame: base_link at `time_s` (N,) from the job's state.
+
+    `xy_m` (N, 2), `yaw_rad` (N,), `speed_mps` (N,).
+    """
+
+    time_s: Array
+    xy_m: Array
+    yaw_rad: Array
+    speed_mps: Array
+
+
+class FuturesJob(msgspec.Struct, frozen=True, kw_only=True):
+    """Simulate `variants` from `state` for `horizon_s`; the result is a function of this alone."""
+
+    round_id: int
+    job_index: int
+    world_id: str
+    state: VehicleState
+    path: PathAhead
+    variants: tuple[Variant, ...]
+    horizon_s: float
+    step_s: float
+    """Between the instants of the result."""
+    seed: int
+    cruise_speed_mps: float
+    """The speed that the nominal future aims at where nothing is in the way."""
+    scenarios: tuple[Scenario, ...] = ()
+    """Definitions that variants name."""
+    starts: Array | None = None
+    """(S, 8) where futures do not begin with the car's state, in the World's frame."""
+    road_users: tuple[SeenRoadUser, ...] = ()
+    signals: tuple[SignalState, ...] = ()
+    """Live colours, the newest of each group."""
+    drive_time_s: float = 0.0
+    """Of the state: signal plans run by it."""
+    lights_by_plan: bool = False
+    """Whether lights of which nothing is heard follow the World's plans; else nobody stops."""
+    car_plan: CarPlan | None = None
+    metrics: tuple[str, ...] = ()
+    """What to measure besides the outcome, by the names of the table of metrics."""
+    accidents: bool = False
+    """Whether collisions with road users are run on as two bodies in motion."""
+
+
+class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
+    """S simulations of N instants; `time_s` (N,) from the seeding state, `states` (S, N, 8)."""
+
+    stamp_ns: int
+    time_s: Array
+    states: Array32
+
+
+class Outcome(msgspec.Struct, frozen=True, kw_only=True):
+    """What became of each of S futures; times and distances are NaN where `valid` is false.
+
+    `collided` (S,) bool, `collision_time_s` (S,), `collision_with` (S,): 0 nothing, 1 road user,
+    2 building or island; `min_clearance_m` (S,) to any road user; `progress_m` (S,) along the path.
+    """
+
+    collided: Array
+    collision_time_s: Array
+    collision_with: Array
+    min_clearance_m: Array
+    progress_m: Array
+    valid: Array
+    """(S,) bool: false where the simulation diverged or the planner failed."""
+    failures: tuple[str, ...] = ()
+    """Why a future is not valid, in words; empty where it is. One for each future, or none."""
+
+
+class RoadUserTracks(msgspec.Struct, frozen=True, kw_only=True):
+    """The other road users of S futures, at most R in each.
+
+    `poses` (S, N, R, 3) x, y, yaw of box centres and `speed_mps` (S, N, R), NaN where there is
+    none; `size_m` (S, R, 2) length and width; `kinds` (S, R) places in `kind_names`.
+    """
+
+    poses: Array32
+    speed_mps: Array32
+    size_m: Array32
+    kinds: Array
+    kind_names: tuple[str, ...]
+
+
+class Accident(msgspec.Struct, frozen=True, kw_only=True):
+    """A collision of the car with a road user, from the two bodies' own motion after it.
+
+    `point_m` (2,) in the World's frame; `angle_rad` is the partner's heading against the ego's;
+    `closing_mps` along the line through the touching faces.
+    """
+
+    future: int
+    """Place in the result."""
+    road_user: int
+    time_s: float
+    point_m: Array
+    angle_rad: float
+    closing_mps: float
+    ego_delta_v_mps: float
+    user_delta_v_mps: float
+
+
+class FuturesResult(msgspec.Struct, frozen=True, kw_only=True):
+    """The answer to a FuturesJob; `metrics` are (S,) by name, NaN where one does not apply."""
+
+    round_id: int
+    job_index: int
+    worker_id: str
+    world_id: str
+    variant_indices: tuple[int, ...]
+    trajectory: Trajectory
+    road_users: RoadUserTracks
+    outcome: Outcome
+    metrics: dict[str, Array]
+    accidents: tuple[Accident, ...]
+    left_out: tuple[str, ...]
+    """Why a future's scenario does not happen in it; empty where it does, or where it has none."""
+    sim_seconds: float
+    cpu_seconds: float
+    wall_seconds: float

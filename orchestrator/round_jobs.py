@@ -1,0 +1,186 @@
+"""What a round simulates: the mix of futures that fits the way ahead, as jobs for workers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.drive import PlannedTrajectory, RoadUsers, SignalState, VehicleState
+from contracts.errors import UserError
+from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from contracts.futures import CarPlan, FuturesJob, PathAhead, SeenRoadUser, Variant
+from contracts.scenario import Scenario
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+from orchestrator.config import DriveConfig
+from orchestrator.instructions import RoundIntent
+from orchestrator.intake import Surroundings
+from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.live import LiveScenarios
+from sim_worker.scenarios.reading import catalogue, find_scenario
+from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.variants import plan_variants
+from world_gen.signal_state import LIVE_FOR_S
+
+STEP_S = 0.1
+HEEDLESS_PLANNER = "constant_speed"
+PLAN_FRESH_NS = 1_000_000_000
+"""An older plan of the car is not compared with a new future, nor followed in one."""
+_SEEN_FRESH_NS = 500_000_000
+_SEEN_WITHIN_M = 120.0
+_KEPT_WORLDS = 8
+
+
+class RoundPlan(NamedTuple):
+    """One round's futures and the jobs that they are cut into."""
+
+    variants: tuple[Variant, ...]
+    jobs: tuple[FuturesJob, ...]
+
+
+def planners_of(planner: str) -> list[str]:
+    """Return who drives the futures in turn: the planner under test, and one that heeds nobody."""
+    return [planner] * 7 + ([HEEDLESS_PLANNER] if planner != HEEDLESS_PLANNER else [])
+
+
+def scenarios_of(config: DriveConfig) -> tuple[Scenario, ...]:
+    """Return the scenarios that a drive's futures take turns with.
+
+    Raises UserError for an unknown one, or one that happens at no junction.
+    """
+    if config.scenarios is None:
+        return tuple(s for s in catalogue().values() if s.where.setting == "junction")
+    found = tuple(find_scenario(name) for name in config.scenarios)
+    for scenario in found:
+        if scenario.where.setting != "junction":
+            raise UserError(
+                f"scenario {scenario.id}: takes place on a {scenario.where.setting}, not at a "
+                "junction ahead of a drive"
+            )
+    return found
+
+
+class RoundPlanner:
+    """Plans rounds: a function of World, intent and what the car says; keeps what is costly."""
+
+    def __init__(self, config: DriveConfig, vehicle: VehicleParameters) -> None:
+        self._config, self._vehicle = config, vehicle
+        self._scenarios = scenarios_of(config)
+        self._known: dict[str, LiveScenarios] = {}
+        self._variants: dict[tuple[str, ...], tuple[Variant, ...]] = {}
+
+    def plan(
+        self,
+        round_id: int,
+        intent: RoundIntent,
+        state: VehicleState,
+        said: Surroundings,
+        world: World,
+        *,
+        start_stamp_ns: int,
+    ) -> RoundPlan:
+        """Return the futures of a round and its jobs."""
+        config = self._config
+        scenarios = self._fitting(world, intent.path)
+        variants = self._variants_with(scenarios)
+        users = _road_users(said.road_users, state, world.frame)
+        signals = _signals(said.signals, state)
+        car_plan = _car_plan(said.plan, state, world.frame)
+        size = config.futures_per_job
+        jobs = []
+        for index, first in enumerate(range(0, config.futures, size)):
+            mine = variants[first : first + size]
+            named = {variant.scenario_id for variant in mine}
+            jobs.append(
+                FuturesJob(
+                    round_id=round_id,
+                    job_index=index,
+                    world_id=intent.world_id,
+                    state=state,
+                    path=intent.path,
+                    variants=mine,
+                    horizon_s=config.horizon_s,
+                    step_s=STEP_S,
+                    seed=config.seed,
+                    cruise_speed_mps=intent.cruise_speed_mps,
+                    scenarios=tuple(s for s in scenarios if s.id in named),
+                    road_users=users,
+                    signals=signals,
+                    drive_time_s=(state.stamp_ns - start_stamp_ns) / 1e9,
+                    car_plan=car_plan,
+                )
+            )
+        return RoundPlan(variants, tuple(jobs))
+
+    def _variants_with(self, scenarios: tuple[Scenario, ...]) -> tuple[Variant, ...]:
+        key = tuple(scenario.id for scenario in scenarios)
+        if key not in self._variants:
+            config = self._config
+            self._variants[key] = plan_variants(
+                count=config.futures,
+                seed=config.seed,
+                planners=planners_of(config.planner),
+                scenarios=scenarios,
+            )
+        return self._variants[key]
+
+    def _fitting(self, world: World, path: PathAhead) -> tuple[Scenario, ...]:
+        """Return the scenarios that can take place on the way through the junction ahead."""
+        if not self._scenarios:
+            return ()
+        if world.id not in self._known:
+            while len(self._known) >= _KEPT_WORLDS:
+                del self._known[next(iter(self._known))]
+            self._known[world.id] = LiveScenarios(RoadNetwork(world))
+        known = self._known[world.id]
+        on = known.on(FrenetPath(path.xy_m), 0.0, self._vehicle)
+        passage = on.passage
+        if passage is None:
+            return ()
+        return tuple(s for s in self._scenarios if known.places(s, passage))
+
+
+def _road_users(
+    users: RoadUsers | None, state: VehicleState, frame: LocalFrame
+) -> tuple[SeenRoadUser, ...]:
+    """Return the road users seen at about the state's time, in the World's frame."""
+    if users is None or abs(state.stamp_ns - users.stamp_ns) > _SEEN_FRESH_NS:
+        return ()
+    here = local_from_geo(frame, state.position.lat_deg, state.position.lon_deg)
+    seen = []
+    for user in users.users:
+        lat, lon = user.position.lat_deg, user.position.lon_deg
+        xy = local_from_geo(frame, lat, lon)
+        if float(np.hypot(*(xy - here))) > _SEEN_WITHIN_M:
+            continue
+        seen.append(
+            SeenRoadUser(
+                kind=user.kind,
+                x_m=float(xy[0]),
+                y_m=float(xy[1]),
+                yaw_rad=float(local_from_geo_yaw(frame, user.yaw_rad, lat, lon)),
+                speed_mps=user.speed_mps,
+                length_m=user.length_m,
+                width_m=user.width_m,
+            )
+        )
+    return tuple(seen)
+
+
+def _signals(states: tuple[SignalState, ...], state: VehicleState) -> tuple[SignalState, ...]:
+    fresh_ns = LIVE_FOR_S * 1e9
+    return tuple(s for s in states if abs(state.stamp_ns - s.stamp_ns) <= fresh_ns)
+
+
+def _car_plan(
+    plan: PlannedTrajectory | None, state: VehicleState, frame: LocalFrame
+) -> CarPlan | None:
+    if plan is None or abs(state.stamp_ns - plan.stamp_ns) > PLAN_FRESH_NS:
+        return None
+    return CarPlan(
+        time_s=plan.time_from_stamp_s + (plan.stamp_ns - state.stamp_ns) / 1e9,
+        xy_m=np.asarray(local_from_geo(frame, plan.lat_deg, plan.lon_deg)),
+        yaw_rad=np.asarray(local_from_geo_yaw(frame, plan.yaw_rad, plan.lat_deg, plan.lon_deg)),
+        speed_mps=plan.speed_mps,
+    )

@@ -1,0 +1,119 @@
+"""Who is on the road in each future of a job, as arrays for `Traffic`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from contracts.drive import RoadUserKind
+from contracts.scenario import Conduct
+from sim_worker.actors.kinds import KINDS
+from sim_worker.actors.path_table import Indices
+from sim_worker.actors.traffic import Crowd
+from sim_worker.planners.path import FrenetPath
+
+KIND_NAMES: tuple[RoadUserKind, ...] = tuple(KINDS)
+
+
+class Player(NamedTuple):
+    """One road user of one future; arc lengths are those of its box centre on its own path.
+
+    `size_m` is length and width where measured, else that of its kind. Who stops does so
+    `acts_after_s` after the start; `hidden_by` names another actor of the future.
+    """
+
+    name: str
+    kind: RoadUserKind
+    path: FrenetPath
+    start_arc_m: float
+    speed_mps: float
+    conduct: Conduct = "heedless"
+    desired_mps: float | None = None
+    lateral_m: float = 0.0
+    acts_after_s: float = np.inf
+    decel_mps2: float = 4.0
+    hidden_by: str = ""
+    size_m: tuple[float, float] | None = None
+
+
+class Casting(NamedTuple):
+    """The crowd of a job, and what else is known of it: (S, R) where nothing else is said.
+
+    `paths` are all that anybody drives on, the ego's first.
+    """
+
+    crowd: Crowd
+    paths: tuple[FrenetPath, ...]
+    kinds: Indices
+    hidden_by: Indices
+    walks: npt.NDArray[np.bool_]
+
+
+def casting(casts: Sequence[Sequence[Player]], *, ego_path: FrenetPath) -> Casting:
+    """Lay the road users of S futures out as arrays; places without one are not present."""
+    count, most = len(casts), max(map(len, casts), default=0)
+    shape = (count, most)
+    places: dict[int, int] = {id(ego_path): 0}
+    paths = [ego_path]
+    kinds, hidden = np.zeros(shape, np.intp), np.full(shape, -1, np.intp)
+    path_of, walks = np.zeros(shape, np.intp), np.zeros(shape, bool)
+    present, lawful = np.zeros(shape, bool), np.zeros(shape, bool)
+    columns = np.tile(_NOBODY, (count, most, 1))
+    for s, players in enumerate(casts):
+        names = [player.name for player in players]
+        for r, player in enumerate(players):
+            if id(player.path) not in places:
+                places[id(player.path)] = len(paths)
+                paths.append(player.path)
+            present[s, r] = True
+            path_of[s, r] = places[id(player.path)]
+            kinds[s, r] = KIND_NAMES.index(player.kind)
+            walks[s, r] = not KINDS[player.kind].keeps_lane
+            lawful[s, r] = player.conduct == "law_abiding"
+            columns[s, r] = _numbers(player)
+            if player.hidden_by:
+                hidden[s, r] = names.index(player.hidden_by)
+    length, width, lateral, arc, speed, desired, accel, decel, brakes_at, brakes_by = np.moveaxis(
+        columns, -1, 0
+    ).copy()
+    crowd = Crowd(
+        present=present,
+        lawful=lawful,
+        length_m=length,
+        width_m=width,
+        path_of=path_of,
+        lateral_m=lateral,
+        start_arc_m=arc,
+        start_speed_mps=speed,
+        desired_mps=desired,
+        accel_mps2=accel,
+        decel_mps2=decel,
+        brakes_at_s=brakes_at,
+        brakes_by_mps2=brakes_by,
+    )
+    return Casting(crowd, tuple(paths), kinds, hidden, walks)
+
+
+_NOBODY = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0])
+
+
+def _numbers(player: Player) -> tuple[float, ...]:
+    """Return a player's columns in the order of `Crowd`, from its length on."""
+    traits = KINDS[player.kind]
+    length, width = player.size_m or (traits.length_m, traits.width_m)
+    desired = player.speed_mps if player.desired_mps is None else player.desired_mps
+    return (
+        length,
+        width,
+        player.lateral_m,
+        player.start_arc_m,
+        0.0 if player.conduct == "parked" else player.speed_mps,
+        desired,
+        traits.accel_mps2,
+        traits.decel_mps2,
+        player.acts_after_s if player.conduct == "stops" else np.inf,
+        player.decel_mps2,
+    )

@@ -1,0 +1,70 @@
+"""Road users that the real car detected, as members of every future's cast."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from contracts.frames import wrap_angle
+from contracts.futures import SeenRoadUser
+from contracts.world import Lane
+from sim_worker.actors.cast import Player
+from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.roads import RoadNetwork
+
+_LANE_WITHIN_M = 1.8
+_LANE_WITHIN_RAD = math.radians(35.0)
+_STRAIGHT_M = 200.0
+_STANDS_MPS = 0.3
+
+
+def seen_actors(users: Sequence[SeenRoadUser], network: RoadNetwork) -> tuple[Player, ...]:
+    """Return detected road users: along the lane they are on, lawfully, else straight on.
+
+    One that stands is taken to stay where it is: whether it waits or is parked cannot be seen.
+    """
+    return tuple(_actor(number, user, network) for number, user in enumerate(users))
+
+
+def _actor(number: int, user: SeenRoadUser, network: RoadNetwork) -> Player:
+    place = np.array([[user.x_m, user.y_m]])
+    lane = None if user.kind == "pedestrian" else _lane_under(user, network)
+    stands = user.speed_mps < _STANDS_MPS
+    if lane is None or stands:
+        ahead = np.array([math.cos(user.yaw_rad), math.sin(user.yaw_rad)])
+        path = FrenetPath(place + np.array([[0.0], [_STRAIGHT_M]]) * ahead)
+        arc, offset = 0.0, 0.0
+    else:
+        path = network.lane_way(lane).path
+        on_path = path.locate(place)
+        arc, offset = float(on_path.arc_m[0]), float(on_path.offset_m[0])
+    return Player(
+        name=f"seen {number}",
+        kind=user.kind,
+        path=path,
+        start_arc_m=arc,
+        speed_mps=user.speed_mps,
+        conduct="parked" if stands else "heedless" if lane is None else "law_abiding",
+        lateral_m=offset,
+        size_m=(user.length_m, user.width_m),
+    )
+
+
+def _lane_under(user: SeenRoadUser, network: RoadNetwork) -> Lane | None:
+    """Return the lane that a road user is on and heads along, the nearest of them."""
+    best, best_m = None, _LANE_WITHIN_M
+    point = np.array([user.x_m, user.y_m])
+    for lane in network.lanes.values():
+        steps = np.diff(lane.centerline, axis=0)
+        length = np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)
+        along = ((point - lane.centerline[:-1]) * steps).sum(axis=1) / length**2
+        nearest = lane.centerline[:-1] + np.clip(along, 0.0, 1.0)[:, None] * steps
+        away = np.hypot(*(nearest - point).T)
+        step = int(away.argmin())
+        heading = math.atan2(steps[step, 1], steps[step, 0])
+        turned = abs(float(wrap_angle(heading - user.yaw_rad)))
+        if away[step] < best_m and turned < _LANE_WITHIN_RAD:
+            best, best_m = lane, float(away[step])
+    return best
