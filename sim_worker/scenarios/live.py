@@ -21,8 +21,9 @@ from sim_worker.scenarios.casting import cast
 from sim_worker.scenarios.meeting import LEAST_TIME_S
 from sim_worker.scenarios.placement import passage_on_path, places_on_passage
 from sim_worker.scenarios.places import Place, Unplaced
-from sim_worker.scenarios.roads import Passage, RoadNetwork, Way
+from sim_worker.scenarios.roads import Passage, RoadNetwork
 from sim_worker.scenarios.roles import ALONG, Cast, CastActor
+from sim_worker.scenarios.ways import Way
 
 _LEAST_SPEED_MPS = 2.0
 """A car that stands is taken to set off with this speed."""
