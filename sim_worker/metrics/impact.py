@@ -13,6 +13,8 @@ from sim_worker.metrics.scene import Scene
 from sim_worker.metrics.time_to_collision import Pairs, meeting
 from sim_worker.overlap import Rectangles, clearance
 
+_MAX_CLOSING_MPS = 100.0
+"""Faster than any two road users approach each other."""
 _STANDS_MPS = 0.05
 """An ego slower than this stands: nuPlan, no_ego_at_fault_collisions."""
 Indices = npt.NDArray[np.intp]
@@ -123,14 +125,10 @@ def impacts(scene: Scene) -> Impacts:
     seen = scene.relative
     _, instants, users = seen.ahead_m.shape
     reach = np.hypot(*scene.user_half_m) + np.hypot(scene.half_length_m, scene.half_width_m)
-    near = [
-        np.flatnonzero(scene.centre_distance_m[rows] < reach[rows] + _travel_m(scene, rows))
-        + rows.start * instants * users
-        for rows in scene.blocks
-    ]
-    pair = np.concatenate(near) if near else np.zeros(0, dtype=np.intp)
+    step_m = _MAX_CLOSING_MPS * float(np.diff(scene.time_s).max())
+    pair = np.flatnonzero(scene.centre_distance_m < reach + step_m)
     row, user = np.divmod(pair, max(users, 1))
-    future, instant = np.divmod(row, instants)
+    instant = row % instants
     # Where there is no next instant, or nobody at it, nothing moves.
     goes_on = instant < instants - 1
     next_row, next_pair = row + goes_on, pair + users * goes_on
@@ -138,9 +136,13 @@ def impacts(scene: Scene) -> Impacts:
     next_row, next_pair = np.where(then, next_row, row), np.where(then, next_pair, pair)
     x, y = (values.reshape(-1) for values in scene.users[:2])
     ego_x, ego_y = (np.ascontiguousarray(scene.centre_m[..., k]).reshape(-1) for k in range(2))
-    cos, sin = (values.reshape(-1)[row] for values in scene.heading)
     move_x = x[next_pair] - x[pair] - (ego_x[next_row] - ego_x[row])
     move_y = y[next_pair] - y[pair] - (ego_y[next_row] - ego_y[row])
+    gap = scene.centre_distance_m.reshape(-1)[pair] - reach[row // instants, 0, user]
+    near = np.flatnonzero(both & (gap <= np.abs(move_x) + np.abs(move_y)))
+    pair, row, user, instant = pair[near], row[near], user[near], instant[near]
+    move_x, move_y, goes_on, future = move_x[near], move_y[near], goes_on[near], row // instants
+    cos, sin = (values.reshape(-1)[row] for values in scene.heading)
     half_length, half_width = scene.user_half_m
     touch = meeting(
         Pairs(
@@ -153,7 +155,7 @@ def impacts(scene: Scene) -> Impacts:
     )  # fmt: skip
     # In units of the step: 0 at this instant, 1 at the next.
     share = np.maximum(touch.from_s, 0.0)
-    hit = both & (touch.from_s <= touch.until_s) & (touch.until_s >= 0.0)
+    hit = (touch.from_s <= touch.until_s) & (touch.until_s >= 0.0)
     hit &= share < np.where(goes_on, 1.0, 1e-300)
     return _first(scene, future[hit], instant[hit], user[hit], share[hit])
 
@@ -188,14 +190,3 @@ def _first(scene: Scene, future: Indices, instant: Indices, user: Indices, share
         closing_mps=spread(np.hypot(relative[:, 0], relative[:, 1]), np.nan),
         at_fault=spread(((impact > _STANDS_MPS) & (ahead > 0.0)).astype(np.float64), 0.0) > 0.0,
     )
-
-
-def _travel_m(scene: Scene, rows: slice) -> Array:
-    """Return (…, N, R) no less than the two move together until the next instant."""
-    x, y, _, _ = scene.users
-    travel = np.zeros(x[rows].shape)
-    moved = np.abs(np.diff(scene.centre_m[rows], axis=1)).sum(axis=-1)
-    for values in (x[rows], y[rows]):
-        travel[:, :-1] += np.abs(values[:, 1:] - values[:, :-1])
-    travel[:, :-1] += moved[..., None]
-    return travel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from sim_worker.metrics.rollout import Measure
@@ -89,19 +90,60 @@ def time_to_collision(scene: Scene) -> Array:
     Hayward (1972), Near-miss determination through use of a scale of danger, with the shapes of
     the road users instead of a common lane: both keep their velocity and heading.
     """
-    found = np.empty(scene.relative.ahead_m.shape)
+    seen = scene.relative
+    found = np.full(seen.ahead_m.shape, np.inf)
     half_length, half_width = scene.user_half_m
-    for rows in scene.blocks:
-        ahead, left, cos, sin, ahead_mps, left_mps, _ = (v[rows] for v in scene.relative)
-        touch = meeting(
-            Pairs(
-                ahead, left, ahead_mps, left_mps, cos, sin,
-                (scene.half_length_m, scene.half_width_m), (half_length[rows], half_width[rows]),
-            )
-        )  # fmt: skip
-        until = np.maximum(touch.from_s, 0.0, out=found[rows])
-        until[touch.until_s < until] = np.inf
+    reach = np.hypot(half_length, half_width) + np.hypot(scene.half_length_m, scene.half_width_m)
+    near = [
+        rows.start * seen.ahead_m[0].size
+        + _may_touch(
+            seen.ahead_m[rows], seen.left_m[rows], seen.ahead_mps[rows], seen.left_mps[rows],
+            reach[rows],
+        )
+        for rows in scene.blocks
+    ]  # fmt: skip
+    pair = np.concatenate(near) if near else np.zeros(0, dtype=np.intp)
+    _, instants, users = seen.ahead_m.shape
+    row, user = np.divmod(pair, max(users, 1))
+    future = row // instants
+
+    def of_pairs(values: Array) -> Array:
+        return np.asarray(values.reshape(-1)[pair])
+
+    touch = meeting(
+        Pairs(
+            of_pairs(seen.ahead_m), of_pairs(seen.left_m),
+            of_pairs(seen.ahead_mps), of_pairs(seen.left_mps),
+            of_pairs(seen.cos), of_pairs(seen.sin),
+            (scene.half_length_m, scene.half_width_m),
+            (half_length[future, 0, user], half_width[future, 0, user]),
+        )
+    )  # fmt: skip
+    until = np.maximum(touch.from_s, 0.0)
+    until[touch.until_s < until] = np.inf
+    found.reshape(-1)[pair] = until
     return found
+
+
+def _may_touch(
+    ahead_m: Array, left_m: Array, ahead_mps: Array, left_mps: Array, reach_m: Array
+) -> npt.NDArray[np.intp]:
+    """Return the flat indices of pairs whose circles touch now or, with their velocities, later."""
+    past = ahead_m * left_mps
+    past -= left_m * ahead_mps
+    past *= past
+    speed = np.square(ahead_mps)
+    speed += np.square(left_mps)
+    square = reach_m * reach_m
+    speed *= square
+    passes = past <= speed
+    closing = ahead_m * ahead_mps
+    closing += left_m * left_mps
+    passes &= closing < 0.0
+    distance = np.square(ahead_m)
+    distance += np.square(left_m)
+    passes |= distance <= square
+    return np.flatnonzero(passes)
 
 
 def ttc_series(scene: Scene) -> Measure:
