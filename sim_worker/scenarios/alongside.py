@@ -11,7 +11,14 @@ from contracts.arrays import Array
 from contracts.scenario import ActorPart
 from sim_worker.actors.kinds import KINDS
 from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.impact import TOLERANCE_M, Moving, first_touch, front_point, gap_m
+from sim_worker.scenarios.impact import (
+    TOLERANCE_M,
+    Moving,
+    Touch,
+    first_touch,
+    front_point,
+    gap_m,
+)
 from sim_worker.scenarios.roles import CastActor, Meeting, Staging
 from sim_worker.scenarios.ways import Way
 from world_gen.polyline import length
@@ -38,18 +45,37 @@ def along(part: ActorPart, staging: Staging, meetings: dict[str, Meeting]) -> Ca
     beside = staging.ego.offset_m - place.near_sign * (free + traits.width_m / 2.0)
     arc = staging.start_m + box.front_m + gap + half
     if part.relation == "parked":
-        lateral = lateral or beside
         for other in staging.scenario.actors:
             if other.hidden_by == part.name and other.name in meetings:
                 impact, way = meetings[other.name]
                 stands = way.path.point_at(np.array([impact.actor_arc_m]))
                 line = float(place.ego.path.locate(stands).arc_m[0])
                 arc = line - KINDS[other.kind].width_m / 2.0 - gap - half
+        lateral = lateral or _out_of_the_way(part, staging, arc, beside)
     elif part.relation == "behind":
         arc = staging.start_m + box.front_m - box.length_m - gap - half
     elif part.relation == "beside":
         arc, lateral = staging.start_m + box.centre_m, lateral or beside
     return staging.actor(part, place.ego.xy_m, arc, lateral, place.ego.name)
+
+
+def _out_of_the_way(part: ActorPart, staging: Staging, arc_m: float, beside_m: float) -> float:
+    """Return how far beside the path a box must stand that the ego passes it, in curves as well."""
+    step = math.copysign(_ASIDE_STEP_M, beside_m)
+    for number in range(_ASIDE_STEPS):
+        lateral = beside_m + number * step
+        parked = Moving(staging.place.ego.path, 0.0, lateral)
+        touch = first_touch(
+            staging.ego, staging.box, parked, KINDS[part.kind], actor_arc_m=np.array([arc_m]),
+            ego_arc_m=np.array([staging.start_m]), until_s=staging.scenario.horizon_s,
+        )  # fmt: skip
+        if not np.isfinite(touch.time_s[0]):
+            # Where it had to be moved, a step more leaves the ego a margin.
+            return lateral if number == 0 else lateral + step
+    return beside_m
+
+
+_ASIDE_STEPS, _ASIDE_STEP_M = 10, 0.3
 
 
 def beside_bay(part: ActorPart, staging: Staging, way: Way) -> CastActor:
@@ -73,23 +99,40 @@ def closing_time_s(part: ActorPart, staging: Staging) -> float | None:
 _ANYWHERE = FrenetPath(np.array([[0.0, 0.0], [1.0, 0.0]]))
 
 
-def run_into(actor: CastActor, staging: Staging) -> Touched | None:
-    """Return the first touch of who drives ahead, if the ego's front makes it."""
+class _OnPath(NamedTuple):
+    """An actor as it moves along the ego's path, and its first touch of the ego."""
+
+    moving: Moving
+    touch: Touch
+
+
+def _played(actor: CastActor, staging: Staging) -> _OnPath:
     after = actor.acts_after_s if actor.conduct == "stops" else math.inf
-    place = staging.place
-    moving = Moving(place.ego.path, actor.speed_mps, actor.lateral_m, after, actor.decel_mps2)
+    path = staging.place.ego.path
+    moving = Moving(path, actor.speed_mps, actor.lateral_m, after, actor.decel_mps2)
     # Its path may have been led back: on the ego's it starts by so much earlier.
-    start = actor.start_arc_m - (length(actor.xy_m) - length(place.ego.xy_m))
+    start = actor.start_arc_m - (length(actor.xy_m) - length(staging.place.ego.xy_m))
     touch = first_touch(
         staging.ego, staging.box, moving, actor.traits, ego_arc_m=np.array([staging.start_m]),
         actor_arc_m=np.array([start]), until_s=staging.scenario.horizon_s,
     )  # fmt: skip
+    return _OnPath(moving, touch)
+
+
+def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
+    """Return whether the ego touches somebody beside its path, with whatever side."""
+    return bool(np.isfinite(_played(actor, staging).touch.time_s[0]))
+
+
+def run_into(actor: CastActor, staging: Staging) -> Touched | None:
+    """Return the first touch of who drives ahead, if the ego's front makes it."""
+    moving, touch = _played(actor, staging)
     if not np.isfinite(touch.time_s[0]):
         return None
     shares = np.linspace(0.0, 1.0, 41)
     points = np.concatenate(
         [
-            front_point(staging.ego, staging.box, touch.ego_arc_m, share, place.near_sign)
+            front_point(staging.ego, staging.box, touch.ego_arc_m, share, staging.place.near_sign)
             for share in shares
         ]
     )

@@ -9,7 +9,14 @@ import numpy as np
 
 from contracts.scenario import EGO, Scenario
 from contracts.vehicle import VehicleParameters
-from sim_worker.scenarios.alongside import Touched, along, beside_bay, closing_time_s, run_into
+from sim_worker.scenarios.alongside import (
+    Touched,
+    along,
+    beside_bay,
+    closing_time_s,
+    run_into,
+    stands_in_the_way,
+)
 from sim_worker.scenarios.drawing import Values
 from sim_worker.scenarios.impact import Moving, ego_box
 from sim_worker.scenarios.meeting import LEAST_TIME_S, incoming, meet
@@ -99,7 +106,7 @@ def _cast(
         for part, ways in zip(scenario.actors, place.actor_ways, strict=True)
     )
     touched, other = _first_touched(staging, actors, meetings)
-    reason = _out_of_bounds(staging, actors, touched.time_s)
+    reason = _out_of_bounds(staging, actors, touched.time_s) or _in_the_way(staging, actors, other)
     if reason:
         return Unplaced(place.junction_id, reason, True)
     way = place.ego
@@ -151,6 +158,15 @@ def _first_touched(
             if found is not None:
                 return found, actor.name
     return Touched(math.nan, np.full(2, math.nan), math.nan), ""
+
+
+def _in_the_way(staging: Staging, actors: tuple[CastActor, ...], met: str) -> str:
+    """Return who parks where the ego must pass on its way to somebody else, or nothing."""
+    for actor in actors:
+        stands = actor.relation == "parked" and actor.name != met
+        if stands and stands_in_the_way(actor, staging):
+            return f"{actor.name} would stand in the ego's way"
+    return ""
 
 
 def _out_of_bounds(staging: Staging, actors: tuple[CastActor, ...], time_s: float) -> str:

@@ -28,6 +28,8 @@ _FINE_FOR_S = 0.6
 """Ticks are fine just before the end of a search: there, boxes come near each other."""
 _AFTER_S = 0.06
 _BISECTIONS = 9
+_CLEAR_M = 0.1
+"""Boxes that come so near are taken to touch where nothing may."""
 _PRESS_S, _BRUSH_M = 0.1, 0.04
 """So soon after the touch boxes overlap by more than half of this, or they merely brush."""
 _OUTLINE = np.array([
@@ -153,11 +155,35 @@ def find_impact(
     good = np.isfinite(touch.time_s) & (np.hypot(*(met - planned).T) <= TOLERANCE_M)
     good &= gap_m(met, actor, traits, touch.actor_arc_m) <= TOLERANCE_M
     good &= _goes_on(ego, box, actor, traits, touch)
-    if not good.any():
-        return None
     order = np.lexsort((ego_arc, which, ~good))
-    best = int(order[0])
-    return Impact(float(ego_arc[best]), float(actor_arc[best]), planned[best], share)
+    for best in order[: int(good.sum())].tolist():
+        impact = Impact(float(ego_arc[best]), float(actor_arc[best]), planned[best], share)
+        if _is_first(ego, box, actor, traits, impact, lead_time_s):
+            return impact
+    return None
+
+
+def _is_first(
+    ego: Moving,
+    box: EgoBox,
+    actor: Moving,
+    traits: KindTraits,
+    impact: Impact,
+    lead_time_s: float,
+) -> bool:
+    """Return whether nothing comes near a touch until shortly before an impact."""
+    until_s = lead_time_s - _FINE_FOR_S
+    if until_s <= 0.0:
+        return True
+    wider = traits._replace(
+        length_m=traits.length_m + 2 * _CLEAR_M, width_m=traits.width_m + 2 * _CLEAR_M
+    )
+    touch = first_touch(
+        ego, box, actor, wider, until_s=until_s,
+        ego_arc_m=np.array([impact.ego_arc_m - ego.speed_mps * lead_time_s]),
+        actor_arc_m=np.array([impact.actor_arc_m - actor.speed_mps * lead_time_s]),
+    )  # fmt: skip
+    return not np.isfinite(touch.time_s[0])
 
 
 def _goes_on(
