@@ -121,44 +121,46 @@ def _edge_time(aside: Array, reach: Array, off: Indices, toward: int, time_s: Ar
 def crossings(scene: Scene) -> Crossings:
     """Return where the ego's track crosses road users' tracks at an angle of 10° or more."""
     future, user, ego_chunk, user_chunk = _near_chunks(scene)
-    x, y, _, _ = scene.users
-    last = len(scene.time_s) - 1
-    node = np.arange(_CHUNK + 1)
-    i = np.minimum(ego_chunk[:, None] * _CHUNK + node, last)
-    j = np.minimum(user_chunk[:, None] * _CHUNK + node, last)
-    ego = scene.centre_m[future[:, None], i]
-    other = np.stack([x[future[:, None], j, user[:, None]], y[future[:, None], j, user[:, None]]])
-    there = scene.there[future[:, None], j, user[:, None]]
-    ego_x, ego_y = ego[..., 0], ego[..., 1]
-    step_x, step_y = np.diff(ego_x, axis=1)[:, :, None], np.diff(ego_y, axis=1)[:, :, None]
-    way_x, way_y = np.diff(other[0], axis=1)[:, None], np.diff(other[1], axis=1)[:, None]
-    from_x = other[0][:, None, :-1] - ego_x[:, :-1, None]
-    from_y = other[1][:, None, :-1] - ego_y[:, :-1, None]
+    instants = len(scene.time_s)
+    users = scene.there.shape[2]
+    # Pairs on the last axis: numpy is slow where the last axis is short.
+    node = np.arange(_CHUNK + 1)[:, None]
+    i = np.minimum(ego_chunk * _CHUNK + node, instants - 1)
+    j = np.minimum(user_chunk * _CHUNK + node, instants - 1)
+    ego = scene.centre_m.reshape(-1, 2)[future * instants + i]
+    ego_x, ego_y = ego[..., 0].copy(), ego[..., 1].copy()
+    place = (future * instants + j) * users + user
+    x, y, there = (v.reshape(-1)[place] for v in (*scene.users[:2], scene.there))
+    step_x, step_y = (np.diff(values, axis=0)[:, None] for values in (ego_x, ego_y))
+    way_x, way_y = (np.diff(values, axis=0)[None] for values in (x, y))
+    from_x, from_y = x[None, :-1] - ego_x[:-1, None], y[None, :-1] - ego_y[:-1, None]
     turn = step_x * way_y - step_y * way_x
     turn[np.abs(turn) < 1e-12] = np.nan
     along_ego = (from_x * way_y - from_y * way_x) / turn
     along_other = (from_x * step_y - from_y * step_x) / turn
     # Ends count for both neighbours: a crossing found twice does no harm, one missed does.
     cross = (np.abs(along_ego - 0.5) <= _HALF_STEP) & (np.abs(along_other - 0.5) <= _HALF_STEP)
-    cross &= (there[:, 1:] & there[:, :-1])[:, None]
-    pair, a, b = np.nonzero(cross)
-    ego_way = np.stack([step_x[pair, a, 0], step_y[pair, a, 0]], axis=-1)
-    ego_way /= np.hypot(ego_way[:, 0], ego_way[:, 1])[:, None]
-    user_way = np.stack([way_x[pair, 0, b], way_y[pair, 0, b]], axis=-1)
-    user_way /= np.hypot(user_way[:, 0], user_way[:, 1])[:, None]
+    cross &= there[1:] & there[:-1]
+    a, b, pair = np.unravel_index(np.flatnonzero(cross), cross.shape)
+    ego_way = _unit(step_x[a, 0, pair], step_y[a, 0, pair])
+    user_way = _unit(way_x[0, b, pair], way_y[0, b, pair])
     angle_sin = ego_way[:, 0] * user_way[:, 1] - ego_way[:, 1] * user_way[:, 0]
     steep = np.abs(angle_sin) >= _PARALLEL_SIN
-    pair, a, b = pair[steep], a[steep], b[steep]
-    share = along_ego[pair, a, b][:, None]
+    a, b, pair = a[steep], b[steep], pair[steep]
+    begin = ego[a, pair]
     return Crossings(
         future=future[pair],
         user=user[pair],
-        ego_step=i[pair, a],
-        user_step=j[pair, b],
-        point_m=ego[pair, a] + share * (ego[pair, a + 1] - ego[pair, a]),
+        ego_step=i[a, pair],
+        user_step=j[b, pair],
+        point_m=begin + along_ego[a, b, pair][:, None] * (ego[a + 1, pair] - begin),
         ego_way=ego_way[steep],
         user_way=user_way[steep],
     )
+
+
+def _unit(x: Array, y: Array) -> Array:
+    return np.stack([x, y], axis=-1) / np.hypot(x, y)[:, None]
 
 
 def _near_chunks(scene: Scene) -> tuple[Indices, Indices, Indices, Indices]:
