@@ -66,7 +66,9 @@ class ActorPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     Without intervention it touches the ego `arrives_after_s` later than meant: 0 is an impact.
     `impact_share` says where on the ego's front, from 0 at its near side to 1. `gap_m` is from
     bumper to bumper along the ego's path (`ahead`, `behind`, `parked`), `lateral_m` to the across
-    side of that path. Who `stops` does so `acts_after_s` with `decel_mps2`.
+    side of that path. Who `stops` does so `acts_after_s` with `decel_mps2`. Who crosses an arm
+    goes to the side that `turn` names, or to either where it is `straight`; who is parked and
+    hides another stands `gap_m` before the other's line.
     """
 
     name: str
