@@ -113,8 +113,9 @@ def leaders(scene: Scene) -> Leaders:
     near = [
         rows.start * seen.ahead_m[0].size
         + _near_course(
-            seen.ahead_m[rows], seen.left_m[rows], scene.centre_ahead_m, curvature[rows],
-            widest[rows],
+            seen.ahead_m[rows].reshape(-1), seen.left_m[rows].reshape(-1), scene.centre_ahead_m,
+            np.repeat(curvature[rows].reshape(-1), seen.ahead_m.shape[2]),
+            float(widest.max(initial=0.0)),
         )
         for rows in scene.blocks
     ]  # fmt: skip
@@ -156,9 +157,9 @@ def leaders(scene: Scene) -> Leaders:
 
 
 def _near_course(
-    ahead_m: Array, left_m: Array, centre_ahead_m: float, curvature: Array, widest_m: Array
+    ahead_m: Array, left_m: Array, centre_ahead_m: float, curvature: Array, widest_m: float
 ) -> Indices:
-    """Return the flat indices of all who may overlap the ego's strip and are ahead.
+    """Return the indices, of all (K,), of those who may overlap the ego's strip and are ahead.
 
     (1 - r) / κ = (2 y - κ (x² + y²)) / (1 + r), and r is at most 1 + |κ| widest where a road user
     reaches the strip at all: a bound without a root.
