@@ -2,38 +2,67 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
 from sim_worker.planners.giving_way import wait_arcs, walker_gap_m
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from sim_worker.planners.tracking import front_from_base_m
+
+DECIDE_S = 0.2
 
 
 class GapAcceptance:
     """Drives as `PurePursuitIdm` does, and waits where it has to give way until a gap is enough.
 
     It also stops for those who walk over its path, and before ground that it could not leave.
+    Driving a job, it decides every 0.2 s, as people do not faster; asked without memory, always.
     """
-
-    def __init__(self) -> None:
-        self._driver = PurePursuitIdm()
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
-        return self._driver.plan(gives_way(view))
+        return self.begin(len(view.arc_m)).plan(view)
+
+    def begin(self, count: int) -> GivingWayDriver:
+        """Return what drives the cars of one job."""
+        return GivingWayDriver(count)
 
 
-def gives_way(view: PlannerView) -> PlannerView:
-    """Return the view with lines where the car has to wait, and those who walk as being ahead."""
-    if view.ground is not None:
-        wait = wait_arcs(view)
-        stop = wait if view.stop_arc_m is None else np.minimum(view.stop_arc_m, wait)
-        view = view._replace(stop_arc_m=stop)
-    walker = walker_gap_m(view)
-    nearer = walker < view.lead_gap_m
-    if not nearer.any():
-        return view
-    return view._replace(
-        lead_gap_m=np.where(nearer, walker, view.lead_gap_m),
-        lead_speed_mps=np.where(nearer, 0.0, view.lead_speed_mps),
-    )
+class GivingWayDriver:
+    """Keeps in mind where to wait, and for whom on foot, from one decision to the next."""
+
+    remarks: Mapping[int, str] = {}
+
+    def __init__(self, count: int) -> None:
+        self._driver = PurePursuitIdm()
+        self._next_s = -np.inf
+        self._wait_arc_m: Array = np.full(count, np.inf)
+        self._walker_arc_m: Array = np.full(count, np.inf)
+
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        """Answer one control tick."""
+        front = view.arc_m + front_from_base_m(view.vehicle)
+        if view.time_s > self._next_s - 1e-6:
+            self._next_s = view.time_s + DECIDE_S
+            self._wait_arc_m = wait_arcs(view)
+            self._walker_arc_m = walker_gap_m(view) + front
+        return self._driver.plan(self._as_seen(view, front))
+
+    def _as_seen(self, view: PlannerView, front_arc_m: Array) -> PlannerView:
+        """Return the view with lines where the car has to wait, and those who walk as ahead."""
+        if view.ground is not None:
+            stop = np.where(self._wait_arc_m > front_arc_m, self._wait_arc_m, np.inf)
+            if view.stop_arc_m is not None:
+                stop = np.minimum(view.stop_arc_m, stop)
+            view = view._replace(stop_arc_m=stop)
+        walker = np.maximum(self._walker_arc_m - front_arc_m, 0.1)
+        nearer = walker < view.lead_gap_m
+        if not nearer.any():
+            return view
+        return view._replace(
+            lead_gap_m=np.where(nearer, walker, view.lead_gap_m),
+            lead_speed_mps=np.where(nearer, 0.0, view.lead_speed_mps),
+        )

@@ -21,6 +21,7 @@ from sim_worker.planners.base import PlannerView, SeenUsers, SharedGround, rows_
 from sim_worker.planners.tracking import front_from_base_m
 
 Flags = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.intp]
 
 CRITICAL_GAP_S = 4.1
 FOLLOW_UP_S = 2.9
@@ -31,6 +32,7 @@ _LATERAL_ACCEL_MPS2 = 2.5
 _COMFORT_DECEL_MPS2 = 2.0
 _LOOKS_M = 15.0
 """Beyond its way to a stop a car looks so far for ground where it has to wait."""
+_SIGHT_M = 60.0
 _STANDING_MPS = 0.5
 _AIMS_BESIDE_M = 2.0
 _AIMS_WITHIN_RAD = 0.6
@@ -55,18 +57,21 @@ class GroundLines(NamedTuple):
 
 def ground_lines(ground: SharedGround, *, length_m: float) -> GroundLines:
     """Join pieces of ground between which a car of that length has no room to stand."""
-    enter, leave = ground.enter_arc_m, ground.leave_arc_m
-    stop, clear = enter.copy(), leave.copy()
-    first = 0
-    for piece in range(1, len(enter)):
-        room = enter[piece] - clear[first:piece].max()
-        if room < length_m + _ROOM_M and enter[piece] - enter[first] < _CHAIN_M:
-            stop[piece] = stop[first]
-        else:
-            clear[first:piece] = clear[first:piece].max()
-            first = piece
-    clear[first:] = clear[first:].max()
-    return GroundLines(stop, clear)
+    stop: list[float] = []
+    clear: list[float] = []
+    begins: list[int] = []
+    first, far = 0.0, -np.inf
+    for enter, leave in zip(ground.enter_arc_m.tolist(), ground.leave_arc_m.tolist(), strict=True):
+        if enter - far >= length_m + _ROOM_M or enter - first >= _CHAIN_M:
+            first, far = enter, leave
+            begins.append(len(stop))
+        far = max(far, leave)
+        stop.append(first)
+        clear.append(far)
+    ends = [*begins[1:], len(stop)]
+    for begin, end in zip(begins, ends, strict=True):
+        clear[begin:end] = [clear[end - 1]] * (end - begin)
+    return GroundLines(np.array(stop), np.array(clear))
 
 
 def wait_arcs(view: PlannerView) -> Array:
@@ -105,26 +110,46 @@ def _taken(view: PlannerView, ground: SharedGround, front_arc_m: Array) -> Flags
     """(S, C) bool: whether somebody with priority needs the ground too soon."""
     users = view.users
     assert users is not None
+    taken = np.zeros((len(front_arc_m), len(ground.enter_arc_m)), dtype=bool)
+    pieces = np.flatnonzero(ground.waits)
+    row, user = np.nonzero(_near(users, front_arc_m, ground.point_m[pieces]))
+    if not len(row) or not len(pieces):
+        return taken
     speed = np.maximum(view.states[:, 3], 0.0)
-    pace = _pace(view, ground)
-    enter_s = _time_to(ground.enter_arc_m - front_arc_m[:, None], speed, pace)
-    clear_s = _time_to(
-        ground.leave_arc_m + view.vehicle.length_m.value - front_arc_m[:, None], speed, pace
-    )
-    heads, arrive_s, gone_s = _heading_for(users, ground, front_arc_m)
-    needed_s = clear_s + LAG_S
+    pace = _pace(view, ground, pieces)
+    enter_s = _time_to(ground.enter_arc_m[pieces] - front_arc_m[:, None], speed, pace)
+    left_m = ground.leave_arc_m[pieces] + view.vehicle.length_m.value - front_arc_m[:, None]
+    needed_s = _time_to(left_m, speed, pace) + LAG_S
     stands = (speed < _STANDING_MPS)[:, None]
     follows = ((view.lead_gap_m < 12.0) & (view.lead_speed_mps > 1.0))[:, None]
-    needed_s = np.maximum(
-        needed_s, np.where(stands, np.where(follows, FOLLOW_UP_S, CRITICAL_GAP_S), 0.0)
+    least_s = np.where(stands, np.where(follows, FOLLOW_UP_S, CRITICAL_GAP_S), 0.0)
+    needed_s = np.maximum(needed_s, least_s)
+    course = _courses(users, ground, pieces, row, user)
+    meets = course.heads & (course.arrive_s < needed_s[row])
+    meets &= course.gone_s > enter_s[row] - LEAD_S
+    pair, piece = np.nonzero(meets)
+    taken[row[pair], pieces[piece]] = True
+    return taken
+
+
+def _near(users: SeenUsers, front_arc_m: Array, points_m: Array) -> Flags:
+    """(S, R) bool: who could matter, being near the ground, on wheels and not in the own lane."""
+    if not len(points_m):
+        return np.zeros(users.speed_mps.shape, dtype=bool)
+    low, high = points_m.min(axis=0) - _SIGHT_M, points_m.max(axis=0) + _SIGHT_M
+    x, y = users.poses[..., 0], users.poses[..., 1]
+    near = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & ~users.walks
+    near &= (
+        (np.abs(users.offset_m) > _OWN_LANE_M)
+        | (np.abs(wrap_angle(users.turned_rad)) > _OWN_LANE_RAD)
+        | (users.arc_m > front_arc_m[:, None] + users.size_m[..., 0])
     )
-    meets = heads & (arrive_s < needed_s[..., None]) & (gone_s > enter_s[..., None] - LEAD_S)
-    return np.asarray(meets.any(axis=2))
+    return np.asarray(near)
 
 
-def _pace(view: PlannerView, ground: SharedGround) -> Array:
-    """Return (S, C) the speed at which the ground is crossed, as bends allow."""
-    middle = 0.5 * (ground.enter_arc_m + ground.leave_arc_m)
+def _pace(view: PlannerView, ground: SharedGround, pieces: Indices) -> Array:
+    """Return (S, W) the speed at which pieces of the ground are crossed, as bends allow."""
+    middle = 0.5 * (ground.enter_arc_m + ground.leave_arc_m)[pieces]
     profile = view.path.speed_profile(
         lateral_accel_mps2=_LATERAL_ACCEL_MPS2, decel_mps2=_COMFORT_DECEL_MPS2
     )
@@ -144,41 +169,44 @@ def _time_to(distance_m: Array, speed_mps: Array, pace_mps: Array) -> Array:
     return np.where(distance < gaining, short, long)
 
 
-def _heading_for(
-    users: SeenUsers, ground: SharedGround, front_arc_m: Array
-) -> tuple[Flags, Array, Array]:
-    """Return (S, C, R) who heads for which ground, when they arrive and when they are gone.
+class _Courses(NamedTuple):
+    """Of P others to W pieces of ground (P, W): who heads there, arrives when, and has left."""
 
-    Others keep their speed, and head for ground that lies on their straight course or, where
-    it is known how the ground is crossed, on a circular arc that ends in that direction.
+    heads: Flags
+    arrive_s: Array
+    gone_s: Array
+
+
+def _courses(
+    users: SeenUsers, ground: SharedGround, pieces: Indices, row: Indices, user: Indices
+) -> _Courses:
+    """Predict others at their present speed.
+
+    They head for ground that lies on their straight course or, where it is known how the ground
+    is crossed, on a circular arc that ends in that direction.
     """
-    x, y, yaw = np.moveaxis(users.poses[:, None], -1, 0)
-    dx, dy = ground.point_m[:, 0, None] - x, ground.point_m[:, 1, None] - y
+    x, y, yaw = users.poses[row, user].T[..., None]
+    dx, dy = ground.point_m[pieces, 0] - x, ground.point_m[pieces, 1] - y
     cos, sin = np.cos(yaw), np.sin(yaw)
     ahead, beside = cos * dx + sin * dy, np.abs(cos * dy - sin * dx)
+    half = 0.5 * users.size_m[row, user, 0][:, None]
+    extent = 0.5 * (ground.leave_arc_m - ground.enter_arc_m)[pieces]
+    reach = half + np.minimum(np.maximum(extent, 1.0), 6.0)
     far = np.hypot(dx, dy)
-    half = 0.5 * users.size_m[:, None, :, 0]
-    half_ground = np.clip(0.5 * (ground.leave_arc_m - ground.enter_arc_m), 1.0, 6.0)[:, None]
-    speed = users.speed_mps[:, None]
-    within = far < half + half_ground
-    heads = (ahead > 0.0) & (beside < _AIMS_BESIDE_M)
-    if ground.their_yaw_rad is not None:
+    speed = users.speed_mps[row, user][:, None]
+    if ground.their_yaw_rad is None:
+        heads = (ahead > 0.0) & (beside < _AIMS_BESIDE_M)
+    else:
         bearing = np.arctan2(dy, dx)
-        arrives = wrap_angle(2.0 * bearing - yaw - ground.their_yaw_rad[:, None])
-        turns = np.abs(wrap_angle(bearing - yaw))
-        heads = (np.abs(arrives) < _AIMS_WITHIN_RAD) & (turns < _BEARS_WITHIN_RAD)
-    own_lane = (
-        (np.abs(users.offset_m) < _OWN_LANE_M)
-        & (np.abs(wrap_angle(users.turned_rad)) < _OWN_LANE_RAD)
-        & (users.arc_m < front_arc_m[:, None] + users.size_m[..., 0])
-    )
-    counts = ~(own_lane | users.walks)[:, None]
+        arrives = wrap_angle(2.0 * bearing - yaw - ground.their_yaw_rad[pieces])
+        heads = np.abs(arrives) < _AIMS_WITHIN_RAD
+        heads &= np.abs(wrap_angle(bearing - yaw)) < _BEARS_WITHIN_RAD
     moves = speed > _STANDING_MPS
     pace = np.maximum(speed, _STANDING_MPS)
-    arrive_s = np.where(within, 0.0, (far - half - half_ground) / pace)
-    gone_s = np.where(moves, (ahead + half + half_ground) / pace, np.inf)
-    found = counts & ((heads & moves) | (within & (gone_s > 0.0)))
-    return np.asarray(found), arrive_s, gone_s
+    within = far < reach
+    arrive_s = np.where(within, 0.0, (far - reach) / pace)
+    gone_s = np.where(moves, (ahead + reach) / pace, np.inf)
+    return _Courses(np.asarray((heads & moves) | (within & (gone_s > 0.0))), arrive_s, gone_s)
 
 
 def walker_gap_m(view: PlannerView) -> Array:

@@ -12,6 +12,7 @@ from importlib.metadata import entry_points
 from sim_worker.planners.as_planned import AsPlanned
 from sim_worker.planners.base import Planner
 from sim_worker.planners.constant_speed import ConstantSpeed
+from sim_worker.planners.frenet_lattice import FrenetLattice
 from sim_worker.planners.gap_acceptance import GapAcceptance
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from sim_worker.planners.reverse_pursuit import ReversePursuit
@@ -22,6 +23,7 @@ _BUILT_IN: dict[str, type[Planner]] = {
     "pure_pursuit_idm": PurePursuitIdm,
     "constant_speed": ConstantSpeed,
     "gap_acceptance": GapAcceptance,
+    "frenet_lattice": FrenetLattice,
     "as_planned": AsPlanned,
     "reverse_pursuit": ReversePursuit,
 }
