@@ -58,7 +58,7 @@ def worlds_of(file: Path, *, most: int | None = None) -> Iterator[World]:
 def count(
     world: World, counts: Counts, reasons: Counts, *, check: bool, most_cases: int = 3
 ) -> None:
-    """Place the whole catalogue on a World's junction; `check` casts and plays its cases as well."""
+    """Place the whole catalogue on a World's junction; `check` plays its cases as well."""
     network, vehicle = RoadNetwork(world), load_vehicle()
     for id_, scenario in catalogue().items():
         result = places(scenario, world, network=network, vehicle=vehicle, most=1)
