@@ -26,6 +26,7 @@ from orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids
 from orchestrator.progress import ProgressLine
 from orchestrator.results import ResultTables
 from orchestrator.run_record import reserve_record, run_record, versions, write_record
+from orchestrator.start_worlds import prepare_start
 from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
 from orchestrator.way_ahead import WayAhead
 
@@ -128,6 +129,7 @@ class _Drive:
         self._start_processes()
         if not self._join_processes(bus, conductor):
             return "interrupted", EXIT_INTERRUPTED
+        prepare_start(self._plan, conductor, look_after=self._look_after, stop=self._stop)
         bus.declare_alive(alive_key(run=self._plan.run_id, process=ORCHESTRATOR))
 
         def housekeeping(now_s: float) -> None:

@@ -6,6 +6,7 @@ as arguments and are only remembered, never decided upon.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -16,6 +17,7 @@ from orchestrator.junctions_ahead import PassedJunction
 from orchestrator.map_matching import OffRoadStretch
 from orchestrator.visits import VisitBook
 from orchestrator.way_ahead import WayAhead
+from world_gen.intersections import Junction
 
 MissionState = Literal["waiting", "following", "off_map"]
 
@@ -57,6 +59,14 @@ class Mission:
         self._off_route_told = False
 
     # What comes in.
+
+    def before_start(self, junctions: Iterable[Junction], *, mono_s: float) -> list[Instruction]:
+        """Ask for the Worlds where a given route begins, before the car moves."""
+        return [
+            BuildWorld(junction.summary.id, load=True)
+            for junction in junctions
+            if self._visits.see(junction, load=True, mono_s=mono_s, drive_time_s=0.0)
+        ]
 
     def on_state(self, state: VehicleState, *, mono_s: float) -> list[Instruction]:
         """Take where the car is."""
