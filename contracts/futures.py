@@ -48,7 +48,8 @@ class Variant(msgspec.Struct, frozen=True, kw_only=True):
 
     With `scenario_id`, one of the job's scenarios happens in it: `values` are its numbers, named
     as in `ConcreteScenario`, and `place_rank` says which of the places that fit the car's path,
-    modulo their number.
+    modulo their number. With `place`, a place's name, it is staged there as the case says, away
+    from any drive: the job's path is that place's, and the car starts where the case begins.
     """
 
     index: int
@@ -62,6 +63,7 @@ class Variant(msgspec.Struct, frozen=True, kw_only=True):
     scenario_id: str = ""
     values: dict[str, float] = {}
     place_rank: int = 0
+    place: str = ""
 
 
 class SeenRoadUser(msgspec.Struct, frozen=True, kw_only=True):

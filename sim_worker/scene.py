@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -22,10 +22,12 @@ from sim_worker.actors.seen import seen_actors
 from sim_worker.actors.traffic import Traffic
 from sim_worker.faults import FaultArrays, fault_arrays
 from sim_worker.planners.base import KnownPlan, SharedGround
-from sim_worker.planners.path import FrenetPath
+from sim_worker.planners.path import FrenetPath, FrenetPoint
 from sim_worker.scenarios.live import LiveScenarios
 from sim_worker.scenarios.places import Unplaced
 from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.scenarios.roles import Cast
+from sim_worker.scenarios.staged import StagedScenarios, staged_players, staged_start
 from sim_worker.seeding import local_state
 from world_gen.signal_state import LiveColour, world_colours_at
 
@@ -98,6 +100,8 @@ class SceneMaker:
         self._rules = JunctionRules(world)
         self._network = RoadNetwork(world)
         self._live = LiveScenarios(self._network)
+        self.staged = StagedScenarios(self._network)
+        """The scenarios of this World at named places, away from any drive."""
 
     def scene(self, job: FuturesJob, vehicle: VehicleParameters, *, tick_s: float) -> Scene:
         """Return the scene of a job on this World.
@@ -107,23 +111,34 @@ class SceneMaker:
         """
         count = len(job.variants)
         path = FrenetPath(job.path.xy_m, job.path.speed_limit_mps)
+        scenarios = {scenario.id: scenario for scenario in job.scenarios}
+        scenario_of = [_scenario_of(variant, scenarios) for variant in job.variants]
+        staged = self._staged(job, scenario_of, vehicle)
         if job.starts is None:
             starts = np.repeat(local_state(job.state, self.world.frame, vehicle)[None], count, 0)
+            for row, played in staged.items():
+                if isinstance(played, Cast):
+                    starts[row] = staged_start(played, vehicle)
         else:
             starts = np.array(job.starts, dtype=np.float64)
         place = path.locate(starts[:, :2], upto_arc_m=_CAR_WITHIN_M)
+        if staged:
+            place = _where_staged(path, starts, place, staged)
         aims = _aims(job, place.offset_m)
-        scenarios = {scenario.id: scenario for scenario in job.scenarios}
-        on_path = self._live.on(path, float(place.arc_m[0]), vehicle)
+        live = any(v.scenario_id and not v.place for v in job.variants)
+        on_path = self._live.on(path, float(place.arc_m[0]), vehicle) if live else None
         seen = seen_actors(job.road_users, self._network)
         casts: list[tuple[Player, ...]] = []
         faults = []
         left_out = [""] * count
-        for row, variant in enumerate(job.variants):
-            scenario = _scenario_of(variant, scenarios)
+        for row, (variant, scenario) in enumerate(zip(job.variants, scenario_of, strict=True)):
             faults.append(_faults(variant, scenario))
             cast = seen
-            if scenario is not None:
+            players: tuple[Player, ...] | Unplaced = ()
+            if row in staged:
+                played = staged[row]
+                players = played if isinstance(played, Unplaced) else staged_players(played, path)
+            elif scenario is not None and on_path is not None:
                 players = on_path.players(
                     scenario,
                     variant.values,
@@ -131,10 +146,10 @@ class SceneMaker:
                     ego_arc_m=float(place.arc_m[row]),
                     ego_speed_mps=float(starts[row, 3]),
                 )
-                if isinstance(players, Unplaced):
-                    left_out[row] = players.reason
-                else:
-                    cast = (*seen, *players)
+            if isinstance(players, Unplaced):
+                left_out[row] = players.reason
+            else:
+                cast = (*seen, *players)
             casts.append(cast)
         fault_columns = fault_arrays(faults)
         crowd = casting(casts, ego_path=path)
@@ -161,7 +176,8 @@ class SceneMaker:
             aims=aims,
             planners=tuple(variant.planner for variant in job.variants),
             faults=fault_columns,
-            limit_share=_limit_share(path, float(place.arc_m[0])),
+            # Staged, a case says how fast the ego drives.
+            limit_share=None if staged else _limit_share(path, float(place.arc_m[0])),
             casts=crowd if traffic is not None else None,
             traffic=traffic,
             sight=sight,
@@ -171,6 +187,25 @@ class SceneMaker:
             lights=Lights(self.world, job.drive_time_s, heard, job.lights_by_plan),
             left_out=tuple(left_out),
         )
+
+    def _staged(
+        self,
+        job: FuturesJob,
+        scenario_of: Sequence[Scenario | None],
+        vehicle: VehicleParameters,
+    ) -> dict[int, Cast | Unplaced]:
+        """Return the cases of the rows that name their place."""
+        rows: dict[tuple[str, str], list[int]] = {}
+        for row, variant in enumerate(job.variants):
+            if variant.place and variant.scenario_id:
+                rows.setdefault((variant.scenario_id, variant.place), []).append(row)
+        found: dict[int, Cast | Unplaced] = {}
+        for (_, place), mine in rows.items():
+            scenario = scenario_of[mine[0]]
+            assert scenario is not None
+            cases = [job.variants[row].values for row in mine]
+            found.update(zip(mine, self.staged.cast(scenario, cases, place, vehicle), strict=True))
+        return found
 
 
 def _scenario_of(variant: Variant, known: Mapping[str, Scenario]) -> Scenario | None:
@@ -182,6 +217,17 @@ def _scenario_of(variant: Variant, known: Mapping[str, Scenario]) -> Scenario | 
             f"{', '.join(known) or 'none'}"
         )
     return known[variant.scenario_id]
+
+
+def _where_staged(
+    path: FrenetPath, starts: Array, place: FrenetPoint, staged: Mapping[int, Cast | Unplaced]
+) -> FrenetPoint:
+    """Return where cars start, those of cases near where these say: ways may cross themselves."""
+    near = place.arc_m.copy()
+    for row, played in staged.items():
+        if isinstance(played, Cast):
+            near[row] = played.ego_arc_m
+    return path.locate(starts[:, :2], near_arc_m=near)
 
 
 def _faults(variant: Variant, scenario: Scenario | None) -> Faults:
@@ -205,7 +251,7 @@ def _aims(job: FuturesJob, present_offset_m: Array) -> Aims:
     variants = job.variants
     cruise = np.array([v.values.get("ego.speed_mps", np.nan) for v in variants])
     if job.starts is None:
-        cruise[:] = np.nan
+        cruise[[not v.place for v in variants]] = np.nan
     cruise = np.where(np.isfinite(cruise), cruise, job.cruise_speed_mps)
     target = cruise * np.array([v.target_speed_factor for v in variants])
     target += np.array([v.target_speed_offset_mps for v in variants])

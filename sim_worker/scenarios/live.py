@@ -23,6 +23,7 @@ from sim_worker.scenarios.placement import passage_on_path, places_on_passage
 from sim_worker.scenarios.places import Place, Unplaced
 from sim_worker.scenarios.roads import Passage, RoadNetwork
 from sim_worker.scenarios.roles import ALONG, Cast, CastActor
+from sim_worker.scenarios.staged import player_on
 from sim_worker.scenarios.ways import Way
 
 _LEAST_SPEED_MPS = 2.0
@@ -122,27 +123,12 @@ class PathScenarios(NamedTuple):
             arc = float(self.path.locate(stands).arc_m[0])
         else:
             arc += ego_arc_m - played.ego_arc_m
-        return _player(actor, self.path, arc)
+        return player_on(actor, self.path, arc)
 
 
 def _coming(actor: CastActor, way: Way, later_s: float) -> Player:
     arc = actor.start_arc_m - (_length(actor.xy_m) - _length(way.xy_m))
-    return _player(actor, way.path, arc - actor.speed_mps * later_s)
-
-
-def _player(actor: CastActor, path: FrenetPath, start_arc_m: float) -> Player:
-    return Player(
-        name=actor.name,
-        kind=actor.kind,
-        path=path,
-        start_arc_m=start_arc_m,
-        speed_mps=actor.speed_mps,
-        conduct=actor.conduct,
-        lateral_m=actor.lateral_m,
-        acts_after_s=actor.acts_after_s,
-        decel_mps2=actor.decel_mps2,
-        hidden_by=actor.hidden_by,
-    )
+    return player_on(actor, way.path, arc - actor.speed_mps * later_s)
 
 
 def _length(xy: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:

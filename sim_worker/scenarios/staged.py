@@ -1,0 +1,126 @@
+"""Scenarios away from any drive: cases at named places, whose egos start where they are cast.
+
+Where a live car is wherever it is, here the case says where everybody begins. Places are named, as
+a placement names them, so that a case can be written down and staged again anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.scenario import Scenario
+from contracts.vehicle import VehicleParameters
+from sim_worker.actors.cast import Player
+from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.beyond_junctions import other_places
+from sim_worker.scenarios.casting import cast_all
+from sim_worker.scenarios.placement import places_on_passage
+from sim_worker.scenarios.places import Place, Unplaced
+from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.scenarios.roles import Cast, CastActor
+from sim_worker.seeding import kinematic_tire_angle, rear_slip_velocity
+from world_gen.polyline import length
+
+_Case = tuple[object, ...]
+
+
+class StagedScenarios:
+    """The scenarios of one World by the names of their places; keeps what was cast before."""
+
+    def __init__(self, network: RoadNetwork) -> None:
+        self._network = network
+        self._places: dict[tuple[str, str], Place | None] = {}
+        self._casts: dict[_Case, Cast | Unplaced] = {}
+
+    def place(self, scenario: Scenario, name: str) -> Place | None:
+        """Return the place of that name, None where the scenario has none so named."""
+        key = (scenario.id, name)
+        if key not in self._places:
+            self._places[key] = _named(scenario, self._network, name)
+        return self._places[key]
+
+    def cast(
+        self,
+        scenario: Scenario,
+        cases: Sequence[Mapping[str, float]],
+        place_name: str,
+        vehicle: VehicleParameters,
+    ) -> tuple[Cast | Unplaced, ...]:
+        """Return cases of a scenario at a place, each begun where the case has the ego begin."""
+        place = self.place(scenario, place_name)
+        if place is None:
+            own = self._network.world.intersection.id
+            reason = f"the World has no place {place_name!r} for {scenario.id}"
+            return tuple(Unplaced(own, reason, True) for _ in cases)
+        keys = [
+            (scenario.id, scenario.lead_time_s, scenario.horizon_s, place.name, vehicle.name,
+             *values.items())
+            for values in cases
+        ]  # fmt: skip
+        new = {key: dict(c) for key, c in zip(keys, cases, strict=True) if key not in self._casts}
+        played = cast_all(scenario, tuple(new.values()), place, vehicle=vehicle)
+        self._casts.update(zip(new, played, strict=True))
+        return tuple(self._casts[key] for key in keys)
+
+
+def _named(scenario: Scenario, network: RoadNetwork, name: str) -> Place | None:
+    if scenario.where.setting != "junction":
+        found, _ = other_places(scenario, network)
+        return next((place for place in found if place.name == name), None)
+    for junction in network.world.junctions:
+        for passage in network.passages(junction.summary.id):
+            if passage.name != name.split("/")[0]:
+                continue
+            for place in places_on_passage(scenario, network, passage):
+                if place.name == name:
+                    return place
+    return None
+
+
+def staged_players(played: Cast, path: FrenetPath) -> tuple[Player, ...]:
+    """Return the road users of a case; `path` is the ego's way, shared by all that go along it."""
+    ways = {way.name: way for options in played.place.actor_ways for way in options}
+    players = []
+    for actor in played.actors:
+        way = ways.get(actor.way, played.place.ego)
+        on = path if way is played.place.ego else way.path
+        # A path that was led back for its actor begins by so much before its way.
+        arc = actor.start_arc_m - (length(actor.xy_m) - length(way.xy_m))
+        players.append(player_on(actor, on, arc))
+    return tuple(players)
+
+
+def player_on(actor: CastActor, path: FrenetPath, start_arc_m: float) -> Player:
+    """Return an actor of a case as one that starts at `start_arc_m` of a path."""
+    return Player(
+        name=actor.name,
+        kind=actor.kind,
+        path=path,
+        start_arc_m=start_arc_m,
+        speed_mps=actor.speed_mps,
+        conduct=actor.conduct,
+        lateral_m=actor.lateral_m,
+        acts_after_s=actor.acts_after_s,
+        decel_mps2=actor.decel_mps2,
+        hidden_by=actor.hidden_by,
+    )
+
+
+def staged_start(played: Cast, vehicle: VehicleParameters) -> Array:
+    """Return (8,) the ego's state as a case begins: in steady motion along its path.
+
+    Backwards it moves against its heading.
+    """
+    path, arc = played.place.ego.path, np.array([played.ego_arc_m])
+    pose = path.pose_at(arc, played.ego_lateral_m)
+    yaw, speed = float(pose.yaw_rad[0]), played.ego_speed_mps
+    yaw_rate = float(path.at_nodes(path.curvature_pm, arc)[0]) * speed
+    if played.reverse:
+        yaw, speed, yaw_rate = yaw + np.pi, -speed, yaw_rate
+    return np.array([
+        *pose.xy_m[0], yaw, speed, rear_slip_velocity(vehicle, speed, yaw_rate), yaw_rate,
+        kinematic_tire_angle(vehicle, speed, yaw_rate), 0.0,
+    ])  # fmt: skip
