@@ -133,7 +133,9 @@ def placed_on(
     index = index_map(opened.osm, opened.graph, opened.junctions)
     vehicle = load_vehicle()
     for junction in _with_progress(junctions) if show_progress else junctions:
-        world = build_world(opened.osm, opened.graph, junction, radius_m=RADIUS_M, index=index)
+        world = build_world(
+            opened.osm, opened.graph, junction, radius_m=RADIUS_M, index=index, ground=False
+        )
         network = RoadNetwork(world)
         for scenario, row in zip(scenarios, found, strict=True):
             result = places(scenario, world, network=network, vehicle=vehicle, most=1)

@@ -10,23 +10,20 @@ import numpy as np
 from contracts.codec import content_bytes
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from contracts.world import Arm, IntersectionSummary, World, WorldJunction
-from world_gen.buildings import buildings_in_frame
 from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
 from world_gen.connection_paths import draw_paths
 from world_gen.connections import ConnectionDraft, connect
 from world_gen.crossings import crossings
 from world_gen.extent import Disc, Rectangle
 from world_gen.find_intersections import find_intersections
+from world_gen.ground import Ground, ground_around
 from world_gen.intersections import Junction
 from world_gen.junction_rules import junction_rules
 from world_gen.lanes import LaneSet, build_lanes, join_straight_on
 from world_gen.map_index import MapIndex, index_map
-from world_gen.map_islands import mapped_islands
 from world_gen.movements import movements
 from world_gen.osm_map import LatLonBounds, MapError, OsmMap
 from world_gen.road_graph import RoadGraph
-from world_gen.road_surface import areas
-from world_gen.sidewalks import sidewalk_areas
 from world_gen.tram_tracks import tram_tracks
 
 GENERATOR_VERSION = 6
@@ -41,18 +38,21 @@ def build_world(
     *,
     radius_m: float = DEFAULT_RADIUS_M,
     index: MapIndex | None = None,
+    ground: bool = True,
 ) -> World:
     """Build the World within `radius_m` of a junction, in the junction's own frame.
 
     What cannot be built is left out and named in the World's notes. Pass an `index` (see
     `index_map`) where many Worlds come from one map: making it takes longer than one World.
+    Without `ground` it is a road network alone: no paved areas, kerbs, islands, sidewalks
+    and buildings.
     Raises ValueError where the radius is not between 10 and 2000 m.
     """
     if not 10.0 <= radius_m <= 2000.0:
         raise ValueError(f"radius {radius_m} m is not between 10 and 2000 m")
     index = index or index_map(osm, graph, (junction,))
     around = surroundings(index, world_frame(junction), Disc(radius_m), (junction,))
-    return _world(index, around, junction.summary)
+    return _world(index, around, junction.summary, ground=ground)
 
 
 def build_region(
@@ -61,12 +61,13 @@ def build_region(
     bounds: LatLonBounds,
     *,
     index: MapIndex | None = None,
+    ground: bool = True,
 ) -> World:
     """Build one World of all that lies within `bounds`, in a frame about their middle.
 
     Every junction whose roads all reach into the bounds gets the same treatment as the one
-    that `build_world` is asked for. Pass an `index` made with all junctions of the map. Raises
-    `MapError` where the bounds hold no road for cars.
+    that `build_world` is asked for. Pass an `index` made with all junctions of the map; for
+    `ground` see there. Raises `MapError` where the bounds hold no road for cars.
     """
     index = index or index_map(osm, graph, find_intersections(osm, graph))
     middle = GeoPoint((bounds.south + bounds.north) / 2, (bounds.west + bounds.east) / 2)
@@ -74,7 +75,7 @@ def build_region(
     around = surroundings(index, frame, _rectangle(bounds, frame), ())
     if not around.edges:
         raise MapError(f"{osm.file}: no road for cars between {_words(bounds)}")
-    return _world(index, around, _region_summary(bounds, middle, graph))
+    return _world(index, around, _region_summary(bounds, middle, graph), ground=ground)
 
 
 def _rectangle(bounds: LatLonBounds, frame: LocalFrame) -> Rectangle:
@@ -107,7 +108,9 @@ def _words(bounds: LatLonBounds) -> str:
     return f"{bounds.west:g},{bounds.south:g},{bounds.east:g},{bounds.north:g}"
 
 
-def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) -> World:
+def _world(
+    index: MapIndex, around: Surroundings, summary: IntersectionSummary, *, ground: bool
+) -> World:
     osm, extent = index.osm, around.extent
     notes: list[str] = []
     lanes = build_lanes(around)
@@ -118,10 +121,8 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
     rules = junction_rules(
         around, osm.node_tags, lanes, connections, crossed, index.junction_lights
     )
-    surface = areas(around, lanes, connections)
     tracks = tram_tracks(around, osm, beside)
-    near = index.buildings_in(on_map)
-    buildings, cut = buildings_in_frame(near, around.frame, index.graph.frame, surface.driven)
+    made = ground_around(index, around, lanes, connections, beside) if ground else Ground()
     world = World(
         id="",
         intersection=summary,
@@ -133,7 +134,7 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
             WorldJunction(
                 summary=junction.summary,
                 arms=_arms(junction, around),
-                area=surface.junction_areas.get(junction.summary.id),
+                area=made.junction_areas.get(junction.summary.id),
                 plan=rules.plans.get(junction.summary.id),
             )
             for junction in around.junctions
@@ -146,13 +147,15 @@ def _world(index: MapIndex, around: Surroundings, summary: IntersectionSummary) 
         crossings=crossed,
         crossing_plans=rules.crossing_plans,
         signals=rules.signals,
-        islands=(*surface.islands, *mapped_islands(around, osm, beside, surface.driven)),
-        kerbs=surface.kerbs,
-        road_surface=surface.road_surface,
-        sidewalks=sidewalk_areas(around, lanes, surface.road_surface, osm, beside),
-        buildings=buildings,
+        islands=made.islands,
+        kerbs=made.kerbs,
+        road_surface=made.road_surface,
+        sidewalks=made.sidewalks,
+        buildings=made.buildings,
         notes=tuple(
-            dict.fromkeys((*lanes.notes, *notes, *tracks.notes, *cut, *_reading_notes(osm, around)))
+            dict.fromkeys(
+                (*lanes.notes, *notes, *tracks.notes, *made.notes, *_reading_notes(osm, around))
+            )
         ),
         attribution=osm.attribution,
     )

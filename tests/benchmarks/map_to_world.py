@@ -1,7 +1,8 @@
-"""`python -m tests.benchmarks.map_to_world MAP FOLDER` makes one World of a whole map and keeps it.
+"""`python -m tests.benchmarks.map_to_world MAP FOLDER [network]` makes a World of a whole map.
 
-The job that is held against SUMO's netconvert: from the file to lanes, connections, right of way,
-surfaces and buildings, written in the form that every room of foretwin loads.
+What is held against SUMO's netconvert: from the file to lanes, connections, right of way and
+lights, written in the form that every room of foretwin loads. That is the `network`, which is what
+netconvert makes; without the word, paved ground, kerbs, sidewalks and buildings come on top.
 """
 
 from __future__ import annotations
@@ -15,15 +16,17 @@ from world_gen.build import build_region
 from world_gen.map_index import index_map
 from world_gen.world_store import WorldStore
 
+NETWORK = "network"
 
-def make_world(map_file: Path, folder: Path) -> World:
+
+def make_world(map_file: Path, folder: Path, *, ground: bool = True) -> World:
     """Build the World of all roads of a map and save it in `folder`."""
     opened = open_map(map_file)
     index = index_map(opened.osm, opened.graph, opened.junctions)
-    world = build_region(opened.osm, opened.graph, opened.osm.bounds, index=index)
+    world = build_region(opened.osm, opened.graph, opened.osm.bounds, index=index, ground=ground)
     WorldStore(folder).save(world)
     return world
 
 
 if __name__ == "__main__":
-    make_world(Path(sys.argv[1]), Path(sys.argv[2]))
+    make_world(Path(sys.argv[1]), Path(sys.argv[2]), ground=sys.argv[3:] != [NETWORK])

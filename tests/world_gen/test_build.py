@@ -237,6 +237,20 @@ def test_the_same_map_has_the_same_world_to_the_last_bit():
     assert world_of(crossing(), radius_m=80.0).id != first.id
 
 
+def test_without_ground_a_world_is_the_same_road_network():
+    osm = crossing()
+    graph = build_road_graph(osm)
+    (junction,) = find_intersections(osm, graph)
+    whole = build_world(osm, graph, junction)
+    network = build_world(osm, graph, junction, ground=False)
+    assert whole.road_surface
+    assert not network.road_surface
+    assert not network.buildings
+    for field in ("lanes", "connections", "conflicts", "stop_lines", "signals", "crossings"):
+        ours, theirs = getattr(network, field), getattr(whole, field)
+        assert list(map(content_bytes, ours)) == list(map(content_bytes, theirs)), field
+
+
 def test_lanes_end_at_the_worlds_edge():
     world = world_of(crossing(), radius_m=40.0)
     assert max(np.hypot(*road.reference_line.T).max() for road in world.roads) <= 40.001
