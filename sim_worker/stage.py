@@ -152,15 +152,8 @@ class Stage:
         self._batch.reset(ids=self._ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
         rows = slice(0, count)
         limit = self.vehicle.max_tire_angle_rad.value
-        start = np.array(states, dtype=np.float64)
-        start[:, 6] = np.clip(start[:, 6], -limit, limit)
-        self._states[rows] = start
-        positions, velocities = cog_from_base(self.vehicle, start)
-        self._qpos[rows, self._joints] = positions
-        self._qvel[rows, self._dofs] = velocities
+        start = self._place(rows, states)
         self._tire_command = start[:, 6].copy()
-        self._ctrl[rows] = 0.0
-        self._ctrl[rows, self._actuators.steer] = self._tire_command
         history = np.repeat(self._tire_command[:, None], self._history_samples, axis=1)
         if steering_history_rad is not None:
             given = np.clip(steering_history_rad, -limit, limit)[:, -self._history_samples :]
@@ -187,6 +180,39 @@ class Stage:
         self.looked = False
         """Whether contacts were looked for in any simulation during the last tick."""
         self._positions, self._velocities = np.empty((4, count)).T, np.empty((4, count)).T
+
+    def reseed(
+        self,
+        rows: npt.NDArray[np.intp],
+        states: Array,
+        *,
+        steering_delay_s: Array,
+        friction_factor: Array,
+    ) -> None:
+        """Start the futures `rows` (K,) anew from `states` (K, 8); the others go on as they are."""
+        check_steering_delay(steering_delay_s)
+        self._batch.reset(ids=rows, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        start = self._place(rows, states)
+        self._tire_command[rows] = start[:, 6]
+        self._history[rows, self._steer_history] = start[:, 6:7]
+        self._delay[rows, self._actuators.steer] = steering_delay_s
+        friction = self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64)
+        self._actuation.restart(rows, friction=friction, accel_mps2=start[:, 7])
+        self._near[rows] = False
+        self._flags[rows] = self._not_looking
+
+    def _place(self, rows: slice | npt.NDArray[np.intp], states: Array) -> Array:
+        """Put vehicles where their states are, and return these, within limits."""
+        limit = self.vehicle.max_tire_angle_rad.value
+        start = np.array(states, dtype=np.float64)
+        start[:, 6] = np.clip(start[:, 6], -limit, limit)
+        self._states[rows] = start
+        positions, velocities = cog_from_base(self.vehicle, start)
+        self._qpos[rows, self._joints] = positions
+        self._qvel[rows, self._dofs] = velocities
+        self._ctrl[rows] = 0.0
+        self._ctrl[rows, self._actuators.steer] = start[:, 6]
+        return start
 
     def step(self, controls: Controls) -> None:
         """Advance one control tick."""

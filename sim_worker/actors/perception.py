@@ -49,10 +49,15 @@ class Sight:
         hidden_by: npt.NDArray[np.intp],
         walks: Flags,
         tick_s: float,
+        kept: int | None = None,
     ) -> None:
-        """`along` projects the traffic's paths on the ego's; `hidden_by` (S, R) columns or -1."""
+        """`along` projects the traffic's paths on the ego's; `hidden_by` (S, R) columns or -1.
+
+        What was seen is remembered for as long as anybody sees late, or for `kept` ticks.
+        """
         crowd = traffic.crowd
         self._crowd, self._along, self._walks = crowd, along, walks
+        self._vehicle, self._hidden_by = vehicle, hidden_by
         self._length_m, self._width_m = vehicle.length_m.value, vehicle.width_m.value
         self._front_m = box_centre_from_base_m(vehicle) + self._length_m / 2.0
         self._size = np.stack([crowd.length_m, crowd.width_m], axis=-1)
@@ -60,11 +65,35 @@ class Sight:
         self._faults, self._tick_s = faults, tick_s
         self._hidden = np.nonzero((hidden_by >= 0) & crowd.present)
         self._hides = hidden_by[self._hidden]
-        kept = int(self._late.max(initial=0)) + 1
-        self._past = [(traffic.arc_m.copy(), traffic.speed_mps.copy(), traffic.poses)] * kept
+        kept = kept or int(self._late.max(initial=0)) + 1
+        now = (traffic.arc_m.copy(), traffic.speed_mps.copy(), traffic.poses)
+        self._past: list[tuple[Array, ...]] = [now] * kept
 
-    def look(self, tick: int, traffic: Traffic, eyes_xy_m: Array) -> SeenUsers:
-        """Return what is seen at a tick from where the cars' fronts are, (S, 2)."""
+    def begun(self, futures: npt.NDArray[np.intp], traffic: Traffic) -> Sight:
+        """Return the sight of (K,) cars that see `traffic`, begun as that of these futures did."""
+        return Sight(
+            traffic,
+            self._along,
+            self._vehicle,
+            PerceptionFaults._make(column[futures] for column in self._faults),
+            hidden_by=self._hidden_by[futures],
+            walks=self._walks[futures],
+            tick_s=self._tick_s,
+            kept=len(self._past),
+        )
+
+    def carry_on(self, before: Sight, futures: Flags) -> None:
+        """Let the `futures` (S,) remember what they saw before."""
+        kept = futures[:, None], futures[:, None], futures[:, None, None]
+        self._past = [
+            tuple(np.where(k, *pair) for k, *pair in zip(kept, theirs, mine, strict=True))
+            for mine, theirs in zip(self._past, before._past, strict=True)
+        ]
+
+    def look(
+        self, tick: int | npt.NDArray[np.intp], traffic: Traffic, eyes_xy_m: Array
+    ) -> SeenUsers:
+        """Return what is seen at a tick, or ticks (S,), from where the cars' fronts are (S, 2)."""
         now = (traffic.arc_m.copy(), traffic.speed_mps.copy(), traffic.poses)
         self._past = [now, *self._past[:-1]]
         arc, speed, poses = now
@@ -73,7 +102,7 @@ class Sight:
             arc, speed, poses = (
                 np.stack([past[k] for past in self._past])[self._late, rows] for k in range(3)
             )
-        unseen = ~self._crowd.present | self._lost(tick * self._tick_s)[:, None]
+        unseen = ~self._crowd.present | self._lost(np.asarray(tick) * self._tick_s)[:, None]
         if len(self._hides):
             unseen = unseen.copy()
             unseen[self._hidden] |= self._behind(poses, eyes_xy_m)
@@ -84,7 +113,7 @@ class Sight:
             poses = np.where(unseen[..., None], np.nan, poses)
         return SeenUsers(poses, speed, self._size, on_arc, offset, self._walks, turned)
 
-    def _lost(self, time_s: float) -> Flags:
+    def _lost(self, time_s: float | Array) -> Flags:
         since = time_s - self._faults.lost_from_s
         return np.asarray((since >= 0.0) & (since < self._faults.lost_for_s))
 

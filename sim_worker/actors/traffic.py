@@ -90,8 +90,22 @@ class Traffic:
         poses[~crowd.present] = np.nan
         return poses
 
-    def step(self, *, time_s: float, dt_s: float) -> None:
-        """Advance by `dt_s` from `time_s`, with what was decided last."""
+    def begun(self, futures: Indices) -> Traffic:
+        """Return traffic (K, R) that begins as that of these futures did."""
+        return Traffic(Crowd._make(f[futures] for f in self.crowd), self.table, self._rules)
+
+    def carry_on(self, before: Traffic, futures: Flags) -> None:
+        """Let the `futures` (S,) go on from where traffic of the same paths has them."""
+        for mine, theirs in (
+            (self.arc_m, before.arc_m),
+            (self.speed_mps, before.speed_mps),
+            (self.poses, before.poses),
+            (self._accel, before._accel),
+        ):
+            mine[futures] = theirs[futures]
+
+    def step(self, *, time_s: float | Array, dt_s: float) -> None:
+        """Advance by `dt_s` from `time_s`, one or (S, 1), with what was decided last."""
         crowd = self.crowd
         if self.reacts or self._brakes:
             accel = self._accel
@@ -105,7 +119,8 @@ class Traffic:
         self.poses = self._placed()
 
     def decide(self, ego: EgoBoxes, red_arcs_m: Array) -> None:
-        """Let law-abiding road users choose their accelerations; `red_arcs_m` (P, K) of paths.
+        """Let law-abiding road users choose their accelerations; `red_arcs_m` (P, K) of paths, or
+        (S, P, K).
 
         Free road and following: intelligent driver model (Treiber, Hennecke, Helbing 2000, eq. 2
         and 3), the nearest of a leader, a red light and ground to be left to others counting as
@@ -125,7 +140,8 @@ class Traffic:
             decel=crowd.decel_mps2[s, r],
         )
         gap, lead_speed = self._leader(mine, ego)
-        line = _before(red_arcs_m[mine.path], mine)
+        red = red_arcs_m[mine.path] if red_arcs_m.ndim == 2 else red_arcs_m[s, mine.path]
+        line = _before(red, mine)
         still = np.minimum(line, self._wait(mine, ego))
         nearer = still < gap
         gap, lead_speed = np.where(nearer, still, gap), np.where(nearer, 0.0, lead_speed)

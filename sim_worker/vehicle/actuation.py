@@ -94,7 +94,7 @@ class Actuation:
         self._max_brake = vehicle.max_brake_decel_mps2.value
         self._drag = vehicle.drag_npv2.value / effective
         self._rolling = vehicle.rolling_resistance_n.value / effective + _TINY_N
-        self._friction = np.asarray(friction, dtype=np.float64)
+        self._friction = np.array(friction, dtype=np.float64)
         self._grip = self._friction * GRAVITY_MPS2
         self._grip_square = self._grip**2
         self._gear: Array | None = None
@@ -104,6 +104,14 @@ class Actuation:
         if tick_s is not None and lags_of_force(vehicle):
             start = np.zeros(len(self._friction)) if accel_mps2 is None else accel_mps2
             self._lag = ForceLag(vehicle, tick_s=tick_s, accel_mps2=start)
+
+    def restart(self, rows: npt.NDArray[np.intp], *, friction: Array, accel_mps2: Array) -> None:
+        """Let the vehicles of `rows` (K,) begin anew with `accel_mps2` (K,) on `friction` (K,)."""
+        self._friction[rows] = friction
+        self._grip = self._friction * GRAVITY_MPS2
+        self._grip_square = self._grip**2
+        if self._lag is not None:
+            self._lag.restart(rows, accel_mps2)
 
     def apply(self, *, speed_mps: Array, accel_mps2: Array) -> None:
         """Set the forces of the next control tick from body speed and command, each (S,).

@@ -6,6 +6,7 @@ import math
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.vehicle import Parameter, VehicleParameters
@@ -31,6 +32,13 @@ class ForceLag:
         start = np.asarray(accel_mps2, dtype=np.float64)
         self._acting = np.stack([np.maximum(start, 0.0), np.minimum(start, 0.0)])
         self._commands = [start] * (self._whole + 2)
+
+    def restart(self, rows: npt.NDArray[np.intp], accel_mps2: Array) -> None:
+        """Let some begin anew with `accel_mps2` (K,) acting."""
+        self._acting[:, rows] = np.maximum(accel_mps2, 0.0), np.minimum(accel_mps2, 0.0)
+        self._commands = [command.copy() for command in self._commands]
+        for command in self._commands:
+            command[rows] = accel_mps2
 
     def follow(self, command_mps2: Array) -> tuple[Array, Array]:
         """Return what drive (≥ 0) and brakes (≤ 0) exert over the next tick, each (S,)."""

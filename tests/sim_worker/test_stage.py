@@ -75,6 +75,29 @@ def test_what_a_stage_did_before_leaves_no_trace(stage: Stage) -> None:
     assert drive(stage, 40, accel=-1.0, tire=0.1).tobytes() == first.tobytes()
 
 
+def test_futures_begun_anew_are_as_if_they_had_begun_alone(stage: Stage) -> None:
+    rows = states(8, speed=np.linspace(2.0, 9.0, 8), tire=0.1)
+    anew = states(2, speed=12.0, tire=-0.2)
+    seed(stage, anew, delay=0.3, friction=0.6)
+    alone = drive(stage, 20, accel=1.5, tire=0.1)
+    seed(stage, rows, delay=0.1)
+    undisturbed = drive(stage, 30, accel=1.5, tire=0.1)
+
+    seed(stage, rows, delay=0.1)
+    drive(stage, 10, accel=1.5, tire=0.1)
+    stage.reseed(
+        np.array([1, 6]),
+        anew,
+        steering_delay_s=np.full(2, 0.3),
+        friction_factor=np.full(2, 0.6),
+    )
+    after = drive(stage, 20, accel=1.5, tire=0.1)
+
+    others = [0, 2, 3, 4, 5, 7]
+    assert after[[1, 6]].tobytes() == alone.tobytes()
+    assert after[others][:, 1:].tobytes() == undisturbed[others][:, 11:].tobytes()
+
+
 def test_threads_change_nothing(stage: Stage) -> None:
     rows = states(8, speed=np.linspace(1.0, 15.0, 8))
     seed(stage, rows)
