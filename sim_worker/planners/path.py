@@ -48,6 +48,7 @@ class FrenetPath:
     def __init__(
         self, xy_m: Array, speed_limit_mps: Array | None = None, *, before_m: float = 20.0
     ) -> None:
+        self._given = (xy_m, speed_limit_mps, before_m)
         points = np.asarray(xy_m, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise ValueError(f"a path needs finite points (N, 2), not shape {points.shape}")
@@ -90,6 +91,10 @@ class FrenetPath:
             nearest = np.clip(np.searchsorted(arc, self.arc_m, side="right") - 1, 0, len(arc) - 1)
             self.speed_limit_mps = limit[nearest]
         """(M,) limits at the nodes, infinite where unknown."""
+
+    def __reduce__(self) -> tuple[object, tuple[object, ...]]:
+        """Travel to another process as what the path was made of."""
+        return _path_of, self._given
 
     @property
     def node_poses(self) -> Array:
@@ -195,6 +200,10 @@ class FrenetPath:
         share = np.minimum(np.maximum(share, 0.0), 1.0)
         arc = (index + share) * SPACING_M + self._first_arc
         return FrenetPoint(arc, cos * y - sin * x)
+
+
+def _path_of(xy_m: Array, speed_limit_mps: Array | None, before_m: float) -> FrenetPath:
+    return FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
 
 
 def _prolonged(at: Array, arc: Array, values: Array) -> Array:

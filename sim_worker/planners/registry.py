@@ -1,7 +1,8 @@
 """Planners by name: those of foretwin, and any that an installed package offers.
 
 A package adds one with an entry point in the group `foretwin.planners` whose object is a class
-without arguments that follows `sim_worker.planners.base.Planner`.
+without arguments that follows `sim_worker.planners.base.Planner`, or
+`sim_worker.planners.one_at_a_time.CarPlanner`. It lives in a process of its own.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from sim_worker.planners.base import Planner
 from sim_worker.planners.constant_speed import ConstantSpeed
 from sim_worker.planners.frenet_lattice import FrenetLattice
 from sim_worker.planners.gap_acceptance import GapAcceptance
+from sim_worker.planners.hosted import HostedPlanner
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from sim_worker.planners.reverse_pursuit import ReversePursuit
 
@@ -42,13 +44,12 @@ def load_planner(name: str) -> Planner:
         return _BUILT_IN[name]()
     for point in entry_points(group=GROUP):
         if point.name == name:
-            try:
-                planner = point.load()()
-            except Exception as error:
-                raise ValueError(
-                    f"planner {name!r} ({point.value}) fails to load: {error}"
-                ) from error
-            if not callable(getattr(planner, "plan", None)):
-                raise ValueError(f"planner {name!r} ({point.value}) has no method plan(view)")
-            return planner  # type: ignore[no-any-return]
+            return HostedPlanner(name, point.value)
     raise ValueError(f"unknown planner {name!r}; known: {', '.join(planner_names())}")
+
+
+def check_planner(name: str) -> None:
+    """Raise ValueError where no planner of that name loads; leaves no process behind."""
+    planner = load_planner.__wrapped__(name)
+    if isinstance(planner, HostedPlanner):
+        planner.close()

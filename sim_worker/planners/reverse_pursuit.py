@@ -9,7 +9,7 @@ from sim_worker.planners.base import PlannerOutput, PlannerView
 from sim_worker.planners.tracking import front_from_base_m, steer_towards
 from sim_worker.vehicle.actuation import resistance_mps2
 
-_LOOKAHEAD_M, _LOOKAHEAD_S = 1.8, 0.5
+_LOOKAHEAD_M, _LOOKAHEAD_S, _LOOKAHEAD_ASIDE = 1.2, 0.7, 1.0
 _ACCEL_MPS2, _DECEL_MPS2, _MAX_DECEL_MPS2 = 1.0, 1.0, 6.0
 _GAP_M = 0.6
 """From the rear to whoever is behind, or crosses behind, where it stops for them."""
@@ -26,9 +26,9 @@ class ReversePursuit:
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick; accelerations are along the direction of travel."""
         speed = np.maximum(-view.states[:, 3], 0.0)
-        goal = view.path.point_at(
-            view.arc_m + _LOOKAHEAD_M + _LOOKAHEAD_S * speed, view.desired_offset_m
-        )
+        aside = np.abs(view.offset_m - view.desired_offset_m)
+        lookahead = _LOOKAHEAD_M + _LOOKAHEAD_S * speed + _LOOKAHEAD_ASIDE * aside
+        goal = view.path.point_at(view.arc_m + lookahead, view.desired_offset_m)
         room = np.minimum(view.path.length_m - view.arc_m, self._free_m(view))
         allowed = np.sqrt(2.0 * _DECEL_MPS2 * np.maximum(room, 0.0))
         wanted = np.minimum(np.maximum(view.target_speed_mps, 0.0), allowed)

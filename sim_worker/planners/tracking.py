@@ -25,11 +25,15 @@ def pure_pursuit(view: PlannerView) -> Array:
     δ = atan(2 L y / d²) with the goal at (x, y) in body axes and distance d
     (Coulter 1992, Implementation of the Pure Pursuit Path Tracking Algorithm).
     """
-    states = view.states
-    lookahead = np.maximum(MIN_LOOKAHEAD_M, LOOKAHEAD_TIME_S * states[:, 3])
-    aside = np.abs(view.offset_m - view.desired_offset_m) - _KEPT_M
-    lookahead = lookahead + _LOOKAHEAD_ASIDE * np.maximum(aside, 0.0)
+    aside = np.abs(view.offset_m - view.desired_offset_m)
+    lookahead = lookahead_m(view.states[:, 3], aside)
     return steer_towards(view, view.path.point_at(view.arc_m + lookahead, view.desired_offset_m))
+
+
+def lookahead_m(speed_mps: Array, aside_m: Array) -> Array:
+    """Return how far ahead goals lie for cars so far beside their lines, each (S,)."""
+    lookahead = np.maximum(MIN_LOOKAHEAD_M, LOOKAHEAD_TIME_S * speed_mps)
+    return np.asarray(lookahead + _LOOKAHEAD_ASIDE * np.maximum(aside_m - _KEPT_M, 0.0))
 
 
 def steer_towards(view: PlannerView, goal: Array) -> Array:

@@ -8,10 +8,9 @@ import numpy as np
 
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import steer_towards
+from sim_worker.planners.tracking import lookahead_m, steer_towards
 from sim_worker.vehicle.actuation import resistance_mps2
 
-_LOOKAHEAD_S, _MIN_LOOKAHEAD_M = 0.5, 2.5
 _NEAR_S = 3.0
 """A car is looked for on its trajectory within this time of where it should be."""
 _POSITION_GAIN, _SPEED_GAIN = 0.6, 1.5
@@ -56,15 +55,15 @@ def track(view: PlannerView, trajectories: Trajectories, *, time_s: Array | floa
     line = _Line(trajectories, count)
     now = np.broadcast_to(np.asarray(time_s, dtype=np.float64), (count,))
     late_m, speed, accel = line.schedule(now)
-    own_arc = line.arc_of(view.states[:, :2], now)
+    own_arc, aside = line.place_of(view.states[:, :2], now)
     late_m = late_m - own_arc
     present = view.states[:, 3]
     wanted = accel + _POSITION_GAIN * late_m + _SPEED_GAIN * (speed - present)
     wanted = np.minimum(np.maximum(wanted, -_MAX_DECEL_MPS2), _MAX_ACCEL_MPS2)
     hold = (np.abs(present) < _HOLD_MPS) & (speed < _HOLD_MPS) & (wanted <= _HOLD_MPS)
     command = np.where(hold, _HOLD_MPS2, wanted + resistance_mps2(view.vehicle, present))
-    lookahead = np.maximum(_MIN_LOOKAHEAD_M, _LOOKAHEAD_S * present)
-    return PlannerOutput(command, steer_towards(view, line.point_at(own_arc + lookahead, view)))
+    goal = line.point_at(own_arc + lookahead_m(present, aside), view)
+    return PlannerOutput(command, steer_towards(view, goal))
 
 
 class _Line:
@@ -99,8 +98,9 @@ class _Line:
         arc = self._arc[row, k] + way * self._length[row, k]
         return arc, self._speed[row, k] + share * gain, gain / span
 
-    def arc_of(self, xy_m: Array, time_s: Array) -> Array:
-        """Return (S,) the arc length nearest to positions, among instants near a time."""
+    def place_of(self, xy_m: Array, time_s: Array) -> tuple[Array, Array]:
+        """Return (S,) the arc length nearest to positions, among instants near a time, and how
+        far away that is."""
         away = np.square(self._xy - xy_m[:, None]).sum(axis=2)
         near = np.abs(self._time - time_s[:, None]) <= _NEAR_S
         near |= ~near.any(axis=1, keepdims=True)
@@ -116,7 +116,7 @@ class _Line:
             arc = self._arc[self._row, k] + along * length
             best_arc = np.where(distance < best, arc, best_arc)
             best = np.minimum(best, distance)
-        return best_arc
+        return best_arc, np.sqrt(best)
 
     def point_at(self, arc_m: Array, view: PlannerView) -> Array:
         """Return points (S, 2) at arc lengths; beyond the end, along the path beside it."""

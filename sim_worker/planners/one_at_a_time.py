@@ -1,0 +1,129 @@
+"""For planners that are written for one car: what one sees, and how many of them make a job."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.vehicle import VehicleParameters
+from sim_worker.planners.base import KnownPlan, PlannerOutput, PlannerView, SharedGround
+from sim_worker.planners.path import FrenetPath
+
+
+class SeenUser(NamedTuple):
+    """One other road user; fields as in `sim_worker.planners.base.SeenUsers`."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    speed_mps: float
+    length_m: float
+    width_m: float
+    arc_m: float
+    offset_m: float
+    walks: bool
+    turned_rad: float
+
+
+class CarView(NamedTuple):
+    """What the planner of one car sees; fields as in `sim_worker.planners.base.PlannerView`."""
+
+    time_s: float
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    vx_mps: float
+    vy_mps: float
+    yaw_rate_radps: float
+    tire_angle_rad: float
+    accel_mps2: float
+    path: FrenetPath
+    arc_m: float
+    offset_m: float
+    desired_offset_m: float
+    target_speed_mps: float
+    speed_factor: float
+    lead_gap_m: float
+    lead_speed_mps: float
+    stop_arc_m: float
+    users: tuple[SeenUser, ...]
+    ground: SharedGround | None
+    car_plan: KnownPlan | None
+    vehicle: VehicleParameters
+
+
+class CarPlanner(Protocol):
+    """A planner of one car: its answer is acceleration and tyre angle."""
+
+    def plan_one(self, view: CarView) -> tuple[float, float]:
+        """Answer one control tick of one car."""
+
+
+@runtime_checkable
+class AnswersOne(Protocol):
+    """What tells a planner of one car by its method."""
+
+    def plan_one(self, view: CarView) -> tuple[float, float]:
+        """Answer one control tick of one car."""
+
+
+class OneAtATime:
+    """Asks a planner of one car for each car in turn; where it raises, that car's answer is NaN.
+
+    The planner is one object for all cars: what it remembers between calls is its own affair.
+    """
+
+    def __init__(self, planner: CarPlanner) -> None:
+        self._planner = planner
+        self.remarks: dict[int, str] = {}
+
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        """Answer one control tick of all cars."""
+        answers = np.full((len(view.arc_m), 2), np.nan)
+        for row in range(len(answers)):
+            if row in self.remarks:
+                continue
+            try:
+                accel, angle = self._planner.plan_one(car_view(view, row))
+                answers[row] = float(accel), float(angle)
+            except Exception as error:
+                # One car's failure is not the others'.
+                self.remarks[row] = f"{type(error).__name__}: {error}"
+        return PlannerOutput(answers[:, 0], answers[:, 1])
+
+
+def car_view(view: PlannerView, row: int) -> CarView:
+    """Return what the car of one row sees."""
+    stop = view.stop_arc_m
+    columns = (
+        view.arc_m, view.offset_m, view.desired_offset_m, view.target_speed_mps,
+        view.speed_factor, view.lead_gap_m, view.lead_speed_mps,
+    )  # fmt: skip
+    fields = [
+        view.time_s, *view.states[row].tolist(), view.path,
+        *(float(column[row]) for column in columns),
+        np.inf if stop is None else float(stop[row]),
+        _users(view, row), view.ground, view.car_plan, view.vehicle,
+    ]  # fmt: skip
+    return CarView._make(fields)
+
+
+def _users(view: PlannerView, row: int) -> tuple[SeenUser, ...]:
+    users = view.users
+    if users is None:
+        return ()
+    there = np.isfinite(users.poses[row, :, 0])
+
+    def of(values: Array) -> list[float]:
+        return values[row][there].tolist()  # type: ignore[no-any-return]
+
+    return tuple(
+        SeenUser._make([*pose, speed, *size, arc, offset, bool(walks), turned])
+        for pose, speed, size, arc, offset, walks, turned in zip(
+            users.poses[row][there].tolist(), of(users.speed_mps),
+            users.size_m[row][there].tolist(), of(users.arc_m), of(users.offset_m),
+            users.walks[row][there].tolist(), of(users.turned_rad), strict=True,
+        )
+    )  # fmt: skip

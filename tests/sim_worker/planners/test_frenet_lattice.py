@@ -1,0 +1,145 @@
+"""The lattice planner: keeps its speed, follows, stops, evades within its lane, and gives way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_worker.planners.base import SharedGround
+from sim_worker.planners.frenet_lattice import FrenetLattice, choose
+from sim_worker.planners.path import FrenetPath
+from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.planners.driven import (
+    Other,
+    at_rest_on,
+    drive,
+    see,
+    straight,
+    view_of,
+    walker,
+)
+
+VEHICLE = load_vehicle()
+ALONG = np.array([[0.0, 0.0], [300.0, 0.0]])
+
+
+def bend(radius_m: float) -> FrenetPath:
+    angle = np.linspace(0.0, math.pi / 2, 40)
+    turn = radius_m * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
+    ends = [np.array([[-40.0, 0.0]]), turn, turn[-1:] + np.array([0.0, 60.0])]
+    return FrenetPath(np.concatenate(ends))
+
+
+def test_it_reaches_its_speed_and_keeps_the_middle_of_its_lane() -> None:
+    path = straight()
+    starts = at_rest_on(path, 0.0, 2.0, count=2)
+    starts[1, 1] = 0.8
+    done = drive(FrenetLattice(), path, starts, vehicle=VEHICLE, seconds=12.0, target_mps=9.0)
+    assert done.states[:, -1, 3] == pytest.approx(9.0, abs=0.4)
+    assert np.abs(done.offset_m[:, -1]).max() < 0.1
+    assert np.abs(done.states[:, :, 7]).max() < 4.0
+
+
+@pytest.mark.parametrize("radius_m", [12.0, 30.0])
+def test_it_slows_down_for_a_bend_and_stays_on_its_path(radius_m: float) -> None:
+    path = bend(radius_m)
+    done = drive(
+        FrenetLattice(), path, at_rest_on(path, 0.0, 9.0), vehicle=VEHICLE, seconds=10.0,
+        target_mps=10.0,
+    )  # fmt: skip
+    lateral = np.abs(done.states[0, :, 3] * done.states[0, :, 5])
+    assert lateral.max() < 4.5
+    assert np.abs(done.offset_m).max() < 0.7
+    assert done.arc_m[0, -1] > 45.0 + radius_m
+
+
+@pytest.mark.parametrize("speed", [0.0, 3.0, 6.0])
+def test_it_follows_a_slower_car_and_stops_behind_a_standing_one(speed: float) -> None:
+    path = straight(300.0)
+    lead = Other(ALONG, speed, 45.0)
+    done = drive(
+        FrenetLattice(), path, at_rest_on(path, 0.0, 10.0), vehicle=VEHICLE, seconds=16.0,
+        others=[lead], target_mps=10.0,
+    )  # fmt: skip
+    assert done.clearance_m.min() > 0.7
+    assert done.states[0, -1, 3] == pytest.approx(speed, abs=0.8)
+    gap = 45.0 + 16.0 * speed - 2.25 - done.front_m[0, -1]
+    assert 0.7 < gap < 5.0 + 2.0 * speed
+
+
+def test_it_stops_at_a_red_light_and_goes_on() -> None:
+    path = straight()
+    done = drive(
+        FrenetLattice(), path, at_rest_on(path, 0.0, 10.0), vehicle=VEHICLE, seconds=20.0,
+        target_mps=10.0, red_arc_m=60.0, red_until_s=14.0,
+    )  # fmt: skip
+    waiting = done.front_m[0, round(13.9 / 0.05)]
+    assert 56.0 < waiting < 60.0
+    assert done.front_m[0, -1] > 65.0
+
+
+def test_it_evades_what_reaches_a_little_into_its_lane() -> None:
+    path = straight()
+    parked = Other(ALONG + np.array([0.0, -1.9]), 0.0, 40.0)
+    done = drive(
+        FrenetLattice(), path, at_rest_on(path, 0.0, 8.0), vehicle=VEHICLE, seconds=9.0,
+        others=[parked],
+    )  # fmt: skip
+    assert done.clearance_m.min() > 0.2
+    assert done.front_m[0, -1] > 55.0
+    assert done.offset_m.max() > 0.2
+    plain = drive(
+        PurePursuitIdm(), path, at_rest_on(path, 0.0, 8.0), vehicle=VEHICLE, seconds=9.0,
+        others=[parked],
+    )  # fmt: skip
+    assert plain.front_m[0, -1] < 40.0
+
+
+@pytest.mark.parametrize("walks", [True, False])
+@pytest.mark.parametrize("after_s", [3.0, 4.0, 5.0, 6.0])
+def test_nobody_who_crosses_is_hit(after_s: float, walks: bool) -> None:
+    path = straight()
+    line = np.array([[45.0, -150.0], [45.0, 150.0]])
+    speed = 1.5 if walks else 8.0
+    other = walker(line, speed, 150.0 - speed * after_s)
+    if not walks:
+        other = Other(line, speed, 150.0 - speed * after_s)
+    done = drive(
+        FrenetLattice(), path, at_rest_on(path, 0.0, 8.0), vehicle=VEHICLE, seconds=14.0,
+        others=[other],
+    )  # fmt: skip
+    assert done.clearance_m.min() > 0.2
+    assert done.front_m[0, -1] > 50.0
+
+
+def test_it_gives_way_where_the_world_says_so() -> None:
+    path = straight()
+    ground = SharedGround(
+        np.array([48.0]), np.array([52.0]), np.array([[50.0, 0.0]]), np.array([True]),
+        np.array([-math.pi / 2]),
+    )  # fmt: skip
+    line = np.array([[50.0, 300.0], [50.0, -300.0]])
+    crossing = [Other(line, 10.0, 300.0 - 10.0 * t) for t in (6.0, 8.5, 11.0)]
+    done = drive(
+        FrenetLattice(), path, at_rest_on(path, 0.0, 8.0), vehicle=VEHICLE, seconds=20.0,
+        others=crossing, ground=ground,
+    )  # fmt: skip
+    assert done.clearance_m.min() > 0.8
+    assert 9.5 < done.first_s(48.0) < 15.0
+
+
+def test_what_one_car_does_is_independent_of_the_others_in_the_job() -> None:
+    path = bend(25.0)
+    starts = at_rest_on(path, 0.0, 7.0, count=6)
+    starts[:, 3] += np.arange(6.0)
+    others = [Other(ALONG - [[60.0, 3.0]], 6.0, 70.0), walker(ALONG[:, ::-1], 1.4)]
+    view = view_of(path, starts, VEHICLE, target_mps=9.0, users=see(path, others, 0.0, 6)[0])
+    along, across = choose(view)
+    for rows in ([0], [3], [1, 4, 5]):
+        seen = see(path, others, 0.0, len(rows))[0]
+        alone = choose(view_of(path, starts[rows], VEHICLE, target_mps=9.0, users=seen))
+        for whole, part in zip((along, across), alone, strict=True):
+            assert whole.coefficients[:, rows].tobytes() == part.coefficients.tobytes()

@@ -1,0 +1,250 @@
+"""Planners of other packages: in a process of their own, whatever they do there."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from contracts.futures import Variant
+from sim_worker.futures import run_job
+from sim_worker.planners.base import Planner, RemembersWithinJob
+from sim_worker.planners.hosted import HostedDriver, HostedPlanner, PlannerFailed
+from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from sim_worker.planners.registry import check_planner, load_planner, planner_names
+from sim_worker.stage import Stage
+from sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.places import crossroads, job
+from tests.sim_worker.planners.driven import Other, at_rest_on, see, straight, view_of
+from tests.sim_worker.planners.installed import install
+
+VEHICLE = load_vehicle()
+
+CODE = """
+import os, time
+import numpy as np
+from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+
+class Steady(PurePursuitIdm):
+    pass
+
+class Counting:
+    def begin(self, count):
+        return Counted(count)
+
+class Counted:
+    def __init__(self, count):
+        self.count, self.asked, self.remarks = count, 0, {}
+    def plan(self, view):
+        self.asked += 1
+        self.remarks[0] = f"asked {self.asked} times for {self.count} cars"
+        return np.full(len(view.arc_m), float(self.asked)), np.zeros(len(view.arc_m))
+
+class One:
+    def plan_one(self, view):
+        if view.arc_m > 15.0:
+            raise KeyError("no lane here")
+        ahead = min((user.arc_m for user in view.users), default=0.0)
+        return view.target_speed_mps - view.vx_mps, ahead / 1000.0
+
+class Blocks(Steady):
+    def plan(self, view):
+        if view.time_s >= 0.5:
+            time.sleep(10.0)
+        return super().plan(view)
+
+class Exits(Steady):
+    def plan(self, view):
+        if view.time_s >= 0.5:
+            os._exit(7)
+        return super().plan(view)
+
+class Crashes(Steady):
+    def plan(self, view):
+        if view.time_s >= 0.5:
+            os.abort()
+        return super().plan(view)
+
+class Raises(Steady):
+    def plan(self, view):
+        if view.time_s >= 0.5:
+            raise RuntimeError("lost\\nmy way")
+        return super().plan(view)
+
+class NoNumber(Steady):
+    def plan(self, view):
+        answer = super().plan(view)
+        if view.time_s >= 0.5:
+            answer.accel_mps2[0] = np.nan
+        return answer
+
+class Scalar:
+    def plan(self, view):
+        return 1.0, 0.0
+
+class NoPlanner:
+    pass
+
+class FailsToLoad:
+    def __init__(self):
+        raise OSError("no weights")
+"""
+
+NAMES = {
+    "steady": "Steady", "counting": "Counting", "one": "One", "blocks": "Blocks",
+    "exits": "Exits", "crashes": "Crashes", "raises": "Raises", "no_number": "NoNumber",
+    "scalar": "Scalar", "no_planner": "NoPlanner", "fails_to_load": "FailsToLoad",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    folder = tmp_path_factory.mktemp("installed")
+    install(folder, "their_planners", CODE, **NAMES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        yield
+        for name in NAMES:
+            if name in _used:
+                planner = load_planner(name)
+                assert isinstance(planner, HostedPlanner)
+                planner.close()
+        load_planner.cache_clear()
+
+
+_used: set[str] = set()
+
+
+def theirs(name: str) -> HostedPlanner:
+    _used.add(name)
+    planner = load_planner(name)
+    assert isinstance(planner, HostedPlanner)
+    return planner
+
+
+@pytest.fixture(scope="module")
+def stage() -> Stage:
+    return Stage(crossroads(), VEHICLE, nsim=8)
+
+
+def test_they_are_known_by_their_entry_points() -> None:
+    assert set(NAMES) < set(planner_names())
+
+
+def test_the_answers_are_those_of_the_same_planner_at_home() -> None:
+    path = straight()
+    starts = at_rest_on(path, 0.0, 7.0, count=3)
+    seen, _ = see(path, [Other(np.array([[0.0, 0.0], [200.0, 0.0]]), 3.0, 40.0)], 0.0, 3)
+    driver = theirs("steady").begin(3)
+    for tick in range(3):
+        view = view_of(path, starts, VEHICLE, time_s=0.05 * tick, users=seen)
+        view = view._replace(lead_gap_m=np.array([5.0, 20.0, np.inf]))
+        there, here = driver.plan(view), PurePursuitIdm().plan(view)
+        assert there.accel_mps2.tobytes() == here.accel_mps2.tobytes()
+        assert there.tire_angle_rad.tobytes() == here.tire_angle_rad.tobytes()
+
+
+def test_one_that_remembers_is_told_when_a_job_begins() -> None:
+    view = view_of(straight(), at_rest_on(straight(), 0.0, count=2), VEHICLE)
+    for _ in range(2):
+        driver = theirs("counting").begin(2)
+        assert [float(driver.plan(view).accel_mps2[0]) for _ in range(3)] == [1.0, 2.0, 3.0]
+        assert driver.remarks == {0: "asked 3 times for 2 cars"}
+
+
+def test_one_for_a_single_car_is_asked_for_each_and_fails_for_each() -> None:
+    path = straight()
+    starts = at_rest_on(path, 10.0, 5.0, count=3)
+    starts[1, 0] = 20.0
+    seen, _ = see(path, [Other(np.array([[0.0, 0.0], [200.0, 0.0]]), 3.0, 40.0)], 0.0, 3)
+    driver = theirs("one").begin(3)
+    answer = driver.plan(view_of(path, starts, VEHICLE, users=seen))
+    assert answer.accel_mps2[[0, 2]] == pytest.approx(3.0)
+    assert answer.tire_angle_rad[[0, 2]] == pytest.approx(0.04)
+    assert np.isnan(answer.accel_mps2[1])
+    assert driver.remarks == {1: "KeyError: 'no lane here'"}
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "lives"),
+    [
+        ("blocks", "gave no answer within 0.5 s and was ended", False),
+        ("exits", "is gone: its process ended with code 7", False),
+        ("crashes", "is gone: its process ended with code -6", False),
+        ("raises", "RuntimeError: lost my way", True),
+        ("scalar", "ValueError: answers of shapes () and ()", True),
+    ],
+)
+def test_what_it_does_is_said_in_time_and_the_next_job_finds_it_well(
+    name: str, words: str, lives: bool
+) -> None:
+    planner = theirs(name)
+    driver = planner.begin(1)
+    view = view_of(straight(), at_rest_on(straight(), 0.0), VEHICLE)
+    if name != "scalar":
+        driver.plan(view)
+    before, begun = planner.pid, time.monotonic()
+    with pytest.raises(PlannerFailed) as failure:
+        driver.plan(view._replace(time_s=0.5))
+    assert str(failure.value) == words
+    assert time.monotonic() - begun < 2.5
+    assert (planner.pid == before) == lives
+    if name != "scalar":
+        assert np.isfinite(planner.begin(1).plan(view).accel_mps2).all()
+
+
+def test_a_blocked_process_is_really_gone() -> None:
+    planner = theirs("blocks")
+    driver, pid = planner.begin(1), planner.pid
+    assert pid is not None
+    view = view_of(straight(), at_rest_on(straight(), 0.0), VEHICLE)
+    with pytest.raises(PlannerFailed):
+        driver.plan(view._replace(time_s=0.5))
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("no_planner", r"has no method plan\(view\), plan_one\(view\) or begin\(count\)"),
+        ("fails_to_load", "fails to load: OSError: no weights"),
+    ],
+)
+def test_one_that_does_not_load_is_refused(name: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        check_planner(name)
+
+
+def test_checking_leaves_no_process() -> None:
+    check_planner("steady")
+    check_planner("constant_speed")
+    with pytest.raises(ValueError, match="unknown planner 'nobody'"):
+        check_planner("nobody")
+
+
+@pytest.mark.parametrize("name", ["blocks", "crashes", "no_number"])
+def test_in_a_job_only_its_own_futures_fail(stage: Stage, name: str) -> None:
+    theirs(name)
+    variants = (
+        Variant(index=0, name="ours"),
+        Variant(index=1, name="theirs", planner=name),
+        Variant(index=2, name="careless", planner="constant_speed"),
+    )
+    begun = time.monotonic()
+    together = run_job(job(variants, horizon_s=2.0), stage)
+    assert time.monotonic() - begun < 9.0
+    assert together.outcome.valid.tolist() == [True, False, True]
+    assert f"planner {name!r} at 0.5 s: " in together.outcome.failures[1]
+    assert together.outcome.failures[0] == together.outcome.failures[2] == ""
+    alone = run_job(job((variants[0], variants[2]), horizon_s=2.0), stage)
+    assert np.array_equal(together.trajectory.states[[0, 2]], alone.trajectory.states)
+
+
+def test_they_are_planners_to_the_type_checker_and_at_run_time() -> None:
+    planner: Planner = theirs("steady")
+    assert isinstance(planner, RemembersWithinJob)
+    assert isinstance(planner.begin(1), HostedDriver)
