@@ -9,6 +9,8 @@ from typing import Annotated
 import typer
 
 from contracts.errors import UserError
+from orchestrator.cli_options import MapArgument, OutOption, ServiceRoadsOption
+from orchestrator.cli_scenarios import scenarios
 
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
 PATH_ERRORS = (
@@ -27,15 +29,7 @@ app = typer.Typer(
 maps = typer.Typer(name="map", help="Fetch maps and prepare them.", no_args_is_help=True)
 app.add_typer(maps)
 
-scenarios = typer.Typer(name="scenarios", help="List, check and place scenarios.")
 app.add_typer(scenarios)
-
-MapArgument = Annotated[Path, typer.Argument(help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")]
-ServiceRoadsOption = Annotated[
-    bool,
-    typer.Option("--service-roads", help="driveways and parking aisles count as roads everywhere"),
-]
-OutOption = Annotated[Path, typer.Option("--out", help="file to write")]
 
 
 @app.command()
@@ -176,46 +170,23 @@ def index_map(
     index_map_file(map_file, folder=folder)
 
 
-@scenarios.callback(invoke_without_command=True)
-def list_scenarios(
-    context: typer.Context,
-    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
-) -> None:
-    """List the scenarios that come with foretwin, or check and place scenarios."""
-    if context.invoked_subcommand is not None:
-        return
-    from orchestrator.scenario_commands import list_scenarios as list_them
-
-    list_them(as_json=as_json)
-
-
-@scenarios.command("check")
-def check_scenario(
-    file: Annotated[Path, typer.Argument(help="scenario, TOML")],
-) -> None:
-    """Say whether a scenario file is sound, and how many cases it has."""
-    from orchestrator.scenario_commands import check_scenario_file
-
-    check_scenario_file(file)
-
-
-@scenarios.command("place")
-def place_scenarios(
-    map_file: MapArgument,
-    scenario: Annotated[
-        list[str] | None, typer.Option(help="id or TOML file; may be repeated [default: all]")
+@app.command()
+def sweep(
+    spec: Annotated[Path, typer.Argument(help="what to sweep over, TOML")],
+    out: Annotated[
+        Path | None, typer.Option(help="folder of the rows [default: sweeps/SPEC]")
     ] = None,
-    junction_id: Annotated[str | None, typer.Option("--id", help="only this junction")] = None,
-    at: Annotated[str | None, typer.Option(help="LAT,LON: only the junction nearest to it")] = None,
-    service_roads: ServiceRoadsOption = False,
-    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
+    workers: Annotated[int, typer.Option(help="worker processes")] = 2,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="start anew, not where it stopped")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
 ) -> None:
-    """Say which junctions of a map take which scenarios, and why not elsewhere."""
-    from orchestrator.scenario_commands import PlaceRequest
-    from orchestrator.scenario_commands import place_scenarios as place_them
+    """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
+    from orchestrator.sweep_command import SweepRequest
+    from orchestrator.sweep_command import sweep as run_sweep
 
-    request = PlaceRequest(map_file, scenario or (), junction_id, at, service_roads)
-    raise typer.Exit(place_them(request, as_json=as_json))
+    raise typer.Exit(run_sweep(SweepRequest(spec, out, workers, fresh, as_json)))
 
 
 @app.command()

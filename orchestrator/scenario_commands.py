@@ -94,7 +94,7 @@ def place_scenarios(request: PlaceRequest, *, as_json: bool) -> int:
     Returns 0, or 3 where a junction that a scenario applies to has no place for it.
     """
     chosen = [find_scenario(name) for name in request.scenarios] or list(catalogue().values())
-    opened, junctions = _junctions(request)
+    opened, junctions = asked_junctions(request)
     found = placed_on(opened, junctions, chosen, show_progress=not as_json)
     if as_json:
         _print_json(found)
@@ -103,7 +103,8 @@ def place_scenarios(request: PlaceRequest, *, as_json: bool) -> int:
     return 3 if any(scenario.unplaced for scenario in found) else 0
 
 
-def _junctions(request: PlaceRequest) -> tuple[OpenMap, tuple[Junction, ...]]:
+def asked_junctions(request: PlaceRequest) -> tuple[OpenMap, tuple[Junction, ...]]:
+    """Open as much of a map as is needed; returns it and the junctions that were asked for."""
     if request.at is not None and request.junction_id is not None:
         raise UserError("name the junction by --at LAT,LON or by --id ID, not by both")
     if request.at is not None:

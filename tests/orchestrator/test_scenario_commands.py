@@ -10,6 +10,7 @@ import pytest
 from orchestrator.cli import run
 from orchestrator.map_opening import open_map
 from orchestrator.plan import EMBEDDED_MAP
+from sim_worker.scenarios.drawing import draw_cases
 from sim_worker.scenarios.reading import CATALOGUE, catalogue
 
 MAP = str(EMBEDDED_MAP)
@@ -110,3 +111,30 @@ def test_unknown_scenarios_are_refused_before_the_map_is_read(
 ) -> None:
     assert run(["scenarios", "place", "no.osm", "--scenario", "ccftab"]) == 2
     assert "no scenario 'ccftab'; known: brake_fault" in capsys.readouterr().err
+
+
+def test_a_case_is_exported_with_its_roads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = next(
+        j.summary for j in open_map(EMBEDDED_MAP).junctions if j.summary.kind == "crossing"
+    )
+    out = tmp_path / "new" / "scp.xosc"
+    asked = ["scenarios", "export", "scp", "--map", MAP, "--id", where.id, "--case", "2"]
+    assert run([*asked, "--out", str(out)]) == 0
+    assert capsys.readouterr().out == (
+        f"{out}: scp, case 2, at {where.id}\n{out.with_suffix('.xodr')}: its roads\n"
+    )
+    drawn = draw_cases(catalogue()["scp"])[1]
+    assert f'name="ego_speed_mps" parameterType="double" value="{drawn["ego.speed_mps"]:.12g}"' in (
+        out.read_text()
+    )
+    assert "<OpenDRIVE>" in out.with_suffix(".xodr").read_text()
+    assert run([*asked[:-1], "9", "--out", str(out)]) == 2
+    assert capsys.readouterr().err == "foretwin: scp has cases 1 to 4; there is no 9\n"
+    assert run([*asked, "--out", str(tmp_path / "scp.xml")]) == 2
+    assert "an OpenSCENARIO file is written as .xosc" in capsys.readouterr().err
+    assert run(["scenarios", "export", "race_track_lap", *asked[3:], "--out", str(out)]) == 2
+    assert "has no place at" in capsys.readouterr().err
+    assert run(["scenarios", "export", "scp", "--map", MAP, "--out", str(out)]) == 2
+    assert "name the junction" in capsys.readouterr().err

@@ -1,0 +1,76 @@
+"""The command line of scenarios: what each command takes. The work is where it is imported from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orchestrator.cli_options import MapArgument, ServiceRoadsOption
+
+scenarios = typer.Typer(name="scenarios", help="List, check, place, draw and export scenarios.")
+
+
+@scenarios.callback(invoke_without_command=True)
+def list_scenarios(
+    context: typer.Context,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
+) -> None:
+    """List the scenarios that come with foretwin, or check and place scenarios."""
+    if context.invoked_subcommand is not None:
+        return
+    from orchestrator.scenario_commands import list_scenarios as list_them
+
+    list_them(as_json=as_json)
+
+
+@scenarios.command("check")
+def check_scenario(
+    file: Annotated[Path, typer.Argument(help="scenario, TOML")],
+) -> None:
+    """Say whether a scenario file is sound, and how many cases it has."""
+    from orchestrator.scenario_commands import check_scenario_file
+
+    check_scenario_file(file)
+
+
+@scenarios.command("place")
+def place_scenarios(
+    map_file: MapArgument,
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="id or TOML file; may be repeated [default: all]")
+    ] = None,
+    junction_id: Annotated[str | None, typer.Option("--id", help="only this junction")] = None,
+    at: Annotated[str | None, typer.Option(help="LAT,LON: only the junction nearest to it")] = None,
+    service_roads: ServiceRoadsOption = False,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
+) -> None:
+    """Say which junctions of a map take which scenarios, and why not elsewhere."""
+    from orchestrator.scenario_commands import PlaceRequest
+    from orchestrator.scenario_commands import place_scenarios as place_them
+
+    request = PlaceRequest(map_file, scenario or (), junction_id, at, service_roads)
+    raise typer.Exit(place_them(request, as_json=as_json))
+
+
+@scenarios.command("export")
+def export_scenario(
+    scenario: Annotated[str, typer.Argument(help="id or TOML file")],
+    map_file: Annotated[
+        Path, typer.Option("--map", help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")
+    ],
+    out: Annotated[Path, typer.Option("--out", help=".xosc file to write; .xodr goes beside it")],
+    junction_id: Annotated[str | None, typer.Option("--id", help="the junction's id")] = None,
+    at: Annotated[str | None, typer.Option(help="LAT,LON: the junction nearest to it")] = None,
+    case: Annotated[int, typer.Option(help="which of its cases, from 1")] = 1,
+    vehicle: Annotated[Path | None, typer.Option(help="vehicle parameters, TOML")] = None,
+    service_roads: ServiceRoadsOption = False,
+) -> None:
+    """Write one case at one junction as OpenSCENARIO 1.2, with its roads as OpenDRIVE."""
+    from orchestrator.scenario_commands import PlaceRequest
+    from orchestrator.scenario_export import CaseRequest
+    from orchestrator.scenario_export import export_scenario as export
+
+    where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
+    export(CaseRequest(scenario, where, case, vehicle), out)

@@ -1,0 +1,79 @@
+"""`foretwin scenarios export`: one case of a scenario at one junction, for other simulators."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+from typing import NamedTuple
+
+from contracts.errors import UserError
+from contracts.scenario import Scenario
+from contracts.world import World
+from orchestrator.scenario_commands import RADIUS_M, PlaceRequest, asked_junctions
+from sim_worker.scenarios.casting import Cast, cast
+from sim_worker.scenarios.drawing import draw_cases
+from sim_worker.scenarios.openscenario import write_openscenario
+from sim_worker.scenarios.placement import places
+from sim_worker.scenarios.reading import find_scenario
+from sim_worker.vehicle.parameters import load_vehicle
+from world_gen.build import build_world
+from world_gen.map_index import index_map
+
+
+class CaseRequest(NamedTuple):
+    """Which case of which scenario, and where; the first case is 1."""
+
+    scenario: str
+    where: PlaceRequest
+    case: int
+    vehicle: Path | None = None
+
+
+class PlacedCase(NamedTuple):
+    """A case as it was cast in a World."""
+
+    scenario: Scenario
+    world: World
+    played: Cast
+
+
+def export_scenario(request: CaseRequest, out: Path) -> None:
+    """Write one case as OpenSCENARIO, and its roads beside it as OpenDRIVE.
+
+    Raises UserError where there is no such case, or no place for it at that junction.
+    """
+    if out.suffix != ".xosc":
+        raise UserError(f"{out}: an OpenSCENARIO file is written as .xosc")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    vehicle = load_vehicle(request.vehicle)
+    found = placed_case(request)
+    roads = write_openscenario(
+        found.played, found.scenario, found.world, out, vehicle=vehicle,
+        written_at=datetime.datetime.now(datetime.UTC),
+    )  # fmt: skip
+    played = found.played
+    print(f"{out}: {found.scenario.id}, case {request.case}, at {played.place.junction_id}")
+    print(f"{roads}: its roads")
+
+
+def placed_case(request: CaseRequest) -> PlacedCase:
+    """Return a case at the first place of a junction where it can be cast."""
+    scenario = find_scenario(request.scenario)
+    cases = draw_cases(scenario)
+    if not 1 <= request.case <= len(cases):
+        raise UserError(f"{scenario.id} has cases 1 to {len(cases)}; there is no {request.case}")
+    if request.where.at is None and request.where.junction_id is None:
+        raise UserError("name the junction by --at LAT,LON or --id ID")
+    vehicle = load_vehicle(request.vehicle)
+    opened, junctions = asked_junctions(request.where)
+    index = index_map(opened.osm, opened.graph, opened.junctions)
+    world = build_world(opened.osm, opened.graph, junctions[0], radius_m=RADIUS_M, index=index)
+    result = places(scenario, world, vehicle=vehicle)
+    reasons = [unplaced.reason for unplaced in result.unplaced]
+    for place in result.places:
+        played = cast(scenario, cases[request.case - 1], place, vehicle=vehicle)
+        if isinstance(played, Cast):
+            return PlacedCase(scenario, world, played)
+        reasons.append(played.reason)
+    where = junctions[0].summary
+    raise UserError(f"{scenario.id} has no place at {where.id} {where.name}: {reasons[0]}")
