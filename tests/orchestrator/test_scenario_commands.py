@@ -134,7 +134,7 @@ def test_a_case_is_exported_with_its_roads(
     assert capsys.readouterr().err == "foretwin: scp has cases 1 to 4; there is no 9\n"
     assert run([*asked, "--out", str(tmp_path / "scp.xml")]) == 2
     assert "an OpenSCENARIO file is written as .xosc" in capsys.readouterr().err
-    assert run(["scenarios", "export", "race_track_lap", *asked[3:], "--out", str(out)]) == 2
+    assert run(["scenarios", "export", "overtaking_motorway", *asked[3:], "--out", str(out)]) == 2
     assert "has no place at" in capsys.readouterr().err
     assert run(["scenarios", "export", "scp", "--map", MAP, "--out", str(out)]) == 2
     assert "name the junction" in capsys.readouterr().err
