@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts import drive, futures, simulation
+from contracts import drive, futures, planner_link, simulation
 
 PREFIX = "foretwin/v1"
 
@@ -105,6 +105,11 @@ CHANNELS: dict[str, Channel] = {
         _row("progress", f"{_RUN}/progress", simulation.Progress, 5, WATCH, "one line"),
         _row("event", f"{_RUN}/event", simulation.Event, None, RESULT, "worth telling"),
         _row("run_end", f"{_RUN}/run_end", simulation.RunEnd, None, RESULT, "write and leave"),
+        # A driving stack in another process as planner under test.
+        _row("planner_scene", f"{_RUN}/worker/{{process}}/planner_scene",
+             planner_link.PlannerScene, None, LIVE, "futures at one instant: what to do?"),
+        _row("planned_motions", f"{_RUN}/worker/{{process}}/planned_motions",
+             planner_link.PlannedMotions, None, LIVE, "what a driving stack would do"),
     )
 }  # fmt: skip
 """All channels by name."""
