@@ -17,6 +17,7 @@ from sim_worker.planners.frenet_lattice import FrenetLattice
 from sim_worker.planners.gap_acceptance import GapAcceptance
 from sim_worker.planners.hosted import HostedPlanner
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from sim_worker.planners.remote import RemotePlanner
 from sim_worker.planners.reverse_pursuit import ReversePursuit
 
 GROUP = "foretwin.planners"
@@ -28,6 +29,7 @@ _BUILT_IN: dict[str, type[Planner]] = {
     "frenet_lattice": FrenetLattice,
     "as_planned": AsPlanned,
     "reverse_pursuit": ReversePursuit,
+    "remote": RemotePlanner,
 }
 
 
