@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
-import platform
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +13,9 @@ from orchestrator.conductor import Conductor
 from orchestrator.mission import Mission
 from orchestrator.plan import DrivePlan
 from orchestrator.supervisor import Supervisor
+from orchestrator.versions import versions
 
 RESERVED_BYTES = 65536
-_PACKAGES = ("foretwin", "mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "numpy", "shapely")
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of Python and of the libraries that decide results."""
-    found = {"python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            found[name] = "not installed as a package"
-    return found
 
 
 def run_record(

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import re
 import sys
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from contracts.world import World
+from orchestrator.progress_bar import progress_bar
 from world_gen.intersections import Junction
 
-PLAIN_PERIOD_S = 5.0
-"""Between lines of progress where there is no terminal."""
 FAILURES_FILE = "failures.txt"
 SOME_FAILED = 3
 _SHOWN_KINDS = 20
@@ -40,7 +37,7 @@ def write_each(
     folder.mkdir(parents=True, exist_ok=True)
     kinds: Counter[str] = Counter()
     failures: list[str] = []
-    with _progress(len(junctions)) as (advance, say):
+    with progress_bar(len(junctions), "Worlds") as (advance, say):
         for junction in junctions:
             name = junction.summary.id
             path = folder / f"{_file_name(name)}{suffix}"
@@ -88,39 +85,3 @@ def _summary(
 
 def _file_name(junction_id: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", junction_id)
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
-    """Give a function that counts one more and one that prints a line beside the bar."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    console = Console(stderr=True, highlight=False)
-
-    def say(text: str) -> None:
-        console.print(text, soft_wrap=True, markup=False)
-
-    if console.is_terminal:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-                   TimeRemainingColumn())  # fmt: skip
-        with Progress(*columns, console=console) as bar:
-            task = bar.add_task("worlds", total=total)
-            yield lambda name: bar.update(task, advance=1, description=name), say
-        return
-    done, last_s = 0, time.monotonic()
-
-    def advance(name: str) -> None:
-        nonlocal done, last_s
-        done += 1
-        if time.monotonic() - last_s >= PLAIN_PERIOD_S:
-            last_s = time.monotonic()
-            say(f"{done} of {total} Worlds, {name}")
-
-    yield advance, say

@@ -1,0 +1,48 @@
+"""A progress bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+PLAIN_PERIOD_S = 5.0
+"""Between lines of progress where there is no terminal."""
+
+
+@contextmanager
+def progress_bar(
+    total: int, what: str
+) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
+    """Give a function that counts one more and one that prints a line beside the bar."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    console = Console(stderr=True, highlight=False)
+
+    def say(text: str) -> None:
+        console.print(text, soft_wrap=True, markup=False)
+
+    if console.is_terminal:
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+                   TimeRemainingColumn())  # fmt: skip
+        with Progress(*columns, console=console) as bar:
+            task = bar.add_task(what, total=total)
+            yield lambda name: bar.update(task, advance=1, description=name), say
+        return
+    done, last_s = 0, time.monotonic()
+
+    def advance(name: str) -> None:
+        nonlocal done, last_s
+        done += 1
+        if time.monotonic() - last_s >= PLAIN_PERIOD_S:
+            last_s = time.monotonic()
+            say(f"{done} of {total} {what}, {name}")
+
+    yield advance, say

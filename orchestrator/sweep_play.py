@@ -1,0 +1,217 @@
+"""What a sweep's worker processes do: find places in a World, and play jobs there."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from contracts.drive import VehicleState
+from contracts.frames import GeoPoint
+from contracts.futures import Accident, FuturesJob, FuturesResult, PathAhead, Variant
+from contracts.scenario import Scenario
+from contracts.world import World
+from orchestrator.sweep_plan import Cell, NotPlaced, PlacedHere, SweepJob, WorldPlaces
+from orchestrator.sweep_rows import Row, blank_row
+from orchestrator.sweep_spec import FUTURES_PER_JOB, STEP_S, Loaded
+from sim_worker.actors.cast import KIND_NAMES
+from sim_worker.futures import run_job
+from sim_worker.scenarios.placement import places
+from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.scenarios.roles import Cast
+from sim_worker.worker import StageCache, load_world, one_line
+
+COLLISION_WITH = ("", "road_user", "static")
+_KEPT_STAGES = 2
+
+
+class PlaySetup(msgspec.Struct, frozen=True, kw_only=True):
+    """What a worker of a sweep is started with."""
+
+    loaded: Loaded
+    worlds_dir: str
+
+
+class PlaceQuestion(msgspec.Struct, frozen=True, kw_only=True):
+    """Where do the scenarios take place in this World?"""
+
+    world_id: str
+
+
+def start_worker(setup: PlaySetup) -> Callable[[PlaceQuestion | SweepJob], Any]:
+    """Return what answers a sweep's questions in this process."""
+    worker = SweepWorker(setup)
+    return worker.answer
+
+
+class SweepWorker:
+    """Answers where scenarios take place, and what becomes of jobs; keeps compiled stages."""
+
+    def __init__(self, setup: PlaySetup) -> None:
+        self._loaded = setup.loaded
+        self._worlds_dir = Path(setup.worlds_dir)
+        self._scenarios = {scenario.id: scenario for scenario in setup.loaded.scenarios}
+        self._stages: dict[str, StageCache] = {}
+
+    def answer(self, question: PlaceQuestion | SweepJob) -> WorldPlaces | list[Row]:
+        """Return the places in a World, or the rows of a job; a job that fails says so in them."""
+        if isinstance(question, PlaceQuestion):
+            world = load_world(self._worlds_dir, question.world_id)
+            return places_in(world, self._loaded)
+        try:
+            return self._play(question)
+        except Exception as error:  # one bad job never stops the sweep
+            return failed_rows(question, self._loaded, one_line(error))
+
+    def _play(self, job: SweepJob) -> list[Row]:
+        loaded, spec = self._loaded, self._loaded.spec
+        vehicle = loaded.vehicles[job.vehicle]
+        if job.vehicle not in self._stages:
+            self._stages[job.vehicle] = StageCache(
+                self._worlds_dir, vehicle, control_hz=spec.control_hz, nsim=FUTURES_PER_JOB,
+                kept=_KEPT_STAGES,
+            )  # fmt: skip
+        prepared = self._stages[job.vehicle].get(job.world_id)
+        world, staged = prepared.scenes.world, prepared.scenes.staged
+        casts: dict[int, Cast] = {}
+        rows = {cell.number: blank_row(job, cell, spec) for cell in job.cells}
+        for scenario, place, cells in _together(job, self._scenarios):
+            played = staged.cast(scenario, [cell.values for cell in cells], place, vehicle)
+            for cell, cast in zip(cells, played, strict=True):
+                if isinstance(cast, Cast):
+                    casts[cell.number] = cast
+                else:
+                    rows[cell.number]["left_out"] = cast.reason
+        cells = [cell for cell in job.cells if cell.number in casts]
+        if cells:
+            futures = _futures_job(job, cells, casts, world, loaded, self._scenarios)
+            result = run_job(futures, prepared.stage, scenes=prepared.scenes)
+            for index, cell in enumerate(cells):
+                rows[cell.number] |= _told(result, index, casts[cell.number])
+        return list(rows.values())
+
+
+def places_in(world: World, loaded: Loaded) -> WorldPlaces:
+    """Return where the scenarios of a sweep take place in a World, for its first vehicle."""
+    network = RoadNetwork(world)
+    vehicle = next(iter(loaded.vehicles.values()))
+    placed, unplaced = [], []
+    for scenario in loaded.scenarios:
+        found = places(scenario, world, network=network, vehicle=vehicle, most=loaded.spec.places)
+        placed += [
+            PlacedHere(
+                scenario_id=scenario.id, junction_id=place.junction_id, place=place.name,
+                ego=place.ego.name,
+            )
+            for place in found.places
+        ]  # fmt: skip
+        unplaced += [
+            NotPlaced(
+                scenario_id=scenario.id, junction_id=one.junction_id, reason=one.reason,
+                applies=one.applies,
+            )
+            for one in found.unplaced
+        ]  # fmt: skip
+    return WorldPlaces(world_id=world.id, placed=tuple(placed), unplaced=tuple(unplaced))
+
+
+def failed_rows(job: SweepJob, loaded: Loaded, reason: str) -> list[Row]:
+    """Return the rows of a job that could not be played."""
+    return [blank_row(job, cell, loaded.spec) | {"failure": reason} for cell in job.cells]
+
+
+def _together(
+    job: SweepJob, scenarios: dict[str, Scenario]
+) -> list[tuple[Scenario, str, list[Cell]]]:
+    """Return the cells of each scenario and place: their cases are cast together."""
+    groups: dict[tuple[str, str], list[Cell]] = {}
+    for cell in job.cells:
+        groups.setdefault((cell.scenario_id, cell.place), []).append(cell)
+    return [(scenarios[id_], place, cells) for (id_, place), cells in groups.items()]
+
+
+def _futures_job(
+    job: SweepJob,
+    cells: list[Cell],
+    casts: dict[int, Cast],
+    world: World,
+    loaded: Loaded,
+    scenarios: dict[str, Scenario],
+) -> FuturesJob:
+    spec, first = loaded.spec, casts[cells[0].number]
+    named = sorted({cell.scenario_id for cell in cells})
+    here = world.frame.origin
+    return FuturesJob(
+        round_id=0,
+        job_index=job.number,
+        world_id=world.id,
+        # Nobody measured a car: each begins where its case says.
+        state=VehicleState(
+            vehicle_id=job.vehicle, stamp_ns=0, position=GeoPoint(here.lat_deg, here.lon_deg),
+            yaw_rad=0.0, speed_mps=0.0, yaw_rate_radps=0.0, accel_mps2=0.0,
+        ),
+        path=PathAhead(xy_m=first.ego_xy_m, speed_limit_mps=first.ego_speed_limit_mps),
+        variants=tuple(
+            Variant(
+                index=index, name=f"{cell.scenario_id} {cell.case}", planner=job.planner,
+                scenario_id=cell.scenario_id, values=cell.values, place=cell.place,
+                target_speed_factor=cell.parameters.get("target_speed_factor", 1.0),
+                target_speed_offset_mps=cell.parameters.get("target_speed_offset_mps", 0.0),
+                lateral_shift_m=cell.parameters.get("lateral_shift_m", 0.0),
+            )
+            for index, cell in enumerate(cells)
+        ),
+        horizon_s=job.horizon_s,
+        step_s=STEP_S,
+        seed=spec.seed,
+        cruise_speed_mps=first.ego_speed_mps,
+        scenarios=tuple(scenarios[id_] for id_ in named),
+        lights_by_plan=spec.lights_by_plan,
+        metrics=spec.metrics,
+        accidents=spec.accidents,
+    )  # fmt: skip
+
+
+def _told(result: FuturesResult, index: int, cast: Cast) -> Row:
+    """Return the columns that the playing of one future fills."""
+    outcome = result.outcome
+    accident = next((a for a in result.accidents if a.future == index), None)
+    states = np.ascontiguousarray(result.trajectory.states[index])
+    users = np.ascontiguousarray(result.road_users.poses[index])
+    row: Row = {
+        "valid": bool(outcome.valid[index]),
+        "failure": outcome.failures[index] if outcome.failures else "",
+        "left_out": result.left_out[index],
+        "planned_impact_time_s": _number(cast.impact_time_s),
+        "planned_impact_with": cast.impact_with,
+        "collided": bool(outcome.collided[index]),
+        "collision_time_s": _number(outcome.collision_time_s[index]),
+        "collision_with": COLLISION_WITH[int(outcome.collision_with[index])],
+        "min_clearance_m": _number(outcome.min_clearance_m[index]),
+        "progress_m": _number(outcome.progress_m[index]),
+        "trajectory_sha256": hashlib.sha256(states.tobytes() + users.tobytes()).hexdigest(),
+    }
+    row |= {f"metric_{name}": _number(values[index]) for name, values in result.metrics.items()}
+    return row if accident is None else row | _accident(result, index, accident)
+
+
+def _accident(result: FuturesResult, index: int, accident: Accident) -> Row:
+    kind = KIND_NAMES[int(result.road_users.kinds[index, accident.road_user])]
+    return {
+        "accident_kind": kind,
+        "accident_time_s": accident.time_s,
+        "accident_x_m": float(accident.point_m[0]),
+        "accident_y_m": float(accident.point_m[1]),
+        "accident_angle_rad": accident.angle_rad,
+        "accident_closing_mps": accident.closing_mps,
+        "accident_ego_delta_v_mps": accident.ego_delta_v_mps,
+        "accident_user_delta_v_mps": accident.user_delta_v_mps,
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
