@@ -1,0 +1,106 @@
+"""A driving stack in a process of its own, as planner under test: copy it and put yours in.
+
+    echo 'endpoint = "tcp/127.0.0.1:7447"' > remote.toml
+    foretwin drive --config remote.toml --planner remote
+    python examples/remote_planner.py --endpoint tcp/127.0.0.1:7447     # in a second terminal
+
+It follows the path at the target speed, brakes for red lights and for who is ahead.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.bus import Bus, BusUnreachable, Mailbox, Received, ZenohBus
+from contracts.planner_link import PlannedMotions, PlannerScene
+from contracts.setup import BusSetup
+
+TIME_S = np.linspace(0.0, 3.0, 16)
+ACCEL_MPS2, DECEL_MPS2, LATERAL_MPS2 = 1.5, 2.5, 2.0
+JOIN_S = 30.0
+
+
+def plan(scene: PlannerScene) -> PlannedMotions:
+    """Return where each car of a scene should be over the next three seconds."""
+    steps = np.hypot(*np.diff(scene.path_xy_m, axis=0).T)
+    path_arc = np.concatenate([[0.0], np.cumsum(steps)])
+    xy, yaw, speed = zip(
+        *(_drive(scene, row, path_arc) for row in range(len(scene.futures))), strict=True
+    )
+    return PlannedMotions(
+        job=scene.job, question=scene.question, futures=scene.futures, time_s=TIME_S,
+        xy_m=np.stack(xy), yaw_rad=np.stack(yaw), speed_mps=np.stack(speed),
+    )  # fmt: skip
+
+
+def _drive(scene: PlannerScene, row: int, path_arc: Array) -> tuple[Array, Array, Array]:
+    """Return positions (N, 2), yaws (N,) and speeds (N,) of one car."""
+    heading = np.unwrap(np.arctan2(*np.gradient(scene.path_xy_m, axis=0).T[::-1]))
+    bend = np.abs(np.gradient(heading, path_arc)) + 1e-6
+    arc, present = float(scene.arc_m[row]), max(float(scene.states[row, 3]), 0.0)
+    front = scene.length_m - scene.rear_overhang_m
+    stop = min(scene.stop_arc_m[row] - 1.0, _rear_of_who_is_ahead(scene, row, path_arc) - 3.0)
+    arcs, speeds = [arc], [present]
+    for step_s in np.diff(TIME_S):
+        room = max(stop - front - arcs[-1], 0.0)
+        ahead = (path_arc >= arcs[-1]) & (path_arc < arcs[-1] + 15.0)
+        curve = np.sqrt(LATERAL_MPS2 / bend[ahead].max()) if ahead.any() else np.inf
+        wanted = min(scene.target_speed_mps[row], curve, np.sqrt(2.0 * DECEL_MPS2 * room))
+        change = np.clip(wanted - speeds[-1], -2.0 * DECEL_MPS2 * step_s, ACCEL_MPS2 * step_s)
+        speeds.append(max(speeds[-1] + change, 0.0))
+        arcs.append(arcs[-1] + 0.5 * (speeds[-2] + speeds[-1]) * step_s)
+    xy = np.column_stack([np.interp(arcs, path_arc, scene.path_xy_m[:, k]) for k in (0, 1)])
+    return xy, np.interp(arcs, path_arc, heading), np.array(speeds)
+
+
+def _rear_of_who_is_ahead(scene: PlannerScene, row: int, path_arc: Array) -> float:
+    """Return the arc length where the nearest other in the lane ahead begins, or infinity."""
+    nearest = np.inf
+    for x, y, _, _, length, width, _ in scene.road_users[row]:
+        away = np.hypot(scene.path_xy_m[:, 0] - x, scene.path_xy_m[:, 1] - y)
+        if np.isnan(x) or away.min() > 0.5 * (scene.width_m + width) + 0.5:
+            continue
+        arc = float(path_arc[away.argmin()])
+        if arc > scene.arc_m[row]:
+            nearest = min(nearest, arc - 0.5 * length)
+    return nearest
+
+
+def serve(bus: Bus) -> None:
+    """Answer every scene of every run on the bus, for ever."""
+    scenes = Mailbox(8)
+    bus.subscribe("planner_scene", scenes, run="*", process="*")
+    print("ready", flush=True)
+    while True:
+        item = scenes.take(1.0)
+        if isinstance(item, Received):
+            scene = item.message()
+            ids = {"run": scene.run_id, "process": scene.worker_id}
+            bus.publish("planned_motions", plan(scene), **ids)
+
+
+def main() -> int:
+    """Join the bus, waiting for a run to begin, and serve until Ctrl-C."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447", help="where the run listens")
+    endpoint = parser.parse_args().endpoint
+    end = time.monotonic() + JOIN_S
+    while True:
+        try:
+            with ZenohBus(BusSetup(endpoint=endpoint)) as bus:
+                serve(bus)
+        except BusUnreachable as error:
+            if time.monotonic() > end:
+                print(error, file=sys.stderr)
+                return 2
+        except KeyboardInterrupt:
+            return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

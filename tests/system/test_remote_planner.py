@@ -1,0 +1,102 @@
+"""A driving stack in a process of its own drives futures over Zenoh, and is killed in between."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from contracts.bus import Bus, Mailbox, ZenohBus
+from contracts.futures import Variant
+from contracts.setup import BusSetup
+from sim_worker.futures import run_job
+from sim_worker.planners.registry import load_planner
+from sim_worker.planners.remote import RemotePlanner
+from sim_worker.stage import Stage
+from sim_worker.vehicle.parameters import load_vehicle
+from tests.contracts.bus_sides import free_endpoint
+from tests.sim_worker.places import crossroads, job
+from tests.sim_worker.planners.driven import at_rest_on, drive, straight
+from tests.system.foretwin_command import REPOSITORY
+
+EXAMPLE = REPOSITORY / "examples" / "remote_planner.py"
+VEHICLE = load_vehicle()
+
+
+@contextmanager
+def example(endpoint: str) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [sys.executable, str(EXAMPLE), "--endpoint", endpoint],
+        stdout=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+    )  # fmt: skip
+    with process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n"
+            yield process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def run_bus() -> Iterator[tuple[Bus, str]]:
+    """A router and a worker's client, as in a run."""
+    setup = BusSetup(endpoint=free_endpoint())
+    with ZenohBus(setup, router=True), ZenohBus(setup) as bus:
+        yield bus, setup.endpoint
+
+
+def test_the_example_drives_and_after_its_death_the_fallback() -> None:
+    path = straight()
+    starts = at_rest_on(path, 5.0, 4.0, count=4)
+    with run_bus() as (bus, endpoint):
+        planner = RemotePlanner(first_answer_s=10.0, answer_s=5.0)
+        planner.connect(bus, run="r1", process="w0")
+        with example(endpoint) as process:
+            told: list[dict[int, str]] = []
+
+            class Kept:
+                def begin(self, count: int):  # type: ignore[no-untyped-def]
+                    driver = planner.begin(count)
+                    told.append(driver.remarks)
+                    return driver
+
+                def plan(self, view):  # type: ignore[no-untyped-def]
+                    raise AssertionError
+
+            alive = drive(
+                Kept(), path, starts, vehicle=VEHICLE, seconds=8.0, red_arc_m=45.0,
+                red_until_s=99.0,
+            )  # fmt: skip
+            process.kill()
+            process.wait()
+        assert told == [{}]
+        assert np.abs(alive.states[:, -1, 3]).max() < 0.3
+        assert (alive.front_m[:, -1] > 43.0).all()
+        assert (alive.front_m[:, -1] < 45.0).all()
+        planner.first_answer_s = planner.answer_s = 0.2
+        drive(Kept(), path, starts, vehicle=VEHICLE, seconds=2.0)
+    assert sorted(told[1]) == [0, 1, 2, 3]
+    assert "no answer within 0.2 s" in told[1][0]
+
+
+def test_futures_of_a_job_are_driven_by_it_beside_others() -> None:
+    variants = (
+        Variant(index=0, name="ours"),
+        Variant(index=1, name="theirs", planner="remote"),
+    )
+    planner = load_planner("remote")
+    assert isinstance(planner, RemotePlanner)
+    with run_bus() as (bus, endpoint), example(endpoint):
+        planner.connect(bus, run="r1", process="w0")
+        shown = Mailbox(64)
+        bus.subscribe("planned_motions", shown, run="r1", process="w0")
+        result = run_job(job(variants, horizon_s=4.0), Stage(crossroads(), VEHICLE, nsim=2))
+    load_planner.cache_clear()
+    assert result.outcome.valid.all()
+    assert result.outcome.progress_m[1] > 25.0
+    assert len(shown) > 30
