@@ -17,8 +17,15 @@ from tests.benchmarks.measuring import Measurement, UnavailableError
 OUT = Path(__file__).parents[2] / "build" / "bench.json"
 
 BENCHMARKS = (
-    "futures_closed_loop_20hz",
-    "futures_full_scene",
+    "open_loop_16",
+    "closed_loop_10hz",
+    "closed_loop_20hz",
+    "closed_loop_50hz",
+    "two_cores",
+    "boxes_200",
+    "boxes_1000",
+    "full_scene",
+    "metadrive",
     "world_from_open_map",
     "world_stages",
     "world_cutout_vs_netconvert",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import mujoco
@@ -14,24 +16,30 @@ from tests.benchmarks.measuring import UnavailableError
 SOURCE = Path(__file__).with_name("bare_mj_step.c")
 
 
-def simulated_seconds_per_cpu_second(
-    model: mujoco.MjModel, *, seconds: float, repeats: int, speed_mps: float, joint: str
-) -> float:
-    """Return what a bare C loop reaches on `model` with one thread; the best of `repeats`.
+@contextmanager
+def bare_loop(
+    model: mujoco.MjModel, *, seconds: float, speed_mps: float, joint: str = "ego_x"
+) -> Iterator[Callable[[], float]]:
+    """Yield what returns the CPU seconds in which one thread steps `model` through `seconds`.
 
-    Raises UnavailableError where no C compiler is installed.
+    Let these be as many as what it is held against simulates: on a busy machine, the shortest of
+    many short runs is luckier than that of a few long ones. Raises UnavailableError where no C
+    compiler is installed.
     """
     steps = round(seconds / model.opt.timestep)
     with tempfile.TemporaryDirectory() as folder:
         program, file = Path(folder) / "bare_mj_step", Path(folder) / "model.mjb"
         _compile(program)
         mujoco.mj_saveModel(model, str(file), None)
-        printed = subprocess.run(
-            [program, file, str(steps), str(repeats), str(speed_mps), joint],
-            check=True, capture_output=True, text=True,
-        ).stdout  # fmt: skip
-    cpu_seconds, timestep_s = map(float, printed.split())
-    return steps * timestep_s / cpu_seconds
+
+        def run() -> float:
+            printed = subprocess.run(
+                [program, file, str(steps), "1", str(speed_mps), joint],
+                check=True, capture_output=True, text=True,
+            ).stdout  # fmt: skip
+            return float(printed.split()[0])
+
+        yield run
 
 
 def _compile(program: Path) -> None:

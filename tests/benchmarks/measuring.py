@@ -29,9 +29,14 @@ class Measurement(NamedTuple):
         return {**row, "ratio": self.value / self.baseline, **self.more}
 
 
+def cpu_seconds(work: Callable[[], object]) -> float:
+    """Return the CPU seconds, over all threads of this process, that `work` takes."""
+    return _taken(work, time.process_time)
+
+
 def cpu_minimum_s(work: Callable[[], object], *, repeats: int) -> float:
     """Return the fewest CPU seconds, over all threads of this process, that `work` took."""
-    return min(_taken(work, time.process_time) for _ in range(repeats))
+    return min(cpu_seconds(work) for _ in range(repeats))
 
 
 def wall_minimum_s(work: Callable[[], object], *, repeats: int) -> float:

@@ -42,7 +42,7 @@ def test_rows_hold_value_unit_baseline_and_ratio(
 
 def test_an_unknown_name_lists_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
     assert harness.main(["speed"]) == 2
-    assert "unknown benchmark speed; known: futures_closed_loop_20hz" in capsys.readouterr().out
+    assert "unknown benchmark speed; known: open_loop_16" in capsys.readouterr().out
 
 
 def test_the_street_that_futures_are_measured_on_can_be_drawn() -> None:

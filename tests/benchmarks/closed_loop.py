@@ -1,0 +1,51 @@
+"""64 futures of 8 s with a planner on open ground, against stepping the model in C."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from contracts.futures import FuturesJob, FuturesResult
+from sim_worker.futures import run_job
+from sim_worker.scene import SceneMaker
+from sim_worker.stage import Stage
+from sim_worker.variants import plan_variants
+from sim_worker.vehicle.parameters import load_vehicle
+from tests.benchmarks import scenes
+from tests.benchmarks.bare_loop import bare_loop
+from tests.benchmarks.measuring import Measurement, cpu_seconds
+
+REPEATS = 20
+SECONDS = scenes.FUTURES * scenes.HORIZON_S
+
+
+def measure_at(control_hz: float) -> Measurement:
+    """Return simulated seconds per CPU second of whole jobs; nobody else is on the road."""
+    stage, run = flat_job(control_hz)
+    job_s = bare_s = float("inf")
+    with bare_loop(stage.model, seconds=SECONDS, speed_mps=scenes.SPEED_MPS) as bare:
+        for _ in range(REPEATS):
+            job_s = min(job_s, cpu_seconds(run))
+            bare_s = min(bare_s, bare())
+    return Measurement(SECONDS / job_s, "simulated s per CPU s", SECONDS / bare_s)
+
+
+def flat_job(control_hz: float) -> tuple[Stage, Callable[[], FuturesResult]]:
+    """Return a stage without buildings and what runs a job on it."""
+    world = scenes.street(buildings=0)
+    stage = Stage(world, load_vehicle(), nsim=scenes.FUTURES, control_hz=control_hz, threads=1)
+    variants = plan_variants(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])
+    return stage, job_runner(stage, scenes.job(world, variants))
+
+
+def job_runner(stage: Stage, job: FuturesJob) -> Callable[[], FuturesResult]:
+    """Return what runs a job as a worker does, whose World is prepared; it ran once already."""
+    assert stage.world is not None
+    maker = SceneMaker(stage.world)
+
+    def run() -> FuturesResult:
+        return run_job(job, stage, scenes=maker)
+
+    valid = run().outcome.valid
+    if not valid.all():
+        raise AssertionError(f"{(~valid).sum()} futures diverged: their cost says nothing")
+    return run

@@ -1,0 +1,11 @@
+"""64 futures of 8 s with a planner at 10 Hz on open ground, against stepping the model in C."""
+
+from __future__ import annotations
+
+from tests.benchmarks.closed_loop import measure_at
+from tests.benchmarks.measuring import Measurement
+
+
+def measure() -> Measurement:
+    """Return simulated seconds per CPU second of whole jobs."""
+    return measure_at(10.0)
