@@ -75,20 +75,22 @@ class JunctionRules:
 
     def ground(self, taken: Sequence[Taken], path: FrenetPath) -> SharedGround | None:
         """Return what other movements cross or join of a path, in its order; None for nothing."""
+        lines = {connection.id: connection.centerline for connection in self._connections}
         rows = []
         for one in taken:
             for (wait, go), stretch in self._stretches.items():
-                for id_, span, waits in (
-                    (wait, stretch[:2], True),
-                    (go, stretch[2:], False),
-                ):
-                    if id_ == one.connection.id:
-                        rows.append((one.from_arc_m + span[0], one.from_arc_m + span[1], waits))
+                mine, theirs = (stretch.wait_in_m, stretch.wait_out_m), stretch[2:]
+                other, waits = go, wait == one.connection.id
+                if not waits:
+                    mine, theirs, other = theirs, mine, wait
+                if waits or go == one.connection.id:
+                    yaw = _heading(lines[other], sum(theirs) / 2.0)
+                    rows.append((one.from_arc_m + mine[0], one.from_arc_m + mine[1], waits, yaw))
         if not rows:
             return None
-        enter, leave, waits_there = np.array(sorted(rows)).T
+        enter, leave, waits_there, their_yaw = np.array(sorted(rows)).T
         middle = path.point_at((enter + leave) / 2.0)
-        return SharedGround(enter, leave, middle, waits_there > 0.5)
+        return SharedGround(enter, leave, middle, waits_there > 0.5, their_yaw)
 
     def _add(self, into: Array, one: Taken, other: Taken) -> None:
         stretch = self._stretches.get((one.connection.id, other.connection.id))
@@ -140,6 +142,14 @@ def _signals(
         for k, (arc, group) in enumerate(line):
             arcs[p, k], places[p, k] = arc, groups.index(group)
     return arcs, places, groups
+
+
+def _heading(line: Array, arc_m: float) -> float:
+    """Return the heading of a polyline at an arc length."""
+    steps = np.diff(line, axis=0)
+    ends = np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))
+    step = min(int(np.searchsorted(ends, arc_m)), len(steps) - 1)
+    return float(np.arctan2(steps[step, 1], steps[step, 0]))
 
 
 def _probe(line: Array) -> Array:

@@ -57,3 +57,20 @@ def test_only_red_and_amber_stop(tmp_path: Path, colour: str) -> None:
 def test_open_ground_has_no_rules() -> None:
     rules = JunctionRules(None)
     assert rules.between([(), ()]).groups == ()
+
+
+def test_ground_that_others_need_says_who_waits_and_which_way_they_cross(tmp_path: Path) -> None:
+    world = crossroads(tmp_path)
+    rules = JunctionRules(world)
+    east = straight_on(world, EAST)
+    ground = rules.ground(rules.taken(east), east)
+    assert ground is not None
+    assert ground.their_yaw_rad is not None
+    assert (np.diff(ground.enter_arc_m) >= 0.0).all()
+    assert (ground.leave_arc_m > ground.enter_arc_m).all()
+    northbound = np.abs(ground.their_yaw_rad - np.pi / 2) < 0.1
+    southbound = np.abs(ground.their_yaw_rad + np.pi / 2) < 0.1
+    # Right before left: who comes from the right has priority, who comes from the left has not.
+    assert ground.waits[northbound].tolist() == [True]
+    assert ground.waits[southbound].tolist() == [False]
+    assert ground.point_m[northbound][0] == pytest.approx([1.75, -1.75], abs=1.0)
