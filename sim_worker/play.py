@@ -36,6 +36,7 @@ class Play:
             scene.starts,
             steering_delay_s=_steering_delay_s(scene, stage),
             friction_factor=scene.faults.friction_factor,
+            backwards=scene.backwards,
         )
         self.arc_m = scene.start_arc_m.copy()
         self._lead = Lead(np.full(count, np.inf), np.zeros(count))
@@ -44,10 +45,11 @@ class Play:
         self._decide_every = max(round(decide_every_s / stage.control_dt_s), 1)
         self._red = np.full((1, 0), np.inf)
 
-    def restart(self, rows: Rows, scene: Scene) -> None:
+    def restart(self, rows: Rows, scene: Scene, *, looked: bool) -> None:
         """Begin `rows` anew, as `scene` has them; the others go on.
 
-        Both scenes have the same path, and the same number of cars and of road users.
+        Traffic and sight of both were `begun` from one. `looked` says that planners have looked
+        since the last act; they do so again now.
         """
         others = np.ones(len(scene.starts), dtype=bool)
         others[rows] = False
@@ -62,7 +64,7 @@ class Play:
         if scene.traffic is not None and before.traffic is not None:
             scene.traffic.carry_on(before.traffic, others)
         if scene.sight is not None and before.sight is not None:
-            scene.sight.carry_on(before.sight, others)
+            scene.sight.carry_on(before.sight, others, looked=looked)
 
     def look(self, tick: int, now: Array) -> PlannerView:
         """Return what planners see of the states (S, 8), the law-abiding having decided."""

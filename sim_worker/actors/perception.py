@@ -79,15 +79,19 @@ class Sight:
             hidden_by=self._hidden_by[futures],
             walks=self._walks[futures],
             tick_s=self._tick_s,
-            kept=len(self._past),
+            kept=len(self._past) + 1,
         )
 
-    def carry_on(self, before: Sight, futures: Flags) -> None:
-        """Let the `futures` (S,) remember what they saw before."""
+    def carry_on(self, before: Sight, futures: Flags, *, looked: bool) -> None:
+        """Let the `futures` (S,) remember what they saw before, both sights being `begun`.
+
+        Who has `looked` at this instant already looks again.
+        """
+        past = [*before._past[1:], before._past[-1]] if looked else before._past
         kept = futures[:, None], futures[:, None], futures[:, None, None]
         self._past = [
             tuple(np.where(k, *pair) for k, *pair in zip(kept, theirs, mine, strict=True))
-            for mine, theirs in zip(self._past, before._past, strict=True)
+            for mine, theirs in zip(self._past, past, strict=True)
         ]
 
     def look(

@@ -1,0 +1,167 @@
+"""What the single and the vector environment have in common: from actions to what they led to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.drive import VehicleState
+from contracts.errors import UserError
+from contracts.futures import FuturesJob, PathAhead
+from contracts.scenario import Scenario
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+from sim_worker.gym.actions import Control, action_size, commands
+from sim_worker.gym.episodes import (
+    Episodes,
+    episodes_of_job,
+    episodes_of_scenario,
+    episodes_of_states,
+)
+from sim_worker.gym.observation import Observation, feature_names, observe
+from sim_worker.gym.reward import Reward, default_reward
+from sim_worker.gym.rows import EpisodeRows, Flags, StepFacts
+from sim_worker.play import Rows
+from sim_worker.vehicle.parameters import load_vehicle
+
+KINDS = ("scenario", "job", "states")
+CASE = "case"
+
+
+class Source(NamedTuple):
+    """Where episodes come from: a scenario at a place, a job, or recorded states on a path.
+
+    See the functions of `sim_worker.gym.episodes` that have these arguments; with `states`, a
+    scenario is optional.
+    """
+
+    world: World | str | Path
+    scenario: Scenario | str | None = None
+    values: Mapping[str, float] | None = None
+    place: str | int = 0
+    job: FuturesJob | str | Path | None = None
+    states: Sequence[VehicleState] = ()
+    path: PathAhead | None = None
+    cases: int = 64
+    cases_seed: int = 0
+    early_or_late_s: float = 2.0
+
+    def altered(self, options: Mapping[str, Any]) -> Source:
+        """Return the source with other values; raises UserError for an unknown one."""
+        for name in options:
+            if name not in self._fields:
+                known = ", ".join((CASE, *self._fields))
+                raise UserError(f"reset knows no option {name!r}; known: {known}")
+        kept = {} if not {"job", "states"} & options.keys() else {"job": None, "states": ()}
+        if "scenario" in options and "states" not in options:
+            kept["job"] = None
+        return self._replace(**{**kept, **options})
+
+    def episodes(self, vehicle: VehicleParameters) -> Episodes:
+        """Return the episodes; raises UserError where the arguments do not fit."""
+        if self.job is not None:
+            return episodes_of_job(self.world, self.job)
+        drawn: dict[str, Any] = {
+            "values": self.values,
+            "cases": self.cases,
+            "cases_seed": self.cases_seed,
+            "early_or_late_s": self.early_or_late_s,
+        }
+        if len(self.states):
+            if self.path is None:
+                raise UserError("recorded states need the path that lay ahead")
+            return episodes_of_states(
+                self.world, self.states, self.path, vehicle, scenario=self.scenario, **drawn
+            )
+        scenario = self.scenario or "roundabout_entry"
+        return episodes_of_scenario(self.world, scenario, vehicle, place=self.place, **drawn)
+
+
+class Begun(NamedTuple):
+    """How one episode begins: the future of the job, and how much later by the lights' plans."""
+
+    case: int
+    lights_s: float
+
+
+class Course:
+    """S cars that learners drive: numbers in, numbers out, without Gymnasium's conventions."""
+
+    def __init__(
+        self,
+        source: Source,
+        *,
+        count: int,
+        control: Control = "free",
+        nearest: int = 6,
+        horizon_s: float = 20.0,
+        control_hz: float = 10.0,
+        reward: Reward = default_reward,
+        vehicle: VehicleParameters | None = None,
+        threads: int = 1,
+    ) -> None:
+        """Compile the World; raises UserError for episodes that cannot be played."""
+        self.control: Control = control
+        self.action_size = action_size(control)
+        self.features = feature_names(nearest)
+        self.count, self.control_hz = count, control_hz
+        self._nearest, self._reward, self._threads = nearest, reward, threads
+        self._most_ticks = max(round(horizon_s * control_hz), 1)
+        self._vehicle = vehicle or load_vehicle()
+        self._load(source)
+
+    def _load(self, source: Source) -> None:
+        self.source = source
+        self.rows = EpisodeRows(
+            source.episodes(self._vehicle),
+            self._vehicle,
+            count=self.count,
+            control_hz=self.control_hz,
+            threads=self._threads,
+        )
+
+    def alter(self, options: Mapping[str, Any]) -> None:
+        """Take episodes from elsewhere, if options say so; raises UserError where they cannot."""
+        if options:
+            self._load(self.source.altered(options))
+
+    def draw(self, rng: np.random.Generator, case: int | None = None) -> Begun:
+        """Draw how an episode begins; `case` chooses among the playable ones."""
+        playable = self.rows.playable
+        drawn = int(rng.integers(len(playable)))
+        lights_s = float(rng.uniform(0.0, self.rows.light_cycle_s))
+        if case is not None:
+            if not 0 <= case < len(playable):
+                raise UserError(f"there are {len(playable)} cases; there is no number {case}")
+            drawn = case
+        return Begun(int(playable[drawn]), lights_s)
+
+    def begin(self, rows: Rows, begun: Sequence[Begun], *, looked: bool = False) -> None:
+        """Let some rows begin; see `EpisodeRows.begin`."""
+        cases, lights_s = zip(*begun, strict=True)
+        self.rows.begin(rows, np.array(cases), np.array(lights_s), looked=looked)
+
+    def look(self) -> Observation:
+        """Return what all see now (S, D)."""
+        self._seen = self.rows.look()
+        return observe(self._seen, nearest=self._nearest)
+
+    def step(self, actions: Array) -> tuple[Array, StepFacts]:
+        """Carry out actions (S, A) and return what they were worth (S,), and what happened."""
+        wanted = np.asarray(actions, dtype=np.float64).reshape(self.count, self.action_size)
+        facts = self.rows.step(commands(wanted, self._seen.view, control=self.control))
+        return np.asarray(self._reward(facts), dtype=np.float64), facts
+
+    def over_time(self) -> Flags:
+        """(S,) bool: whether an episode has lasted as long as it may."""
+        return np.asarray(self.rows.ticks >= self._most_ticks)
+
+
+def told(facts: StepFacts) -> dict[str, Array | Flags]:
+    """Return what `info` says of a step: the fields of `StepFacts` that are no motion."""
+    names = ("collided", "off_road", "arrived", "ran_red", "did_not_wait", "failed")
+    return {"progress_m": facts.progress_m, **{name: getattr(facts, name) for name in names}}
