@@ -54,17 +54,23 @@ def place_scenarios(
     raise typer.Exit(place_them(request, as_json=as_json))
 
 
+MapOption = Annotated[Path, typer.Option("--map", help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")]
+IdOption = Annotated[str | None, typer.Option("--id", help="the junction's id")]
+AtOption = Annotated[str | None, typer.Option("--at", help="LAT,LON: the junction nearest to it")]
+CaseOption = Annotated[int, typer.Option("--case", help="which of its cases, from 1")]
+VehicleOption = Annotated[Path | None, typer.Option("--vehicle", help="vehicle parameters, TOML")]
+ScenarioArgument = Annotated[str, typer.Argument(help="id or TOML file")]
+
+
 @scenarios.command("export")
 def export_scenario(
-    scenario: Annotated[str, typer.Argument(help="id or TOML file")],
-    map_file: Annotated[
-        Path, typer.Option("--map", help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")
-    ],
+    scenario: ScenarioArgument,
+    map_file: MapOption,
     out: Annotated[Path, typer.Option("--out", help=".xosc file to write; .xodr goes beside it")],
-    junction_id: Annotated[str | None, typer.Option("--id", help="the junction's id")] = None,
-    at: Annotated[str | None, typer.Option(help="LAT,LON: the junction nearest to it")] = None,
-    case: Annotated[int, typer.Option(help="which of its cases, from 1")] = 1,
-    vehicle: Annotated[Path | None, typer.Option(help="vehicle parameters, TOML")] = None,
+    junction_id: IdOption = None,
+    at: AtOption = None,
+    case: CaseOption = 1,
+    vehicle: VehicleOption = None,
     service_roads: ServiceRoadsOption = False,
 ) -> None:
     """Write one case at one junction as OpenSCENARIO 1.2, with its roads as OpenDRIVE."""
@@ -74,3 +80,24 @@ def export_scenario(
 
     where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
     export(CaseRequest(scenario, where, case, vehicle), out)
+
+
+@scenarios.command("draw")
+def draw_scenario(
+    scenario: ScenarioArgument,
+    map_file: MapOption,
+    out: Annotated[Path, typer.Option("--out", help=".png file to write")],
+    junction_id: IdOption = None,
+    at: AtOption = None,
+    case: CaseOption = 1,
+    planner: Annotated[str, typer.Option(help="who drives the ego")] = "pure_pursuit_idm",
+    vehicle: VehicleOption = None,
+    service_roads: ServiceRoadsOption = False,
+) -> None:
+    """Draw one case at one junction from above: as planned, and as a planner drives it."""
+    from orchestrator.scenario_commands import PlaceRequest
+    from orchestrator.scenario_export import CaseRequest
+    from orchestrator.scenario_export import draw_scenario as draw
+
+    where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
+    draw(CaseRequest(scenario, where, case, vehicle), out, planner=planner)

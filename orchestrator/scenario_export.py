@@ -1,4 +1,4 @@
-"""`foretwin scenarios export`: one case of a scenario at one junction, for other simulators."""
+"""`foretwin scenarios export` and `draw`: one case of a scenario at one junction, as a file."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from contracts.errors import UserError
 from contracts.scenario import Scenario
 from contracts.world import World
 from orchestrator.scenario_commands import RADIUS_M, PlaceRequest, asked_junctions
+from sim_worker.planners.registry import check_planner
 from sim_worker.scenarios.casting import Cast, cast
 from sim_worker.scenarios.drawing import draw_cases
 from sim_worker.scenarios.openscenario import write_openscenario
@@ -54,6 +55,31 @@ def export_scenario(request: CaseRequest, out: Path) -> None:
     played = found.played
     print(f"{out}: {found.scenario.id}, case {request.case}, at {played.place.junction_id}")
     print(f"{roads}: its roads")
+
+
+def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> None:
+    """Write a picture of one case: as planned, and as a planner drives it.
+
+    Raises UserError where there is no such case, place or planner, or where the planner fails.
+    """
+    from sim_worker.scenarios.picture import write_case_picture
+    from sim_worker.scenarios.picture_runs import heedless_run, planned_run
+
+    if out.suffix != ".png":
+        raise UserError(f"{out}: a picture of a case is written as .png")
+    try:
+        check_planner(planner)
+    except ValueError as error:
+        raise UserError(str(error)) from error
+    vehicle = load_vehicle(request.vehicle)
+    scenario, world, played = placed_case(request)
+    heedless = heedless_run(played, vehicle, horizon_s=scenario.horizon_s)
+    try:
+        planned = planned_run(played, scenario, world, vehicle, planner=planner)
+    except ValueError as error:
+        raise UserError(str(error)) from error
+    write_case_picture(out, played, scenario, world, heedless, planned, planner=planner)
+    print(f"{out}: {scenario.id}, case {request.case}, at {played.place.junction_id}")
 
 
 def placed_case(request: CaseRequest) -> PlacedCase:

@@ -138,3 +138,18 @@ def test_a_case_is_exported_with_its_roads(
     assert "has no place at" in capsys.readouterr().err
     assert run(["scenarios", "export", "scp", "--map", MAP, "--out", str(out)]) == 2
     assert "name the junction" in capsys.readouterr().err
+
+
+def test_a_case_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    where = next(
+        j.summary for j in open_map(EMBEDDED_MAP).junctions if j.summary.kind == "crossing"
+    )
+    out = tmp_path / "scp.png"
+    asked = ["scenarios", "draw", "scp", "--map", MAP, "--id", where.id, "--out", str(out)]
+    assert run(asked) == 0
+    assert capsys.readouterr().out == f"{out}: scp, case 1, at {where.id}\n"
+    assert out.read_bytes().startswith(b"\x89PNG")
+    assert run([*asked, "--planner", "nobody"]) == 2
+    assert "unknown planner 'nobody'" in capsys.readouterr().err
+    assert run([*asked[:-1], str(tmp_path / "scp.svg")]) == 2
+    assert "a picture of a case is written as .png" in capsys.readouterr().err
