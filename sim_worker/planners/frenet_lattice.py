@@ -40,7 +40,7 @@ _SLOPE = 0.3
 _WEIGHT_SPEED, _WEIGHT_ACCEL, _WEIGHT_JERK = 0.15, 0.25, 0.05
 _WEIGHT_ASIDE, _WEIGHT_ACROSS_JERK = 0.6, 0.1
 _FORBIDDEN, _CROSSES_LINE, _COLLIDES = 1e3, 300.0, 100.0
-_LOOKAHEAD_S = 0.6
+_LOOKAHEAD_S, _PREVIEW_S = 0.6, 0.1
 _SPEED_GAIN, _PLACE_GAIN = 1.2, 0.3
 _HOLD_MPS, _HOLD_MPS2 = 0.3, -2.0
 
@@ -55,7 +55,7 @@ class FrenetLattice:
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
-        return self.begin(len(view.arc_m)).plan(view)
+        return LatticeDriver(preview_s=REPLAN_S).plan(view)
 
     def begin(self, count: int) -> LatticeDriver:
         """Return what drives the cars of one job."""
@@ -67,7 +67,10 @@ class LatticeDriver:
 
     remarks: Mapping[int, str] = {}
 
-    def __init__(self) -> None:
+    def __init__(self, *, preview_s: float = _PREVIEW_S) -> None:
+        """`preview_s`: over so much of the plan's beginning its acceleration is taken, as the
+        plan begins with the present one."""
+        self._preview_s = preview_s
         self._chosen: tuple[Motions, Motions] | None = None
         self._since_s = 0.0
 
@@ -80,7 +83,8 @@ class LatticeDriver:
             self._since_s, passed_s = view.time_s, 0.0
         along, across = chosen
         now = np.asarray(passed_s)
-        place, speed, accel = along.at(now)
+        place, speed, _ = along.at(now)
+        accel = (along.at(now + self._preview_s)[1] - speed) / self._preview_s
         offset = np.asarray(across.place_at(now + _LOOKAHEAD_S), dtype=np.float64)
         angle = pure_pursuit(view._replace(desired_offset_m=offset))
         present = view.states[:, 3]
