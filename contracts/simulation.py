@@ -42,7 +42,9 @@ class BuildReply(msgspec.Struct, frozen=True, kw_only=True):
 class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     """One round for those who watch: futures (S, M, 2) and the rest in the drive's frame.
 
-    `criticality` (S,) in 0..1: 1 collides, 0 keeps 10 m or more from everything.
+    `criticality` (S,) in 0..1: 1 collides, 0 keeps 10 m or more from everything. `user_xy_m`
+    (K, M, 2) are tracks of road users whom the worst futures meet, `touch_xy_m` (C, 2) where cars
+    touch one, with the scenario's id in `touch_names`.
     """
 
     round_id: int
@@ -56,6 +58,9 @@ class RoundView(msgspec.Struct, frozen=True, kw_only=True):
     collided: int
     min_clearance_m: float | None
     latency_ms: float
+    user_xy_m: Array32
+    touch_xy_m: Array32
+    touch_names: tuple[str, ...]
 
 
 class HorizonError(msgspec.Struct, frozen=True, kw_only=True):

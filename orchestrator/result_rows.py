@@ -8,15 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.frames import LocalFrame, target_from_source
 from contracts.futures import FuturesResult, Variant
-from contracts.simulation import Comparison, HorizonError, MirrorSample, PlanComparison, RoundView
+from contracts.simulation import Comparison, HorizonError, MirrorSample, PlanComparison
 from orchestrator.rounds import RoundDone
 from sim_worker.metrics.displacement import distinct_count
 
 DISTINCT_M = 0.1
-VIEW_POINTS = 25
-SAFE_CLEARANCE_M = 10.0
 
 
 class RoundFutures(NamedTuple):
@@ -108,38 +105,6 @@ def round_row(
         "cpu_seconds": sum(r.cpu_seconds for r in done.results),
         "sha256": sha256,
     }
-
-
-def round_view(
-    done: RoundDone,
-    futures: RoundFutures,
-    world_frame: LocalFrame,
-    drive_frame: LocalFrame,
-    variants: Sequence[Variant],
-) -> RoundView:
-    """Return a round for those who watch: fewer points, in the drive's frame, with criticality."""
-    count, instants = futures.states.shape[:2]
-    kept = np.unique(np.linspace(0, instants - 1, VIEW_POINTS).round().astype(int))
-    flat = futures.states[:, kept, :3].reshape(-1, 3)
-    moved = target_from_source(drive_frame, world_frame, flat[:, :2], flat[:, 2]).xy_m
-    clearance = np.where(np.isfinite(futures.min_clearance_m), futures.min_clearance_m, np.inf)
-    criticality = np.where(
-        futures.collided, 1.0, np.clip(1.0 - clearance / SAFE_CLEARANCE_M, 0.0, 0.95)
-    )
-    nearest = float(clearance.min()) if count else np.inf
-    return RoundView(
-        round_id=done.order.round_id,
-        stamp_ns=done.order.stamp_ns,
-        intersection_id=done.order.junction_id,
-        world_id=done.order.world_id,
-        xy_m=moved.reshape(count, len(kept), 2).astype(np.float32),
-        criticality=criticality.astype(np.float32),
-        nominal_index=0,
-        names=tuple(variant.name for variant in variants),
-        collided=int(np.count_nonzero(futures.collided)),
-        min_clearance_m=nearest if np.isfinite(nearest) else None,
-        latency_ms=done.latency_ms,
-    )
 
 
 def comparison_row(comparison: Comparison) -> dict[str, Any]:

@@ -21,10 +21,10 @@ from orchestrator.result_rows import (
     future_rows,
     plan_row,
     round_row,
-    round_view,
 )
 from orchestrator.results import ResultTables
 from orchestrator.round_jobs import PLAN_FRESH_NS, RoundPlanner
+from orchestrator.round_views import round_view
 from orchestrator.rounds import RoundDesk, RoundDone, RoundOrder
 from sim_worker.metrics.comparison import compare_plan
 

@@ -14,6 +14,7 @@ from viewer.rows import Row, static, table_cell
 
 SAFE, WATCH, CRITICAL = (56, 176, 92), (255, 184, 28), (234, 62, 56)
 NOMINAL: Colour = (250, 250, 255)
+ROAD_USER: Colour = (214, 112, 214)
 BASELINES: dict[str, tuple[Colour, str]] = {
     "nominal": (TWIN, "nominal future"),
     "constant_velocity": ((255, 176, 66), "constant velocity"),
@@ -69,6 +70,7 @@ def _futures(view: RoundView, drive_ns: int) -> list[Row]:
     count, points = view.xy_m.shape[:2]
     if count == 0 or points < 2:
         return no_futures(drive_ns)
+    others = _road_users(view, drive_ns)
     chosen = np.unique(np.linspace(0, points - 1, min(points, FUTURE_POINTS)).round().astype(int))
     # Rounded to 1/64 m, paths compress to a third.
     paths = np.round(view.xy_m[:, chosen].astype(np.float64) * 64.0) / 64.0
@@ -100,6 +102,32 @@ def _futures(view: RoundView, drive_ns: int) -> list[Row]:
                 strips[:, -1].astype(np.float32),
                 colors=colours[usable],
                 radii=np.where(radii[usable] > 0.2, 0.7, 0.45),
+            ),
+        ),
+        *others,
+    ]
+
+
+def _road_users(view: RoundView, drive_ns: int) -> list[Row]:
+    """Return whom the worst futures meet, and where they touch, with the scenarios' names."""
+    tracks = view.user_xy_m[np.isfinite(view.user_xy_m).all(axis=(1, 2))]
+    raised = np.concatenate([tracks, np.full((*tracks.shape[:2], 1), 0.35, np.float32)], axis=2)
+    touches = np.column_stack([view.touch_xy_m, np.full(len(view.touch_xy_m), 0.8)])
+    return [
+        Row(
+            "world/futures/road_users",
+            drive_ns,
+            rr.LineStrips3D(list(raised), colors=[ROAD_USER], radii=[0.06]),
+        ),
+        Row(
+            "world/futures/touches",
+            drive_ns,
+            rr.Points3D(
+                touches.astype(np.float32),
+                colors=[CRITICAL],
+                radii=[0.6],
+                labels=list(view.touch_names),
+                show_labels=False,
             ),
         ),
     ]

@@ -14,9 +14,9 @@ from orchestrator.result_rows import (
     mirror_row,
     plan_row,
     round_row,
-    round_view,
 )
 from orchestrator.results import TABLES
+from orchestrator.round_views import round_view
 from tests.orchestrator.futures_rounds import round_done, straight, variants
 from tests.orchestrator.trip import START_NS, town_world
 from tests.viewer.scene import drive

@@ -139,6 +139,9 @@ def round_at(time_s: float, *, futures: int = 64, points: int = 81) -> RoundView
         collided=int((criticality >= 1.0).sum()),
         min_clearance_m=0.4,
         latency_ms=180.0,
+        user_xy_m=xy[:2, ::-1].astype(np.float32),
+        touch_xy_m=xy[:1, -1].astype(np.float32),
+        touch_names=("ltap_od",),
     )
 
 
