@@ -23,7 +23,7 @@ from orchestrator.sweep_spec import (
     Loaded,
     SweepSpec,
 )
-from sim_worker.planners.registry import load_planner
+from sim_worker.planners.registry import drives_backwards
 from sim_worker.scenarios.drawing import Values, draw_cases
 
 MOST_CELLS = 5_000_000
@@ -123,11 +123,7 @@ def with_parameters(values: Values, parameters: Mapping[str, float]) -> Values:
 
 def planners_for(scenario: Scenario, spec: SweepSpec) -> tuple[str, ...]:
     """Return which of the planners drive a scenario: backwards, only those that can."""
-    able = tuple(
-        name
-        for name in spec.planners
-        if bool(getattr(load_planner(name), "drives_backwards", False)) == scenario.ego.reverse
-    )
+    able = tuple(name for name in spec.planners if drives_backwards(name) == scenario.ego.reverse)
     return able or ((BACKWARDS_PLANNER,) if scenario.ego.reverse else ())
 
 

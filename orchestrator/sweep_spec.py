@@ -15,7 +15,7 @@ from contracts.vehicle import VehicleParameters
 from orchestrator.map_choice import node_of_id, parse_bbox
 from orchestrator.world_command import MAX_RADIUS_M, MIN_RADIUS_M
 from sim_worker.metrics.table import METRICS
-from sim_worker.planners.registry import load_planner
+from sim_worker.planners.registry import check_planner
 from sim_worker.scenarios.reading import catalogue, find_scenario
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.vehicle.planar import TIMESTEP_S
@@ -129,7 +129,7 @@ def check_spec(spec: SweepSpec) -> Loaded:
         for name in spec.junctions if spec.map is not None else ():
             node_of_id(name)
     for name in spec.planners:
-        load_planner(name)
+        check_planner(name)
     _check_metrics(spec.metrics)
     _check_parameters(spec.parameters)
     return Loaded(

@@ -21,6 +21,7 @@ from sim_worker.actors.cast import KIND_NAMES
 from sim_worker.closed_loop import DriveRecord, drive
 from sim_worker.judging import judge, with_collisions
 from sim_worker.measuring import measure
+from sim_worker.rehearsal import staged_cases
 from sim_worker.scene import Scene, SceneMaker
 from sim_worker.stage import Stage
 from sim_worker.touch import Touches
@@ -45,7 +46,8 @@ def run_job(
         raise ValueError(f"job for world {job.world_id} on a stage that holds {held}")
     ticks, every = _ticks(job, stage)
     maker = SceneMaker(world) if scenes is None else scenes
-    scene = maker.scene(job, stage.vehicle, tick_s=stage.control_dt_s)
+    staged = staged_cases(job, stage, maker)
+    scene = maker.scene(job, stage.vehicle, tick_s=stage.control_dt_s, staged=staged)
     with np.errstate(over="ignore", invalid="ignore"):
         record = drive(scene, stage, ticks=ticks)
         states = record.states[:, ::every].astype(np.float32)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.drive import SignalColour
@@ -22,7 +23,8 @@ from sim_worker.actors.seen import seen_actors
 from sim_worker.actors.traffic import Traffic
 from sim_worker.faults import FaultArrays, fault_arrays
 from sim_worker.planners.base import KnownPlan, SharedGround
-from sim_worker.planners.path import FrenetPath, FrenetPoint
+from sim_worker.planners.path import FrenetPath
+from sim_worker.planners.registry import drives_backwards
 from sim_worker.scenarios.live import LiveScenarios
 from sim_worker.scenarios.places import Unplaced
 from sim_worker.scenarios.roads import RoadNetwork
@@ -67,6 +69,11 @@ class Scene(NamedTuple):
     left_out: tuple[str, ...]
     """(S,) why a future's scenario does not happen in it, in words; empty where it does."""
 
+    @property
+    def backwards(self) -> npt.NDArray[np.bool_]:
+        """(S,) whose planner drives in reverse."""
+        return np.array([drives_backwards(name) for name in self.planners])
+
     def red_arcs_m(self, time_s: float) -> Array:
         """Return (P, K) the stop lines of all paths that show no green at a time of the job."""
         if not self.rules.groups:
@@ -102,9 +109,22 @@ class SceneMaker:
         self._live = LiveScenarios(self._network)
         self.staged = StagedScenarios(self._network)
         """The scenarios of this World at named places, away from any drive."""
+        self.rehearsed: dict[tuple[object, ...], Any] = {}
+        """Drives of egos alone that cases were cast on."""
 
-    def scene(self, job: FuturesJob, vehicle: VehicleParameters, *, tick_s: float) -> Scene:
+    def scene(
+        self,
+        job: FuturesJob,
+        vehicle: VehicleParameters,
+        *,
+        tick_s: float,
+        staged: Mapping[int, Cast | Unplaced] | None = None,
+        start_arc_m: Array | None = None,
+    ) -> Scene:
         """Return the scene of a job on this World.
+
+        `staged` are the cases of the rows that name their place, if they are known already;
+        `start_arc_m` (S,) is about where the cars are, if that is known.
 
         Raises ValueError for a scenario that the job does not define, or a state that is not
         finite.
@@ -113,7 +133,8 @@ class SceneMaker:
         path = FrenetPath(job.path.xy_m, job.path.speed_limit_mps)
         scenarios = {scenario.id: scenario for scenario in job.scenarios}
         scenario_of = [_scenario_of(variant, scenarios) for variant in job.variants]
-        staged = self._staged(job, scenario_of, vehicle)
+        if staged is None:
+            staged = self.staged_cases(job, vehicle)
         if job.starts is None:
             starts = np.repeat(local_state(job.state, self.world.frame, vehicle)[None], count, 0)
             for row, played in staged.items():
@@ -122,8 +143,14 @@ class SceneMaker:
         else:
             starts = np.array(job.starts, dtype=np.float64)
         place = path.locate(starts[:, :2], upto_arc_m=_CAR_WITHIN_M)
-        if staged:
-            place = _where_staged(path, starts, place, staged)
+        if staged and start_arc_m is None:
+            start_arc_m = place.arc_m
+            for row, played in staged.items():
+                if isinstance(played, Cast):
+                    start_arc_m[row] = played.ego_arc_m
+        if start_arc_m is not None:
+            # Ways may be long, and cross themselves.
+            place = path.locate(starts[:, :2], near_arc_m=start_arc_m)
         aims = _aims(job, place.offset_m)
         live = any(v.scenario_id and not v.place for v in job.variants)
         on_path = self._live.on(path, float(place.arc_m[0]), vehicle) if live else None
@@ -188,20 +215,18 @@ class SceneMaker:
             left_out=tuple(left_out),
         )
 
-    def _staged(
-        self,
-        job: FuturesJob,
-        scenario_of: Sequence[Scenario | None],
-        vehicle: VehicleParameters,
+    def staged_cases(
+        self, job: FuturesJob, vehicle: VehicleParameters
     ) -> dict[int, Cast | Unplaced]:
-        """Return the cases of the rows that name their place."""
+        """Return the cases of the rows that name their place, on its path as it is."""
+        known = {scenario.id: scenario for scenario in job.scenarios}
         rows: dict[tuple[str, str], list[int]] = {}
         for row, variant in enumerate(job.variants):
             if variant.place and variant.scenario_id:
                 rows.setdefault((variant.scenario_id, variant.place), []).append(row)
         found: dict[int, Cast | Unplaced] = {}
         for (_, place), mine in rows.items():
-            scenario = scenario_of[mine[0]]
+            scenario = _scenario_of(job.variants[mine[0]], known)
             assert scenario is not None
             cases = [job.variants[row].values for row in mine]
             found.update(zip(mine, self.staged.cast(scenario, cases, place, vehicle), strict=True))
@@ -217,17 +242,6 @@ def _scenario_of(variant: Variant, known: Mapping[str, Scenario]) -> Scenario | 
             f"{', '.join(known) or 'none'}"
         )
     return known[variant.scenario_id]
-
-
-def _where_staged(
-    path: FrenetPath, starts: Array, place: FrenetPoint, staged: Mapping[int, Cast | Unplaced]
-) -> FrenetPoint:
-    """Return where cars start, those of cases near where these say: ways may cross themselves."""
-    near = place.arc_m.copy()
-    for row, played in staged.items():
-        if isinstance(played, Cast):
-            near[row] = played.ego_arc_m
-    return path.locate(starts[:, :2], near_arc_m=near)
 
 
 def _faults(variant: Variant, scenario: Scenario | None) -> Faults:

@@ -135,12 +135,14 @@ class Stage:
         steering_delay_s: Array,
         friction_factor: Array,
         steering_history_rad: Array | None = None,
+        backwards: npt.NDArray[np.bool_] | None = None,
     ) -> None:
         """Start S futures from base_link `states` (S, 8) in the World's frame.
 
         `steering_delay_s` (S,) whole, `friction_factor` (S,) of the vehicle's friction.
         `steering_history_rad` (S, H) are the tyre angles commanded before, one physics step
         apart, latest last; without it the present angle counts as having been commanded all along.
+        `backwards` (S,) says whose gear is in reverse, where one's is.
         Raises ValueError for too many states or a delay beyond the buffer.
         """
         count = len(states)
@@ -171,6 +173,7 @@ class Stage:
             forcerange=self._forcerange[rows],
             tick_s=self.control_dt_s,
             accel_mps2=start[:, 7],
+            backwards=backwards,
         )
         self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
         record = np.zeros((count, self.steps_per_tick, self.model.nsensordata))

@@ -55,3 +55,8 @@ def check_planner(name: str) -> None:
     planner = load_planner.__wrapped__(name)
     if isinstance(planner, HostedPlanner):
         planner.close()
+
+
+def drives_backwards(name: str) -> bool:
+    """Return whether a planner has its cars driven in reverse: of foretwin's own, some do."""
+    return bool(getattr(_BUILT_IN.get(name), "drives_backwards", False))

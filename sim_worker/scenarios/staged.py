@@ -21,6 +21,7 @@ from sim_worker.scenarios.placement import places_on_passage
 from sim_worker.scenarios.places import Place, Unplaced
 from sim_worker.scenarios.roads import RoadNetwork
 from sim_worker.scenarios.roles import Cast, CastActor
+from sim_worker.scenarios.ways import Way
 from sim_worker.seeding import kinematic_tire_angle, rear_slip_velocity
 from world_gen.polyline import length
 
@@ -34,6 +35,8 @@ class StagedScenarios:
         self._network = network
         self._places: dict[tuple[str, str], Place | None] = {}
         self._casts: dict[_Case, Cast | Unplaced] = {}
+        self._ways: dict[int, Way | None] = {}
+        """Those that cases were cast on: as long as they are kept, no other has their identity."""
 
     def place(self, scenario: Scenario, name: str) -> Place | None:
         """Return the place of that name, None where the scenario has none so named."""
@@ -48,21 +51,33 @@ class StagedScenarios:
         cases: Sequence[Mapping[str, float]],
         place_name: str,
         vehicle: VehicleParameters,
+        *,
+        ego_way: Way | None = None,
+        ego_arc_m: float | None = None,
     ) -> tuple[Cast | Unplaced, ...]:
-        """Return cases of a scenario at a place, each begun where the case has the ego begin."""
+        """Return cases of a scenario at a place, each begun where the case has the ego begin.
+
+        `ego_way` is the line that the ego really drives, in place of the place's own; with
+        `ego_arc_m` it starts there, and not where the case says.
+        """
         place = self.place(scenario, place_name)
         if place is None:
             own = self._network.world.intersection.id
             reason = f"the World has no place {place_name!r} for {scenario.id}"
             return tuple(Unplaced(own, reason, True) for _ in cases)
+        if ego_way is not None:
+            place = place._replace(ego=ego_way)
         keys = [
-            (scenario.id, scenario.lead_time_s, scenario.horizon_s, place.name, vehicle.name,
-             *values.items())
+            (id(ego_way), ego_arc_m, scenario.id, scenario.lead_time_s, scenario.horizon_s,
+             place.name, vehicle.name, *values.items())
             for values in cases
         ]  # fmt: skip
         new = {key: dict(c) for key, c in zip(keys, cases, strict=True) if key not in self._casts}
-        played = cast_all(scenario, tuple(new.values()), place, vehicle=vehicle)
+        played = cast_all(
+            scenario, tuple(new.values()), place, vehicle=vehicle, ego_arc_m=ego_arc_m
+        )
         self._casts.update(zip(new, played, strict=True))
+        self._ways[id(ego_way)] = ego_way
         return tuple(self._casts[key] for key in keys)
 
 
@@ -83,13 +98,19 @@ def _named(scenario: Scenario, network: RoadNetwork, name: str) -> Place | None:
 def staged_players(played: Cast, path: FrenetPath) -> tuple[Player, ...]:
     """Return the road users of a case; `path` is the ego's way, shared by all that go along it."""
     ways = {way.name: way for options in played.place.actor_ways for way in options}
+    ego = played.place.ego
     players = []
     for actor in played.actors:
-        way = ways.get(actor.way, played.place.ego)
-        on = path if way is played.place.ego else way.path
+        way = ways.get(actor.way, ego)
         # A path that was led back for its actor begins by so much before its way.
         arc = actor.start_arc_m - (length(actor.xy_m) - length(way.xy_m))
-        players.append(player_on(actor, on, arc))
+        if way is ego:
+            # The ego may have been cast on the line that it really drives.
+            stands = ego.path.point_at(np.array([arc]))
+            arc = float(path.locate(stands, near_arc_m=np.array([arc])).arc_m[0])
+            players.append(player_on(actor, path, arc))
+        else:
+            players.append(player_on(actor, way.path, arc))
     return tuple(players)
 
 

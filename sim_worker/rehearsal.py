@@ -1,0 +1,221 @@
+"""Cases as a real car meets them: cast on the line that it drives when nobody intervenes.
+
+A car cuts and runs wide in bends, where its path is a line without inertia. So the ego drives
+alone first, and who is to meet it is cast on the line that it left, at the time it came by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.futures import FuturesJob, Variant
+from contracts.scenario import EGO
+from sim_worker.closed_loop import drive
+from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.places import Unplaced
+from sim_worker.scenarios.roles import ALONG, Cast
+from sim_worker.scenarios.staged import staged_start
+from sim_worker.scenarios.ways import Way
+from sim_worker.scene import SceneMaker
+from sim_worker.stage import Stage
+
+_FORWARDS, _BACKWARDS = "constant_speed", "reverse_pursuit"
+_STRAIGHT_PM = 1e-3
+"""On a line that bends no more, a car is where its path is."""
+_RUN_UP_M = 10.0
+"""Who starts so far before the first bend drives it as all do who come along there."""
+_KEEPS_SPEED = 0.15
+"""A car whose speed differs by more of what the case says does something else."""
+_AFTER_S = 1.0
+"""Lines go on for so long after the last impact."""
+
+
+class _Ego(NamedTuple):
+    """How an ego drives when nobody intervenes; all egos of a job that do so share one line.
+
+    Where they start matters from where the path bends on; before it, `start_m` is None.
+    """
+
+    speed_mps: float
+    lateral_m: float
+    reverse: bool
+    start_m: float | None
+
+
+class DrivenLine(NamedTuple):
+    """The line of one drive: its way, and when (T,) it came by which arc length (T,)."""
+
+    way: Way
+    time_s: Array
+    arc_m: Array
+
+
+def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, Cast | Unplaced]:
+    """Return the cases of the rows that name their place, met where the car really drives.
+
+    A function of the job, as what it leads to: the drives of one job are driven together, and kept
+    for jobs that ask for the very same.
+    """
+    played = maker.staged_cases(job, stage.vehicle)
+    bent = {
+        row: case
+        for row, case in played.items()
+        if isinstance(case, Cast) and math.isfinite(case.impact_time_s) and _bends(case)
+    }
+    if not bent:
+        return played
+    lines = _lines(job, bent, stage, maker)
+    groups: dict[tuple[str, str, _Ego], list[int]] = {}
+    for row, case in bent.items():
+        variant = job.variants[row]
+        groups.setdefault((variant.scenario_id, variant.place, _ego(case)), []).append(row)
+    scenarios = {scenario.id: scenario for scenario in job.scenarios}
+    for (scenario_id, place, ego), rows in groups.items():
+        line = lines[ego]
+        cases = [job.variants[row].values for row in rows]
+        again = maker.staged.cast(
+            scenarios[scenario_id], cases, place, stage.vehicle, ego_way=line.way,
+            ego_arc_m=ego.start_m,
+        )  # fmt: skip
+        for row, met in zip(rows, again, strict=True):
+            # Where no car can drive like that, nobody can say when it meets somebody.
+            played[row] = _unplanned(bent[row])
+            if isinstance(met, Cast) and met.impact_with == bent[row].impact_with:
+                played[row] = _on_time(met, line) if _drives(met, line) else played[row]
+    return played
+
+
+def _ego(case: Cast) -> _Ego:
+    path = case.place.ego.path
+    bends = path.arc_m[(np.abs(path.curvature_pm) > _STRAIGHT_PM) & (path.arc_m > 0.0)]
+    in_time = case.ego_arc_m < bends.min(initial=np.inf) - _RUN_UP_M
+    shift = case.values[f"{EGO}.lateral_shift_m"]
+    start = None if in_time else case.ego_arc_m
+    return _Ego(case.ego_speed_mps, shift, case.reverse, start)
+
+
+def _bends(case: Cast) -> bool:
+    """Return whether the ego's path bends before the impact."""
+    path = case.place.ego.path
+    until = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
+    inside = (path.arc_m >= case.ego_arc_m - 1.0) & (path.arc_m <= until + 1.0)
+    return bool(np.abs(path.curvature_pm[inside]).max(initial=0.0) > _STRAIGHT_PM)
+
+
+def _lines(
+    job: FuturesJob, bent: Mapping[int, Cast], stage: Stage, maker: SceneMaker
+) -> dict[_Ego, DrivenLine]:
+    """Return the line of each ego, all driven side by side."""
+    first: dict[_Ego, Cast] = {}
+    for case in bent.values():
+        ego = _ego(case)
+        if ego not in first or case.ego_arc_m < first[ego].ego_arc_m:
+            first[ego] = case
+    egos = sorted(first, key=lambda ego: (ego[:3], ego.start_m or 0.0))
+    last_s = max(
+        case.impact_time_s + (case.ego_arc_m - first[_ego(case)].ego_arc_m) / case.ego_speed_mps
+        for case in bent.values()
+    )
+    ticks = math.ceil((last_s + _AFTER_S) / stage.control_dt_s)
+    way = first[egos[0]].place.ego
+    key = (
+        way.name, stage.vehicle.name, stage.control_dt_s, ticks,
+        *((ego, first[ego].ego_arc_m) for ego in egos),
+    )  # fmt: skip
+    if key not in maker.rehearsed:
+        cases = [first[ego] for ego in egos]
+        states = _drive_alone(job, cases, stage, maker, ticks)
+        maker.rehearsed[key] = dict(zip(egos, _told(cases, states, stage), strict=True))
+    lines: dict[_Ego, DrivenLine] = maker.rehearsed[key]
+    return lines
+
+
+def _drive_alone(
+    job: FuturesJob, cases: list[Cast], stage: Stage, maker: SceneMaker, ticks: int
+) -> Array:
+    """Return states (S, T, 8) of egos that nobody meets."""
+    variants = tuple(
+        Variant(
+            index=index, name="alone", planner=_BACKWARDS if case.reverse else _FORWARDS,
+            values={f"{EGO}.speed_mps": case.ego_speed_mps},
+        )
+        for index, case in enumerate(cases)
+    )  # fmt: skip
+    alone = FuturesJob(
+        round_id=job.round_id,
+        job_index=job.job_index,
+        world_id=job.world_id,
+        state=job.state,
+        path=job.path,
+        variants=variants,
+        horizon_s=ticks * stage.control_dt_s,
+        step_s=job.step_s,
+        seed=job.seed,
+        cruise_speed_mps=0.0,
+        starts=np.stack([staged_start(case, stage.vehicle) for case in cases]),
+    )
+    near = np.array([case.ego_arc_m for case in cases])
+    scene = maker.scene(alone, stage.vehicle, tick_s=stage.control_dt_s, start_arc_m=near)
+    return drive(scene._replace(limit_share=None), stage, ticks=ticks).states
+
+
+def _told(cases: Iterable[Cast], states: Array, stage: Stage) -> Iterable[DrivenLine]:
+    for case, driven in zip(cases, states, strict=True):
+        path, way = case.place.ego.path, case.place.ego
+        before = np.arange(0.0, max(case.ego_arc_m - 0.5, 0.0), 1.0)
+        xy = np.concatenate([path.point_at(before, case.ego_lateral_m), driven[:, :2]])
+        steps = np.hypot(*np.diff(xy, axis=0).T)
+        arc = np.concatenate([[0.0], np.cumsum(steps)])
+        moved = np.concatenate([[True], steps > 1e-6])
+        limit = path.at_nodes(np.minimum(path.speed_limit_mps, 1e3), arc)
+        # The lines of egos beside their paths are moved back: casting moves them aside again.
+        line = FrenetPath(xy[moved], limit[moved])
+        if case.ego_lateral_m:
+            xy = line.point_at(arc, -case.ego_lateral_m)
+            line = FrenetPath(xy[moved], limit[moved])
+        yield DrivenLine(
+            way=way._replace(xy_m=xy[moved], speed_limit_mps=limit[moved], path=line),
+            time_s=np.arange(float(len(driven))) * stage.control_dt_s,
+            arc_m=arc[len(before) :],
+        )
+
+
+def _on_time(case: Cast, line: DrivenLine) -> Cast:
+    """Return a case in which those who come meet the ego when it really is there."""
+    met_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
+    from_s, to_s = (_time_at(line, arc, case.ego_speed_mps) for arc in (case.ego_arc_m, met_m))
+    later_s = (to_s - from_s) - case.impact_time_s
+    actors = tuple(
+        actor
+        if actor.relation in ALONG
+        else actor._replace(start_arc_m=actor.start_arc_m - actor.speed_mps * later_s)
+        for actor in case.actors
+    )
+    return case._replace(actors=actors, impact_time_s=case.impact_time_s + later_s)
+
+
+def _drives(case: Cast, line: DrivenLine) -> bool:
+    """Return whether the car drives its line as the case has it, until the impact."""
+    until_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
+    if until_m > line.arc_m[-1]:
+        return False
+    before = (line.arc_m[:-1] >= case.ego_arc_m) & (line.arc_m[:-1] < until_m)
+    speed = (np.diff(line.arc_m) / np.diff(line.time_s))[before]
+    return bool(np.abs(speed / case.ego_speed_mps - 1.0).max(initial=0.0) < _KEEPS_SPEED)
+
+
+def _unplanned(case: Cast) -> Cast:
+    return case._replace(
+        impact_time_s=math.nan, impact_point_m=np.full(2, math.nan), impact_share=math.nan,
+        impact_with="",
+    )  # fmt: skip
+
+
+def _time_at(line: DrivenLine, arc_m: float, speed_mps: float) -> float:
+    before_m = min(arc_m - line.arc_m[0], 0.0)
+    return float(np.interp(arc_m, line.arc_m, line.time_s)) + float(before_m) / speed_mps
