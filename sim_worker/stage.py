@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
-from mujoco import batch as mujoco_batch
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from sim_worker.nearness import NearStatics
-from sim_worker.stage_model import PREFIX, STATIC_CONTACT, compile_stage, world_spec
+from sim_worker.physics import Physics
+from sim_worker.stage_model import PREFIX, compile_stage, world_spec
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
@@ -61,12 +60,8 @@ class Stage:
         nsim: int,
         control_hz: float = 20.0,
         threads: int = 1,
-        spec: mujoco.MjSpec | None = None,
     ) -> None:
-        """Compile; `spec` replaces the World's own geometry (for tests).
-
-        Raises ValueError where a control tick is no whole number of physics steps.
-        """
+        """Compile; raises ValueError where a control tick is no whole number of physics steps."""
         silence_step_clock()
         log_mujoco_warnings()
         steps = 1.0 / (control_hz * TIMESTEP_S)
@@ -82,23 +77,18 @@ class Stage:
         self.timestep_s = TIMESTEP_S
         rate = vehicle.max_tire_rate_radps.value * TIMESTEP_S
         self._reach = rate * np.arange(1, self.steps_per_tick + 1)
-        self.model = compile_stage(world_spec(world) if spec is None else spec, vehicle)
-        self._batch = mujoco_batch.Batch(self.model, nsim, nthread=threads, persistent=True)
+        self.model = compile_stage(world_spec(world), vehicle)
+        """Of the World, with one vehicle in it."""
+        self._physics = Physics(self.model, vehicle, nsim=nsim, threads=threads)
         self._bind()
         self._bound_reach()
         self._ids: Any = None
         self._count = 0
         # Columns that lie together in memory: each is read far more often than a row.
         self._states = np.zeros((8, nsim)).T
-        self._record: dict[str | int | mujoco.mjtState, np.ndarray[Any, Any]] = {}
 
     def _bind(self) -> None:
-        batch, model = self._batch, self.model
-        self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
-        self._ctrl, self._history = batch.bind("ctrl"), batch.bind("history")
-        self._delay = batch.expand("actuator_delay")
-        self._biasprm = batch.expand("actuator_biasprm")
-        self._forcerange = batch.expand("actuator_forcerange")
+        model = self.model
         self._actuators = actuator_ids(model, PREFIX)
         first = model.joint(PREFIX + JOINTS[0])
         self._joints = slice(first.qposadr[0], first.qposadr[0] + len(JOINTS))
@@ -108,15 +98,6 @@ class Stage:
         first = int(model.actuator_historyadr[steer]) + 2 + samples
         self._steer_history = slice(first, first + samples)
         self._history_samples = samples
-        self._static_contact = int(model.sensor(STATIC_CONTACT).adr[0])
-        self._flags = batch.expand("opt.disableflags").reshape(self.nsim)
-        self._looking = int(model.opt.disableflags)
-        # The planar vehicle has no other constraint, and no other sensor.
-        disable = mujoco.mjtDisableBit
-        self._not_looking = self._looking | int(
-            disable.mjDSBL_CONSTRAINT | disable.mjDSBL_CONTACT | disable.mjDSBL_SENSOR
-        )
-        self._control_spec = int(mujoco.mjtState.mjSTATE_CTRL)
 
     def _bound_reach(self) -> None:
         vehicle = self.vehicle
@@ -151,7 +132,7 @@ class Stage:
         check_steering_delay(steering_delay_s)
         self._count = count
         self._ids = np.arange(count)
-        self._batch.reset(ids=self._ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._physics.reset(self._ids)
         rows = slice(0, count)
         limit = self.vehicle.max_tire_angle_rad.value
         start = self._place(rows, states)
@@ -162,24 +143,22 @@ class Stage:
             history[:, : -given.shape[1]] = given[:, :1]
             history[:, -given.shape[1] :] = given
             self._tire_command = given[:, -1].copy()
-        self._history[rows, self._steer_history] = history
-        self._delay[rows, self._actuators.steer] = steering_delay_s
+        self._physics.history[rows, self._steer_history] = history
+        self._physics.delay[rows, self._actuators.steer] = steering_delay_s
         self._actuation = Actuation(
             self.vehicle,
             self._actuators,
             friction=self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64),
-            ctrl=self._ctrl[rows],
-            biasprm=self._biasprm[rows],
-            forcerange=self._forcerange[rows],
+            ctrl=self._physics.ctrl[rows],
+            biasprm=self._physics.biasprm[rows],
+            forcerange=self._physics.forcerange[rows],
             tick_s=self.control_dt_s,
             accel_mps2=start[:, 7],
             backwards=backwards,
         )
         self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
-        record = np.zeros((count, self.steps_per_tick, self.model.nsensordata))
-        self._record = {"sensordata": record}
-        self._near = np.zeros(count, dtype=bool)
-        self._flags[rows] = self._not_looking
+        self.static_contact = np.zeros(count, dtype=bool)
+        """(S,) bool: whether the vehicle touched a building or island during the last tick."""
         self.looked = False
         """Whether contacts were looked for in any simulation during the last tick."""
         self._positions, self._velocities = np.empty((4, count)).T, np.empty((4, count)).T
@@ -194,15 +173,14 @@ class Stage:
     ) -> None:
         """Start the futures `rows` (K,) anew from `states` (K, 8); the others go on as they are."""
         check_steering_delay(steering_delay_s)
-        self._batch.reset(ids=rows, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._physics.reset(rows)
         start = self._place(rows, states)
         self._tire_command[rows] = start[:, 6]
-        self._history[rows, self._steer_history] = start[:, 6:7]
-        self._delay[rows, self._actuators.steer] = steering_delay_s
+        self._physics.history[rows, self._steer_history] = start[:, 6:7]
+        self._physics.delay[rows, self._actuators.steer] = steering_delay_s
         friction = self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64)
         self._actuation.restart(rows, friction=friction, accel_mps2=start[:, 7])
-        self._near[rows] = False
-        self._flags[rows] = self._not_looking
+        self.static_contact[rows] = False
 
     def _place(self, rows: slice | npt.NDArray[np.intp], states: Array) -> Array:
         """Put vehicles where their states are, and return these, within limits."""
@@ -211,10 +189,10 @@ class Stage:
         start[:, 6] = np.clip(start[:, 6], -limit, limit)
         self._states[rows] = start
         positions, velocities = cog_from_base(self.vehicle, start)
-        self._qpos[rows, self._joints] = positions
-        self._qvel[rows, self._dofs] = velocities
-        self._ctrl[rows] = 0.0
-        self._ctrl[rows, self._actuators.steer] = start[:, 6]
+        self._physics.qpos[rows, self._joints] = positions
+        self._physics.qvel[rows, self._dofs] = velocities
+        self._physics.ctrl[rows] = 0.0
+        self._physics.ctrl[rows, self._actuators.steer] = start[:, 6]
         return start
 
     def step(self, controls: Controls) -> None:
@@ -224,7 +202,7 @@ class Stage:
         speed = states[:, 3].copy()
         self._actuation.apply(speed_mps=speed, accel_mps2=controls.accel_mps2)
         per_step, ids = self._controls, self._actuators
-        per_step[:, :, ids.drive] = self._ctrl[rows, None, ids.drive]
+        per_step[:, :, ids.drive] = self._physics.ctrl[rows, None, ids.drive]
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
         change = (controls.tire_angle_rad - self._tire_command)[:, None]
         spread = self._tire_command[:, None] + np.minimum(
@@ -232,22 +210,23 @@ class Stage:
         )
         per_step[:, :, ids.steer] = spread
         self._tire_command = spread[:, -1]
-        self._near = self._near_statics_of(states)
-        looked, self.looked = self.looked, bool(self._near.any())
-        if looked or self.looked:
-            self._flags[rows] = np.where(self._near, self._looking, self._not_looking)
-        self._batch.rollout(
-            self.steps_per_tick,
-            control=per_step,
-            control_spec=self._control_spec,
-            record=("sensordata",),
-            ids=None if self._count == self.nsim else self._ids,
-            out=self._record,
-        )
-        np.copyto(self._positions, self._qpos[rows, self._joints])
-        np.copyto(self._velocities, self._qvel[rows, self._dofs])
+        self._advance(per_step, self._near_statics_of(states))
+        np.copyto(self._positions, self._physics.qpos[rows, self._joints])
+        np.copyto(self._velocities, self._physics.qvel[rows, self._dofs])
         base_from_cog(self.vehicle, self._positions, self._velocities, states)
         np.divide(states[:, 3] - speed, self.control_dt_s, out=states[:, 7])
+
+    def _advance(self, per_step: Array, near: npt.NDArray[np.bool_]) -> None:
+        if self.looked:
+            self.static_contact[:] = False
+        self.looked = bool(near.any())
+        if not self.looked:
+            self._physics.advance(per_step, None if self._count == self.nsim else self._ids)
+            return
+        close, far = np.flatnonzero(near), np.flatnonzero(~near)
+        self.static_contact[close] = self._physics.advance_among(per_step[close], close)
+        if len(far):
+            self._physics.advance(per_step[far], far)
 
     def _near_statics_of(self, states: Array) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a contact during the coming tick cannot be ruled out."""
@@ -266,12 +245,6 @@ class Stage:
     def states(self) -> Array:
         """Base_link states (S, 8) now; a live array that the next step overwrites."""
         return self._states[: self._count]
-
-    @property
-    def static_contact(self) -> npt.NDArray[np.bool_]:
-        """(S,) bool: whether the vehicle touched a building or island during the last tick."""
-        found = self._record["sensordata"][:, :, self._static_contact]
-        return np.asarray((found > 0.0).any(axis=1) & self._near)
 
     def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""

@@ -28,6 +28,18 @@ def world_spec(world: World | None) -> mujoco.MjSpec:
     return spec
 
 
+def compile_open(vehicle: VehicleParameters) -> mujoco.MjModel:
+    """Return the vehicle where it can touch nothing: the state of `compile_stage`, nothing else."""
+    spec = mujoco.MjSpec()
+    set_physics_options(spec)
+    spec.attach(vehicle_spec(vehicle), prefix=PREFIX, frame=spec.worldbody.add_frame())
+    disable = mujoco.mjtDisableBit
+    # The planar vehicle has no other constraint than contacts.
+    spec.option.disableflags |= int(disable.mjDSBL_CONSTRAINT | disable.mjDSBL_CONTACT)
+    spec.option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    return spec.compile()
+
+
 def compile_stage(spec: mujoco.MjSpec, vehicle: VehicleParameters) -> mujoco.MjModel:
     """Return `spec` with the vehicle and a sensor of contacts between both."""
     spec.attach(vehicle_spec(vehicle), prefix=PREFIX, frame=spec.worldbody.add_frame())
