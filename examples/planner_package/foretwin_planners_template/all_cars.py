@@ -7,7 +7,8 @@ import numpy as np
 from sim_worker.planners.base import PlannerOutput, PlannerView
 from sim_worker.planners.tracking import front_from_base_m, pure_pursuit
 
-ACCEL_MPS2, DECEL_MPS2 = 1.0, 1.5
+ACCEL_MPS2, DECEL_MPS2, MOST_MPS2 = 1.0, 1.5, 6.0
+GAIN_PS = 3.0
 GAP_M = 3.0
 
 
@@ -24,5 +25,5 @@ class Calm:
         bends = view.path.speed_profile(lateral_accel_mps2=1.5, decel_mps2=DECEL_MPS2)
         safe = np.sqrt(2.0 * DECEL_MPS2 * np.maximum(room, 0.0))
         wanted = np.minimum(view.target_speed_mps, view.path.at_nodes(bends, view.arc_m + speed))
-        accel = np.clip(np.minimum(wanted, safe) - speed, -4.0 * DECEL_MPS2, ACCEL_MPS2)
+        accel = np.clip(GAIN_PS * (np.minimum(wanted, safe) - speed), -MOST_MPS2, ACCEL_MPS2)
         return PlannerOutput(accel, pure_pursuit(view))

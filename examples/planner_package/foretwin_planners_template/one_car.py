@@ -8,7 +8,8 @@ import numpy as np
 
 from sim_worker.planners.one_at_a_time import CarView
 
-ACCEL_MPS2, DECEL_MPS2 = 1.0, 1.5
+ACCEL_MPS2, DECEL_MPS2, MOST_MPS2 = 1.0, 1.5, 6.0
+GAIN_PS = 3.0
 GAP_M, LOOKAHEAD_M = 3.0, 6.0
 
 
@@ -21,7 +22,7 @@ class CalmOne:
         room = min(view.lead_gap_m - GAP_M, view.stop_arc_m - view.arc_m - front - 1.0)
         safe = math.sqrt(2.0 * DECEL_MPS2 * max(room, 0.0))
         wanted = min(view.target_speed_mps, safe)
-        accel = min(max(wanted - view.vx_mps, -4.0 * DECEL_MPS2), ACCEL_MPS2)
+        accel = min(max(GAIN_PS * (wanted - view.vx_mps), -MOST_MPS2), ACCEL_MPS2)
 
         ahead = LOOKAHEAD_M + 0.5 * view.vx_mps
         goal = view.path.point_at(np.array([view.arc_m + ahead]), view.desired_offset_m)[0]
