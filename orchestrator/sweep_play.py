@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,16 +11,21 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from contracts.arrays import Array32
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint
 from contracts.futures import Accident, FuturesJob, FuturesResult, PathAhead, Variant
 from contracts.scenario import Scenario
+from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from orchestrator.sweep_plan import Cell, NotPlaced, PlacedHere, SweepJob, WorldPlaces
 from orchestrator.sweep_rows import Row, blank_row
 from orchestrator.sweep_spec import FUTURES_PER_JOB, STEP_S, Loaded
 from sim_worker.actors.cast import KIND_NAMES
 from sim_worker.futures import run_job
+from sim_worker.planners.path import FrenetPath
+from sim_worker.rehearsal import staged_cases
+from sim_worker.scenarios.impact import Moving, ego_box, front_point
 from sim_worker.scenarios.placement import places
 from sim_worker.scenarios.roads import RoadNetwork
 from sim_worker.scenarios.roles import Cast
@@ -90,8 +96,11 @@ class SweepWorker:
         if cells:
             futures = _futures_job(job, cells, casts, world, loaded, self._scenarios)
             result = run_job(futures, prepared.stage, scenes=prepared.scenes)
+            meant = staged_cases(futures, prepared.stage, prepared.scenes)
             for index, cell in enumerate(cells):
-                rows[cell.number] |= _told(result, index, casts[cell.number])
+                case = meant[index]
+                assert isinstance(case, Cast)
+                rows[cell.number] |= _told(result, index, case, vehicle)
         return list(rows.values())
 
 
@@ -176,7 +185,7 @@ def _futures_job(
     )  # fmt: skip
 
 
-def _told(result: FuturesResult, index: int, cast: Cast) -> Row:
+def _told(result: FuturesResult, index: int, case: Cast, vehicle: VehicleParameters) -> Row:
     """Return the columns that the playing of one future fills."""
     outcome = result.outcome
     accident = next((a for a in result.accidents if a.future == index), None)
@@ -186,8 +195,8 @@ def _told(result: FuturesResult, index: int, cast: Cast) -> Row:
         "valid": bool(outcome.valid[index]),
         "failure": outcome.failures[index] if outcome.failures else "",
         "left_out": result.left_out[index],
-        "planned_impact_time_s": _number(cast.impact_time_s),
-        "planned_impact_with": cast.impact_with,
+        "planned_impact_time_s": _number(case.impact_time_s),
+        "planned_impact_with": case.impact_with,
         "collided": bool(outcome.collided[index]),
         "collision_time_s": _number(outcome.collision_time_s[index]),
         "collision_with": COLLISION_WITH[int(outcome.collision_with[index])],
@@ -196,7 +205,31 @@ def _told(result: FuturesResult, index: int, cast: Cast) -> Row:
         "trajectory_sha256": hashlib.sha256(states.tobytes() + users.tobytes()).hexdigest(),
     }
     row |= {f"metric_{name}": _number(values[index]) for name, values in result.metrics.items()}
-    return row if accident is None else row | _accident(result, index, accident)
+    if accident is None:
+        return row
+    row |= _accident(result, index, accident)
+    row["accident_with"] = case.actors[accident.road_user].name
+    if row["accident_with"] == case.impact_with:
+        row["planned_impact_off_m"] = _off_m(states, accident.time_s, case, vehicle)
+    return row
+
+
+def _off_m(states: Array32, time_s: float, case: Cast, vehicle: VehicleParameters) -> float:
+    """Return how far the point of the ego that was to be hit is from where that was planned.
+
+    The ego goes on from the last instant before the touch as it moves then.
+    """
+    last = max(math.ceil(time_s / STEP_S - 1e-6) - 1, 0)
+    x, y, yaw, ahead_mps, left_mps, yaw_rate = states[last, :6].astype(np.float64)
+    since_s = time_s - last * STEP_S
+    heading = yaw + yaw_rate * since_s / 2.0
+    x += (ahead_mps * np.cos(heading) - left_mps * np.sin(heading)) * since_s
+    y += (ahead_mps * np.sin(heading) + left_mps * np.cos(heading)) * since_s
+    yaw += yaw_rate * since_s + (np.pi if case.reverse else 0.0)
+    pose = FrenetPath(np.array([[x, y], [x + np.cos(yaw), y + np.sin(yaw)]]))
+    box, here = ego_box(vehicle, reverse=case.reverse), Moving(pose, 0.0)
+    point = front_point(here, box, np.zeros(1), case.impact_share, case.place.near_sign)
+    return float(np.hypot(*(point[0] - case.impact_point_m)))
 
 
 def _accident(result: FuturesResult, index: int, accident: Accident) -> Row:

@@ -25,9 +25,11 @@ _CELL = (
 _PLAYED = (
     ("valid", pa.bool_()), ("failure", pa.string()), ("left_out", pa.string()),
     ("planned_impact_time_s", pa.float64()), ("planned_impact_with", pa.string()),
+    ("planned_impact_off_m", pa.float64()),
     ("collided", pa.bool_()), ("collision_time_s", pa.float64()), ("collision_with", pa.string()),
     ("min_clearance_m", pa.float64()), ("progress_m", pa.float64()),
-    ("accident_kind", pa.string()), ("accident_time_s", pa.float64()),
+    ("accident_with", pa.string()), ("accident_kind", pa.string()),
+    ("accident_time_s", pa.float64()),
     ("accident_x_m", pa.float64()), ("accident_y_m", pa.float64()),
     ("accident_angle_rad", pa.float64()), ("accident_closing_mps", pa.float64()),
     ("accident_ego_delta_v_mps", pa.float64()), ("accident_user_delta_v_mps", pa.float64()),

@@ -94,8 +94,9 @@ def print_summary(out: Path, summary: dict[str, Any]) -> None:
             "" if score is None else f"{score:.3f}",
         )  # fmt: skip
     console = Console()
-    # A file or a pipe has no width of its own to keep to.
-    console.print(table, width=None if console.is_terminal else _PLAIN_WIDTH)
+    if not console.is_terminal:
+        console.width = _PLAIN_WIDTH  # A file or a pipe has no width of its own to keep to.
+    console.print(table)
     print(
         f"{out}: {summary['rows']} rows of {summary['worlds']} Worlds, {summary['jobs_played']} of "
         f"{summary['jobs']} jobs played now in {summary['playing_s']:.1f} s; "

@@ -29,7 +29,7 @@ _STRAIGHT_PM = 1e-3
 """On a line that bends no more, a car is where its path is."""
 _RUN_UP_M = 10.0
 """Who starts so far before the first bend drives it as all do who come along there."""
-_KEEPS_SPEED = 0.15
+_KEEPS_SPEED = 0.35
 """A car whose speed differs by more of what the case says does something else."""
 _AFTER_S = 1.0
 """Lines go on for so long after the last impact."""
