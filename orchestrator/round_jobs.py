@@ -16,6 +16,7 @@ from contracts.world import World
 from orchestrator.config import DriveConfig
 from orchestrator.instructions import RoundIntent
 from orchestrator.intake import Surroundings
+from orchestrator.way_ahead import PATH_BEHIND_M
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.live import LiveScenarios
 from sim_worker.scenarios.reading import catalogue, find_scenario
@@ -134,7 +135,7 @@ class RoundPlanner:
                 del self._known[next(iter(self._known))]
             self._known[world.id] = LiveScenarios(RoadNetwork(world))
         known = self._known[world.id]
-        on = known.on(FrenetPath(path.xy_m), 0.0, self._vehicle)
+        on = known.on(FrenetPath(path.xy_m), PATH_BEHIND_M, self._vehicle)
         passage = on.passage
         if passage is None:
             return ()

@@ -52,13 +52,22 @@ def round_view(
         xy_m=in_drive(futures.states[:, kept, :2]),
         criticality=criticality.astype(np.float32),
         nominal_index=0,
-        names=tuple(variant.name for variant in variants),
+        names=_names(done, variants),
         collided=int(np.count_nonzero(futures.collided)),
         min_clearance_m=nearest if np.isfinite(nearest) else None,
         latency_ms=done.latency_ms,
         user_xy_m=in_drive(met.tracks_m),
         touch_xy_m=in_drive(met.touches_m),
         touch_names=met.touch_names,
+    )
+
+
+def _names(done: RoundDone, variants: Sequence[Variant]) -> tuple[str, ...]:
+    """Return the futures' names; one whose scenario is left out says so."""
+    left_out = [reason for result in done.results for reason in result.left_out]
+    return tuple(
+        f"{variant.name} (left out)" if reason else variant.name
+        for variant, reason in zip(variants, left_out, strict=True)
     )
 
 
