@@ -27,6 +27,8 @@ __all__ = ["Cast", "CastActor", "cast", "cast_all"]
 
 _LEAST_SPEED_MPS = 2.0
 """A car that stands is taken to set off with this speed."""
+_LATERAL_ACCEL_MPS2 = 4.0
+"""Cars begin with no more of it: half of what holds them on a dry road."""
 _VERGE_M = 4.0
 """Beside the road, where one may still stand or park."""
 
@@ -128,7 +130,8 @@ def _cast(
 def _start_arc(staging: Staging, meetings: dict[str, Meeting]) -> float:
     """Return where base_link starts: so long before the impact, or the junction, as is meant.
 
-    It starts later where its lane begins later.
+    It starts later where its lane begins later, or where it would begin in a bend that nobody
+    drives through so fast.
     """
     scenario, place, ego = staging.scenario, staging.place, staging.ego
     end, time_s = place.ego.entry_m - staging.box.front_m, scenario.lead_time_s
@@ -140,7 +143,16 @@ def _start_arc(staging: Staging, meetings: dict[str, Meeting]) -> float:
             time_s = closing_time_s(part, staging) or time_s
             break
     room_s = (end - place.ego.first_m - staging.box.length_m) / ego.speed_mps
-    return end - ego.speed_mps * min(time_s, max(room_s, 2 * LEAST_TIME_S))
+    start = end - ego.speed_mps * min(time_s, max(room_s, 2 * LEAST_TIME_S))
+    return _past_bend(ego, start, end - 2 * LEAST_TIME_S * ego.speed_mps)
+
+
+def _past_bend(ego: Moving, start_m: float, latest_m: float) -> float:
+    """Return where a bend ends in which nobody can begin at that speed; else the start itself."""
+    arcs = np.arange(start_m, latest_m, 1.0)
+    curvature = ego.path.at_nodes(ego.path.curvature_pm, arcs)
+    free = np.abs(curvature) * ego.speed_mps**2 <= _LATERAL_ACCEL_MPS2
+    return float(arcs[free.argmax()]) if free.any() else start_m
 
 
 def _first_touched(

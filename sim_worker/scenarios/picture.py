@@ -30,6 +30,7 @@ from world_gen.polyline import offset
 
 EGO, PLANNED, OTHERS, STANDING, IMPACT = "#1f5fd0", "#0b8a4b", "#d62728", "#7a4b22", "#ffd400"
 _LEAST_HALF_M, _MOST_HALF_M, _MARGIN_M = 20.0, 75.0, 8.0
+_FAR_M = 120.0
 _GHOST_EVERY_S = 1.0
 
 
@@ -117,18 +118,18 @@ def write_case_picture(
     figure.text(
         0.02, 0.88, f"{scenario.shows}\n{told(played, heedless, planned, planner)}", fontsize=9.5
     )
-    draw_case_legend(figure, planner if planned is not None else "")
+    draw_case_legend(figure, planner if planned is not None else "", ncols=3)
     figure.text(0.98, 0.012, world.attribution, fontsize=9, ha="right", weight="bold")
     path.parent.mkdir(parents=True, exist_ok=True)
     metadata = {"Copyright": world.attribution, "Software": "foretwin"}
     FigureCanvasAgg(figure).print_figure(str(path), format="png", metadata=metadata)
 
 
-def draw_case_legend(figure: Figure, planner: str) -> None:
+def draw_case_legend(figure: Figure, planner: str, *, ncols: int = 4) -> None:
     """Explain the colours at the figure's lower edge."""
     handles: list[Any] = [
         Patch(facecolor=EGO, edgecolor="black", label="ego, keeping its speed"),
-        Patch(facecolor=OTHERS, edgecolor="black", label="others then"),
+        Patch(facecolor=OTHERS, edgecolor="black", label="others at the impact, or when nearest"),
         Patch(facecolor=STANDING, edgecolor="black", label="standing"),
         Patch(facecolor="none", edgecolor=EGO, label="start (hollow), each second (faint)"),
         Line2D([], [], marker="*", linestyle="", markersize=10, color=IMPACT,
@@ -137,10 +138,10 @@ def draw_case_legend(figure: Figure, planner: str) -> None:
     if planner:
         handles[1:1] = [
             Patch(facecolor=PLANNED, edgecolor="black", label=f"ego by {planner}, when nearest"),
-            Patch(facecolor="none", edgecolor=PLANNED, label="others then"),
+            Patch(facecolor="none", edgecolor=PLANNED, label="others at that moment"),
         ]
     figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=4, fontsize=8.5,
+        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=ncols, fontsize=8.5,
         frameon=False, columnspacing=1.2, handlelength=1.6,
     )  # fmt: skip
 
@@ -168,9 +169,8 @@ def _view(heedless: Run, planned: Run | None, aspect: float) -> View:
     if planned is not None:
         points.append(planned.ego.centre_m[planned.moment][None])
     middle = heedless.ego.centre_m[heedless.moment]
-    spread = np.concatenate(points)
-    near = spread[np.abs(spread - middle).max(axis=1) < 1.6 * _MOST_HALF_M]
-    low, high = near.min(axis=0) - _MARGIN_M, near.max(axis=0) + _MARGIN_M
+    spread = np.clip(np.concatenate(points), middle - _FAR_M, middle + _FAR_M)
+    low, high = spread.min(axis=0) - _MARGIN_M, spread.max(axis=0) + _MARGIN_M
     half = max((high - low)[1] / 2.0, (high - low)[0] / 2.0 / aspect)
     half = min(max(half, _LEAST_HALF_M), _MOST_HALF_M)
     centre = (low + high) / 2.0

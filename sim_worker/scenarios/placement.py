@@ -20,7 +20,7 @@ from sim_worker.scenarios.drawing import Values, draw_cases
 from sim_worker.scenarios.places import Place, Placement, Unplaced
 from sim_worker.scenarios.relations import ways_of
 from sim_worker.scenarios.roads import Passage, RoadNetwork
-from sim_worker.scenarios.ways import Way
+from sim_worker.scenarios.ways import Way, unlike_its_turn
 from sim_worker.vehicle.parameters import load_vehicle
 
 _ON_CONNECTION_M = 3.0
@@ -79,6 +79,7 @@ def _at_junction(
     if refused:
         return Placement((), (Unplaced(junction.summary.id, refused, False),))
     passages = [p for p in network.passages(junction.summary.id) if p.turn == scenario.ego.turn]
+    passages.sort(key=lambda p: unlike_its_turn(p.turn, p.exit_heading_rad - p.entry_heading_rad))
     if any(part.relation == "parked" for part in scenario.actors):
         passages.sort(key=network.lanes_to_kerb)
     if not passages:

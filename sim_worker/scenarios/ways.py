@@ -18,6 +18,7 @@ APPROACH_M, DEPARTURE_M = 150.0, 120.0
 """How far ways are led back and on along the lanes."""
 _HEADING_OVER_M = 8.0
 _STRAIGHT_RAD, _BACK_RAD = math.radians(45.0), math.radians(150.0)
+_CLEARER_BY_RAD = math.radians(20.0)
 
 
 class Way(NamedTuple):
@@ -74,6 +75,15 @@ def traffic_turn(turn: str, side: DrivingSide) -> TrafficTurn | None:
     if turn == "u_turn":
         return None
     return "across" if (turn == "left") == (side == "right") else "near"
+
+
+def unlike_its_turn(turn: TrafficTurn | None, change_rad: float) -> int:
+    """Return by how many steps a change of heading differs from what a turn makes one think of.
+
+    A fork may be called a turn; where a right angle is at hand as well, it is the clearer one.
+    """
+    meant = 0.0 if turn == "straight" else math.pi / 2.0
+    return round(abs(abs(float(wrap_angle(change_rad))) - meant) / _CLEARER_BY_RAD)
 
 
 def turn_by_heading(change_rad: float, side: DrivingSide) -> TrafficTurn | None:

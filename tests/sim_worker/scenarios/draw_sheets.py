@@ -58,6 +58,8 @@ SHEETS = {
 TILES, TRIES, MOST_AT_ONE_JUNCTION = 3, 60, 4
 PLANNERS = {"reversing_parking": "reverse_pursuit"}
 """Who drives the ego, where not by `pure_pursuit_idm`."""
+TYPICAL = {"roundabout_entry": "roundabout", "roundabout_exit": "roundabout"}
+"""Kinds that show best what a scenario is; it takes place on others, too."""
 _TILE_IN, _CAPTION_IN, _HEAD_IN, _FOOT_IN = (5.0, 4.1), 0.78, 0.62, 0.55
 
 
@@ -120,16 +122,25 @@ def choose_tiles(data: Path) -> dict[str, list[Tile]]:
 
 
 def tile_of(scenario: Scenario, world: World, where: str) -> Tile | None:
-    """Return a case of a scenario in a World, the middle one if that can be cast."""
+    """Return a case of a scenario in a World, the middle one if that can be cast.
+
+    Of several places that counts whose roads the World holds farthest.
+    """
     vehicle = load_vehicle()
-    found = places(scenario, world, network=RoadNetwork(world), vehicle=vehicle, most=1).places
+    if TYPICAL.get(scenario.id, world.intersection.kind) != world.intersection.kind:
+        return None
+    found = places(scenario, world, network=RoadNetwork(world), vehicle=vehicle, most=4).places
     cases = draw_cases(scenario)
-    for values in (cases[len(cases) // 2], *cases) if found else ():
-        played = cast(scenario, values, found[0], vehicle=vehicle)
-        if isinstance(played, Cast):
-            name = world.intersection.name or world.intersection.id
-            return Tile(textwrap.shorten(f"{where}: {name}", 72), world, played)
-    return None
+    played = [
+        case
+        for place in found
+        for case in [cast(scenario, cases[len(cases) // 2], place, vehicle=vehicle)]
+        if isinstance(case, Cast)
+    ]
+    if not played:
+        return None
+    name = textwrap.shorten(f"{where}: {world.intersection.name or world.intersection.id}", 72)
+    return Tile(name, world, min(played, key=lambda case: round(case.off_lanes_m / 5.0)))
 
 
 def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]]) -> Figure:

@@ -18,6 +18,7 @@ from sim_worker.scenarios.drawing import Values, draw_cases
 from sim_worker.scenarios.placement import places
 from sim_worker.scenarios.places import Place, Unplaced
 from sim_worker.scenarios.reading import catalogue
+from sim_worker.scenarios.ways import lengthened
 from sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.collide import actor_boxes, ego_boxes, first_collision
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
@@ -238,3 +239,30 @@ def test_the_same_values_give_the_same_cast() -> None:
     )
     assert runs[0].ego_arc_m == runs[1].ego_arc_m
     assert [a.start_arc_m for a in runs[0].actors] == [a.start_arc_m for a in runs[1].actors]
+
+
+def test_nobody_begins_in_a_bend_too_tight_for_its_speed() -> None:
+    scenario, world = catalogue()["scp"], cross()
+    place = places(scenario, world, vehicle=VEHICLE, most=1).places[0]
+    bend_m, entry_m, radius_m = 30.0, place.ego.entry_m, 10.0
+    after = place.ego.path.pose_at(np.arange(entry_m - bend_m, place.ego.exit_m + 60.0, 1.0))
+    heading = float(after.yaw_rad[0])
+    turn = np.linspace(np.pi / 2.0, 0.05, 24)
+    back = radius_m * np.stack([-np.sin(turn), 1.0 - np.cos(turn)], axis=-1)
+    cos, sin = math.cos(heading), math.sin(heading)
+    bend = after.xy_m[0] + back @ np.array([[cos, sin], [-sin, cos]])
+    xy = np.concatenate([bend, after.xy_m])
+    length_m = float(np.hypot(*np.diff(bend, axis=0).T).sum())
+    way = lengthened(
+        "bent", xy, np.full(len(xy), 13.9), length_m + bend_m,
+        length_m + bend_m + place.ego.exit_m - entry_m,
+    )  # fmt: skip
+    bent = place._replace(ego=way)
+    case = draw_cases(scenario)[0]
+    fast = played(scenario, case | {"ego.speed_mps": 12.0}, bent)
+    curvature = way.path.at_nodes(way.path.curvature_pm, np.array([fast.ego_arc_m]))
+    assert abs(float(curvature[0])) * 12.0**2 <= 4.0
+    assert 1.6 <= fast.impact_time_s < 3.5
+    check_impact(fast)
+    slow = played(scenario, case | {"ego.speed_mps": 6.0}, bent)
+    assert slow.impact_time_s == pytest.approx(scenario.lead_time_s)

@@ -17,6 +17,7 @@ from sim_worker.scenarios.placement import passage_on_path, place_on_path, place
 from sim_worker.scenarios.places import Place, Unplaced
 from sim_worker.scenarios.reading import catalogue
 from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.scenarios.ways import unlike_its_turn
 from sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
 
@@ -206,3 +207,23 @@ def test_who_joins_the_ring_enters_where_the_ego_passes() -> None:
     assert result.places
     for place in result.places:
         assert place.actor_ways[0][0].name.split("+")[0] != place.ego.name.split("+")[0]
+
+
+def test_the_clearest_turn_comes_first() -> None:
+    right, fork = math.radians(-90.0), math.radians(-25.0)
+    assert unlike_its_turn("near", right) < unlike_its_turn("near", fork)
+    assert unlike_its_turn("across", -right + math.tau) == unlike_its_turn("near", right) == 0
+    assert unlike_its_turn("straight", fork) > unlike_its_turn("straight", 0.05) == 0
+    world = tee((0.0, 180.0, 235.0, 270.0))
+    network = RoadNetwork(world)
+    for id_ in ("cbta", "cpta"):
+        first = places(catalogue()[id_], world, network=network).places[0]
+        passages = {p.name: p for p in network.passages(first.junction_id)}
+        offs = [
+            unlike_its_turn(p.turn, p.exit_heading_rad - p.entry_heading_rad)
+            for p in passages.values()
+            if p.turn == catalogue()[id_].ego.turn
+        ]
+        chosen = passages[first.ego.name]
+        off = unlike_its_turn(chosen.turn, chosen.exit_heading_rad - chosen.entry_heading_rad)
+        assert off == min(offs) < max(offs)
