@@ -12,14 +12,14 @@ import msgspec
 
 from contracts.errors import UserError
 from orchestrator.progress_bar import progress_bar
-from orchestrator.sweep_folder import FoundPlaces, SweepFolder, fingerprint_of
+from orchestrator.sweep_folder import FoundPlaces, SweepFolder, fingerprint_of, worlds_folder
 from orchestrator.sweep_plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
 from orchestrator.sweep_play import PlaceQuestion, PlaySetup, failed_rows, start_worker
-from orchestrator.sweep_pool import Lost, Task, run_tasks
+from orchestrator.sweep_pool import Crew, Lost, Task
 from orchestrator.sweep_rows import Parts, RowsHash
 from orchestrator.sweep_spec import Loaded, load_spec
 from orchestrator.sweep_summary import Summary, print_summary
-from orchestrator.sweep_worlds import SweepWorlds, source_digest, sweep_worlds
+from orchestrator.sweep_worlds import source_digest, sweep_worlds
 
 SOME_FAILED = 3
 
@@ -43,7 +43,8 @@ def sweep(request: SweepRequest) -> int:
         raise UserError(f"--workers {request.workers}: at least 1")
     loaded = load_spec(request.spec)
     out = request.out or Path("sweeps") / request.spec.stem
-    summary = run_sweep(loaded, out, workers=request.workers, fresh=request.fresh)
+    with crew_for(loaded, out, request.workers) as crew:
+        summary = run_sweep(loaded, out, crew, fresh=request.fresh)
     if request.as_json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
     else:
@@ -51,16 +52,23 @@ def sweep(request: SweepRequest) -> int:
     return SOME_FAILED if summary["failed"] or summary["failures"] else 0
 
 
-def run_sweep(loaded: Loaded, out: Path, *, workers: int, fresh: bool = False) -> dict[str, Any]:
+def crew_for(loaded: Loaded, out: Path, workers: int) -> Crew:
+    """Return the processes that play a sweep in the folder `out`."""
+    worlds = Path(loaded.spec.worlds) if loaded.spec.worlds else worlds_folder(out)
+    setup = PlaySetup(loaded=loaded, worlds_dir=str(worlds))
+    return Crew(workers, start_worker, setup, timeout_s=loaded.spec.job_timeout_s)
+
+
+def run_sweep(loaded: Loaded, out: Path, crew: Crew, *, fresh: bool = False) -> dict[str, Any]:
     """Play what is not yet played of a sweep, and return its summary as `sweep.json` has it."""
     folder = SweepFolder(out, fingerprint_of(loaded, source_digest(loaded.spec)), fresh=fresh)
     folder.begin(loaded)
-    places = folder.places() or _find_places(loaded, folder, workers)
+    places = folder.places() or _find_places(loaded, folder, crew)
     plan = plan_sweep(loaded, places.worlds)
     parts = Parts(folder.rows_dir, loaded.spec)
     there = parts.done(plan.jobs)
     started_s = time.monotonic()
-    _play([job for job in plan.jobs if job.number not in there], loaded, places, parts, workers)
+    _play([job for job in plan.jobs if job.number not in there], loaded, parts, crew)
     return folder.summarise(
         _summary(loaded, plan, places, parts)
         | {"jobs_played": len(plan.jobs) - len(there),
@@ -68,7 +76,7 @@ def run_sweep(loaded: Loaded, out: Path, *, workers: int, fresh: bool = False) -
     )  # fmt: skip
 
 
-def _find_places(loaded: Loaded, folder: SweepFolder, workers: int) -> FoundPlaces:
+def _find_places(loaded: Loaded, folder: SweepFolder, crew: Crew) -> FoundPlaces:
     """Build or read the Worlds, and find where the scenarios take place in each."""
     with _counting("Worlds") as advance:
         worlds = sweep_worlds(loaded.spec, folder.worlds_dir, advance)
@@ -85,16 +93,8 @@ def _find_places(loaded: Loaded, folder: SweepFolder, workers: int) -> FoundPlac
                 found[task.number] = answer
             advance_one(task.place)
 
-        run_tasks(
-            tasks, workers=workers, start=start_worker, setup=_setup(loaded, worlds.folder),
-            done=done, timeout_s=loaded.spec.job_timeout_s,
-        )  # fmt: skip
-    ordered = tuple(found[number] for number in sorted(found))
-    return folder.save_places(SweepWorlds(worlds.folder, worlds.ids, failures), ordered)
-
-
-def _setup(loaded: Loaded, worlds_dir: Path) -> PlaySetup:
-    return PlaySetup(loaded=loaded, worlds_dir=str(worlds_dir))
+        crew.run(tasks, done)
+    return folder.save_places(tuple(found[number] for number in sorted(found)), failures)
 
 
 class _counting:  # noqa: N801
@@ -119,9 +119,7 @@ class _counting:  # noqa: N801
             self._bar.__exit__(*what)
 
 
-def _play(
-    jobs: Sequence[SweepJob], loaded: Loaded, places: FoundPlaces, parts: Parts, workers: int
-) -> None:
+def _play(jobs: Sequence[SweepJob], loaded: Loaded, parts: Parts, crew: Crew) -> None:
     """Play jobs and write their rows as they come."""
     with progress_bar(sum(len(job.cells) for job in jobs), "futures") as (advance, say):
 
@@ -134,11 +132,7 @@ def _play(
             for _ in job.cells:
                 advance(f"{job.cells[0].junction_id} {job.planner}")
 
-        run_tasks(
-            [Task(job.number, job.world_id, job) for job in jobs], workers=workers,
-            start=start_worker, setup=_setup(loaded, Path(places.worlds_dir)), done=done,
-            timeout_s=loaded.spec.job_timeout_s,
-        )  # fmt: skip
+        crew.run([Task(job.number, job.world_id, job) for job in jobs], done)
 
 
 def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts) -> dict[str, Any]:

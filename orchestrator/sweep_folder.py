@@ -12,7 +12,6 @@ import msgspec
 from contracts.errors import UserError
 from orchestrator.sweep_plan import WorldPlaces
 from orchestrator.sweep_spec import Loaded
-from orchestrator.sweep_worlds import SweepWorlds
 from orchestrator.versions import versions
 from world_gen.build import GENERATOR_VERSION
 
@@ -23,7 +22,6 @@ class FoundPlaces(msgspec.Struct, frozen=True, kw_only=True):
     """What a sweep found out before it played anything."""
 
     fingerprint: str
-    worlds_dir: str
     worlds: tuple[WorldPlaces, ...]
     failures: dict[str, str]
     """Junctions or Worlds of which nothing can be played, and why."""
@@ -44,7 +42,7 @@ class SweepFolder:
     @property
     def worlds_dir(self) -> Path:
         """Return where Worlds are built."""
-        return self.path / WORLDS
+        return worlds_folder(self.path)
 
     @property
     def rows_dir(self) -> Path:
@@ -84,12 +82,9 @@ class SweepFolder:
         partial.replace(self.path / SUMMARY)
         return whole
 
-    def save_places(self, worlds: SweepWorlds, found: tuple[WorldPlaces, ...]) -> FoundPlaces:
+    def save_places(self, found: tuple[WorldPlaces, ...], failures: dict[str, str]) -> FoundPlaces:
         """Keep where scenarios take place: it need not be found out again."""
-        places = FoundPlaces(
-            fingerprint=self.fingerprint, worlds_dir=str(worlds.folder.resolve()), worlds=found,
-            failures=worlds.failures,
-        )  # fmt: skip
+        places = FoundPlaces(fingerprint=self.fingerprint, worlds=found, failures=failures)
         partial = self.path / f"{PLAN}.writing"
         partial.write_bytes(msgspec.msgpack.encode(places))
         partial.replace(self.path / PLAN)
@@ -102,6 +97,11 @@ class SweepFolder:
         except (FileNotFoundError, msgspec.DecodeError):
             return None
         return kept if kept.fingerprint == self.fingerprint else None
+
+
+def worlds_folder(out: Path) -> Path:
+    """Return where the Worlds of a sweep are built."""
+    return out / WORLDS
 
 
 def fingerprint_of(loaded: Loaded, source: str) -> str:

@@ -19,6 +19,7 @@ from contracts.scenario import Scenario
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from orchestrator.sweep_plan import Cell, NotPlaced, PlacedHere, SweepJob, WorldPlaces
+from orchestrator.sweep_pool import Lost
 from orchestrator.sweep_rows import Row, blank_row
 from orchestrator.sweep_spec import FUTURES_PER_JOB, STEP_S, Loaded
 from sim_worker.actors.cast import KIND_NAMES
@@ -63,11 +64,13 @@ class SweepWorker:
         self._scenarios = {scenario.id: scenario for scenario in setup.loaded.scenarios}
         self._stages: dict[str, StageCache] = {}
 
-    def answer(self, question: PlaceQuestion | SweepJob) -> WorldPlaces | list[Row]:
+    def answer(self, question: PlaceQuestion | SweepJob) -> WorldPlaces | list[Row] | Lost:
         """Return the places in a World, or the rows of a job; a job that fails says so in them."""
         if isinstance(question, PlaceQuestion):
-            world = load_world(self._worlds_dir, question.world_id)
-            return places_in(world, self._loaded)
+            try:
+                return places_in(load_world(self._worlds_dir, question.world_id), self._loaded)
+            except Exception as error:  # one bad World never stops the sweep
+                return Lost(one_line(error))
         try:
             return self._play(question)
         except Exception as error:  # one bad job never stops the sweep

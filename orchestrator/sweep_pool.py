@@ -73,25 +73,46 @@ def _serve(connection: Connection, start: Callable[[Any], Answer], setup: object
         return
 
 
-def run_tasks(
-    tasks: Sequence[Task],
-    *,
-    workers: int,
-    start: Callable[[Any], Answer],
-    setup: object,
-    done: Callable[[Task, Any], None],
-    timeout_s: float,
-) -> None:
-    """Have `workers` processes answer all tasks, and call `done` with each answer as it comes.
+class Crew:
+    """Up to `workers` processes, each started when there is a task for it.
 
-    `start(setup)`, called once in each process, gives what answers a task's question; it must be
-    importable there. Where `ATTEMPTS` workers died of a task, or one did not answer in
-    `timeout_s`, the answer is a `Lost`. On any exception, Ctrl-C included, all workers end.
+    `start(setup)`, called once in each, gives what answers a task's question; it must be
+    importable there. Use it as a context: at its end, whatever ends it, all processes end.
     """
-    pending = list(reversed(tasks))
-    attempts: dict[int, int] = {}
-    crew = [_Worker(start, setup) for _ in range(min(workers, len(tasks)))]
-    try:
+
+    def __init__(
+        self, workers: int, start: Callable[[Any], Answer], setup: object, *, timeout_s: float
+    ) -> None:
+        self._most, self._start, self._setup = workers, start, setup
+        self._timeout_s = timeout_s
+        self._workers: list[_Worker] = []
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(self, *what: object) -> None:
+        for worker in self._workers:
+            worker.end()
+        for worker in self._workers:
+            worker.join()
+        self._workers.clear()
+
+    @property
+    def pids(self) -> list[int]:
+        """Return the processes that are there now."""
+        return [worker.process.pid for worker in self._workers if worker.process.pid]
+
+    def run(self, tasks: Sequence[Task], done: Callable[[Task, Any], None]) -> None:
+        """Have all tasks answered, and call `done` with each answer as it comes.
+
+        Where `ATTEMPTS` workers died of a task, or one did not answer in time, the answer is a
+        `Lost`.
+        """
+        pending = list(reversed(tasks))
+        attempts: dict[int, int] = {}
+        while len(self._workers) < min(self._most, len(tasks)):
+            self._workers.append(self._worker())
+        crew = self._workers
         while pending or any(worker.task for worker in crew):
             for worker in crew:
                 if worker.task is None and pending:
@@ -105,18 +126,16 @@ def run_tasks(
                     assert task is not None
                     done(task, taken[1])
                 elif worker.connection in ready or worker.process.sentinel in ready:
-                    crew[index] = _Worker(start, setup)
+                    crew[index] = self._worker()
                     _mourn(worker, pending, attempts, done)
-                elif worker.task and time.monotonic() - worker.since_s > timeout_s:
-                    crew[index] = _Worker(start, setup)
+                elif worker.task and time.monotonic() - worker.since_s > self._timeout_s:
+                    crew[index] = self._worker()
                     worker.end()
                     worker.join()
-                    done(worker.task, Lost(f"no answer in {timeout_s:g} s"))
-    finally:
-        for worker in crew:
-            worker.end()
-        for worker in crew:
-            worker.join()
+                    done(worker.task, Lost(f"no answer in {self._timeout_s:g} s"))
+
+    def _worker(self) -> _Worker:
+        return _Worker(self._start, self._setup)
 
 
 def _give(worker: _Worker, pending: list[Task], crew: Sequence[_Worker]) -> None:

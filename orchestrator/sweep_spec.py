@@ -39,24 +39,12 @@ STEP_S = 0.1
 FUTURES_PER_JOB = 64
 
 
-class Recorded(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Start from where a real car was: the rounds of one run of `foretwin drive`.
-
-    One round of every `every_s` seconds of the drive, at which the car has a junction ahead.
-    """
-
-    run: str
-    every_s: float = 2.0
-
-
 class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything that decides the rows of a sweep; paths are relative to where it is started."""
 
     map: str | None = None
     worlds: str | None = None
     """A folder of .world files, in place of a map."""
-    recorded: Recorded | None = None
-    """A run, in place of both."""
     junctions: Literal["all"] | tuple[str, ...] = "all"
     bbox: str | None = None
     """W,S,E,N in degrees: only junctions in there."""
@@ -140,13 +128,13 @@ def check_spec(spec: SweepSpec) -> Loaded:
 
 
 def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
-    sources = [n for n in ("map", "worlds", "recorded") if getattr(spec, n) is not None]
+    sources = [n for n in ("map", "worlds") if getattr(spec, n) is not None]
     steps = 1.0 / (spec.control_hz * TIMESTEP_S) if spec.control_hz > 0.0 else 0.0
     ticks = STEP_S * spec.control_hz
     horizon = spec.horizon_s
     return (
         (len(sources) == 1,
-         f"exactly one of map, worlds and recorded; got {' and '.join(sources) or 'none'}"),
+         f"exactly one of map and worlds; got {' and '.join(sources) or 'none'}"),
         (spec.junctions == "all" or len(spec.junctions) > 0,
          "junctions: at least one id, or \"all\""),
         (spec.sample is None or spec.sample >= 1, f"sample {spec.sample}: at least 1"),
@@ -168,7 +156,6 @@ def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
          f"control_hz {spec.control_hz:g}: must be a multiple of {1.0 / STEP_S:g}"),
         (spec.job_timeout_s > 0.0, f"job_timeout_s {spec.job_timeout_s:g}: above 0"),
         (spec.seed >= 0, f"seed {spec.seed}: not negative"),
-        (spec.recorded is None or spec.recorded.every_s > 0.0, "recorded.every_s: above 0"),
     )  # fmt: skip
 
 

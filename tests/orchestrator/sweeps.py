@@ -1,0 +1,28 @@
+"""A small sweep over a drawn crossing, for tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.sim_worker.scenarios.worlds import cross
+from world_gen.world_store import WorldStore
+
+SMALL = """
+worlds = "{worlds}"
+scenarios = ["scp", "cpta", "reversing_parking"]
+cases = 2
+planners = ["pure_pursuit_idm", "constant_speed"]
+horizon_s = 5.0
+metrics = ["ttc", "driving_score"]
+
+[parameters]
+friction_factor = [1.0, 0.4]
+"""
+
+
+def small_sweep(folder: Path, text: str = SMALL) -> Path:
+    """Write a sweep's file, and the World that it is about, into a folder."""
+    WorldStore(folder / "drawn").save(cross())
+    spec = folder / "small.toml"
+    spec.write_text(text.format(worlds=folder / "drawn"))
+    return spec
