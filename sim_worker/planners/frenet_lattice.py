@@ -11,35 +11,33 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
-from sim_worker.planners.base import PlannerOutput, PlannerView
+from sim_worker.planners.base import PlannerOutput, PlannerView, SeenUsers, rows_of
 from sim_worker.planners.giving_way import wait_arcs
-from sim_worker.planners.path import SPACING_M
+from sim_worker.planners.lattice_rating import (
+    LATERAL_ACCEL_MPS2,
+    MAX_ACCEL_MPS2,
+    MAX_DECEL_MPS2,
+    collisions,
+    rate_across,
+    rate_along,
+)
 from sim_worker.planners.polynomials import Floats, Motions, joined, to_place, to_speed
-from sim_worker.planners.prediction import courses
+from sim_worker.planners.prediction import Changes, changes
 from sim_worker.planners.tracking import front_from_base_m, pure_pursuit
 from sim_worker.vehicle.actuation import resistance_mps2
-from sim_worker.vehicle.planar import box_centre_from_base_m
 
 REPLAN_S = 0.5
-HORIZON_S, _INSTANTS = 4.0, 12
-_INSTANTS_S: Array = np.linspace(HORIZON_S / _INSTANTS, HORIZON_S, _INSTANTS)
-_ROUGH_INSTANTS_S = _INSTANTS_S.astype(np.float32)[:, None, None]
+_AT_ONCE_S, _LEAD_BRAKES_MPS2 = 0.15, 2.5
+"""Sooner where somebody ahead brakes harder than this."""
 _SPEED_SHARES = np.array([1.0, 0.8, 0.6, 0.35, 0.0])
 _SPEED_TIMES_S = np.array([2.5, 5.0])
 _ASIDE_M = np.array([0.0, -0.5, 0.5, -1.0, 1.0, -1.5, 1.5])
 _ASIDE_TIMES_S = np.array([2.0, 3.5])
-_NEAREST = 6
-_MAX_ACCEL_MPS2, _MAX_DECEL_MPS2 = 2.5, 7.0
-_COMFORT_DECEL_MPS2, _LATERAL_ACCEL_MPS2, _MAX_LATERAL_MPS2 = 2.0, 2.5, 4.0
+_COMFORT_DECEL_MPS2 = 2.0
 _LINE_GAP_M, _STANDSTILL_GAP_M, _TIME_GAP_S = 1.0, 2.0, 1.2
-_ALONG_MARGIN_M, _ACROSS_MARGIN_M = 0.8, 0.4
-_SLOPE = 0.3
-"""Of the own speed, how fast a car may move across its path."""
-_WEIGHT_SPEED, _WEIGHT_ACCEL, _WEIGHT_JERK = 0.15, 0.25, 0.05
-_WEIGHT_ASIDE, _WEIGHT_ACROSS_JERK = 0.6, 0.1
-_FORBIDDEN, _CROSSES_LINE, _COLLIDES = 1e3, 300.0, 100.0
 _LOOKAHEAD_S, _PREVIEW_S = 0.6, 0.1
 _SPEED_GAIN, _PLACE_GAIN = 1.2, 0.3
 _HOLD_MPS, _HOLD_MPS2 = 0.3, -2.0
@@ -63,7 +61,7 @@ class FrenetLattice:
 
 
 class LatticeDriver:
-    """Follows the motions chosen last, and chooses anew every half second."""
+    """Follows the motions chosen last, and chooses anew every half second, or when it has to."""
 
     remarks: Mapping[int, str] = {}
 
@@ -72,40 +70,90 @@ class LatticeDriver:
         plan begins with the present one."""
         self._preview_s = preview_s
         self._chosen: tuple[Motions, Motions] | None = None
-        self._since_s = 0.0
+        self._since_s: Array | float = -np.inf
+        self._looked_s = 0.0
+        self._seen: SeenUsers | None = None
+        self._lead_mps: Array | None = None
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
-        chosen, passed_s = self._chosen, view.time_s - self._since_s
-        if chosen is None or passed_s > REPLAN_S - 1e-6:
-            before = None if chosen is None else _now(*chosen, passed_s)
-            self._chosen = chosen = choose(view, before)
-            self._since_s, passed_s = view.time_s, 0.0
+        passed_s = np.broadcast_to(view.time_s - self._since_s, view.arc_m.shape)
+        due = (passed_s > REPLAN_S - 1e-6) | self._sees_somebody_new(view)
+        due |= self._lead_brakes(view) & (passed_s > _AT_ONCE_S)
+        if self._chosen is None:
+            chosen = choose(view)
+        elif due.any():
+            chosen = self._renewed(self._chosen, view, np.flatnonzero(due), passed_s)
+        else:
+            chosen = self._chosen
+        self._chosen = chosen
+        self._since_s = np.where(due, view.time_s, self._since_s)
+        self._looked_s, self._seen = view.time_s, view.users
+        self._lead_mps = view.lead_speed_mps
         along, across = chosen
-        now = np.asarray(passed_s)
-        place, speed, _ = along.at(now)
-        accel = (along.at(now + self._preview_s)[1] - speed) / self._preview_s
+        now = np.where(due, 0.0, passed_s)
+        place = along.place_at(now)
+        speed, later = along.speed_at(np.stack([now, now + self._preview_s]))
+        accel = (later - speed) / self._preview_s
         offset = np.asarray(across.place_at(now + _LOOKAHEAD_S), dtype=np.float64)
         angle = pure_pursuit(view._replace(desired_offset_m=offset))
         present = view.states[:, 3]
         command = accel + _SPEED_GAIN * (speed - present) + _PLACE_GAIN * (place - view.arc_m)
-        command = np.minimum(np.maximum(command, -_MAX_DECEL_MPS2), _MAX_ACCEL_MPS2)
+        command = np.minimum(np.maximum(command, -MAX_DECEL_MPS2), MAX_ACCEL_MPS2)
         hold = (present < _HOLD_MPS) & (speed < _HOLD_MPS) & (accel < _HOLD_MPS)
         command = command + resistance_mps2(view.vehicle, present)
         return PlannerOutput(np.where(hold, _HOLD_MPS2, command), angle)
 
+    def _sees_somebody_new(self, view: PlannerView) -> npt.NDArray[np.bool_]:
+        if view.users is None or self._seen is None:
+            return np.zeros(len(view.arc_m), dtype=bool)
+        new = np.isfinite(view.users.arc_m) & ~np.isfinite(self._seen.arc_m)
+        return np.asarray(new.any(axis=1))
 
-def _now(along: Motions, across: Motions, passed_s: float) -> _Planned:
+    def _lead_brakes(self, view: PlannerView) -> npt.NDArray[np.bool_]:
+        if self._lead_mps is None:
+            return np.zeros(len(view.arc_m), dtype=bool)
+        least = _LEAD_BRAKES_MPS2 * (view.time_s - self._looked_s)
+        return np.asarray(self._lead_mps - view.lead_speed_mps > least)
+
+    def _renewed(
+        self,
+        chosen: tuple[Motions, Motions],
+        view: PlannerView,
+        rows: npt.NDArray[np.intp],
+        passed_s: Array,
+    ) -> tuple[Motions, Motions]:
+        """Return the motions with those of some rows chosen anew."""
+        changing = None
+        if view.users is not None and self._seen is not None:
+            now_s = view.time_s - self._looked_s
+            changing = changes(self._seen, view.users, passed_s=now_s)
+        along, across = chosen
+        if len(rows) == len(passed_s):
+            return choose(view, _planned(along, across, passed_s), changing)
+        mine = Motions(along.coefficients[:, rows], along.end_s[rows])
+        aside = Motions(across.coefficients[:, rows], across.end_s[rows])
+        if changing is not None:
+            changing = Changes(*(values[rows] for values in changing))
+        before = _planned(mine, aside, passed_s[rows])
+        for old, new in zip(chosen, choose(rows_of(view, rows), before, changing), strict=True):
+            old.coefficients[:, rows] = new.coefficients
+            old.end_s[rows] = new.end_s
+        return chosen
+
+
+def _planned(along: Motions, across: Motions, passed_s: Array) -> _Planned:
     """Return the acceleration along, and place, speed, acceleration across, that were planned."""
-    at = np.asarray(passed_s)
-    return (along.at(at)[2], *across.at(at))
+    return (along.at(passed_s)[2], *across.at(passed_s))
 
 
-def choose(view: PlannerView, before: _Planned | None = None) -> tuple[Motions, Motions]:
+def choose(
+    view: PlannerView, before: _Planned | None = None, changing: Changes | None = None
+) -> tuple[Motions, Motions]:
     """Return the best motions of S cars along and across the path, from now on.
 
     `before` is what the last plan has for now: acceleration along, and place, speed, acceleration
-    across the path.
+    across the path; `changing` is how others change their motion.
     """
     states = view.states
     slant = states[:, 2] - view.path.pose_at(view.arc_m).yaw_rad
@@ -122,14 +170,14 @@ def choose(view: PlannerView, before: _Planned | None = None) -> tuple[Motions, 
             for planned, present in zip(before[1:], (offset, slide, push), strict=True)
         )
     accel = np.where(speed < 0.1, np.maximum(accel, 0.0), accel)
-    accel = np.minimum(np.maximum(accel, -_MAX_DECEL_MPS2), _MAX_ACCEL_MPS2)
+    accel = np.minimum(np.maximum(accel, -MAX_DECEL_MPS2), MAX_ACCEL_MPS2)
     stop = _stop_places(view)
     along = _along(view, speed, accel, stop)
     across = _across(view, offset, slide, push)
-    along_cost, places, speeds = _rate_along(view, along, stop)
-    across_cost, offsets = _rate_across(view, across, speed)
+    along_cost, places, speeds = rate_along(view, along, stop)
+    across_cost, offsets = rate_across(view, across, speed)
     total = along_cost[:, :, None] + across_cost[:, None, :]
-    total += _collisions(view, places, speeds, offsets)
+    total += collisions(view, places, speeds, offsets, changing)
     best = total.reshape(len(total), -1).argmin(axis=1)
     rows = np.arange(len(total))
     first, second = np.divmod(best, total.shape[2])
@@ -155,7 +203,7 @@ def _along(view: PlannerView, speed: Array, accel: Floats, stop: Array) -> Motio
     """Return (S, L) motions along the path."""
     arc, speed, accel = view.arc_m[:, None], speed[:, None], accel[:, None]
     profile = view.path.speed_profile(
-        lateral_accel_mps2=_LATERAL_ACCEL_MPS2, decel_mps2=_COMFORT_DECEL_MPS2
+        lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=_COMFORT_DECEL_MPS2
     )
     bend = view.path.at_nodes(profile, arc + speed * _SPEED_TIMES_S)
     wanted = np.minimum(view.target_speed_mps[:, None], view.speed_factor[:, None] * bend)
@@ -163,7 +211,7 @@ def _along(view: PlannerView, speed: Array, accel: Floats, stop: Array) -> Motio
     times = np.repeat(_SPEED_TIMES_S, len(_SPEED_SHARES))
     keeping = to_speed(arc, speed, accel, end_speed=ends, end_s=times)
 
-    brake_s = np.maximum(speed / np.array([_MAX_DECEL_MPS2 - 1.0, 3.5]) * 1.3, 0.5)
+    brake_s = np.maximum(speed / np.array([MAX_DECEL_MPS2 - 1.0, 3.5]) * 1.3, 0.5)
     braking = to_speed(arc, speed, accel, end_speed=np.zeros_like(brake_s), end_s=brake_s)
 
     way = np.minimum(np.maximum(stop[:, None] - _LINE_GAP_M - arc, 0.0), 150.0)
@@ -192,83 +240,3 @@ def _across(view: PlannerView, offset: Floats, slide: Floats, push: Floats) -> M
         offset, slide, push, end_place=ends, end_speed=np.zeros_like(ends),
         end_s=np.append(times, 2.0),
     )  # fmt: skip
-
-
-def _rough(motions: Motions, origin: Array) -> Motions:
-    """Return motions in single precision, places counted from where each car is."""
-    coefficients = motions.coefficients.copy()
-    coefficients[0] -= origin[:, None]
-    return Motions(coefficients.astype(np.float32), motions.end_s.astype(np.float32))
-
-
-def _rate_along(view: PlannerView, along: Motions, stop: Array) -> tuple[Floats, Floats, Floats]:
-    """Return costs (S, L), and places, from the present one on, and speeds (K, S, L)."""
-    rough = _rough(along, view.arc_m)
-    place, speed, accel = rough.at(_ROUGH_INSTANTS_S)
-    jerk = rough.jerk_at(_ROUGH_INSTANTS_S)
-    target = np.maximum(view.target_speed_mps, 0.0).astype(np.float32)[:, None]
-    cost = (
-        _WEIGHT_SPEED * np.square(speed - target)
-        + _WEIGHT_ACCEL * np.square(accel)
-        + _WEIGHT_JERK * np.square(np.minimum(np.abs(jerk), np.float32(20.0)))
-    ).sum(axis=0) / _INSTANTS
-    most = _MAX_ACCEL_MPS2 * np.clip(view.speed_factor, 0.3, 2.0)[:, None]
-    wrong = (accel.max(axis=0) > most) | (accel.min(axis=0) < -_MAX_DECEL_MPS2 - 1.0)
-    wrong |= speed.min(axis=0) < -0.1
-    bends = np.abs(view.path.curvature_pm).astype(np.float32)
-    here = ((view.arc_m - view.path.arc_m[0]) / SPACING_M + 0.5).astype(np.float32)
-    nodes = (place / SPACING_M + here[:, None]).astype(np.intp)
-    lateral = (np.square(speed) * bends.take(nodes, mode="clip")).max(axis=0)
-    allowed = np.square(np.maximum(view.speed_factor, 1.0))[:, None]
-    excess = np.maximum(lateral / (allowed * _LATERAL_ACCEL_MPS2) - 1.0, 0.0)
-    wrong |= lateral > _MAX_LATERAL_MPS2 * allowed
-    beyond = place.max(axis=0) - (stop - view.arc_m)[:, None]
-    cost = cost + 20.0 * excess + _FORBIDDEN * wrong
-    cost += np.where(beyond > 0.0, _CROSSES_LINE + beyond, 0.0)
-    return cost, place, speed
-
-
-def _rate_across(view: PlannerView, across: Motions, speed: Array) -> tuple[Floats, Floats]:
-    """Return costs (S, D) and offsets (K, S, D)."""
-    rough = _rough(across, np.zeros(len(speed)))
-    offset, slide, _ = rough.at(_ROUGH_INSTANTS_S)
-    jerk = rough.jerk_at(_ROUGH_INSTANTS_S)
-    wanted = view.desired_offset_m.astype(np.float32)[:, None]
-    cost = _WEIGHT_ASIDE * np.square(offset - wanted) + _WEIGHT_ACROSS_JERK * np.square(jerk)
-    cost = cost.sum(axis=0) / _INSTANTS
-    steep = np.abs(slide).max(axis=0) > (_SLOPE * speed + 0.1)[:, None]
-    # To stay is always possible.
-    steep[:, -1] = False
-    return cost + _FORBIDDEN * steep, offset
-
-
-def _collisions(view: PlannerView, place: Floats, speed: Floats, offset: Floats) -> Floats:
-    """Return (S, L, D) what touching others costs: more the longer it lasts.
-
-    Boxes along the path; between two instants each may be half a step farther. Whether two overlap
-    is a product of overlaps along and across, summed over others and instants.
-    """
-    found = courses(view, _INSTANTS_S, nearest=_NEAREST)
-    if found is None:
-        return np.zeros((place.shape[1], 1, 1))
-    vehicle = view.vehicle
-    half_step = np.float32(HORIZON_S / _INSTANTS / 2.0)
-    ahead = found.arc_m - (view.arc_m + box_centre_from_base_m(vehicle))[:, None]
-    reach = 0.5 * vehicle.length_m.value + _ALONG_MARGIN_M + found.half_along_m
-    closing = np.abs(speed[:, :, None] - _single(found.along_mps))
-    along = np.abs(place[:, :, None] - _single(ahead)) < _single(reach) + half_step * closing
-    width = 0.5 * vehicle.width_m.value + _ACROSS_MARGIN_M + found.half_across_m
-    width = width + half_step * np.abs(found.across_mps)
-    across = np.abs(offset[:, :, None] - _single(found.offset_m)) < _single(width)
-    count = place.shape[1]
-    instants = along.shape[0] * along.shape[2]
-    first = along.transpose(1, 3, 0, 2).reshape(count, -1, instants).astype(np.float32)
-    second = across.transpose(1, 0, 2, 3).reshape(count, instants, -1).astype(np.float32)
-    # Sums of ones: exact, in whatever order.
-    touched = first @ second
-    return np.where(touched > 0.5, _COLLIDES + 10.0 * touched, 0.0)
-
-
-def _single(values: Array) -> Floats:
-    """Return (…, 1) in single precision, for an axis of candidates."""
-    return np.asarray(values.astype(np.float32)[..., None])

@@ -28,8 +28,14 @@ class Motions(NamedTuple):
         place = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
         late = time_s - t
         if late.any():
-            place = place + late * self.at(t)[1]
+            place = place + late * self.speed_at(t)
         return np.asarray(place)
+
+    def speed_at(self, time_s: Floats) -> Floats:
+        """Return speeds at times that broadcast against (…); see `at`."""
+        c, t = self.coefficients, np.minimum(time_s, self.end_s)
+        bends = 3.0 * c[3] + t * (4.0 * c[4] + t * (5.0 * c[5]))
+        return np.asarray(c[1] + t * (2.0 * c[2] + t * bends))
 
     def at(self, time_s: Floats) -> tuple[Floats, Floats, Floats]:
         """Return place, speed and acceleration at times that broadcast against (…).

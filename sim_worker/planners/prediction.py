@@ -8,10 +8,11 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.frames import wrap_angle
-from sim_worker.planners.base import PlannerView
+from sim_worker.planners.base import PlannerView, SeenUsers
 
 _KEEPS_LANE_RAD = 0.35
 _SIGHT_M = 60.0
+_TURNS_ON_S, _TURNS_OFF_RADPS = 1.5, 0.12
 _LEAST_SCALE = 0.2
 """Of distances along the path seen from the inside of a bend, where they lose their meaning."""
 
@@ -31,11 +32,31 @@ class Courses(NamedTuple):
     half_across_m: Array
 
 
-def courses(view: PlannerView, instants_s: Array, *, nearest: int) -> Courses | None:
+class Changes(NamedTuple):
+    """How others are changing their motion, each (S, R): braking, and yaw rate."""
+
+    brakes_mps2: Array
+    yaw_rate_radps: Array
+
+
+def changes(before: SeenUsers, now: SeenUsers, *, passed_s: float) -> Changes | None:
+    """Return what changed between two looks at the same others."""
+    if before.poses.shape != now.poses.shape or passed_s <= 0.0:
+        return None
+    brakes = np.maximum(before.speed_mps - now.speed_mps, 0.0) / passed_s
+    turns = wrap_angle(now.poses[..., 2] - before.poses[..., 2]) / passed_s
+    known = np.isfinite(turns)
+    return Changes(np.where(known, brakes, 0.0), np.where(known, turns, 0.0))
+
+
+def courses(
+    view: PlannerView, instants_s: Array, *, nearest: int, changing: Changes | None = None
+) -> Courses | None:
     """Predict the `nearest` others of each car at even instants; None where nobody is near.
 
-    Those along the path keep their angle to it, as lanes do; the rest go straight on. Who follows
-    in the car's own lane is left out: not to be hit from behind is not the car's part.
+    Those along the path keep their angle to it, as lanes do; the rest go straight on, and those
+    seen `changing` brake or turn on for a while. Who follows in the car's own lane is left out:
+    not to be hit from behind is not the car's part.
     """
     users = view.users
     if users is None or users.poses.shape[1] == 0:
@@ -64,6 +85,9 @@ def courses(view: PlannerView, instants_s: Array, *, nearest: int) -> Courses | 
     length, width = pick(users.size_m[..., 0]), pick(users.size_m[..., 1])
     turned = np.where(there, turned, 0.0)
     offset = np.where(there, offset, 0.0)
+    brakes, yaw_rate = np.zeros_like(speed), np.zeros_like(speed)
+    if changing is not None:
+        brakes, yaw_rate = pick(changing.brakes_mps2), pick(changing.yaw_rate_radps)
     rows: list[list[Array]] = []
     for k, passed_s in enumerate(np.diff(instants_s, prepend=0.0).tolist()):
         # The bend changes slowly: every second step is as the one before.
@@ -71,10 +95,15 @@ def courses(view: PlannerView, instants_s: Array, *, nearest: int) -> Courses | 
             bend = view.path.at_nodes(view.path.curvature_pm, np.where(there, arc, 0.0))
             ahead = speed * np.cos(turned) / np.maximum(1.0 - bend * offset, _LEAST_SCALE)
             aside = speed * np.sin(turned)
-            turning = np.where(keeps, 0.0, -bend * ahead)
+            goes_on = yaw_rate if instants_s[k] < _TURNS_ON_S else 0.0
+            off_the_road = goes_on - bend * ahead
+            if k == 0 and changing is not None:
+                keeps = keeps & (np.abs(off_the_road) < _TURNS_OFF_RADPS)
+            turning = np.where(keeps, 0.0, off_the_road)
         arc = arc + passed_s * ahead
         offset = offset + passed_s * aside
         turned = turned + passed_s * turning
+        speed = np.maximum(speed - passed_s * brakes, 0.0)
         rows.append([arc, offset, ahead, aside])
     found = [np.stack(column) for column in zip(*rows, strict=True)]
     return Courses(
