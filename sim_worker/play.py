@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from contracts.arrays import Array
+from sim_worker.actors.crowd import EgoBoxes
 from sim_worker.actors.perception import Lead
-from sim_worker.actors.traffic import EgoBoxes
 from sim_worker.planners.base import PlannerOutput, PlannerView
 from sim_worker.planners.path import FrenetPoint
 from sim_worker.scene import Scene

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from contracts.drive import RoadUserKind
 from contracts.scenario import Conduct
+from sim_worker.actors.crowd import Crowd
 from sim_worker.actors.kinds import KINDS
 from sim_worker.actors.path_table import Indices
-from sim_worker.actors.traffic import Crowd
 from sim_worker.planners.path import FrenetPath
 
 KIND_NAMES: tuple[RoadUserKind, ...] = tuple(KINDS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +14,26 @@ from sim_worker.planners.path import SPACING_M, FrenetPath
 Indices = npt.NDArray[np.intp]
 
 
+class OnPaths(NamedTuple):
+    """Paths of any number of places (…): their first nodes in the table, where these are, and the
+    last place short of the end."""
+
+    begin: Indices
+    first_arc_m: Array
+    last: Array
+
+
+class Place(NamedTuple):
+    """Places (…) in a table: the node before, and the share of the way to the next."""
+
+    node: Indices
+    share: Array
+
+
 class PathTable:
     """The nodes of P paths in one array, so that look-ups for all road users are one call.
 
-    Places are a path's index and an arc length, both of any one shape; beyond a path's ends they
-    stay at the end.
+    Beyond a path's ends, places stay at the end.
     """
 
     def __init__(self, paths: Sequence[FrenetPath]) -> None:
@@ -35,49 +51,53 @@ class PathTable:
     def __len__(self) -> int:
         return len(self.paths)
 
-    def _locate(self, path_of: Indices, arc_m: Array) -> tuple[Indices, Array]:
-        place = (arc_m - self._first_arc[path_of]) / SPACING_M
-        place = np.minimum(np.maximum(place, 0.0), self._last[path_of] - 1e-9)
-        index = place.astype(np.intp)
-        return self._begin[path_of] + index, place - index
+    def on(self, path_of: Indices) -> OnPaths:
+        """Return what places on these paths (…) have in common, to be looked up once."""
+        last = self._last[path_of] - 1e-9
+        return OnPaths(self._begin[path_of], self._first_arc[path_of], last)
 
-    def poses(self, path_of: Indices, arc_m: Array, lateral_m: Array | None = None) -> Array:
+    def place(self, on: OnPaths, arc_m: Array) -> Place:
+        """Return where arc lengths (…) are on their paths."""
+        place = (arc_m - on.first_arc_m) / SPACING_M
+        place = np.minimum(np.maximum(place, 0.0), on.last)
+        index = place.astype(np.intp)
+        return Place(on.begin + index, place - index)
+
+    def poses(self, place: Place, lateral_m: Array | None = None) -> Array:
         """Return x, y, yaw (…, 3) at places on the paths, `lateral_m` (…) to the left of them."""
-        index, share = self._locate(path_of, arc_m)
-        found = self._steps[index]
-        found *= share[..., None]
-        found += self._poses[index]
+        found = self._steps.take(place.node, axis=0)
+        found *= place.share[..., None]
+        found += self._poses.take(place.node, axis=0)
         if lateral_m is not None:
             found[..., 0] -= np.sin(found[..., 2]) * lateral_m
             found[..., 1] += np.cos(found[..., 2]) * lateral_m
         return np.asarray(found)
+
+    def headings(self, place: Place) -> Array:
+        """Return the paths' headings (…), without jumps, at places."""
+        return np.asarray(
+            self._steps[:, 2].take(place.node) * place.share + self._poses[:, 2].take(place.node)
+        )
 
     def along(self, path: FrenetPath) -> PathProjection:
         """Project every node on another path, so that road users can be found on it at once."""
         place = path.locate(self._poses[:, :2])
         heading = path.pose_at(place.arc_m).yaw_rad
         columns = [place.arc_m, place.offset_m, self._poses[:, 2] - heading]
-        return PathProjection(self, np.column_stack(columns))
-
-    def at_nodes(self, values: Array, path_of: Indices, arc_m: Array) -> Array:
-        """Interpolate `values` (M, …), given at all nodes in order, at places on the paths."""
-        index, share = self._locate(path_of, arc_m)
-        low, high = values[index], values[np.minimum(index + 1, len(values) - 1)]
-        return np.asarray(
-            low + share.reshape(share.shape + (1,) * (values.ndim - 1)) * (high - low)
-        )
+        return PathProjection(np.column_stack(columns))
 
 
 class PathProjection:
     """Where all places of a table lie on one other path, looked up instead of searched for."""
 
-    def __init__(self, table: PathTable, columns: Array) -> None:
-        self._table = table
+    def __init__(self, columns: Array) -> None:
+        """`columns` (M, 3) are arc length, offset to the left and relative heading of all nodes."""
         self._columns = columns
+        self._steps = np.diff(columns, axis=0, append=columns[-1:])
 
-    def at(self, path_of: Indices, arc_m: Array) -> tuple[Array, Array, Array]:
-        """Return arc length, offset to the left and relative heading on the other path."""
-        arc, offset, turned = np.moveaxis(
-            self._table.at_nodes(self._columns, path_of, arc_m), -1, 0
-        )
-        return arc, offset, turned
+    def at(self, place: Place) -> tuple[Array, Array, Array]:
+        """Return arc length, offset to the left and relative heading (…) on the other path."""
+        found = self._steps.take(place.node, axis=0)
+        found *= place.share[..., None]
+        found += self._columns.take(place.node, axis=0)
+        return found[..., 0], found[..., 1], found[..., 2]

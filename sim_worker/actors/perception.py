@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
-from sim_worker.actors.path_table import PathProjection
+from sim_worker.actors.path_table import PathProjection, Place
 from sim_worker.actors.traffic import Traffic
 from sim_worker.planners.base import SeenUsers
 from sim_worker.planners.path import FrenetPoint
@@ -19,6 +19,7 @@ Flags = npt.NDArray[np.bool_]
 
 _MARGIN_M = 0.3
 """What passes the car's side by less than this is in its way."""
+_ROUNDING_M = 1e-6
 
 
 class PerceptionFaults(NamedTuple):
@@ -66,8 +67,14 @@ class Sight:
         self._hidden = np.nonzero((hidden_by >= 0) & crowd.present)
         self._hides = hidden_by[self._hidden]
         kept = kept or int(self._late.max(initial=0)) + 1
-        now = (traffic.arc_m.copy(), traffic.speed_mps.copy(), traffic.poses)
-        self._past: list[tuple[Array, ...]] = [now] * kept
+        self._past: list[tuple[npt.NDArray[Any], ...]] = [_now(traffic)] * kept
+        self._anybody_late = bool(self._late.any())
+        self._ever_lost = bool((faults.lost_for_s > 0.0).any())
+        self._absent = ~crowd.present
+        self._all_there = not self._absent.any()
+        self._beside_m = crowd.lateral_m if crowd.lateral_m.any() else None
+        # No box that is turned is wider than this, nor longer.
+        self._half_diagonal_m = 0.5 * np.hypot(crowd.length_m, crowd.width_m)
 
     def begun(self, futures: npt.NDArray[np.intp], traffic: Traffic) -> Sight:
         """Return the sight of (K,) cars that see `traffic`, begun as that of these futures did."""
@@ -88,7 +95,8 @@ class Sight:
         Who has `looked` at this instant already looks again.
         """
         past = [*before._past[1:], before._past[-1]] if looked else before._past
-        kept = futures[:, None], futures[:, None], futures[:, None, None]
+        row = futures[:, None]
+        kept = row, row, row, row[..., None]
         self._past = [
             tuple(np.where(k, *pair) for k, *pair in zip(kept, theirs, mine, strict=True))
             for mine, theirs in zip(self._past, past, strict=True)
@@ -98,24 +106,34 @@ class Sight:
         self, tick: int | npt.NDArray[np.intp], traffic: Traffic, eyes_xy_m: Array
     ) -> SeenUsers:
         """Return what is seen at a tick, or ticks (S,), from where the cars' fronts are (S, 2)."""
-        now = (traffic.arc_m.copy(), traffic.speed_mps.copy(), traffic.poses)
-        self._past = [now, *self._past[:-1]]
-        arc, speed, poses = now
-        if self._late.any():
-            rows = np.arange(len(arc))
-            arc, speed, poses = (
-                np.stack([past[k] for past in self._past])[self._late, rows] for k in range(3)
+        self._past = [_now(traffic), *self._past[:-1]]
+        node, share, speed, poses = self._past[0]
+        if self._anybody_late:
+            rows = np.arange(len(node))
+            node, share, speed, poses = (
+                np.stack([past[k] for past in self._past])[self._late, rows] for k in range(4)
             )
-        unseen = ~self._crowd.present | self._lost(np.asarray(tick) * self._tick_s)[:, None]
-        if len(self._hides):
-            unseen = unseen.copy()
-            unseen[self._hidden] |= self._behind(poses, eyes_xy_m)
-        on_arc, offset, turned = self._along.at(self._crowd.path_of, arc)
-        offset = offset + self._crowd.lateral_m * np.cos(turned)
-        if unseen.any():
+        on_arc, offset, turned = self._along.at(Place(node, share))
+        if self._beside_m is not None:
+            offset = offset + self._beside_m * np.cos(turned)
+        unseen = self._unseen(tick, poses, eyes_xy_m)
+        if unseen is not None:
             on_arc = np.where(unseen, np.nan, on_arc)
             poses = np.where(unseen[..., None], np.nan, poses)
         return SeenUsers(poses, speed, self._size, on_arc, offset, self._walks, turned)
+
+    def _unseen(
+        self, tick: int | npt.NDArray[np.intp], poses: Array, eyes_xy_m: Array
+    ) -> Flags | None:
+        """(S, R) bool: who is absent, lost or hidden; None where everybody is seen."""
+        if self._all_there and not self._ever_lost and not len(self._hides):
+            return None
+        unseen = self._absent.copy()
+        if self._ever_lost:
+            unseen |= self._lost(np.asarray(tick) * self._tick_s)[:, None]
+        if len(self._hides):
+            unseen[self._hidden] |= self._behind(poses, eyes_xy_m)
+        return unseen
 
     def _lost(self, time_s: float | Array) -> Flags:
         since = time_s - self._faults.lost_from_s
@@ -141,16 +159,25 @@ class Sight:
 
     def lead(self, seen: SeenUsers, place: FrenetPoint) -> Lead:
         """Return who is in the way of base_link at `place` (S,) on the ego's path."""
-        cos, sin = np.abs(np.cos(seen.turned_rad)), np.abs(np.sin(seen.turned_rad))
-        length, width = seen.size_m[..., 0], seen.size_m[..., 1]
-        gap = seen.arc_m - place.arc_m[:, None] - self._front_m
+        aside = np.abs(seen.offset_m - place.offset_m[:, None])
+        margin = 0.5 * self._width_m + _MARGIN_M
+        few = np.nonzero(aside < self._half_diagonal_m + (margin + _ROUNDING_M))
+        turned, (length, width) = seen.turned_rad[few], self._size[few].T
+        cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
+        row = few[0]
+        gap = seen.arc_m[few] - place.arc_m[row] - self._front_m
         gap -= 0.5 * (length * cos + width * sin)
         beside = 0.5 * (length * sin + width * cos + self._width_m) + _MARGIN_M
-        in_way = np.abs(seen.offset_m - place.offset_m[:, None]) < beside
-        in_way &= gap > -self._length_m
-        gap = np.where(in_way, gap, np.inf)
-        nearest = gap.argmin(axis=1)
-        rows = np.arange(len(gap))
-        gap = gap[rows, nearest]
+        in_way = (aside[few] < beside) & (gap > -self._length_m)
+        gaps = np.full(aside.shape, np.inf)
+        gaps[few] = np.where(in_way, gap, np.inf)
+        rows, nearest = np.arange(len(gaps)), gaps.argmin(axis=1)
+        gap = gaps[rows, nearest]
         speed = seen.speed_mps[rows, nearest] * np.cos(seen.turned_rad[rows, nearest])
         return Lead(gap, np.where(np.isfinite(gap), speed, 0.0))
+
+
+def _now(traffic: Traffic) -> tuple[npt.NDArray[Any], ...]:
+    """Return what is remembered of an instant: places, speeds and poses."""
+    node, share = traffic.place
+    return node, share, traffic.speed_mps.copy(), traffic.poses

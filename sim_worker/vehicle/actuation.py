@@ -128,14 +128,18 @@ class Actuation:
         accel = np.minimum(np.maximum(accel, -self._grip), self._grip)
         share = np.maximum(1.0 - accel * accel / self._grip_square, _MIN_LATERAL_SHARE**2)
         forward = accel if self._gear is None else accel * self._gear
-        loads = np.maximum(self._loads_n + self._transfer_kg * forward, _TINY_N)
+        loads = self._transfer_kg * forward
+        loads += self._loads_n
+        np.maximum(loads, _TINY_N, out=loads)
         speed = np.abs(speed_mps)
-        np.copyto(self._damping, self._stiffness_prad * loads / np.maximum(speed, _MIN_SPEED_MPS))
-        lateral = self._friction * np.sqrt(share) * loads
-        np.copyto(self._lateral_high, lateral)
-        np.negative(lateral, out=self._lateral_low)
+        slow = np.maximum(speed, _MIN_SPEED_MPS)
+        np.divide(self._stiffness_prad * loads, slow, out=self._damping)
+        loads *= self._friction * np.sqrt(share)
+        np.copyto(self._lateral_high, loads)
+        np.negative(loads, out=self._lateral_low)
         drive = self._mass * np.maximum(accel, 0.0)
-        brake = drive - self._mass * accel + self._rolling
+        brake = drive - self._mass * accel
+        brake += self._rolling
         if self._gear is not None:
             drive *= self._gear
         drive -= self._drag * speed_mps * speed

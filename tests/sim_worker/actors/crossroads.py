@@ -8,9 +8,10 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.world import Connection, World
+from sim_worker.actors.crowd import Crowd, EgoBoxes
 from sim_worker.actors.path_table import PathTable
 from sim_worker.actors.right_of_way import JunctionRules
-from sim_worker.actors.traffic import Crowd, EgoBoxes, Traffic
+from sim_worker.actors.traffic import Traffic
 from sim_worker.planners.path import FrenetPath
 from tests.world_gen.sketch import Sketch
 from world_gen.build import build_world
@@ -64,6 +65,7 @@ def traffic(
     speed_mps: list[float],
     lawful: list[bool],
     brakes_at_s: float = np.inf,
+    present: list[bool] | None = None,
 ) -> Traffic:
     """One future in which each path has one car, so many metres before the junction's centre."""
     rules = JunctionRules(world)
@@ -71,7 +73,7 @@ def traffic(
     start = np.array([[centre_arc(p) - b for p, b in zip(paths, before_m, strict=True)]])
     speed = np.array([speed_mps])
     crowd = Crowd(
-        present=row > 0,
+        present=row > 0 if present is None else np.array([present]),
         lawful=np.array([lawful]),
         length_m=4.5 * row,
         width_m=1.8 * row,

@@ -25,7 +25,7 @@ TABLE = PathTable([CIRCLE, STRAIGHT])
 def test_poses_are_those_of_each_path_alone(which: list[int], arc: float, lateral: float) -> None:
     places = np.array(which)
     arcs = np.full(len(places), arc)
-    found = TABLE.poses(places, arcs, np.full(len(places), lateral))
+    found = TABLE.poses(TABLE.place(TABLE.on(places), arcs), np.full(len(places), lateral))
     for row, path in zip(found, (TABLE.paths[i] for i in which), strict=True):
         alone = path.pose_at(np.array([arc]), lateral)
         assert row[2] == pytest.approx(alone.yaw_rad[0], abs=1e-9)
@@ -35,13 +35,14 @@ def test_poses_are_those_of_each_path_alone(which: list[int], arc: float, latera
 
 def test_beyond_its_end_a_place_stays_at_the_end() -> None:
     last = STRAIGHT.arc_m[-1]
-    found = TABLE.poses(np.array([1, 1]), np.array([last, last + 50.0]))
+    found = TABLE.poses(TABLE.place(TABLE.on(np.array([1, 1])), np.array([last, last + 50.0])))
     assert found[0] == pytest.approx(found[1], abs=1e-6)
 
 
 def test_a_crossing_road_is_found_on_the_other_path_without_a_search() -> None:
     east = FrenetPath(np.array([[-50.0, 0.0], [80.0, 0.0]]))
-    arc, offset, turned = TABLE.along(east).at(np.array([1]), np.array([25.0]))
+    place = TABLE.place(TABLE.on(np.array([1])), np.array([25.0]))
+    arc, offset, turned = TABLE.along(east).at(place)
     # 25 m along the northbound path is 15 m south of the eastbound one, at x = 5.
     assert (arc[0], offset[0], turned[0]) == pytest.approx((55.0, -15.0, np.pi / 2), abs=1e-6)
 

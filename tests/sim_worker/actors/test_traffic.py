@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim_worker.actors.traffic import EgoBoxes
+from sim_worker.actors.crowd import EgoBoxes
 from tests.sim_worker.actors.crossroads import centre_arc, crossroads, run, straight_on, traffic
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
@@ -90,9 +90,9 @@ def test_who_is_not_there_is_nowhere(tmp_path: Path) -> None:
     world = crossroads(tmp_path)
     east = straight_on(world, EAST)
     moving = traffic(
-        world, [east, east], before_m=[60.0, 20.0], speed_mps=[5.0, 5.0], lawful=[True] * 2
-    )
-    moving.crowd.present[0, 1] = False
+        world, [east, east], before_m=[60.0, 20.0], speed_mps=[5.0, 5.0], lawful=[True] * 2,
+        present=[True, False],
+    )  # fmt: skip
     run(moving, seconds=2.0)
     assert np.isnan(moving.poses[0, 1]).all()
     assert moving.speed_mps[0, 0] > 5.0, "nobody is ahead"
