@@ -24,6 +24,8 @@ _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
 _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")
 _LEAST_M = {"motorway": 120.0, "road": 60.0, "circuit": 150.0, "parking_bay": 32.0}
 _END_M = 10.0
+_LEAST_RADIUS_M = 150.0
+"""Of a motorway's lane: a bend for 80 km/h, at 0.34 g. Trunk roads through junctions bend more."""
 _ON_LANE_M = 2.5
 _JOINT_M = 1.5
 
@@ -60,9 +62,17 @@ def other_places(
             return iter(()), f"the path does not run on a {_WORDS[setting]} here"
         return iter((_place(scenario, network, way),)), ""
     ways = _laps(network, lanes) if setting == "circuit" else _stretches(network, lanes)
-    long_enough = (way for way in ways if way.last_m - way.first_m >= _LEAST_M[setting])
-    places = (_place(scenario, network, way) for way in long_enough)
-    return places, f"each {_WORDS[setting]} is shorter than {_LEAST_M[setting]:g} m"
+    fitting = (
+        way
+        for way in ways
+        if way.last_m - way.first_m >= _LEAST_M[setting]
+        and (setting != "motorway" or _least_radius_m(way) >= _LEAST_RADIUS_M)
+    )
+    places = (_place(scenario, network, way) for way in fitting)
+    why = f"each {_WORDS[setting]} is shorter than {_LEAST_M[setting]:g} m"
+    if setting == "motorway":
+        why += f" or has a bend tighter than {_LEAST_RADIUS_M:g} m"
+    return places, why
 
 
 _WORDS = {
@@ -81,6 +91,13 @@ def _fits(lane: Lane, setting: str, network: RoadNetwork) -> bool:
         across = lane.left_id if network.near_sign > 0.0 else lane.right_id
         return road_class in _CLASSES["motorway"] and across is not None
     return setting != "circuit" or road_class in _CLASSES["circuit"]
+
+
+def _least_radius_m(way: Way) -> float:
+    """Return the radius of a way's tightest bend, as far as lanes carry it."""
+    arcs = np.arange(way.first_m, way.last_m, 1.0)
+    curvature = way.path.at_nodes(way.path.curvature_pm, arcs)
+    return 1.0 / max(float(np.abs(curvature).max()), 1e-6)
 
 
 def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> Place:

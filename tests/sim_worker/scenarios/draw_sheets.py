@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
@@ -25,7 +26,17 @@ from contracts.scenario import Scenario
 from contracts.world import ATTRIBUTION, World
 from sim_worker.scenarios.casting import Cast, cast
 from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.picture import draw_case, draw_case_legend, told
+from sim_worker.scenarios.picture import (
+    EGO,
+    IMPACT,
+    MOST_HALF_M,
+    OTHERS,
+    PLANNED,
+    STANDING,
+    draw_case,
+    draw_case_legend,
+    told,
+)
 from sim_worker.scenarios.picture_runs import heedless_run, planned_run
 from sim_worker.scenarios.placement import places
 from sim_worker.scenarios.reading import catalogue
@@ -34,6 +45,7 @@ from sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.worlds import motorway, race_track
 from world_gen.build import build_world
 from world_gen.build_graph import build_road_graph
+from world_gen.export.picture_style import GROUND, ISLAND, JUNCTION, ROAD, SIDEWALK
 from world_gen.find_intersections import find_intersections
 from world_gen.map_index import index_map
 from world_gen.read_osm import read_map
@@ -60,6 +72,10 @@ PLANNERS = {"reversing_parking": "reverse_pursuit"}
 """Who drives the ego, where not by `pure_pursuit_idm`."""
 TYPICAL = {"roundabout_entry": "roundabout", "roundabout_exit": "roundabout"}
 """Kinds that show best what a scenario is; it takes place on others, too."""
+EXACT = (
+    "white", "black", EGO, IMPACT, OTHERS, PLANNED, STANDING, GROUND, ISLAND, JUNCTION, ROAD,
+    SIDEWALK,
+)  # fmt: skip
 _TILE_IN, _CAPTION_IN, _HEAD_IN, _FOOT_IN = (5.0, 4.1), 0.78, 0.62, 0.55
 
 
@@ -115,9 +131,9 @@ def choose_tiles(data: Path) -> dict[str, list[Tile]]:
         print(f"{name}: without {', '.join(missing) or 'none'}", flush=True)
     for id_, world in drawn.items():
         if not tiles[id_]:
-            tile = tile_of(catalogue()[id_], world, "drawn")
+            tile = tile_of(catalogue()[id_], world, "")
             assert tile is not None
-            tiles[id_].append(tile)
+            tiles[id_].append(tile._replace(where="drawn, since none of the maps has one"))
     return tiles
 
 
@@ -163,7 +179,10 @@ def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]]) -> Figure:
             axes = figure.add_axes((left, bottom, wide / width, high / height))
             heedless = heedless_run(tile.played, vehicle, horizon_s=scenario.horizon_s)
             planned = planned_run(tile.played, scenario, tile.world, vehicle, planner=planner)
-            draw_case(axes, tile.played, tile.world, heedless, planned, aspect=wide / high)
+            draw_case(
+                axes, tile.played, tile.world, heedless, planned, aspect=wide / high,
+                most_half_m=MOST_HALF_M * (2.0 if scenario.where.setting == "circuit" else 1.0),
+            )  # fmt: skip
             words = f"{tile.where}\n{told(tile.played, heedless, planned, planner)}"
             figure.text(left, bottom - 0.05 / height, words, fontsize=8.8, va="top",
                         linespacing=1.15)  # fmt: skip
@@ -176,17 +195,18 @@ def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]]) -> Figure:
 
 
 def save(figure: Figure, file: Path) -> None:
-    """Write a figure as PNG with a palette, a third of the size."""
+    """Write a figure as PNG with a palette, a third of the size; the colours that matter stay."""
     buffer = io.BytesIO()
     FigureCanvasAgg(figure).print_figure(buffer, format="png")
-    image = (
-        Image.open(buffer)
-        .convert("RGB")
-        .quantize(128, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    )
+    image = Image.open(buffer).convert("RGB")
+    exact = [round(255 * part) for colour in EXACT for part in to_rgb(colour)]
+    common = image.quantize(160, dither=Image.Dither.NONE).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(exact + common)
     about = PngInfo()
     about.add_text("Copyright", ATTRIBUTION.replace("©", "(c)"))
-    image.save(file, optimize=True, pnginfo=about)
+    reduced = image.quantize(palette=palette, dither=Image.Dither.NONE)
+    reduced.save(file, optimize=True, pnginfo=about)
     print(f"{file}: {file.stat().st_size / 1000:.0f} kB")
 
 

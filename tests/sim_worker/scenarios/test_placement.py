@@ -20,6 +20,9 @@ from sim_worker.scenarios.roads import RoadNetwork
 from sim_worker.scenarios.ways import unlike_its_turn
 from sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
+from tests.world_gen.drawn_maps import drawn_map
+from world_gen.build import build_region
+from world_gen.build_graph import build_road_graph
 
 VEHICLE = load_vehicle()
 
@@ -116,6 +119,12 @@ def test_a_motorway_takes_overtaking_on_its_slow_lane() -> None:
         assert lane.left_id is not None
         assert lane.right_id is None
     assert "motorway" in why_not("overtaking_motorway", cross()).reason
+    bent = {i: (x, 0.0) for i, x in enumerate((-300.0, -150.0, -8.0), start=1)}
+    bent |= {4: (-2.0, 2.0), 5: (0.0, 8.0), 6: (0.0, 150.0), 7: (0.0, 300.0)}
+    tags = {"highway": "trunk", "lanes": "2", "oneway": "yes", "maxspeed": "100"}
+    osm = drawn_map(bent, [(1, list(bent), tags)])
+    corner = build_region(osm, build_road_graph(osm), osm.bounds)
+    assert why_not("overtaking_motorway", corner).reason.endswith("has a bend tighter than 150 m")
 
 
 def test_a_closed_track_is_one_lap_and_more() -> None:
