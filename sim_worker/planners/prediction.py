@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.frames import wrap_angle
@@ -12,6 +13,8 @@ from sim_worker.planners.base import PlannerView, SeenUsers
 
 _KEEPS_LANE_RAD = 0.35
 _SIGHT_M = 60.0
+_WAY_M, _BEYOND_M, _GAINS_MPS = 7.0, 15.0, 3.0
+"""Who stays farther beside the way, or beyond what a car can reach of it, is no matter."""
 _TURNS_ON_S, _TURNS_OFF_RADPS = 1.5, 0.12
 _LEAST_SCALE = 0.2
 """Of distances along the path seen from the inside of a bend, where they lose their meaning."""
@@ -49,6 +52,17 @@ def changes(before: SeenUsers, now: SeenUsers, *, passed_s: float) -> Changes | 
     return Changes(np.where(known, brakes, 0.0), np.where(known, turns, 0.0))
 
 
+def _may_meet(view: PlannerView, users: SeenUsers, within_s: float) -> npt.NDArray[np.bool_]:
+    """(S, R) bool: who could come near the car's way, by present speeds, in that time."""
+    along = within_s * users.speed_mps * np.cos(users.turned_rad)
+    aside = within_s * np.abs(users.speed_mps * np.sin(users.turned_rad))
+    ahead = users.arc_m - view.arc_m[:, None]
+    reach = within_s * (view.states[:, 3] + _GAINS_MPS) + _BEYOND_M
+    meets = np.abs(users.offset_m - view.offset_m[:, None]) < _WAY_M + aside
+    meets &= ahead + np.minimum(along, 0.0) < reach[:, None]
+    return np.asarray(meets & (ahead + np.maximum(along, 0.0) > -_BEYOND_M))
+
+
 def courses(
     view: PlannerView, instants_s: Array, *, nearest: int, changing: Changes | None = None
 ) -> Courses | None:
@@ -67,7 +81,7 @@ def courses(
     along_lane = (np.abs(turned) < _KEEPS_LANE_RAD) & ~users.walks
     behind = along_lane & (users.arc_m < view.arc_m[:, None])
     behind &= np.abs(users.offset_m - view.offset_m[:, None]) < 2.0
-    counts = (away < _SIGHT_M**2) & ~behind
+    counts = (away < _SIGHT_M**2) & ~behind & _may_meet(view, users, float(instants_s[-1]))
     if not counts.any():
         return None
     away = np.where(counts, away, np.inf)
@@ -90,20 +104,22 @@ def courses(
         brakes, yaw_rate = pick(changing.brakes_mps2), pick(changing.yaw_rate_radps)
     rows: list[list[Array]] = []
     for k, passed_s in enumerate(np.diff(instants_s, prepend=0.0).tolist()):
+        after = np.maximum(speed - passed_s * brakes, 0.0)
+        mean, speed = 0.5 * (speed + after), after
         # The bend changes slowly: every second step is as the one before.
         if k % 2 == 0:
             bend = view.path.at_nodes(view.path.curvature_pm, np.where(there, arc, 0.0))
-            ahead = speed * np.cos(turned) / np.maximum(1.0 - bend * offset, _LEAST_SCALE)
-            aside = speed * np.sin(turned)
+            along = np.cos(turned) / np.maximum(1.0 - bend * offset, _LEAST_SCALE)
+            across = np.sin(turned)
             goes_on = yaw_rate if instants_s[k] < _TURNS_ON_S else 0.0
-            off_the_road = goes_on - bend * ahead
+            off_the_road = goes_on - bend * along * mean
             if k == 0 and changing is not None:
                 keeps = keeps & (np.abs(off_the_road) < _TURNS_OFF_RADPS)
             turning = np.where(keeps, 0.0, off_the_road)
+        ahead, aside = along * mean, across * mean
         arc = arc + passed_s * ahead
         offset = offset + passed_s * aside
         turned = turned + passed_s * turning
-        speed = np.maximum(speed - passed_s * brakes, 0.0)
         rows.append([arc, offset, ahead, aside])
     found = [np.stack(column) for column in zip(*rows, strict=True)]
     return Courses(
