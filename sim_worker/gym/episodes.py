@@ -74,6 +74,8 @@ def episodes_of_scenario(
     scenario = find_scenario(scenario) if isinstance(scenario, str) else scenario
     scenes = SceneMaker(world)
     at = _place(scenario, world, vehicle, place)
+    if at.reverse:
+        raise UserError(f"{scenario.id} is driven backwards at {at.name}; learners drive forwards")
     drawn = _cases(scenario, values or {}, cases, cases_seed, early_or_late_s)
     played = scenes.staged.cast(scenario, drawn, at.name, vehicle)
     variants: list[Variant] = []

@@ -12,13 +12,13 @@ from sim_worker.gym.rows import StepFacts
 Reward = Callable[[StepFacts], Array]
 """From what happened to S cars in a step to what it is worth to each, (S,)."""
 
-PROGRESS_PER_M = 0.1
+PROGRESS_PER_M = 0.2
 PER_S = -0.2
 COMFORT_PER_S = -0.05
 COMFORT_ACCEL_MPS2, COMFORT_JERK_MPS3 = 3.0, 5.0
 """So much acceleration, or jerk, costs the weight of comfort each second, twice as much four."""
-SPEEDING_PER_M = -0.2
-COLLISION, OFF_ROAD, RAN_RED, DID_NOT_WAIT, ARRIVED = -20.0, -20.0, -5.0, -2.0, 2.0
+SPEEDING_PER_M = -0.4
+COLLISION, OFF_ROAD, RAN_RED, DID_NOT_WAIT, ARRIVED = -20.0, -20.0, -5.0, -2.0, 5.0
 
 
 def default_reward(step: StepFacts) -> Array:

@@ -205,7 +205,7 @@ class EpisodeRows:
 
 
 def scene_of(pool: Scene, cases: Rows) -> Scene:
-    """Return the scene of (S,) futures of another one, each as it begins there."""
+    """Return the scene of (S,) futures of another one, each as begun there; nobody plans."""
     casts = pool.casts
     traffic = sight = None
     if casts is not None and pool.traffic is not None and pool.sight is not None:
@@ -226,12 +226,12 @@ def scene_of(pool: Scene, cases: Rows) -> Scene:
         starts=pool.starts[cases],
         start_arc_m=pool.start_arc_m[cases],
         aims=Aims._make(column[cases] for column in pool.aims),
-        planners=tuple(pool.planners[k] for k in cases),
+        planners=(),
         faults=faults._replace(**columns, perception=perception),
         casts=casts,
         traffic=traffic,
         sight=sight,
-        left_out=tuple(pool.left_out[k] for k in cases),
+        left_out=(),
     )
 
 

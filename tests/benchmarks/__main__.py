@@ -26,6 +26,7 @@ BENCHMARKS = (
     "boxes_1000",
     "full_scene",
     "metadrive",
+    "gym_steps",
     "world_from_open_map",
     "world_stages",
     "world_cutout_vs_netconvert",
