@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -114,6 +114,38 @@ def test_faults_of_a_future_act_in_its_row_alone() -> None:
 
     assert all(len(values) == 1 for values in by_case.values())
     assert min(by_case[1]) > max(by_case[0]) + 1.0
+
+
+def test_a_row_among_law_abiding_road_users_is_an_environment_alone() -> None:
+    seen = tuple(
+        SeenRoadUser(
+            kind="car", x_m=x, y_m=y, yaw_rad=yaw, speed_mps=6.0, length_m=4.5, width_m=1.8
+        )
+        for x, y, yaw in ((1.5, -40.0, np.pi / 2), (-1.5, 35.0, -np.pi / 2), (-25.0, -1.5, 0.0))
+    )
+    variants = (Variant(index=0, name="nominal"), happening(1, "scp"))
+    question = msgspec.structs.replace(job(variants), road_users=seen)
+    settings: dict[str, Any] = {"job": question, "control": "along_path", "horizon_s": 3.0}
+    envs = JunctionVectorEnv(3, crossroads(), autoreset_mode="SameStep", **settings)
+    env = JunctionEnv(crossroads(), **settings)
+    among, _ = envs.reset(seed=4)
+    alone, _ = env.reset(seed=6)
+    cases = set()
+    for step in range(70):
+        action = np.full(1, 0.1 * np.sin(step), np.float32)
+        # The others drive differently, so that they begin anew at other times.
+        actions = np.stack([action + 0.5, action - 0.2, action])
+        among, rewards, _, _, infos = envs.step(actions)
+        alone, reward, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
+            alone, info = env.reset()
+            cases.add(info["case"])
+            assert infos["case"][2] == info["case"]
+        assert (reward, alone.tobytes()) == (rewards[2], among[2].tobytes())
+
+    assert env.course.rows.scene.traffic is not None
+    assert env.course.rows.scene.traffic.reacts
+    assert cases
 
 
 def test_what_does_not_fit_says_so() -> None:
