@@ -145,6 +145,7 @@ def drive(
         starts,
         steering_delay_s=np.full(count, vehicle.steering_delay_s.value),
         friction_factor=np.ones(count),
+        backwards=np.full(count, getattr(planner, "drives_backwards", False)),
     )
     driver: Planner = planner.begin(count) if isinstance(planner, RemembersWithinJob) else planner
     centre_m = box_centre_from_base_m(vehicle)

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
 import pytest
 
 from contracts.arrays import Array
-from sim_worker import stage as stage_module
 from sim_worker.planners.as_planned import AsPlanned
 from sim_worker.planners.base import KnownPlan
 from sim_worker.planners.path import FrenetPath
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from sim_worker.planners.reverse_pursuit import ReversePursuit
-from sim_worker.stage import Stage
-from sim_worker.vehicle.actuation import Actuation
 from sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import Other, at_rest_on, drive, straight, view_of, walker
 
@@ -104,14 +100,6 @@ def test_a_plan_that_is_none_is_named(spoil: object, words: str) -> None:
         AsPlanned().plan(view)
 
 
-@pytest.fixture
-def reversing(monkeypatch: pytest.MonkeyPatch) -> Stage:
-    """A stage whose cars have their gear in reverse."""
-    backwards = functools.partial(Actuation, backwards=np.ones(1, dtype=bool))
-    monkeypatch.setattr(stage_module, "Actuation", backwards)
-    return Stage(None, VEHICLE, nsim=1)
-
-
 def bay_path() -> FrenetPath:
     """Straight on to the west, then by two arcs of 6 m to the side, as into a bay beside a road."""
     angle = np.linspace(0.0, math.acos(1.0 - 2.5 / 12.0), 12)
@@ -128,11 +116,11 @@ def backing(path: FrenetPath, arc_m: float) -> Array:
 
 
 @pytest.mark.parametrize("speed", [1.1, 2.2])
-def test_it_backs_into_a_bay_and_stops_at_its_end(reversing: Stage, speed: float) -> None:
+def test_it_backs_into_a_bay_and_stops_at_its_end(speed: float) -> None:
     path = bay_path()
     done = drive(
         ReversePursuit(), path, backing(path, 2.0), vehicle=VEHICLE, seconds=30.0,
-        target_mps=speed, stage=reversing,
+        target_mps=speed,
     )  # fmt: skip
     assert done.states[0, :, 3].min() == pytest.approx(-speed, abs=0.2)
     assert np.abs(done.offset_m).max() < 0.25
@@ -142,13 +130,13 @@ def test_it_backs_into_a_bay_and_stops_at_its_end(reversing: Stage, speed: float
     assert turned == pytest.approx(0.0, abs=math.radians(8.0))
 
 
-def test_it_stops_for_who_walks_or_stands_behind_it(reversing: Stage) -> None:
+def test_it_stops_for_who_walks_or_stands_behind_it() -> None:
     path = FrenetPath(np.array([[0.0, 0.0], [-60.0, 0.0]]))
     crossing = walker(np.array([[-14.0, -40.0], [-14.0, 40.0]]), 1.2, 40.0 - 1.2 * 8.0)
     wall = Other(np.array([[-30.0, 0.0], [-31.0, 0.0]]), 0.0, 0.0)
     done = drive(
         ReversePursuit(), path, backing(path, 2.0), vehicle=VEHICLE, seconds=40.0,
-        target_mps=1.5, stage=reversing, others=[crossing, wall],
+        target_mps=1.5, others=[crossing, wall],
     )  # fmt: skip
     assert done.clearance_m.min() > 0.1
     rear = done.states[0, -1, 0] - VEHICLE.rear_overhang_m.value
