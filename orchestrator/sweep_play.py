@@ -24,9 +24,7 @@ from orchestrator.sweep_rows import Row, blank_row
 from orchestrator.sweep_spec import FUTURES_PER_JOB, STEP_S, Loaded
 from sim_worker.actors.cast import KIND_NAMES
 from sim_worker.futures import run_job
-from sim_worker.planners.path import FrenetPath
-from sim_worker.rehearsal import staged_cases
-from sim_worker.scenarios.impact import Moving, ego_box, front_point
+from sim_worker.rehearsal import off_plan_m, staged_cases
 from sim_worker.scenarios.placement import places
 from sim_worker.scenarios.roads import RoadNetwork
 from sim_worker.scenarios.roles import Cast
@@ -228,11 +226,8 @@ def _off_m(states: Array32, time_s: float, case: Cast, vehicle: VehicleParameter
     heading = yaw + yaw_rate * since_s / 2.0
     x += (ahead_mps * np.cos(heading) - left_mps * np.sin(heading)) * since_s
     y += (ahead_mps * np.sin(heading) + left_mps * np.cos(heading)) * since_s
-    yaw += yaw_rate * since_s + (np.pi if case.reverse else 0.0)
-    pose = FrenetPath(np.array([[x, y], [x + np.cos(yaw), y + np.sin(yaw)]]))
-    box, here = ego_box(vehicle, reverse=case.reverse), Moving(pose, 0.0)
-    point = front_point(here, box, np.zeros(1), case.impact_share, case.place.near_sign)
-    return float(np.hypot(*(point[0] - case.impact_point_m)))
+    there = np.array([x, y, yaw + yaw_rate * since_s])
+    return off_plan_m(case, there, vehicle)
 
 
 def _accident(result: FuturesResult, index: int, accident: Accident) -> Row:

@@ -15,20 +15,29 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.futures import FuturesJob, Variant
 from contracts.scenario import EGO
+from contracts.vehicle import VehicleParameters
+from sim_worker.actors.kinds import KINDS
 from sim_worker.closed_loop import drive
 from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.impact import ego_box
 from sim_worker.scenarios.places import Unplaced
-from sim_worker.scenarios.roles import ALONG, Cast
-from sim_worker.scenarios.staged import staged_start
+from sim_worker.scenarios.roles import ALONG, Cast, CastActor
+from sim_worker.scenarios.staged import staged_players, staged_start
 from sim_worker.scenarios.ways import Way
 from sim_worker.scene import SceneMaker
 from sim_worker.stage import Stage
+from sim_worker.touch import first_touches
+from world_gen.polyline import length
 
 _FORWARDS, _BACKWARDS = "constant_speed", "reverse_pursuit"
 _STRAIGHT_PM = 1e-3
 """On a line that bends no more, a car is where its path is."""
 _RUN_UP_M = 10.0
 """Who starts so far before the first bend drives it as all do who come along there."""
+_NEAR_M = 0.07
+"""From an impact to its plan, where one is promised: within 0.1 m however control ticks fall."""
+_WATCHED_S = 1.0
+"""Before it, one who drives alone is looked at for touches."""
 _KEEPS_SPEED = 0.35
 """A car whose speed differs by more of what the case says does something else."""
 _AFTER_S = 1.0
@@ -48,11 +57,13 @@ class _Ego(NamedTuple):
 
 
 class DrivenLine(NamedTuple):
-    """The line of one drive: its way, and when (T,) it came by which arc length (T,)."""
+    """The line of one drive: its way, and when (T,) it came by which arc length (T,), with `states`
+    (T, 8)."""
 
     way: Way
     time_s: Array
     arc_m: Array
+    states: Array
 
 
 def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, Cast | Unplaced]:
@@ -75,6 +86,7 @@ def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, 
         variant = job.variants[row]
         groups.setdefault((variant.scenario_id, variant.place, _ego(case)), []).append(row)
     scenarios = {scenario.id: scenario for scenario in job.scenarios}
+    on_time: dict[int, Cast] = {}
     for (scenario_id, place, ego), rows in groups.items():
         line = lines[ego]
         cases = [job.variants[row].values for row in rows]
@@ -85,9 +97,64 @@ def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, 
         for row, met in zip(rows, again, strict=True):
             # Where no car can drive like that, nobody can say when it meets somebody.
             played[row] = _unplanned(bent[row])
-            if isinstance(met, Cast) and met.impact_with == bent[row].impact_with:
-                played[row] = _on_time(met, line) if _drives(met, line) else played[row]
+            meant = bent[row].impact_with
+            if isinstance(met, Cast) and met.impact_with == meant and _drives(met, line):
+                on_time[row] = _on_time(met, line, bent[row].place.ego)
+    off_m = _off_m(on_time, lines, bent, stage)
+    played |= {row: case for row, case in on_time.items() if not off_m.get(row, 0.0) > _NEAR_M}
     return played
+
+
+def _along(case: Cast) -> bool:
+    return any(a.name == case.impact_with and a.relation in ALONG for a in case.actors)
+
+
+def _off_m(
+    cases: Mapping[int, Cast],
+    lines: Mapping[_Ego, DrivenLine],
+    bent: Mapping[int, Cast],
+    stage: Stage,
+) -> dict[int, float]:
+    """Return how far from their plans impacts with those who come are, as it was driven, by row."""
+    rows = [row for row, case in cases.items() if not _along(case)]
+    if not rows:
+        return {}
+    tick_s = stage.control_dt_s
+    states, users, sizes = [], [], []
+    for row in rows:
+        case, line = cases[row], lines[_ego(bent[row])]
+        from_s = _time_at(line, case.ego_arc_m, case.ego_speed_mps)
+        first = max(math.ceil((from_s + case.impact_time_s - _WATCHED_S) / tick_s), 0)
+        ticks = first + np.arange(round((_WATCHED_S + _AFTER_S / 2.0) / tick_s))
+        ticks = np.minimum(ticks, len(line.states) - 1)
+        player = next(
+            p for p in staged_players(case, case.place.ego.path) if p.name == case.impact_with
+        )
+        since_s = np.asarray(ticks * tick_s - from_s, dtype=np.float64)
+        arc = player.start_arc_m + player.speed_mps * since_s
+        pose = player.path.pose_at(arc, player.lateral_m)
+        states.append(line.states[ticks])
+        users.append(np.column_stack([pose.xy_m, pose.yaw_rad])[:, None])
+        sizes.append([(KINDS[player.kind].length_m, KINDS[player.kind].width_m)])
+    touches = first_touches(
+        stage.vehicle, np.stack(states), np.stack(users), np.array(sizes), tick_s=tick_s
+    )
+    off = dict.fromkeys(rows, math.inf)
+    for future, state in zip(touches.future.tolist(), touches.ego_states, strict=True):
+        off[rows[future]] = off_plan_m(cases[rows[future]], state, stage.vehicle)
+    return off
+
+
+def off_plan_m(case: Cast, state: Array, vehicle: VehicleParameters) -> float:
+    """Return how far the point of the ego that is to be hit is from where that is planned, with
+    base_link in a state (8,)."""
+    box = ego_box(vehicle, reverse=case.reverse)
+    yaw = float(state[2]) + (math.pi if case.reverse else 0.0)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    left = case.place.near_sign * (case.impact_share - 0.5) * box.width_m
+    x = float(state[0]) + box.front_m * cos - left * sin - float(case.impact_point_m[0])
+    y = float(state[1]) + box.front_m * sin + left * cos - float(case.impact_point_m[1])
+    return math.hypot(x, y)
 
 
 def _ego(case: Cast) -> _Ego:
@@ -182,21 +249,33 @@ def _told(cases: Iterable[Cast], states: Array, stage: Stage) -> Iterable[Driven
             way=way._replace(xy_m=xy[moved], speed_limit_mps=limit[moved], path=line),
             time_s=np.arange(float(len(driven))) * stage.control_dt_s,
             arc_m=arc[len(before) :],
+            states=driven,
         )
 
 
-def _on_time(case: Cast, line: DrivenLine) -> Cast:
-    """Return a case in which those who come meet the ego when it really is there."""
+def _on_time(case: Cast, line: DrivenLine, way: Way) -> Cast:
+    """Return a case, on the ego's path `way` again, in which those who come meet the ego when it
+    really is there."""
     met_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
     from_s, to_s = (_time_at(line, arc, case.ego_speed_mps) for arc in (case.ego_arc_m, met_m))
     later_s = (to_s - from_s) - case.impact_time_s
-    actors = tuple(
-        actor
-        if actor.relation in ALONG
-        else actor._replace(start_arc_m=actor.start_arc_m - actor.speed_mps * later_s)
-        for actor in case.actors
+    return case._replace(
+        place=case.place._replace(ego=way),
+        ego_xy_m=way.xy_m,
+        ego_speed_limit_mps=way.speed_limit_mps,
+        actors=tuple(_from_line(actor, later_s, line, way) for actor in case.actors),
+        impact_time_s=case.impact_time_s + later_s,
     )
-    return case._replace(actors=actors, impact_time_s=case.impact_time_s + later_s)
+
+
+def _from_line(actor: CastActor, later_s: float, line: DrivenLine, way: Way) -> CastActor:
+    if actor.relation not in ALONG:
+        return actor._replace(start_arc_m=actor.start_arc_m - actor.speed_mps * later_s)
+    if actor.way != way.name:
+        return actor
+    arc = np.array([actor.start_arc_m - (length(actor.xy_m) - length(line.way.xy_m))])
+    place = way.path.locate(line.way.path.point_at(arc), near_arc_m=arc)
+    return actor._replace(xy_m=way.xy_m, start_arc_m=float(place.arc_m[0]))
 
 
 def _drives(case: Cast, line: DrivenLine) -> bool:

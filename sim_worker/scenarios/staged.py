@@ -104,13 +104,7 @@ def staged_players(played: Cast, path: FrenetPath) -> tuple[Player, ...]:
         way = ways.get(actor.way, ego)
         # A path that was led back for its actor begins by so much before its way.
         arc = actor.start_arc_m - (length(actor.xy_m) - length(way.xy_m))
-        if way is ego:
-            # The ego may have been cast on the line that it really drives.
-            stands = ego.path.point_at(np.array([arc]))
-            arc = float(path.locate(stands, near_arc_m=np.array([arc])).arc_m[0])
-            players.append(player_on(actor, path, arc))
-        else:
-            players.append(player_on(actor, way.path, arc))
+        players.append(player_on(actor, path if way is ego else way.path, arc))
     return tuple(players)
 
 
