@@ -60,7 +60,7 @@ class LiveScenarios:
     ) -> Cast | Unplaced:
         """Return a case at a place with nobody early or late, as if it began there."""
         punctual = {name: 0.0 if name.endswith(_LATE) else v for name, v in values.items()}
-        key = (scenario.id, place.name, vehicle.name, *punctual.items())
+        key = (scenario, place.name, vehicle, *punctual.items())
         if key not in self._casts:
             self._casts[key] = cast(scenario, punctual, place, vehicle=vehicle)
         return self._casts[key]
