@@ -10,8 +10,10 @@ It follows the path at the target speed, brakes for red lights and for who is ah
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,33 +27,43 @@ ACCEL_MPS2, DECEL_MPS2, LATERAL_MPS2 = 1.5, 2.5, 2.0
 JOIN_S = 30.0
 
 
+class Road(NamedTuple):
+    """Of the path's points, 1 m apart: arc length, heading, and the speed that bends allow."""
+
+    arc_m: Array
+    heading_rad: Array
+    bends_mps: Array
+
+
 def plan(scene: PlannerScene) -> PlannedMotions:
     """Return where each car of a scene should be over the next three seconds."""
     steps = np.hypot(*np.diff(scene.path_xy_m, axis=0).T)
     path_arc = np.concatenate([[0.0], np.cumsum(steps)])
-    xy, yaw, speed = zip(
-        *(_drive(scene, row, path_arc) for row in range(len(scene.futures))), strict=True
-    )
+    heading = np.unwrap(np.arctan2(*np.gradient(scene.path_xy_m, axis=0).T[::-1]))
+    bend = np.abs(np.gradient(heading, path_arc)) + 1e-6
+    ahead = np.lib.stride_tricks.sliding_window_view(np.pad(bend, (0, 14), mode="edge"), 15)
+    road = Road(path_arc, heading, np.sqrt(LATERAL_MPS2 / ahead.max(axis=1)))
+    rows = range(len(scene.futures))
+    xy, yaw, speed = zip(*(_drive(scene, row, road) for row in rows), strict=True)
     return PlannedMotions(
         job=scene.job, question=scene.question, futures=scene.futures, time_s=TIME_S,
         xy_m=np.stack(xy), yaw_rad=np.stack(yaw), speed_mps=np.stack(speed),
     )  # fmt: skip
 
 
-def _drive(scene: PlannerScene, row: int, path_arc: Array) -> tuple[Array, Array, Array]:
+def _drive(scene: PlannerScene, row: int, road: Road) -> tuple[Array, Array, Array]:
     """Return positions (N, 2), yaws (N,) and speeds (N,) of one car."""
-    heading = np.unwrap(np.arctan2(*np.gradient(scene.path_xy_m, axis=0).T[::-1]))
-    bend = np.abs(np.gradient(heading, path_arc)) + 1e-6
+    path_arc, heading, bends_mps = road
     arc, present = float(scene.arc_m[row]), max(float(scene.states[row, 3]), 0.0)
     front = scene.length_m - scene.rear_overhang_m
     stop = min(scene.stop_arc_m[row] - 1.0, _rear_of_who_is_ahead(scene, row, path_arc) - 3.0)
     arcs, speeds = [arc], [present]
     for step_s in np.diff(TIME_S):
         room = max(stop - front - arcs[-1], 0.0)
-        ahead = (path_arc >= arcs[-1]) & (path_arc < arcs[-1] + 15.0)
-        curve = np.sqrt(LATERAL_MPS2 / bend[ahead].max()) if ahead.any() else np.inf
-        wanted = min(scene.target_speed_mps[row], curve, np.sqrt(2.0 * DECEL_MPS2 * room))
-        change = np.clip(wanted - speeds[-1], -2.0 * DECEL_MPS2 * step_s, ACCEL_MPS2 * step_s)
+        curve = bends_mps[min(max(int(arcs[-1]), 0), len(bends_mps) - 1)]
+        wanted = min(scene.target_speed_mps[row], curve, math.sqrt(2.0 * DECEL_MPS2 * room))
+        change = wanted - speeds[-1]
+        change = min(max(change, -2.0 * DECEL_MPS2 * step_s), ACCEL_MPS2 * step_s)
         speeds.append(max(speeds[-1] + change, 0.0))
         arcs.append(arcs[-1] + 0.5 * (speeds[-2] + speeds[-1]) * step_s)
     xy = np.column_stack([np.interp(arcs, path_arc, scene.path_xy_m[:, k]) for k in (0, 1)])
