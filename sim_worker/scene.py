@@ -19,7 +19,7 @@ from sim_worker.actors.cast import Casting, Player, casting
 from sim_worker.actors.path_table import PathTable
 from sim_worker.actors.perception import Sight
 from sim_worker.actors.right_of_way import JunctionRules, PathRules
-from sim_worker.actors.seen import seen_actors
+from sim_worker.actors.seen import SeenActors
 from sim_worker.actors.traffic import Traffic
 from sim_worker.faults import FaultArrays, fault_arrays
 from sim_worker.planners.base import KnownPlan, SharedGround
@@ -106,6 +106,7 @@ class SceneMaker:
         self.world = world
         self._rules = JunctionRules(world)
         self._network = RoadNetwork(world)
+        self._seen = SeenActors(self._network)
         self._live = LiveScenarios(self._network)
         self.staged = StagedScenarios(self._network)
         """The scenarios of this World at named places, away from any drive."""
@@ -154,7 +155,7 @@ class SceneMaker:
         aims = _aims(job, place.offset_m)
         live = any(v.scenario_id and not v.place for v in job.variants)
         on_path = self._live.on(path, float(place.arc_m[0]), vehicle) if live else None
-        seen = seen_actors(job.road_users, self._network)
+        seen = self._seen.actors(job.road_users)
         casts: list[tuple[Player, ...]] = []
         faults = []
         left_out = [""] * count

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -54,28 +54,28 @@ class Casting(NamedTuple):
 
 def casting(casts: Sequence[Sequence[Player]], *, ego_path: FrenetPath) -> Casting:
     """Lay the road users of S futures out as arrays; places without one are not present."""
-    count, most = len(casts), max(map(len, casts), default=0)
-    shape = (count, most)
-    places: dict[int, int] = {id(ego_path): 0}
-    paths = [ego_path]
-    kinds, hidden = np.zeros(shape, np.intp), np.full(shape, -1, np.intp)
-    path_of, walks = np.zeros(shape, np.intp), np.zeros(shape, bool)
-    present, lawful = np.zeros(shape, bool), np.zeros(shape, bool)
-    columns = np.tile(_NOBODY, (count, most, 1))
-    for s, players in enumerate(casts):
-        names = [player.name for player in players]
-        for r, player in enumerate(players):
-            if id(player.path) not in places:
-                places[id(player.path)] = len(paths)
-                paths.append(player.path)
-            present[s, r] = True
-            path_of[s, r] = places[id(player.path)]
-            kinds[s, r] = KIND_NAMES.index(player.kind)
-            walks[s, r] = not KINDS[player.kind].keeps_lane
-            lawful[s, r] = player.conduct == "law_abiding"
-            columns[s, r] = _numbers(player)
+    shape = (len(casts), max(map(len, casts), default=0))
+    # Futures have many road users in common: each is looked at once.
+    known: dict[int, int] = {}
+    players: list[Player] = []
+    which, hidden = np.zeros(shape, np.intp), np.full(shape, -1, np.intp)
+    for s, cast in enumerate(casts):
+        for player in cast:
+            if id(player) not in known:
+                players.append(player)
+                known[id(player)] = len(players)
+        which[s, : len(cast)] = [known[id(player)] for player in cast]
+        for r, player in enumerate(cast):
             if player.hidden_by:
-                hidden[s, r] = names.index(player.hidden_by)
+                hidden[s, r] = [other.name for other in cast].index(player.hidden_by)
+    paths = {id(ego_path): ego_path}
+    for player in players:
+        paths.setdefault(id(player.path), player.path)
+    places = {path: place for place, path in enumerate(paths)}
+    rows = [_NOBODY, *(_row(player, places) for player in players)]
+    present, lawful, walks, path_of, kinds, columns = (
+        np.array(column)[which] for column in zip(*rows, strict=True)
+    )
     length, width, lateral, arc, speed, desired, accel, decel, brakes_at, brakes_by = np.moveaxis(
         columns, -1, 0
     ).copy()
@@ -94,10 +94,34 @@ def casting(casts: Sequence[Sequence[Player]], *, ego_path: FrenetPath) -> Casti
         brakes_at_s=brakes_at,
         brakes_by_mps2=brakes_by,
     )
-    return Casting(crowd, tuple(paths), kinds, hidden, walks)
+    return Casting(crowd, tuple(paths.values()), kinds, hidden, walks)
 
 
-_NOBODY = np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0])
+class _Row(NamedTuple):
+    """What arrays hold of one player; `numbers` are the columns of `Crowd` from its length on."""
+
+    present: bool
+    lawful: bool
+    walks: bool
+    path: int
+    kind: int
+    numbers: tuple[float, ...]
+
+
+_NOBODY = _Row(
+    False, False, False, 0, 0, (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
+)  # fmt: skip
+
+
+def _row(player: Player, places: Mapping[int, int]) -> _Row:
+    return _Row(
+        present=True,
+        lawful=player.conduct == "law_abiding",
+        walks=not KINDS[player.kind].keeps_lane,
+        path=places[id(player.path)],
+        kind=KIND_NAMES.index(player.kind),
+        numbers=_numbers(player),
+    )
 
 
 def _numbers(player: Player) -> tuple[float, ...]:

@@ -59,6 +59,9 @@ class LawAbiding:
         self._width = crowd.width_m[s, r]
         self._decel, self._most = crowd.decel_mps2[s, r], crowd.accel_mps2[s, r]
         self._desired = crowd.desired_mps[s, r]
+        self._parts = [
+            slice(first, first + _ROWS_AT_ONCE) for first in range(0, len(s), _ROWS_AT_ONCE)
+        ]
         self._pairs: tuple[int, _Pairs] | None = None
 
     def accelerations(self, now: Now, ego: EgoBoxes, red_arcs_m: Array) -> Array:
@@ -94,28 +97,24 @@ class LawAbiding:
         s, crowd = self.rows, self._crowd
         x, y, yaw = now.poses[s, self.columns].T
         cos, sin = np.cos(yaw), np.sin(yaw)
-        poses = [_with_ego(ego.poses[:, i], now.poses[..., i]) for i in range(3)]
+        xs, ys, yaws = (_with_ego(ego.poses[:, i], now.poses[..., i]) for i in range(3))
         length = _with_ego(ego.length_m, crowd.length_m)
         width = _with_ego(ego.width_m, crowd.width_m)
         half_bend = 0.5 * bend
         widest = 0.5 * (self._width + np.max(length + width)) + _BESIDE_M
-        found = []
-        for first in range(0, len(s), _ROWS_AT_ONCE):
-            part = slice(first, first + _ROWS_AT_ONCE)
-            dx, dy = poses[0][s[part]] - x[part, None], poses[1][s[part]] - y[part, None]
-            c, i = cos[part, None], sin[part, None]
-            ahead = c * dx + i * dy
-            left = c * dy - i * dx - half_bend[part, None] * np.square(ahead)
-            close = (ahead > 0.0) & (ahead < _SIGHT_M) & (np.abs(left) < widest[part, None])
-            found.append(np.flatnonzero(close) + first * dx.shape[1])
-        k, o = np.divmod(np.concatenate(found), length.shape[1])
-        row = s[k]
-        dx, dy = poses[0][row, o] - x[k], poses[1][row, o] - y[k]
+        found = [
+            _in_front(xs.T, ys.T, s[part], x[part], y[part], cos[part], sin[part],
+                      half_bend[part], widest[part], part.start)
+            for part in self._parts
+        ]  # fmt: skip
+        k, o = np.concatenate(found, axis=1)
+        at = s[k] * length.shape[1] + o
+        dx, dy = xs.take(at) - x[k], ys.take(at) - y[k]
         ahead = cos[k] * dx + sin[k] * dy
         left = cos[k] * dy - sin[k] * dx - half_bend[k] * np.square(ahead)
-        turned = poses[2][row, o] - yaw[k]
+        turned = yaws.take(at) - yaw[k]
         along, across = np.abs(np.cos(turned)), np.abs(np.sin(turned))
-        long, wide = length[row, o], width[row, o]
+        long, wide = length.take(at), width.take(at)
         gap = ahead - self._half[k] - 0.5 * (long * along + wide * across)
         beside = 0.5 * (self._width[k] + long * across + wide * along) + _BESIDE_M
         in_way = (np.abs(left) < beside) & (np.square(dx) + np.square(dy) < _SIGHT_M**2)
@@ -124,7 +123,7 @@ class LawAbiding:
         chosen = in_way & (gap == nearest[k])
         speeds = _with_ego(ego.speed_mps, now.speed_mps)
         speed = np.zeros(len(s))
-        speed[k[chosen]] = speeds[row[chosen], o[chosen]] * np.cos(turned[chosen])
+        speed[k[chosen]] = speeds.take(at[chosen]) * np.cos(turned[chosen])
         return nearest, np.maximum(speed, 0.0)
 
     def _wait(self, now: Now, ego: EgoBoxes, arc: Array, speed: Array) -> Array:
@@ -172,6 +171,30 @@ class LawAbiding:
         reach = np.square(speed) / (4.0 * self._decel)
         ahead = np.where(ahead > reach[:, None] - _LINE_GAP_M, ahead, np.inf)
         return np.asarray(ahead.min(axis=1, initial=np.inf)) - _LINE_GAP_M
+
+
+def _in_front(
+    xs: Array, ys: Array, future: Indices, x: Array, y: Array, cos: Array, sin: Array,
+    half_bend: Array, within_m: Array, first: int,
+) -> Indices:  # fmt: skip
+    """Return (2, N) who of (K,) road users has whom of (R + 1, S) ahead, near its own parabola.
+
+    Everybody's x and y come with one row for each of the others: so the inner loops are long.
+    """
+    dx, dy = xs.take(future, axis=1) - x, ys.take(future, axis=1) - y
+    ahead = cos * dx
+    ahead += sin * dy
+    dy *= cos
+    dx *= sin
+    dy -= dx
+    bent = np.square(ahead, out=dx)
+    bent *= half_bend
+    dy -= bent
+    near = np.abs(dy, out=dy) < within_m
+    near &= ahead > 0.0
+    near &= ahead < _SIGHT_M
+    other, who = np.divmod(np.flatnonzero(near), len(x))
+    return np.stack([who + first, other])
 
 
 def _with_ego(ego: Array | float, others: Array) -> Array:

@@ -73,8 +73,10 @@ class Sight:
         self._absent = ~crowd.present
         self._all_there = not self._absent.any()
         self._beside_m = crowd.lateral_m if crowd.lateral_m.any() else None
-        # No box that is turned is wider than this, nor longer.
-        self._half_diagonal_m = 0.5 * np.hypot(crowd.length_m, crowd.width_m)
+        self._sizes = np.stack([crowd.length_m.ravel(), crowd.width_m.ravel()])
+        half_diagonal = 0.5 * np.hypot(crowd.length_m, crowd.width_m)
+        self._at_most_aside_m = half_diagonal + (0.5 * self._width_m + _MARGIN_M + _ROUNDING_M)
+        """However it is turned, who is farther aside than this is not in the way."""
 
     def begun(self, futures: npt.NDArray[np.intp], traffic: Traffic) -> Sight:
         """Return the sight of (K,) cars that see `traffic`, begun as that of these futures did."""
@@ -160,17 +162,16 @@ class Sight:
     def lead(self, seen: SeenUsers, place: FrenetPoint) -> Lead:
         """Return who is in the way of base_link at `place` (S,) on the ego's path."""
         aside = np.abs(seen.offset_m - place.offset_m[:, None])
-        margin = 0.5 * self._width_m + _MARGIN_M
-        few = np.nonzero(aside < self._half_diagonal_m + (margin + _ROUNDING_M))
-        turned, (length, width) = seen.turned_rad[few], self._size[few].T
+        few = np.flatnonzero(aside < self._at_most_aside_m)
+        row = few // aside.shape[1]
+        turned, length, width = seen.turned_rad.take(few), *self._sizes.take(few, axis=1)
         cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
-        row = few[0]
-        gap = seen.arc_m[few] - place.arc_m[row] - self._front_m
+        gap = seen.arc_m.take(few) - place.arc_m[row] - self._front_m
         gap -= 0.5 * (length * cos + width * sin)
         beside = 0.5 * (length * sin + width * cos + self._width_m) + _MARGIN_M
-        in_way = (aside[few] < beside) & (gap > -self._length_m)
+        in_way = (aside.take(few) < beside) & (gap > -self._length_m)
         gaps = np.full(aside.shape, np.inf)
-        gaps[few] = np.where(in_way, gap, np.inf)
+        gaps.put(few[in_way], gap[in_way])
         rows, nearest = np.arange(len(gaps)), gaps.argmin(axis=1)
         gap = gaps[rows, nearest]
         speed = seen.speed_mps[rows, nearest] * np.cos(seen.turned_rad[rows, nearest])

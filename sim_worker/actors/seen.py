@@ -20,24 +20,41 @@ _STRAIGHT_M = 200.0
 _STANDS_MPS = 0.3
 
 
-def seen_actors(users: Sequence[SeenRoadUser], network: RoadNetwork) -> tuple[Player, ...]:
-    """Return detected road users: along the lane they are on, lawfully, else straight on.
+class SeenActors:
+    """Detected road users of one World: along the lane they are on, lawfully, else straight on.
 
     One that stands is taken to stay where it is: whether it waits or is parked cannot be seen.
     """
-    return tuple(_actor(number, user, network) for number, user in enumerate(users))
+
+    def __init__(self, network: RoadNetwork) -> None:
+        self._network = network
+        self._path_of_lane: dict[str, FrenetPath] = {}
+
+    def actors(self, users: Sequence[SeenRoadUser]) -> tuple[Player, ...]:
+        """Return the road users as players; those on the same lane have the same path."""
+        return tuple(
+            _actor(number, user, self._lane_path(user)) for number, user in enumerate(users)
+        )
+
+    def _lane_path(self, user: SeenRoadUser) -> FrenetPath | None:
+        if user.kind == "pedestrian" or user.speed_mps < _STANDS_MPS:
+            return None
+        lane = _lane_under(user, self._network)
+        if lane is None:
+            return None
+        if lane.id not in self._path_of_lane:
+            self._path_of_lane[lane.id] = self._network.lane_way(lane).path
+        return self._path_of_lane[lane.id]
 
 
-def _actor(number: int, user: SeenRoadUser, network: RoadNetwork) -> Player:
+def _actor(number: int, user: SeenRoadUser, path: FrenetPath | None) -> Player:
     place = np.array([[user.x_m, user.y_m]])
-    lane = None if user.kind == "pedestrian" else _lane_under(user, network)
-    stands = user.speed_mps < _STANDS_MPS
-    if lane is None or stands:
+    stands, lawful = user.speed_mps < _STANDS_MPS, path is not None
+    if path is None:
         ahead = np.array([math.cos(user.yaw_rad), math.sin(user.yaw_rad)])
         path = FrenetPath(place + np.array([[0.0], [_STRAIGHT_M]]) * ahead)
         arc, offset = 0.0, 0.0
     else:
-        path = network.lane_way(lane).path
         on_path = path.locate(place)
         arc, offset = float(on_path.arc_m[0]), float(on_path.offset_m[0])
     return Player(
@@ -46,7 +63,7 @@ def _actor(number: int, user: SeenRoadUser, network: RoadNetwork) -> Player:
         path=path,
         start_arc_m=arc,
         speed_mps=user.speed_mps,
-        conduct="parked" if stands else "heedless" if lane is None else "law_abiding",
+        conduct="law_abiding" if lawful else "parked" if stands else "heedless",
         lateral_m=offset,
         size_m=(user.length_m, user.width_m),
     )

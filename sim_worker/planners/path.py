@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from contracts.arrays import Array
 
@@ -18,8 +19,8 @@ SPACING_M = 1.0
 _AFTER_M = 200.0
 _WINDOW = 12
 """Nodes searched on either side of the last known place."""
-_BLOCK = 32
-"""Points whose distances to all nodes are looked at together: they stay in the cache."""
+_MANY = 32
+"""Points, from which on a tree of the nodes is searched faster than all of them."""
 _SMOOTH_NODES = 2
 """Curvature is the heading change over this many nodes on either side."""
 
@@ -154,9 +155,11 @@ class FrenetPath:
         """Return positions and headings at arc lengths (…) and offsets to the left."""
         return PathPose(self.point_at(arc_m, offset_m), self.at_nodes(self._heading, arc_m))
 
-    def _nearest(self, x: Array, y: Array, end: int) -> npt.NDArray[np.intp]:
-        """Return which of the nodes before `end` is nearest to each of a few points."""
-        dx, dy = self._x[:end] - x[:, None], self._y[:end] - y[:, None]
+    def _nearest(self, xy_m: Array, end: int) -> npt.NDArray[np.intp]:
+        """Return which of the nodes before `end` is nearest to each of the points."""
+        if len(xy_m) > _MANY:
+            return np.asarray(cKDTree(self._nodes[:end, :2]).query(xy_m)[1], dtype=np.intp)
+        dx, dy = self._x[:end] - xy_m[:, 0, None], self._y[:end] - xy_m[:, 1, None]
         dx *= dx
         dy *= dy
         dx += dy
@@ -173,12 +176,7 @@ class FrenetPath:
         x, y = xy_m[:, 0], xy_m[:, 1]
         if near_arc_m is None:
             end = max(2, int(np.searchsorted(self.arc_m, upto_arc_m, side="right")))
-            index = np.concatenate(
-                [
-                    self._nearest(x[k : k + _BLOCK], y[k : k + _BLOCK], end)
-                    for k in range(0, len(x), _BLOCK)
-                ]
-            )
+            index = self._nearest(xy_m, end)
         else:
             centre = (near_arc_m - (self._first_arc + _WINDOW * SPACING_M)) / SPACING_M
             centre = np.minimum(np.maximum(centre, 0.0), self._last - 2 * _WINDOW)
