@@ -205,7 +205,7 @@ class EpisodeRows:
 
 
 def scene_of(pool: Scene, cases: Rows) -> Scene:
-    """Return the scene of (S,) futures of another one, each as begun there; nobody plans."""
+    """Return the scene of (S,) futures of another one, each as it begins there."""
     casts = pool.casts
     traffic = sight = None
     if casts is not None and pool.traffic is not None and pool.sight is not None:
@@ -226,7 +226,7 @@ def scene_of(pool: Scene, cases: Rows) -> Scene:
         starts=pool.starts[cases],
         start_arc_m=pool.start_arc_m[cases],
         aims=Aims._make(column[cases] for column in pool.aims),
-        planners=(),
+        planners=tuple(pool.planners[k] for k in cases),
         faults=faults._replace(**columns, perception=perception),
         casts=casts,
         traffic=traffic,
@@ -236,10 +236,14 @@ def scene_of(pool: Scene, cases: Rows) -> Scene:
 
 
 def _playable(pool: Scene) -> Rows:
-    """Return which futures can be played as episodes; raises UserError where none can."""
+    """Return which futures can be played as episodes, forwards; UserError where none can."""
     place = pool.path.locate(pool.starts[:, :2], near_arc_m=pool.start_arc_m)
     beside = np.abs(place.offset_m) > _BEGINS_WITHIN_M
-    found = [k for k, reason in enumerate(pool.left_out) if not reason and not beside[k]]
+    found = [
+        k
+        for k, reason in enumerate(pool.left_out)
+        if not (reason or beside[k] or pool.backwards[k])
+    ]
     if not found:
         why = next(filter(None, pool.left_out), "")
         why = why or f"they begin {np.abs(place.offset_m).min():.1f} m beside the path"

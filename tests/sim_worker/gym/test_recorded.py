@@ -123,8 +123,8 @@ def test_a_row_among_law_abiding_road_users_is_an_environment_alone() -> None:
         )
         for x, y, yaw in ((1.5, -40.0, np.pi / 2), (-1.5, 35.0, -np.pi / 2), (-25.0, -1.5, 0.0))
     )
-    variants = (Variant(index=0, name="nominal"), happening(1, "scp"))
-    question = msgspec.structs.replace(job(variants), road_users=seen)
+    late = Variant(index=0, name="late", faults=Faults(perception_delay_s=0.4))
+    question = msgspec.structs.replace(job((late, happening(1, "scp"))), road_users=seen)
     settings: dict[str, Any] = {"job": question, "control": "along_path", "horizon_s": 3.0}
     envs = JunctionVectorEnv(3, crossroads(), autoreset_mode="SameStep", **settings)
     env = JunctionEnv(crossroads(), **settings)
