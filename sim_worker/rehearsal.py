@@ -7,7 +7,7 @@ alone first, and who is to meet it is cast on the line that it left, at the time
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from contracts.scenario import EGO
 from contracts.vehicle import VehicleParameters
 from sim_worker.actors.kinds import KINDS
 from sim_worker.closed_loop import drive
-from sim_worker.planners.path import FrenetPath
+from sim_worker.driven_line import DrivenLine, driven_lines, drives_as_cast, time_at
 from sim_worker.scenarios.impact import ego_box
 from sim_worker.scenarios.places import Unplaced
 from sim_worker.scenarios.roles import ALONG, Cast, CastActor
@@ -38,8 +38,6 @@ _NEAR_M = 0.07
 """From an impact to its plan, where one is promised: within 0.1 m however control ticks fall."""
 _WATCHED_S = 1.0
 """Before it, one who drives alone is looked at for touches."""
-_KEEPS_SPEED = 0.35
-"""A car whose speed differs by more of what the case says does something else."""
 _AFTER_S = 1.0
 """Lines go on for so long after the last impact."""
 
@@ -54,16 +52,6 @@ class _Ego(NamedTuple):
     lateral_m: float
     reverse: bool
     start_m: float | None
-
-
-class DrivenLine(NamedTuple):
-    """The line of one drive: its way, and when (T,) it came by which arc length (T,), with `states`
-    (T, 8)."""
-
-    way: Way
-    time_s: Array
-    arc_m: Array
-    states: Array
 
 
 def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, Cast | Unplaced]:
@@ -98,7 +86,11 @@ def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, 
             # Where no car can drive like that, nobody can say when it meets somebody.
             played[row] = _unplanned(bent[row])
             meant = bent[row].impact_with
-            if isinstance(met, Cast) and met.impact_with == meant and _drives(met, line):
+            if (
+                isinstance(met, Cast)
+                and met.impact_with == meant
+                and drives_as_cast(met, line, bent[row].place.ego.path)
+            ):
                 on_time[row] = _on_time(met, line, bent[row].place.ego)
     off_m = _off_m(on_time, lines, bent, stage)
     played |= {row: case for row, case in on_time.items() if not off_m.get(row, 0.0) > _NEAR_M}
@@ -123,7 +115,7 @@ def _off_m(
     states, users, sizes = [], [], []
     for row in rows:
         case, line = cases[row], lines[_ego(bent[row])]
-        from_s = _time_at(line, case.ego_arc_m, case.ego_speed_mps)
+        from_s = time_at(line, case.ego_arc_m, case.ego_speed_mps)
         first = max(math.ceil((from_s + case.impact_time_s - _WATCHED_S) / tick_s), 0)
         ticks = first + np.arange(round((_WATCHED_S + _AFTER_S / 2.0) / tick_s))
         ticks = np.minimum(ticks, len(line.states) - 1)
@@ -197,7 +189,9 @@ def _lines(
     if key not in maker.rehearsed:
         cases = [first[ego] for ego in egos]
         states = _drive_alone(job, cases, stage, maker, ticks)
-        maker.rehearsed[key] = dict(zip(egos, _told(cases, states, stage), strict=True))
+        maker.rehearsed[key] = dict(
+            zip(egos, driven_lines(cases, states, tick_s=stage.control_dt_s), strict=True)
+        )
     lines: dict[_Ego, DrivenLine] = maker.rehearsed[key]
     return lines
 
@@ -231,33 +225,11 @@ def _drive_alone(
     return drive(scene._replace(limit_share=None), stage, ticks=ticks).states
 
 
-def _told(cases: Iterable[Cast], states: Array, stage: Stage) -> Iterable[DrivenLine]:
-    for case, driven in zip(cases, states, strict=True):
-        path, way = case.place.ego.path, case.place.ego
-        before = np.arange(0.0, max(case.ego_arc_m - 0.5, 0.0), 1.0)
-        xy = np.concatenate([path.point_at(before, case.ego_lateral_m), driven[:, :2]])
-        steps = np.hypot(*np.diff(xy, axis=0).T)
-        arc = np.concatenate([[0.0], np.cumsum(steps)])
-        moved = np.concatenate([[True], steps > 1e-6])
-        limit = path.at_nodes(np.minimum(path.speed_limit_mps, 1e3), arc)
-        # The lines of egos beside their paths are moved back: casting moves them aside again.
-        line = FrenetPath(xy[moved], limit[moved])
-        if case.ego_lateral_m:
-            xy = line.point_at(arc, -case.ego_lateral_m)
-            line = FrenetPath(xy[moved], limit[moved])
-        yield DrivenLine(
-            way=way._replace(xy_m=xy[moved], speed_limit_mps=limit[moved], path=line),
-            time_s=np.arange(float(len(driven))) * stage.control_dt_s,
-            arc_m=arc[len(before) :],
-            states=driven,
-        )
-
-
 def _on_time(case: Cast, line: DrivenLine, way: Way) -> Cast:
     """Return a case, on the ego's path `way` again, in which those who come meet the ego when it
     really is there."""
     met_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
-    from_s, to_s = (_time_at(line, arc, case.ego_speed_mps) for arc in (case.ego_arc_m, met_m))
+    from_s, to_s = (time_at(line, arc, case.ego_speed_mps) for arc in (case.ego_arc_m, met_m))
     later_s = (to_s - from_s) - case.impact_time_s
     return case._replace(
         place=case.place._replace(ego=way),
@@ -278,23 +250,8 @@ def _from_line(actor: CastActor, later_s: float, line: DrivenLine, way: Way) -> 
     return actor._replace(xy_m=way.xy_m, start_arc_m=float(place.arc_m[0]))
 
 
-def _drives(case: Cast, line: DrivenLine) -> bool:
-    """Return whether the car drives its line as the case has it, until the impact."""
-    until_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
-    if until_m > line.arc_m[-1]:
-        return False
-    before = (line.arc_m[:-1] >= case.ego_arc_m) & (line.arc_m[:-1] < until_m)
-    speed = (np.diff(line.arc_m) / np.diff(line.time_s))[before]
-    return bool(np.abs(speed / case.ego_speed_mps - 1.0).max(initial=0.0) < _KEEPS_SPEED)
-
-
 def _unplanned(case: Cast) -> Cast:
     return case._replace(
         impact_time_s=math.nan, impact_point_m=np.full(2, math.nan), impact_share=math.nan,
         impact_with="",
     )  # fmt: skip
-
-
-def _time_at(line: DrivenLine, arc_m: float, speed_mps: float) -> float:
-    before_m = min(arc_m - line.arc_m[0], 0.0)
-    return float(np.interp(arc_m, line.arc_m, line.time_s)) + float(before_m) / speed_mps
