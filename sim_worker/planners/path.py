@@ -73,12 +73,6 @@ class FrenetPath:
         self._nodes = np.stack([self._x, self._y, self._cos, self._sin], axis=-1)
         self._steps = np.diff(self._nodes, axis=0)
         self._last = len(self.arc_m) - 1
-        window = 2 * _WINDOW + 1
-        self._windows = [
-            np.lib.stride_tricks.sliding_window_view(values, window)
-            for values in (self._x, self._y)
-        ]
-        """(M - 2 W, 2 W + 1) the nodes around each, for the search near a known place."""
         length = np.hypot(self._steps[:, 0], self._steps[:, 1])
         self._segments = np.column_stack(
             [self._x[:-1], self._y[:-1], self._steps[:, :2] / length[:, None], 1.0 / length]
@@ -101,6 +95,14 @@ class FrenetPath:
     def node_poses(self) -> Array:
         """(M, 3) x, y and heading without jumps at the nodes."""
         return np.column_stack([self._x, self._y, self._heading])
+
+    @functools.cached_property
+    def _windows(self) -> tuple[Array, Array]:
+        """(M - 2 W, 2 W + 1) x and y of the nodes around each, for the search near a place."""
+        views = np.lib.stride_tricks.sliding_window_view
+        # Copies, whose rows are taken together faster than those of views.
+        x, y = (views(values, 2 * _WINDOW + 1).copy() for values in (self._x, self._y))
+        return x, y
 
     @functools.cached_property
     def curvature_pm(self) -> Array:
@@ -181,7 +183,7 @@ class FrenetPath:
             centre = (near_arc_m - (self._first_arc + _WINDOW * SPACING_M)) / SPACING_M
             centre = np.minimum(np.maximum(centre, 0.0), self._last - 2 * _WINDOW)
             start = centre.astype(np.intp)
-            dx, dy = (window[start] for window in self._windows)
+            dx, dy = (window.take(start, axis=0) for window in self._windows)
             dx -= x[:, None]
             dy -= y[:, None]
             dx *= dx

@@ -54,8 +54,6 @@ class PurePursuitIdm:
         ratio = speed / allowed
         fourth = np.square(np.square(ratio))
         below = start * (1.0 - fourth)
-        if not (target < 0.05).any() and not (ratio > 1.0).any():
-            return np.asarray(below)
         above = -COMFORT_DECEL_MPS2 * (
             1.0 - np.maximum(ratio, 1.0) ** (-start * EXPONENT / COMFORT_DECEL_MPS2)
         )
@@ -72,6 +70,8 @@ class PurePursuitIdm:
 
     def _interaction(self, view: PlannerView, speed: Array) -> Array:
         """IDM deceleration for what is ahead: a (s* / s)², s* = s0 + v T + v Δv / (2 √(a b))."""
+        if view.stop_arc_m is None and view.lead_gap_m.min() == np.inf:
+            return np.zeros(len(speed))
         gap = np.maximum(view.lead_gap_m, 0.1)
         approach = speed * (speed - view.lead_speed_mps)
         wanted = STANDSTILL_GAP_M + np.maximum(
