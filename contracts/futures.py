@@ -148,6 +148,8 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     """(S,) bool: false where the simulation diverged or the planner failed."""
     failures: tuple[str, ...] = ()
     """Why a future is not valid, in words; empty where it is. One for each future, or none."""
+    remarks: tuple[str, ...] = ()
+    """What a planner says of a future that it did drive, such as that a fallback had to act."""
 
 
 class RoadUserTracks(msgspec.Struct, frozen=True, kw_only=True):

@@ -70,6 +70,8 @@ class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     mirror_rate_hz: float = 10.0
     commands_recorded: bool = False
     threads: int = 1
+    planners: tuple[str, ...] = ()
+    """Loaded before the first job: those of other packages live in processes of their own."""
 
 
 class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

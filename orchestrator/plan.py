@@ -25,7 +25,7 @@ from orchestrator.road_index import RoadIndex
 from orchestrator.round_jobs import scenarios_of
 from orchestrator.route import Route
 from orchestrator.standin_path import StandinPath, standin_path
-from sim_worker.planners.registry import load_planner
+from sim_worker.planners.registry import check_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line
 from world_gen.intersections import Junction
@@ -105,7 +105,7 @@ class DrivePlan(DriveInputs):
 def read_inputs(config: DriveConfig) -> DriveInputs:
     """Read map, log, route and vehicle; raises UserError or FileNotFoundError, one line each."""
     try:
-        load_planner(config.planner)
+        check_planner(config.planner)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     scenarios_of(config)  # an unknown one is told before anything long begins

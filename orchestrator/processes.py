@@ -15,6 +15,7 @@ from contracts.setup import (
     WorkerSetup,
 )
 from orchestrator.plan import DrivePlan
+from orchestrator.round_jobs import planners_of
 
 ORCHESTRATOR = "orchestrator"
 BUILDER = "builder"
@@ -63,6 +64,7 @@ def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
         vehicle=plan.vehicle,
         drive_frame=plan.drive_frame,
         commands_recorded=plan.commands_recorded,
+        planners=() if process_id == MIRROR else tuple(planners_of(plan.config.planner)),
     )
 
 

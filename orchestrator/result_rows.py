@@ -61,6 +61,7 @@ def future_rows(done: RoundDone, variants: Sequence[Variant]) -> FutureRows:
                     "planner": variant.planner,
                     "scenario": _happened(result, place, variant),
                     "failure": outcome.failures[place] if outcome.failures else "",
+                    "remark": outcome.remarks[place] if outcome.remarks else "",
                     "worker_id": result.worker_id,
                     "valid": bool(outcome.valid[place]),
                     "collided": bool(outcome.collided[place]),

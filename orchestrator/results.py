@@ -29,8 +29,8 @@ TABLES: dict[str, pa.Schema] = {
     "futures": pa.schema(
         [
             ("round_id", _I), ("stamp_ns", _I), ("variant", _I), ("name", _S), ("planner", _S),
-            ("scenario", _S), ("failure", _S), ("worker_id", _S), ("valid", _B), ("collided", _B),
-            ("collision_time_s", _F),
+            ("scenario", _S), ("failure", _S), ("remark", _S), ("worker_id", _S), ("valid", _B),
+            ("collided", _B), ("collision_time_s", _F),
             ("collision_with", _I), ("min_clearance_m", _F), ("progress_m", _F), ("end_x_m", _F),
             ("end_y_m", _F), ("end_yaw_rad", _F), ("end_speed_mps", _F),
             ("end_difference_from_nominal_m", _F), ("max_difference_from_nominal_m", _F),

@@ -9,7 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from contracts.arrays import Array
-from sim_worker.planners.base import Planner, PlannerOutput, PlannerView, rows_of
+from sim_worker.planners.base import (
+    Planner,
+    PlannerOutput,
+    PlannerView,
+    RemembersWithinJob,
+    rows_of,
+)
 from sim_worker.planners.registry import load_planner
 from sim_worker.play import Play
 from sim_worker.scene import Scene
@@ -23,7 +29,8 @@ class DriveRecord(NamedTuple):
     """What was recorded at T control ticks.
 
     States (S, T, 8), static contacts and validity (S, T), progress (S,) along the path; of road
-    users poses (S, T, R, 3) and speeds (S, T, R). `failures` (S,) says why a planner failed.
+    users poses (S, T, R, 3) and speeds (S, T, R). `failures` (S,) says why a planner failed,
+    `remarks` (S,) what one that did not has to say.
     """
 
     states: Array
@@ -33,6 +40,7 @@ class DriveRecord(NamedTuple):
     users: Array
     user_speed_mps: Array
     failures: tuple[str, ...]
+    remarks: tuple[str, ...]
 
 
 def drive(scene: Scene, stage: Stage, *, ticks: int) -> DriveRecord:
@@ -103,6 +111,7 @@ class _Loop:
                 self._planners.reasons[row] or ("" if self._valid[row, -1] else "diverged")
                 for row in range(len(scene.starts))
             ),
+            tuple(self._planners.remarks()),
         )
 
 
@@ -113,10 +122,13 @@ class _Planners:
         self.failed: Flags = np.zeros(len(names), dtype=bool)
         self.any_failed = False
         self.reasons = [""] * len(names)
-        self._groups: list[tuple[str, Planner, Rows]] = [
-            (kind, load_planner(kind), np.flatnonzero([name == kind for name in names]))
-            for kind in sorted(set(names))
-        ]
+        self._groups: list[tuple[str, Planner, Rows]] = []
+        for kind in sorted(set(names)):
+            rows = np.flatnonzero([name == kind for name in names])
+            planner = load_planner(kind)
+            if isinstance(planner, RemembersWithinJob):
+                planner = planner.begin(len(rows))
+            self._groups.append((kind, planner, rows))
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         if len(self._groups) == 1:
@@ -142,9 +154,21 @@ class _Planners:
             return PlannerOutput(np.zeros(len(rows)), np.zeros(len(rows)))
         fine = np.isfinite(accel + angle)
         if not fine.all():
-            self._fail(name, rows[~fine], "answers what is no number", view.time_s)
+            said = getattr(planner, "remarks", {})
+            for place in np.flatnonzero(~fine):
+                reason = said.get(int(place), "answers what is no number")
+                self._fail(name, rows[place : place + 1], reason, view.time_s)
             accel, angle = np.where(fine, accel, 0.0), np.where(fine, angle, 0.0)
         return PlannerOutput(accel, angle)
+
+    def remarks(self) -> list[str]:
+        """Return what planners have to say of the cars that they did drive, empty for most."""
+        found = [""] * len(self.reasons)
+        for _, planner, rows in self._groups:
+            for place, said in getattr(planner, "remarks", {}).items():
+                if not self.failed[rows[place]]:
+                    found[rows[place]] = said
+        return found
 
     def _fail(self, name: str, rows: Rows, reason: str, time_s: float) -> None:
         for row in rows[~self.failed[rows]]:

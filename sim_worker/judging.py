@@ -53,6 +53,7 @@ def judge(
         progress_m=np.where(valid, drive.progress_m, np.nan),
         valid=valid,
         failures=drive.failures if any(drive.failures) else (),
+        remarks=drive.remarks if any(drive.remarks) else (),
     )
     kept = counts[touches.future]
     return outcome, Touches._make(field[kept] for field in touches)

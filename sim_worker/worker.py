@@ -22,7 +22,8 @@ from contracts.simulation import PrepareReply, PrepareRequest
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from sim_worker.futures import run_job
-from sim_worker.planners.registry import load_planner, planner_names
+from sim_worker.planners.registry import load_planner
+from sim_worker.planners.remote import RemotePlanner
 from sim_worker.scene import SceneMaker
 from sim_worker.stage import Controls, Stage
 
@@ -138,17 +139,12 @@ class FuturesWorker:
 
 
 def warm_up(stage: Stage) -> None:
-    """Do once, before it counts, what a first job does first: project, step, load planners."""
+    """Do once, before it counts, what a first job does first: project and step."""
     assert stage.world is not None
     origin = stage.world.frame.origin
     local_from_geo(stage.world.frame, origin.lat_deg, origin.lon_deg)
     stage.seed(np.zeros((1, 8)), steering_delay_s=np.zeros(1), friction_factor=np.ones(1))
     stage.step(Controls(np.zeros(1), np.zeros(1)))
-    for name in planner_names():
-        try:
-            load_planner(name)
-        except ValueError as error:
-            log.warning("%s", error)
 
 
 def one_line(error: Exception) -> str:
@@ -163,6 +159,14 @@ def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     ids = {"run": setup.run_id, "process": setup.process_id}
     bus.serve("prepare", mailbox, **ids)
     bus.serve("job", mailbox, **ids)
+    remote = load_planner("remote")
+    assert isinstance(remote, RemotePlanner)
+    remote.connect(bus, run=setup.run_id, process=setup.process_id)
+    for name in setup.planners:
+        try:
+            load_planner(name)
+        except ValueError as error:
+            log.warning("%s", error)
     life.ready()
     while not life.over:
         request = mailbox.take(_IDLE_S)
