@@ -31,6 +31,8 @@ def driven_lines(cases: Iterable[Cast], states: Array, *, tick_s: float) -> Iter
     """Yield the line of each case's ego from its states (S, T, 8) at control ticks."""
     for case, driven in zip(cases, states, strict=True):
         path, way = case.place.ego.path, case.place.ego
+        # A car that was lost from sight went nowhere that one could tell.
+        driven = np.where(np.isfinite(driven).all(axis=1)[:, None], driven, driven[0])
         before = np.arange(0.0, max(case.ego_arc_m - 0.5, 0.0), 1.0)
         xy = np.concatenate([path.point_at(before, case.ego_lateral_m), driven[:, :2]])
         steps = np.hypot(*np.diff(xy, axis=0).T)
