@@ -12,12 +12,12 @@ import msgspec
 
 from contracts.errors import UserError
 from orchestrator.progress_bar import progress_bar
-from orchestrator.sweep_folder import FoundPlaces, SweepFolder, fingerprint_of, worlds_folder
+from orchestrator.sweep_folder import FoundPlaces, SweepFolder, built_worlds, fingerprint_of
 from orchestrator.sweep_plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
 from orchestrator.sweep_play import PlaceQuestion, PlaySetup, failed_rows, start_worker
 from orchestrator.sweep_pool import Crew, Lost, Task
 from orchestrator.sweep_rows import Parts, RowsHash
-from orchestrator.sweep_spec import Loaded, load_spec
+from orchestrator.sweep_spec import Loaded, load_spec, worlds_folder
 from orchestrator.sweep_summary import Summary, print_summary
 from orchestrator.sweep_worlds import source_digest, sweep_worlds
 
@@ -54,7 +54,7 @@ def sweep(request: SweepRequest) -> int:
 
 def crew_for(loaded: Loaded, out: Path, workers: int) -> Crew:
     """Return the processes that play a sweep in the folder `out`."""
-    worlds = Path(loaded.spec.worlds) if loaded.spec.worlds else worlds_folder(out)
+    worlds = worlds_folder(loaded.spec) or built_worlds(out)
     setup = PlaySetup(loaded=loaded, worlds_dir=str(worlds))
     return Crew(workers, start_worker, setup, timeout_s=loaded.spec.job_timeout_s)
 

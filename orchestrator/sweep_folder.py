@@ -42,7 +42,7 @@ class SweepFolder:
     @property
     def worlds_dir(self) -> Path:
         """Return where Worlds are built."""
-        return worlds_folder(self.path)
+        return built_worlds(self.path)
 
     @property
     def rows_dir(self) -> Path:
@@ -99,7 +99,7 @@ class SweepFolder:
         return kept if kept.fingerprint == self.fingerprint else None
 
 
-def worlds_folder(out: Path) -> Path:
+def built_worlds(out: Path) -> Path:
     """Return where the Worlds of a sweep are built."""
     return out / WORLDS
 
@@ -108,7 +108,15 @@ def fingerprint_of(loaded: Loaded, source: str) -> str:
     """Return a hash of everything that decides the rows of a sweep."""
     # How long one waits for a job does not.
     spec = msgspec.structs.replace(loaded.spec, job_timeout_s=1.0)
-    parts = (spec, loaded.scenarios, loaded.vehicles, source, GENERATOR_VERSION, versions())
+    parts = (
+        spec,
+        loaded.scenarios,
+        loaded.vehicles,
+        loaded.starts,
+        source,
+        GENERATOR_VERSION,
+        versions(),
+    )
     return hashlib.sha256(msgspec.json.encode(parts)).hexdigest()
 
 

@@ -38,6 +38,10 @@ class PlacedHere(msgspec.Struct, frozen=True, kw_only=True):
     junction_id: str
     place: str
     ego: str
+    start: int | None = None
+    """Of the recorded starts, which; None where the case says where the ego starts."""
+    rank: int = 0
+    """Which of the places that fit the way of a recorded car."""
 
 
 class NotPlaced(msgspec.Struct, frozen=True, kw_only=True):
@@ -64,6 +68,8 @@ class Cell(msgspec.Struct, frozen=True, kw_only=True):
     scenario_id: str
     junction_id: str
     place: str
+    start: int | None
+    rank: int
     case: int
     values: dict[str, float]
     parameters: dict[str, float]
@@ -161,7 +167,8 @@ def plan_sweep(loaded: Loaded, worlds: Sequence[WorldPlaces]) -> SweepPlan:
                 made = tuple(
                     Cell(
                         number=number + i, scenario_id=here.scenario_id,
-                        junction_id=here.junction_id, place=here.place, case=case,
+                        junction_id=here.junction_id, place=here.place, start=here.start,
+                        rank=here.rank, case=case,
                         values=values, parameters=parameters,
                     )
                     for i, (here, case, values, parameters) in enumerate(batch)

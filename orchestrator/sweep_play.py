@@ -18,16 +18,17 @@ from contracts.futures import Accident, FuturesJob, FuturesResult, PathAhead, Va
 from contracts.scenario import Scenario
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from orchestrator.sweep_plan import Cell, NotPlaced, PlacedHere, SweepJob, WorldPlaces
+from orchestrator.sweep_places import places_in
+from orchestrator.sweep_plan import Cell, SweepJob, WorldPlaces
 from orchestrator.sweep_pool import Lost
 from orchestrator.sweep_rows import Row, blank_row
 from orchestrator.sweep_spec import FUTURES_PER_JOB, STEP_S, Loaded
 from sim_worker.actors.cast import KIND_NAMES
 from sim_worker.futures import run_job
 from sim_worker.rehearsal import off_plan_m, staged_cases
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.roads import RoadNetwork
 from sim_worker.scenarios.roles import Cast
+from sim_worker.scene import SceneMaker
+from sim_worker.stage import Stage
 from sim_worker.worker import StageCache, load_world, one_line
 
 COLLISION_WITH = ("", "road_user", "static")
@@ -84,6 +85,8 @@ class SweepWorker:
             )  # fmt: skip
         prepared = self._stages[job.vehicle].get(job.world_id)
         world, staged = prepared.scenes.world, prepared.scenes.staged
+        if job.cells[0].start is not None:
+            return self._play_recorded(job, prepared.stage, prepared.scenes)
         casts: dict[int, Cast] = {}
         rows = {cell.number: blank_row(job, cell, spec) for cell in job.cells}
         for scenario, place, cells in _together(job, self._scenarios):
@@ -95,7 +98,7 @@ class SweepWorker:
                     rows[cell.number]["left_out"] = cast.reason
         cells = [cell for cell in job.cells if cell.number in casts]
         if cells:
-            futures = _futures_job(job, cells, casts, world, loaded, self._scenarios)
+            futures = _staged_job(job, cells, casts, world, loaded, self._scenarios)
             result = run_job(futures, prepared.stage, scenes=prepared.scenes)
             meant = staged_cases(futures, prepared.stage, prepared.scenes)
             for index, cell in enumerate(cells):
@@ -104,29 +107,22 @@ class SweepWorker:
                 rows[cell.number] |= _told(result, index, case, vehicle)
         return list(rows.values())
 
-
-def places_in(world: World, loaded: Loaded) -> WorldPlaces:
-    """Return where the scenarios of a sweep take place in a World, for its first vehicle."""
-    network = RoadNetwork(world)
-    vehicle = next(iter(loaded.vehicles.values()))
-    placed, unplaced = [], []
-    for scenario in loaded.scenarios:
-        found = places(scenario, world, network=network, vehicle=vehicle, most=loaded.spec.places)
-        placed += [
-            PlacedHere(
-                scenario_id=scenario.id, junction_id=place.junction_id, place=place.name,
-                ego=place.ego.name,
-            )
-            for place in found.places
-        ]  # fmt: skip
-        unplaced += [
-            NotPlaced(
-                scenario_id=scenario.id, junction_id=one.junction_id, reason=one.reason,
-                applies=one.applies,
-            )
-            for one in found.unplaced
-        ]  # fmt: skip
-    return WorldPlaces(world_id=world.id, placed=tuple(placed), unplaced=tuple(unplaced))
+    def _play_recorded(self, job: SweepJob, stage: Stage, scenes: SceneMaker) -> list[Row]:
+        """Play cases around a car that was recorded; those who meet it are timed to it."""
+        start = self._loaded.starts[job.cells[0].start or 0]
+        futures = _futures_job(
+            job, list(job.cells), self._loaded, self._scenarios, world_id=start.world_id,
+            state=start.state, path=start.path(scenes.world.frame),
+            cruise_speed_mps=start.cruise_speed_mps, drive_time_s=start.drive_time_s,
+        )  # fmt: skip
+        result = run_job(futures, stage, scenes=scenes)
+        vehicle = self._loaded.vehicles[job.vehicle]
+        return [
+            blank_row(job, cell, self._loaded.spec)
+            | {"start_stamp_ns": start.state.stamp_ns}
+            | _told(result, index, None, vehicle)
+            for index, cell in enumerate(job.cells)
+        ]
 
 
 def failed_rows(job: SweepJob, loaded: Loaded, reason: str) -> list[Row]:
@@ -144,7 +140,7 @@ def _together(
     return [(scenarios[id_], place, cells) for (id_, place), cells in groups.items()]
 
 
-def _futures_job(
+def _staged_job(
     job: SweepJob,
     cells: list[Cell],
     casts: dict[int, Cast],
@@ -152,23 +148,43 @@ def _futures_job(
     loaded: Loaded,
     scenarios: dict[str, Scenario],
 ) -> FuturesJob:
-    spec, first = loaded.spec, casts[cells[0].number]
-    named = sorted({cell.scenario_id for cell in cells})
-    here = world.frame.origin
-    return FuturesJob(
-        round_id=0,
-        job_index=job.number,
-        world_id=world.id,
+    first, here = casts[cells[0].number], world.frame.origin
+    return _futures_job(
+        job, cells, loaded, scenarios, world_id=world.id,
         # Nobody measured a car: each begins where its case says.
         state=VehicleState(
             vehicle_id=job.vehicle, stamp_ns=0, position=GeoPoint(here.lat_deg, here.lon_deg),
             yaw_rad=0.0, speed_mps=0.0, yaw_rate_radps=0.0, accel_mps2=0.0,
         ),
         path=PathAhead(xy_m=first.ego_xy_m, speed_limit_mps=first.ego_speed_limit_mps),
+        cruise_speed_mps=first.ego_speed_mps,
+    )  # fmt: skip
+
+
+def _futures_job(
+    job: SweepJob,
+    cells: list[Cell],
+    loaded: Loaded,
+    scenarios: dict[str, Scenario],
+    *,
+    world_id: str,
+    state: VehicleState,
+    path: PathAhead,
+    cruise_speed_mps: float,
+    drive_time_s: float = 0.0,
+) -> FuturesJob:
+    spec = loaded.spec
+    return FuturesJob(
+        round_id=0,
+        job_index=job.number,
+        world_id=world_id,
+        state=state,
+        path=path,
         variants=tuple(
             Variant(
                 index=index, name=f"{cell.scenario_id} {cell.case}", planner=job.planner,
-                scenario_id=cell.scenario_id, values=cell.values, place=cell.place,
+                scenario_id=cell.scenario_id, values=cell.values, place_rank=cell.rank,
+                place=cell.place if cell.start is None else "",
                 target_speed_factor=cell.parameters.get("target_speed_factor", 1.0),
                 target_speed_offset_mps=cell.parameters.get("target_speed_offset_mps", 0.0),
                 lateral_shift_m=cell.parameters.get("lateral_shift_m", 0.0),
@@ -178,15 +194,16 @@ def _futures_job(
         horizon_s=job.horizon_s,
         step_s=STEP_S,
         seed=spec.seed,
-        cruise_speed_mps=first.ego_speed_mps,
-        scenarios=tuple(scenarios[id_] for id_ in named),
+        cruise_speed_mps=cruise_speed_mps,
+        scenarios=tuple(scenarios[id_] for id_ in sorted({c.scenario_id for c in cells})),
+        drive_time_s=drive_time_s,
         lights_by_plan=spec.lights_by_plan,
         metrics=spec.metrics,
         accidents=spec.accidents,
     )  # fmt: skip
 
 
-def _told(result: FuturesResult, index: int, case: Cast, vehicle: VehicleParameters) -> Row:
+def _told(result: FuturesResult, index: int, case: Cast | None, vehicle: VehicleParameters) -> Row:
     """Return the columns that the playing of one future fills."""
     outcome = result.outcome
     accident = next((a for a in result.accidents if a.future == index), None)
@@ -196,8 +213,8 @@ def _told(result: FuturesResult, index: int, case: Cast, vehicle: VehicleParamet
         "valid": bool(outcome.valid[index]),
         "failure": outcome.failures[index] if outcome.failures else "",
         "left_out": result.left_out[index],
-        "planned_impact_time_s": _number(case.impact_time_s),
-        "planned_impact_with": case.impact_with,
+        "planned_impact_time_s": None if case is None else _number(case.impact_time_s),
+        "planned_impact_with": "" if case is None else case.impact_with,
         "collided": bool(outcome.collided[index]),
         "collision_time_s": _number(outcome.collision_time_s[index]),
         "collision_with": COLLISION_WITH[int(outcome.collision_with[index])],
@@ -209,6 +226,8 @@ def _told(result: FuturesResult, index: int, case: Cast, vehicle: VehicleParamet
     if accident is None:
         return row
     row |= _accident(result, index, accident)
+    if case is None:
+        return row
     row["accident_with"] = case.actors[accident.road_user].name
     if row["accident_with"] == case.impact_with:
         row["planned_impact_off_m"] = _off_m(states, accident.time_s, case, vehicle)

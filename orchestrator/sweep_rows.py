@@ -20,7 +20,8 @@ _CELL = (
     ("cell", pa.int64()), ("job", pa.int32()), ("world", pa.string()), ("junction", pa.string()),
     ("place", pa.string()), ("scenario", pa.string()), ("case", pa.int32()),
     ("values", pa.map_(pa.string(), pa.float64())), ("planner", pa.string()),
-    ("vehicle", pa.string()), ("seed", pa.int64()), ("horizon_s", pa.float64()),
+    ("vehicle", pa.string()), ("seed", pa.int64()),
+    ("start_stamp_ns", pa.int64()), ("horizon_s", pa.float64()),
 )  # fmt: skip
 _PLAYED = (
     ("valid", pa.bool_()), ("failure", pa.string()), ("left_out", pa.string()),

@@ -13,6 +13,7 @@ from contracts.futures import Faults
 from contracts.scenario import Scenario
 from contracts.vehicle import VehicleParameters
 from orchestrator.map_choice import node_of_id, parse_bbox
+from orchestrator.sweep_recorded import WORLDS, RecordedStart, read_starts
 from orchestrator.world_command import MAX_RADIUS_M, MIN_RADIUS_M
 from sim_worker.metrics.table import METRICS
 from sim_worker.planners.registry import check_planner
@@ -39,12 +40,21 @@ STEP_S = 0.1
 FUTURES_PER_JOB = 64
 
 
+class Recorded(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Start where a real car was: the folder of a run of `foretwin drive`, and how often."""
+
+    run: str
+    every_s: float = 2.0
+
+
 class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything that decides the rows of a sweep; paths are relative to where it is started."""
 
     map: str | None = None
     worlds: str | None = None
     """A folder of .world files, in place of a map."""
+    recorded: Recorded | None = None
+    """A recorded drive, in place of both: its Worlds, its states, its ways."""
     junctions: Literal["all"] | tuple[str, ...] = "all"
     bbox: str | None = None
     """W,S,E,N in degrees: only junctions in there."""
@@ -80,6 +90,8 @@ class Loaded(msgspec.Struct, frozen=True, kw_only=True):
     spec: SweepSpec
     scenarios: tuple[Scenario, ...]
     vehicles: dict[str, VehicleParameters]
+    starts: tuple[RecordedStart, ...] = ()
+    """Where a recorded car was; without them, egos start where their cases say."""
 
 
 def load_spec(path: Path) -> Loaded:
@@ -120,21 +132,30 @@ def check_spec(spec: SweepSpec) -> Loaded:
         check_planner(name)
     _check_metrics(spec.metrics)
     _check_parameters(spec.parameters)
-    return Loaded(
-        spec=spec,
-        scenarios=_scenarios(spec),
-        vehicles={name: load_vehicle(name) for name in spec.vehicles},
-    )
+    scenarios = _scenarios(spec)
+    vehicles = {name: load_vehicle(name) for name in spec.vehicles}
+    starts: tuple[RecordedStart, ...] = ()
+    if spec.recorded is not None:
+        first = vehicles[spec.vehicles[0]]
+        starts = read_starts(Path(spec.recorded.run), first, every_s=spec.recorded.every_s)
+    return Loaded(spec=spec, scenarios=scenarios, vehicles=vehicles, starts=starts)
+
+
+def worlds_folder(spec: SweepSpec) -> Path | None:
+    """Return where the Worlds of a sweep lie already, None where they are built from a map."""
+    if spec.recorded is not None:
+        return Path(spec.recorded.run) / WORLDS
+    return None if spec.worlds is None else Path(spec.worlds)
 
 
 def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
-    sources = [n for n in ("map", "worlds") if getattr(spec, n) is not None]
+    sources = [n for n in ("map", "worlds", "recorded") if getattr(spec, n) is not None]
     steps = 1.0 / (spec.control_hz * TIMESTEP_S) if spec.control_hz > 0.0 else 0.0
     ticks = STEP_S * spec.control_hz
     horizon = spec.horizon_s
     return (
         (len(sources) == 1,
-         f"exactly one of map and worlds; got {' and '.join(sources) or 'none'}"),
+         f"exactly one of map, worlds and recorded; got {' and '.join(sources) or 'none'}"),
         (spec.junctions == "all" or len(spec.junctions) > 0,
          "junctions: at least one id, or \"all\""),
         (spec.sample is None or spec.sample >= 1, f"sample {spec.sample}: at least 1"),
@@ -155,6 +176,7 @@ def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
         (ticks >= 1.0 - 1e-9 and abs(ticks - round(ticks)) < 1e-6,
          f"control_hz {spec.control_hz:g}: must be a multiple of {1.0 / STEP_S:g}"),
         (spec.job_timeout_s > 0.0, f"job_timeout_s {spec.job_timeout_s:g}: above 0"),
+        (spec.recorded is None or spec.recorded.every_s > 0.0, "recorded.every_s: above 0"),
         (spec.seed >= 0, f"seed {spec.seed}: not negative"),
     )  # fmt: skip
 

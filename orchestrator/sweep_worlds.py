@@ -13,7 +13,7 @@ from contracts.codec import SchemaMismatch
 from contracts.errors import UserError
 from orchestrator.map_choice import junction_by_id, node_of_id, parse_bbox
 from orchestrator.map_opening import NodeClip, open_map
-from orchestrator.sweep_spec import SweepSpec
+from orchestrator.sweep_spec import SweepSpec, worlds_folder
 from sim_worker.worker import load_world
 from world_gen.intersections import Junction
 from world_gen.map_index import index_map
@@ -46,8 +46,9 @@ def source_digest(spec: SweepSpec) -> str:
             raise FileNotFoundError(f"map {path}: no such file")
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    assert spec.worlds is not None
-    return " ".join(path.stem for path in _files(Path(spec.worlds)))
+    folder = worlds_folder(spec)
+    assert folder is not None
+    return " ".join(path.stem for path in _files(folder))
 
 
 def sweep_worlds(spec: SweepSpec, folder: Path, advance: Advance) -> SweepWorlds:
@@ -55,9 +56,10 @@ def sweep_worlds(spec: SweepSpec, folder: Path, advance: Advance) -> SweepWorlds
 
     Raises UserError for a junction that is not there, or where none is left.
     """
-    if spec.map is None:
-        assert spec.worlds is not None
-        return _read(spec, Path(spec.worlds))
+    there = worlds_folder(spec)
+    if there is not None:
+        return _read(spec, there)
+    assert spec.map is not None
     opened = open_map(Path(spec.map), clip=_clip(spec), service_roads=spec.service_roads)
     if spec.junctions == "all":
         found: Sequence[Junction] = opened.junctions
