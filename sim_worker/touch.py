@@ -68,7 +68,7 @@ def first_touches(
     near = _near(vehicle, states, users, user_size_m, tick_s=tick_s)
     motion = _Motion(vehicle, states, users, user_size_m, *near)
     motion = motion.only(motion.may_touch())
-    steps = max(math.ceil(tick_s / _SEARCH_STEP_S - 1e-9), 1)
+    steps = _steps(tick_s)
     if not len(motion.future):
         return _describe(motion, np.zeros(0), 1.0 / steps, tick_s)
     # What comes after a tick that ends in a touch does not matter.
@@ -84,6 +84,28 @@ def first_touches(
     _, first = np.unique(motion.future[hit][order], return_index=True)
     chosen = order[first]
     return _describe(motion.only(hit[chosen]), step[chosen] / steps, 1.0 / steps, tick_s)
+
+
+def touched(
+    vehicle: VehicleParameters, states: Array, users: Array, user_size_m: Array, *, tick_s: float
+) -> npt.NDArray[np.bool_]:
+    """Return which of S futures `first_touches` finds a touch in: (S,) bool, without details."""
+    motion = _Motion(
+        vehicle, states, users, user_size_m,
+        *_near(vehicle, states, users, user_size_m, tick_s=tick_s),
+    )  # fmt: skip
+    found = np.zeros(len(states), dtype=bool)
+    if len(motion.future):
+        motion = motion.only(motion.may_touch())
+    if len(motion.future):
+        share = np.arange(_steps(tick_s) + 1.0) / _steps(tick_s)
+        found[motion.future[motion.overlapping(share[:, None]).any(axis=0)]] = True
+    return found
+
+
+def _steps(tick_s: float) -> int:
+    """Return how many parts of a tick are looked at for overlaps."""
+    return max(math.ceil(tick_s / _SEARCH_STEP_S - 1e-9), 1)
 
 
 class _Motion:

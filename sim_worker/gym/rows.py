@@ -19,7 +19,7 @@ from sim_worker.planners.giving_way import wait_arcs
 from sim_worker.play import Play, Rows
 from sim_worker.scene import Aims, Scene
 from sim_worker.stage import Stage
-from sim_worker.touch import first_touches
+from sim_worker.touch import touched
 from world_gen.signal_state import cycle_s
 
 Flags = npt.NDArray[np.bool_]
@@ -184,14 +184,13 @@ class EpisodeRows:
         casts = self.scene.casts
         if casts is not None:
             crowd = casts.crowd
-            touches = first_touches(
+            found |= touched(
                 self.stage.vehicle,
                 np.stack([before, after], axis=1),
                 np.stack([users, self._users()], axis=1),
                 np.stack([crowd.length_m, crowd.width_m], axis=-1),
                 tick_s=self.stage.control_dt_s,
             )
-            found[touches.future] = True
         return found
 
     def _off_road(self, states: Array, offset_m: Array) -> Flags:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from contracts.arrays import Array
 from sim_worker.overlap import Rectangles, clearance
-from sim_worker.touch import Touches, ego_rectangles, first_touches
+from sim_worker.touch import Touches, ego_rectangles, first_touches, touched
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.vehicle.planar import box_centre_from_base_m
 
@@ -28,7 +28,11 @@ def straight(count: int, ticks: int, *, speed: float = 10.0) -> Array:
 
 def search(states: Array, users: Array, *, length: float = 4.0, width: float = 2.0) -> Touches:
     size = np.broadcast_to([length, width], (*users.shape[::2][:1], users.shape[2], 2))
-    return first_touches(CAR, states, users, size, tick_s=TICK_S)
+    found = first_touches(CAR, states, users, size, tick_s=TICK_S)
+    # Who only asks whether there is one is told the same.
+    any_touch = touched(CAR, states, users, size, tick_s=TICK_S)
+    assert np.flatnonzero(any_touch).tolist() == sorted(found.future)
+    return found
 
 
 def moving(x: float, y: float, yaw: float, vx: float, vy: float, *, ticks: int) -> Array:
