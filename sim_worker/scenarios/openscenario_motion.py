@@ -17,6 +17,7 @@ from sim_worker.scenarios.roles import Cast, CastActor
 from world_gen.export.opendrive_elements import number
 
 _STEP_S, _SPACING_M = 0.1, 0.5
+_MOST_DRIFT_M = 0.15
 _BEYOND_M = 20.0
 """Paths that are not timed go on so far, for whoever drives them faster."""
 
@@ -45,17 +46,25 @@ class Motion(NamedTuple):
 
 
 def ego_motion(played: Cast, *, horizon_s: float) -> Motion:
-    """Return the ego's motion along its path; backwards it is timed, as speeds have no sign."""
+    """Return the ego's motion along its path.
+
+    It is timed backwards, as speeds have no sign there, and where the path has kinks, along which
+    nobody moves as fast as an arc length says.
+    """
     path, speed = FrenetPath(played.ego_xy_m), played.ego_speed_mps
-    if played.reverse:
-        time = _instants(horizon_s)
-        pose = path.pose_at(played.ego_arc_m + speed * time, played.ego_lateral_m)
-        pose = pose._replace(yaw_rad=pose.yaw_rad + math.pi)
-        return Motion(EGO, pose, time, True, number(-speed), {})
     along = _spaced(speed * horizon_s)
     pose = path.pose_at(played.ego_arc_m + along, played.ego_lateral_m)
-    name = f"{EGO}_speed_mps"
-    return Motion(EGO, pose, along / speed, False, f"${name}", {name: speed})
+    steps = np.hypot(*np.diff(pose.xy_m, axis=0).T)
+    drift_m = np.abs(np.cumsum(steps) - along[1:])
+    if not played.reverse and float(drift_m.max()) <= _MOST_DRIFT_M:
+        name = f"{EGO}_speed_mps"
+        return Motion(EGO, pose, along / speed, False, f"${name}", {name: speed})
+    time = _instants(horizon_s)
+    pose = path.pose_at(played.ego_arc_m + speed * time, played.ego_lateral_m)
+    if not played.reverse:
+        return Motion(EGO, pose, time, True, number(speed), {})
+    pose = pose._replace(yaw_rad=pose.yaw_rad + math.pi)
+    return Motion(EGO, pose, time, True, number(-speed), {})
 
 
 def actor_motion(actor: CastActor, *, horizon_s: float) -> Motion:

@@ -29,8 +29,7 @@ from world_gen.export.picture_style import LANE_EDGE, LINE_COLOUR, View, view_ar
 from world_gen.polyline import offset
 
 EGO, PLANNED, OTHERS, STANDING, IMPACT = "#1f5fd0", "#0b8a4b", "#d62728", "#7a4b22", "#ffd400"
-MOST_HALF_M = 75.0
-_LEAST_HALF_M, _MARGIN_M = 20.0, 8.0
+_LEAST_HALF_M, _MOST_HALF_M, _MARGIN_M = 20.0, 75.0, 8.0
 _GHOST_EVERY_S = 1.0
 
 
@@ -42,13 +41,13 @@ def draw_case(
     planned: Run | None,
     *,
     aspect: float,
-    most_half_m: float = MOST_HALF_M,
+    view: View | None = None,
 ) -> None:
     """Draw one case in its World; `aspect` is the width of the axes over their height.
 
-    What happens farther apart than twice `most_half_m` is drawn in part.
+    Without a `view`, it holds what happens, but for who comes from afar.
     """
-    view = _view(heedless, planned, aspect, most_half_m)
+    view = view or _view(heedless, planned, aspect)
     draw_ground(axes, world, view)
     _draw_lanes(axes, world, view)
     _draw_paths(axes, played, heedless)
@@ -172,17 +171,19 @@ def _faults(played: Cast) -> str:
     return f"; {', '.join(said)}" if said else ""
 
 
-def _view(heedless: Run, planned: Run | None, aspect: float, most_half_m: float) -> View:
+def _view(heedless: Run, planned: Run | None, aspect: float) -> View:
     """Return a view that holds what happens; who comes from afar comes in from beyond its edge."""
     points = [heedless.ego.centre_m[[0, heedless.moment]]]
     points += [box.centre_m[[0, heedless.moment]] for box in heedless.others]
     if planned is not None:
         points.append(planned.ego.centre_m[planned.moment][None])
     middle = heedless.ego.centre_m[heedless.moment]
-    spread = np.clip(np.concatenate(points), middle - 1.6 * most_half_m, middle + 1.6 * most_half_m)
+    spread = np.clip(
+        np.concatenate(points), middle - 1.6 * _MOST_HALF_M, middle + 1.6 * _MOST_HALF_M
+    )
     low, high = spread.min(axis=0) - _MARGIN_M, spread.max(axis=0) + _MARGIN_M
     half = max((high - low)[1] / 2.0, (high - low)[0] / 2.0 / aspect)
-    half = min(max(half, _LEAST_HALF_M), most_half_m)
+    half = min(max(half, _LEAST_HALF_M), _MOST_HALF_M)
     centre = (low + high) / 2.0
     reach = 0.75 * half * np.array([aspect, 1.0])
     return view_around(np.clip(centre, middle - reach, middle + reach), half, aspect, close=False)

@@ -29,7 +29,6 @@ from sim_worker.scenarios.drawing import draw_cases
 from sim_worker.scenarios.picture import (
     EGO,
     IMPACT,
-    MOST_HALF_M,
     OTHERS,
     PLANNED,
     STANDING,
@@ -45,7 +44,15 @@ from sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.worlds import motorway, race_track
 from world_gen.build import build_world
 from world_gen.build_graph import build_road_graph
-from world_gen.export.picture_style import GROUND, ISLAND, JUNCTION, ROAD, SIDEWALK
+from world_gen.export.picture_style import (
+    GROUND,
+    ISLAND,
+    JUNCTION,
+    ROAD,
+    SIDEWALK,
+    View,
+    view_around,
+)
 from world_gen.find_intersections import find_intersections
 from world_gen.map_index import index_map
 from world_gen.read_osm import read_map
@@ -68,6 +75,8 @@ SHEETS = {
     "beyond": ("lost_detections", "overtaking_motorway", "race_track_lap"),
 }
 TILES, TRIES, MOST_AT_ONE_JUNCTION = 3, 60, 4
+MOST_OFF_M = 5.0
+"""Nobody starts so far beyond the end of what a World holds of a road."""
 PLANNERS = {"reversing_parking": "reverse_pursuit"}
 """Who drives the ego, where not by `pure_pursuit_idm`."""
 TYPICAL = {"roundabout_entry": "roundabout", "roundabout_exit": "roundabout"}
@@ -153,10 +162,17 @@ def tile_of(scenario: Scenario, world: World, where: str) -> Tile | None:
         for case in [cast(scenario, cases[len(cases) // 2], place, vehicle=vehicle)]
         if isinstance(case, Cast)
     ]
-    if not played:
+    best = min(played, key=lambda case: round(case.off_lanes_m / 5.0), default=None)
+    if best is None or best.off_lanes_m > MOST_OFF_M:
         return None
     name = textwrap.shorten(f"{where}: {world.intersection.name or world.intersection.id}", 72)
-    return Tile(name, world, min(played, key=lambda case: round(case.off_lanes_m / 5.0)))
+    return Tile(name, world, best)
+
+
+def whole_lap(tile: Tile, aspect: float) -> View:
+    low, high = tile.played.ego_xy_m.min(axis=0), tile.played.ego_xy_m.max(axis=0)
+    half_m = max(high[1] - low[1], (high[0] - low[0]) / aspect) / 2.0 + 10.0
+    return view_around((low + high) / 2.0, half_m, aspect, close=False)
 
 
 def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]]) -> Figure:
@@ -181,7 +197,7 @@ def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]]) -> Figure:
             planned = planned_run(tile.played, scenario, tile.world, vehicle, planner=planner)
             draw_case(
                 axes, tile.played, tile.world, heedless, planned, aspect=wide / high,
-                most_half_m=MOST_HALF_M * (2.0 if scenario.where.setting == "circuit" else 1.0),
+                view=whole_lap(tile, wide / high) if scenario.where.setting == "circuit" else None,
             )  # fmt: skip
             words = f"{tile.where}\n{told(tile.played, heedless, planned, planner)}"
             figure.text(left, bottom - 0.05 / height, words, fontsize=8.8, va="top",

@@ -8,6 +8,7 @@ import pytest
 
 from contracts.errors import UserError
 from contracts.scenario import Scenario
+from sim_worker.scenarios.drawing import draw_cases
 from sim_worker.scenarios.reading import CATALOGUE, catalogue, find_scenario, numbers, read_scenario
 
 IDS = {
@@ -120,3 +121,18 @@ def test_what_is_no_scenario_file_says_so(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UserError, match="is no UTF-8 text"):
         read_scenario(tmp_path / "binary.toml")
+
+
+def test_the_scenario_of_the_documentation_is_sound(tmp_path: Path) -> None:
+    words = (Path(__file__).parents[3] / "docs" / "scenarios.md").read_text(encoding="utf-8")
+    file = tmp_path / "motorcycle.toml"
+    file.write_text(words.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    assert len(draw_cases(read_scenario(file))) == 6
+
+
+def test_the_documentation_lists_the_catalogue() -> None:
+    words = (Path(__file__).parents[3] / "docs" / "scenarios.md").read_text(encoding="utf-8")
+    for id_, scenario in catalogue().items():
+        row = next(line for line in words.splitlines() if line.startswith(f"| `{id_}` |"))
+        assert scenario.title in row
+        assert scenario.source.split(",")[0] in row
