@@ -116,5 +116,6 @@ def _line(states: list[VehicleState], stamps: list[int], place: int) -> Array | 
     for index in range(1, len(xy)):
         if np.hypot(*(xy[index] - xy[kept[-1]])) >= _STEP_M:
             kept.append(index)
-    ahead = sum(index > place - first for index in kept) * _STEP_M
-    return degrees[kept] if ahead >= _LEAST_M else None
+    onward = xy[[place - first, *(index for index in kept if index > place - first)]]
+    ahead_m = float(np.hypot(*np.diff(onward, axis=0).T).sum())
+    return degrees[kept] if ahead_m >= _LEAST_M else None

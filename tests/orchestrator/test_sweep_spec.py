@@ -36,7 +36,7 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ('maps = "a.osm"', "unknown field `maps`"),
-        ("", "exactly one of map and worlds; got none"),
+        ("", "exactly one of map, worlds and recorded; got none"),
         ('map = "a"\nworlds = "b"', "got map and worlds"),
         ('map = "a"\nsample = 0', "sample 0: at least 1"),
         ('map = "a"\nbbox = "1,2,3"', "four numbers"),
