@@ -147,7 +147,7 @@ def _forced(
     ahead, speed = distance[candidate], speeds[rows, instant].ravel()[candidate]
     needed = _needed_deceleration(ahead, speed, (leaves - enters)[row])
     arrives = _arrival(scene, conflict, rows[row], user)
-    narrow = (arrives - leaves[row] < NARROW_S) & (arrives > enters[row])
+    narrow = (arrives < leaves[row] + NARROW_S) & (arrives > enters[row])
     found = np.zeros((len(rows), users), dtype=bool)
     found[row, user] = (needed > HARD_BRAKING_MPS2) | narrow
     return found
