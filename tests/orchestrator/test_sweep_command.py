@@ -97,7 +97,10 @@ def test_a_second_start_plays_only_what_is_missing(
     parts[1].unlink()
     parts[2].write_bytes(parts[2].read_bytes()[:100])
     (out / "rows" / "job-000000.writing").write_bytes(b"half")
-    assert run(["sweep", str(folder / "small.toml"), "--out", str(out), "--workers", "1", "--json"]) == 0
+    assert (
+        run(["sweep", str(folder / "small.toml"), "--out", str(out), "--workers", "1", "--json"])
+        == 0
+    )
     again = json.loads(capsys.readouterr().out)
     assert again["jobs_played"] == 2
     assert again["rows_sha256"] == summary["rows_sha256"]
