@@ -120,8 +120,11 @@ class Play:
         scene = self.scene
         target, stop, seen = scene.aims.target_speed_mps, None, None
         if scene.sight is not None and scene.traffic is not None:
-            ahead = np.column_stack([np.cos(now[:, 2]), np.sin(now[:, 2])])
-            seen = scene.sight.look(tick, scene.traffic, now[:, :2] + self.front_m * ahead)
+            eyes = now[:, :2]
+            if scene.sight.anybody_hidden:
+                ahead = np.column_stack([np.cos(now[:, 2]), np.sin(now[:, 2])])
+                eyes = eyes + self.front_m * ahead
+            seen = scene.sight.look(tick, scene.traffic, eyes)
             self._lead = scene.sight.lead(seen, place)
         if scene.limit_share is not None:
             target = target * scene.path.at_nodes(scene.limit_share, place.arc_m)

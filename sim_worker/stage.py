@@ -157,6 +157,11 @@ class Stage:
             backwards=backwards,
         )
         self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
+        self._steer_controls = self._controls[:, :, self._actuators.steer]
+        self._drive_controls = self._controls[:, :, self._actuators.drive]
+        self._drive_command = self._physics.ctrl[rows, None, self._actuators.drive]
+        self._joint_now = self._physics.qpos[rows, self._joints]
+        self._rate_now = self._physics.qvel[rows, self._dofs]
         self.static_contact = np.zeros(count, dtype=bool)
         """(S,) bool: whether the vehicle touched a building or island during the last tick."""
         self.looked = False
@@ -201,18 +206,15 @@ class Stage:
         states = self._states[rows]
         speed = states[:, 3].copy()
         self._actuation.apply(speed_mps=speed, accel_mps2=controls.accel_mps2)
-        per_step, ids = self._controls, self._actuators
-        per_step[:, :, ids.drive] = self._physics.ctrl[rows, None, ids.drive]
+        np.copyto(self._drive_controls, self._drive_command)
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
         change = (controls.tire_angle_rad - self._tire_command)[:, None]
-        spread = self._tire_command[:, None] + np.minimum(
-            np.maximum(change, -self._reach), self._reach
-        )
-        per_step[:, :, ids.steer] = spread
-        self._tire_command = spread[:, -1]
-        self._advance(per_step, self._near_statics_of(states))
-        np.copyto(self._positions, self._physics.qpos[rows, self._joints])
-        np.copyto(self._velocities, self._physics.qvel[rows, self._dofs])
+        change = np.minimum(np.maximum(change, -self._reach), self._reach)
+        np.add(self._tire_command[:, None], change, out=self._steer_controls)
+        self._tire_command = self._steer_controls[:, -1].copy()
+        self._advance(self._controls, self._near_statics_of(states))
+        np.copyto(self._positions, self._joint_now)
+        np.copyto(self._velocities, self._rate_now)
         base_from_cog(self.vehicle, self._positions, self._velocities, states)
         np.divide(states[:, 3] - speed, self.control_dt_s, out=states[:, 7])
 

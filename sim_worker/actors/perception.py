@@ -66,6 +66,8 @@ class Sight:
         self._faults, self._tick_s = faults, tick_s
         self._hidden = np.nonzero((hidden_by >= 0) & crowd.present)
         self._hides = hidden_by[self._hidden]
+        self.anybody_hidden = len(self._hides) > 0
+        """Whether it matters where the cars' eyes are."""
         kept = kept or int(self._late.max(initial=0)) + 1
         self._past: list[tuple[npt.NDArray[Any], ...]] = [_now(traffic)] * kept
         self._anybody_late = bool(self._late.any())
@@ -128,12 +130,12 @@ class Sight:
         self, tick: int | npt.NDArray[np.intp], poses: Array, eyes_xy_m: Array
     ) -> Flags | None:
         """(S, R) bool: who is absent, lost or hidden; None where everybody is seen."""
-        if self._all_there and not self._ever_lost and not len(self._hides):
+        if self._all_there and not self._ever_lost and not self.anybody_hidden:
             return None
         unseen = self._absent.copy()
         if self._ever_lost:
             unseen |= self._lost(np.asarray(tick) * self._tick_s)[:, None]
-        if len(self._hides):
+        if self.anybody_hidden:
             unseen[self._hidden] |= self._behind(poses, eyes_xy_m)
         return unseen
 
