@@ -92,12 +92,14 @@ class PathProjection:
 
     def __init__(self, columns: Array) -> None:
         """`columns` (M, 3) are arc length, offset to the left and relative heading of all nodes."""
-        self._columns = columns
-        self._steps = np.diff(columns, axis=0, append=columns[-1:])
+        # One array each: what is looked up then lies together.
+        self._columns = [np.ascontiguousarray(column) for column in columns.T]
+        self._steps = [np.diff(column, append=column[-1:]) for column in self._columns]
 
     def at(self, place: Place) -> tuple[Array, Array, Array]:
         """Return arc length, offset to the left and relative heading (…) on the other path."""
-        found = self._steps.take(place.node, axis=0)
-        found *= place.share[..., None]
-        found += self._columns.take(place.node, axis=0)
-        return found[..., 0], found[..., 1], found[..., 2]
+        arc, offset, turned = (
+            steps.take(place.node) * place.share + column.take(place.node)
+            for steps, column in zip(self._steps, self._columns, strict=True)
+        )
+        return arc, offset, turned
