@@ -78,7 +78,7 @@ TILES, TRIES, MOST_AT_ONE_JUNCTION = 3, 60, 4
 MOST_OFF_M = 5.0
 """Nobody starts so far beyond the end of what a World holds of a road."""
 PLANNERS = {"reversing_parking": "reverse_pursuit"}
-"""Who drives the ego, where not by `pure_pursuit_idm`."""
+"""Who drives the ego where the usual planner cannot."""
 TYPICAL = {"roundabout_entry": "roundabout", "roundabout_exit": "roundabout"}
 """Kinds that show best what a scenario is; it takes place on others, too."""
 EXACT = (
@@ -175,8 +175,8 @@ def whole_lap(tile: Tile, aspect: float) -> View:
     return view_around((low + high) / 2.0, half_m, aspect, close=False)
 
 
-def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]]) -> Figure:
-    """Draw one row for each scenario, its title above three tiles."""
+def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]], usual: str) -> Figure:
+    """Draw one row for each scenario, its title above three tiles; `usual` is who drives."""
     vehicle = load_vehicle()
     wide, high = _TILE_IN
     row_in = high + _CAPTION_IN + _HEAD_IN
@@ -184,7 +184,7 @@ def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]]) -> Figure:
     figure = Figure(figsize=(width, height), dpi=100, facecolor="white")
     for row, id_ in enumerate(ids):
         scenario = catalogue()[id_]
-        planner = PLANNERS.get(id_, "pure_pursuit_idm")
+        planner = PLANNERS.get(id_, usual)
         top = 1.0 - row * row_in / height
         figure.text(0.1 / width, top - 0.24 / height, f"{id_}: {scenario.title}", fontsize=14,
                     weight="bold", va="center")  # fmt: skip
@@ -231,13 +231,14 @@ def main() -> None:
     parser.add_argument("data", type=Path, help="folder of the maps")
     parser.add_argument("out", type=Path, help="folder to write to")
     parser.add_argument("--sheet", choices=SHEETS, help="only this one")
+    parser.add_argument("--planner", default="pure_pursuit_idm", help="who drives the ego")
     asked = parser.parse_args()
     assert sorted(id_ for ids in SHEETS.values() for id_ in ids) == sorted(catalogue())
     tiles = choose_tiles(asked.data)
     asked.out.mkdir(parents=True, exist_ok=True)
     for name, ids in SHEETS.items():
         if asked.sheet in (None, name):
-            save(draw_sheet(ids, tiles), asked.out / f"{name}.png")
+            save(draw_sheet(ids, tiles, asked.planner), asked.out / f"{name}.png")
 
 
 if __name__ == "__main__":
