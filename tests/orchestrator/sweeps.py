@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from orchestrator.sweep_play import PlaySetup, SweepWorker
+from orchestrator.sweep_pool import Task
+from orchestrator.sweep_spec import Loaded
 from tests.sim_worker.scenarios.worlds import cross
 from world_gen.world_store import WorldStore
 
@@ -26,3 +30,14 @@ def small_sweep(folder: Path, text: str = SMALL) -> Path:
     spec = folder / "small.toml"
     spec.write_text(text.format(worlds=folder / "drawn"))
     return spec
+
+
+class Alone:
+    """A crew of this process alone: what it answers is what any worker would."""
+
+    def __init__(self, loaded: Loaded) -> None:
+        self._worker = SweepWorker(PlaySetup(loaded=loaded, worlds_dir=loaded.spec.worlds or ""))
+
+    def run(self, tasks: Sequence[Task], done: Callable[[Task, object], None]) -> None:
+        for task in tasks:
+            done(task, self._worker.answer(task.question))

@@ -19,7 +19,7 @@ from orchestrator.cli import run
 from orchestrator.sweep_command import crew_for, run_sweep
 from orchestrator.sweep_rows import schema_of
 from orchestrator.sweep_spec import load_spec
-from tests.orchestrator.sweeps import SMALL, small_sweep
+from tests.orchestrator.sweeps import SMALL, Alone, small_sweep
 
 ENDS_WITHIN_S = 3.0
 STARTS_WITHIN_S = 120.0
@@ -27,11 +27,10 @@ STARTS_WITHIN_S = 120.0
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """A small sweep's folder, by one worker, and what it came to."""
+    """A small sweep's folder, played in this process, and what it came to."""
     folder = tmp_path_factory.mktemp("swept")
     loaded = load_spec(small_sweep(folder))
-    with crew_for(loaded, folder / "out", 1) as crew:
-        return folder, run_sweep(loaded, folder / "out", crew)
+    return folder, run_sweep(loaded, folder / "out", Alone(loaded))
 
 
 def _rows(out: Path) -> list[dict[str, Any]]:
@@ -149,8 +148,7 @@ def test_ctrl_c_ends_soon_and_keeps_what_is_done(
     assert kept
     assert not json.loads((out / "sweep.json").read_text())["complete"]
     loaded = load_spec(folder / "small.toml")
-    with crew_for(loaded, out, 1) as crew:
-        again = run_sweep(loaded, out, crew)
+    again = run_sweep(loaded, out, Alone(loaded))
     assert again["jobs_played"] <= summary["jobs"] - len(kept)
     assert again["rows_sha256"] == summary["rows_sha256"]
 
