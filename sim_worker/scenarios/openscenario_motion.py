@@ -17,7 +17,7 @@ from sim_worker.scenarios.roles import Cast, CastActor
 from world_gen.export.opendrive_elements import number
 
 _STEP_S, _SPACING_M = 0.1, 0.5
-_MOST_DRIFT_M = 0.15
+_MOST_DRIFT_M = 0.06
 _BEYOND_M = 20.0
 """Paths that are not timed go on so far, for whoever drives them faster."""
 
