@@ -19,7 +19,7 @@ from contracts.vehicle import VehicleParameters
 from sim_worker.actors.kinds import KINDS
 from sim_worker.closed_loop import drive
 from sim_worker.driven_line import DrivenLine, driven_lines, drives_as_cast, time_at
-from sim_worker.scenarios.impact import ego_box
+from sim_worker.scenarios.impact import Moving, ego_box
 from sim_worker.scenarios.places import Unplaced
 from sim_worker.scenarios.roles import ALONG, Cast, CastActor
 from sim_worker.scenarios.staged import staged_players, staged_start
@@ -93,12 +93,8 @@ def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, 
             ):
                 on_time[row] = _on_time(met, line, bent[row].place.ego)
     off_m = _off_m(on_time, lines, bent, stage)
-    played |= {row: case for row, case in on_time.items() if not off_m.get(row, 0.0) > _NEAR_M}
+    played |= {row: case for row, case in on_time.items() if off_m[row] <= _NEAR_M}
     return played
-
-
-def _along(case: Cast) -> bool:
-    return any(a.name == case.impact_with and a.relation in ALONG for a in case.actors)
 
 
 def _off_m(
@@ -107,8 +103,8 @@ def _off_m(
     bent: Mapping[int, Cast],
     stage: Stage,
 ) -> dict[int, float]:
-    """Return how far from their plans impacts with those who come are, as it was driven, by row."""
-    rows = [row for row, case in cases.items() if not _along(case)]
+    """Return how far from their plans impacts are, as it was driven, by row."""
+    rows = list(cases)
     if not rows:
         return {}
     tick_s = stage.control_dt_s
@@ -123,7 +119,9 @@ def _off_m(
             p for p in staged_players(case, case.place.ego.path) if p.name == case.impact_with
         )
         since_s = np.asarray(ticks * tick_s - from_s, dtype=np.float64)
-        arc = player.start_arc_m + player.speed_mps * since_s
+        stops_s = player.acts_after_s if player.conduct == "stops" else math.inf
+        moving = Moving(player.path, player.speed_mps, 0.0, stops_s, player.decel_mps2)
+        arc = player.start_arc_m + moving.travelled_m(since_s)
         pose = player.path.pose_at(arc, player.lateral_m)
         states.append(line.states[ticks])
         users.append(np.column_stack([pose.xy_m, pose.yaw_rad])[:, None])
