@@ -31,11 +31,12 @@ def when(run: Path, text: str) -> float:
 
 
 def under_way(out: Path) -> Path:
-    """Wait until a drive has its first world loaded; return its folder."""
+    """Wait until the car moves and a first world is loaded; return the drive's folder."""
     wait_for(lambda: run_folder(out) is not None, "the run's folder")
     run = run_folder(out)
     assert run is not None
     wait_for(lambda: says(run, "loaded by"), "the first world")
+    wait_for(lambda: says(run, "on the map"), "the car on its way")
     return run
 
 
