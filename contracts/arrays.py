@@ -18,7 +18,8 @@ _WIRE_TYPES = ("<f8", "<f4", "<i8", "<i4", "|u1", "|b1")
 
 def array_to_wire(array: np.ndarray[Any, Any]) -> tuple[str, tuple[int, ...], bytes]:
     """Return (dtype, shape, bytes) of an array, little-endian and C-contiguous."""
-    contiguous = np.ascontiguousarray(array)
+    # Asking numpy to see to it costs more than most arrays' bytes: a World has thousands.
+    contiguous = array if array.flags.c_contiguous and array.ndim else np.ascontiguousarray(array)
     if contiguous.dtype.byteorder == ">":
         contiguous = contiguous.astype(contiguous.dtype.newbyteorder("<"))
     return contiguous.dtype.str, contiguous.shape, contiguous.tobytes()
