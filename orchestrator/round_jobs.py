@@ -21,7 +21,7 @@ from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.live import LiveScenarios
 from sim_worker.scenarios.reading import catalogue, find_scenario
 from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.variants import plan_variants
+from sim_worker.variants import cases_of, plan_variants
 from world_gen.signal_state import LIVE_FOR_S
 
 STEP_S = 0.1
@@ -68,6 +68,8 @@ class RoundPlanner:
     def __init__(self, config: DriveConfig, vehicle: VehicleParameters) -> None:
         self._config, self._vehicle = config, vehicle
         self._scenarios = scenarios_of(config)
+        for scenario in self._scenarios:
+            cases_of(scenario, config.seed)  # before the drive, not in its first round
         self._known: dict[str, LiveScenarios] = {}
         self._variants: dict[tuple[str, ...], tuple[Variant, ...]] = {}
 

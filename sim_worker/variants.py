@@ -6,6 +6,7 @@ follow an additive recurrence (Roberts 2018, the R-sequence), shifted by the see
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -44,7 +45,7 @@ def plan_variants(
     nominal = Variant(index=0, name="nominal", planner=planners[0])
     points = _low_discrepancy(count, seed)
     strata = np.random.default_rng(seed).permutation(count - 1)
-    cases = [draw_cases(scenario, seed=seed) for scenario in scenarios]
+    cases = [cases_of(scenario, seed) for scenario in scenarios]
     variants = [nominal]
     for index in range(1, count):
         speed = (strata[index - 1] + 0.5) / (count - 1)
@@ -60,6 +61,12 @@ def plan_variants(
             theme = _OWN_THEMES[(index // 2 if scenarios else index) % len(_OWN_THEMES)]
             variants.append(_fault(index, speed, points[index], planner, theme))
     return tuple(variants)
+
+
+@functools.cache
+def cases_of(scenario: Scenario, seed: int) -> tuple[Mapping[str, float], ...]:
+    """Return a scenario's cases, drawn once: rounds come back to the same scenarios."""
+    return draw_cases(scenario, seed=seed)
 
 
 def _low_discrepancy(count: int, seed: int) -> Array:

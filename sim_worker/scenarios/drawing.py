@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 from scipy.special import ndtr, ndtri
-from scipy.stats import qmc
 
 from contracts.arrays import Array
 from contracts.scenario import Scenario, Span
@@ -45,6 +44,9 @@ def _draws(ranged: list[NamedNumber], count: int, seed: int) -> Array:
     """Return (count, len(ranged)) numbers within their spans."""
     if not ranged:
         return np.zeros((count, 0))
+    # It takes most of a second to import, and those who only cast cases never draw.
+    from scipy.stats import qmc
+
     sobol = qmc.Sobol(d=len(ranged), scramble=True, rng=np.random.default_rng(seed))
     even = sobol.random_base2(max(0, (count - 1).bit_length()))[:count]
     columns = [_within(n.value, even[:, i]) for i, n in enumerate(ranged)]  # type: ignore[arg-type]
