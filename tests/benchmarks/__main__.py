@@ -1,7 +1,7 @@
 """`python -m tests.benchmarks [NAME ...]` measures and writes `build/bench.json`.
 
-The file is `{name: {value, unit, baseline, ratio, ...}}`. Exit code 1 where something could not be
-measured, 2 for an unknown name.
+The file is `{name: {value, unit, baseline, ratio, ...}}`; rows of benchmarks that were not
+named stay. Exit code 1 where something could not be measured, 2 for an unknown name.
 """
 
 from __future__ import annotations
@@ -64,9 +64,19 @@ def main(names: list[str]) -> int:
         for name_of, figure in measured.more.items():
             print(f"{'':28} {name_of} {figure:.4g}")
     OUT.parent.mkdir(exist_ok=True)
-    OUT.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+    kept = {name: row for name, row in _written().items() if name not in chosen}
+    in_order = {name: row for name in BENCHMARKS if (row := {**kept, **rows}.get(name))}
+    OUT.write_text(json.dumps(in_order, indent=2) + "\n", encoding="utf-8")
     print(f"written: {OUT}")
     return 0 if len(rows) == len(chosen) else 1
+
+
+def _written() -> dict[str, dict[str, float | str]]:
+    """Return the rows of earlier runs; a file that was cut short holds none."""
+    try:
+        return json.loads(OUT.read_text(encoding="utf-8"))  # type: ignore[no-any-return]
+    except (FileNotFoundError, json.JSONDecodeError):
+        return {}
 
 
 if __name__ == "__main__":
