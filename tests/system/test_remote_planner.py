@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 import numpy as np
 
@@ -18,7 +16,7 @@ from sim_worker.planners.registry import load_planner
 from sim_worker.planners.remote import RemotePlanner
 from sim_worker.stage import Stage
 from sim_worker.vehicle.parameters import load_vehicle
-from tests.contracts.bus_sides import free_endpoint
+from tests.contracts.bus_sides import free_endpoint, python
 from tests.sim_worker.places import crossroads, job
 from tests.sim_worker.planners.driven import at_rest_on, drive, straight
 from tests.system.foretwin_command import REPOSITORY
@@ -27,19 +25,8 @@ EXAMPLE = REPOSITORY / "examples" / "remote_planner.py"
 VEHICLE = load_vehicle()
 
 
-@contextmanager
-def example(endpoint: str) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen(
-        [sys.executable, str(EXAMPLE), "--endpoint", endpoint],
-        stdout=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
-    )  # fmt: skip
-    with process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "ready\n"
-            yield process
-        finally:
-            process.kill()
+def example(endpoint: str) -> AbstractContextManager[subprocess.Popen[str]]:
+    return python(str(EXAMPLE), "--endpoint", endpoint)
 
 
 @contextmanager
