@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +16,7 @@ from contracts.scenario import Scenario
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from orchestrator.config import DriveConfig
+from orchestrator.fewer_futures import some_of
 from orchestrator.instructions import RoundIntent
 from orchestrator.intake import Surroundings
 from orchestrator.way_ahead import PATH_BEHIND_M
@@ -31,6 +34,8 @@ PLAN_FRESH_NS = 1_000_000_000
 _SEEN_FRESH_NS = 500_000_000
 _SEEN_WITHIN_M = 120.0
 _KEPT_WORLDS = 8
+LEAST_IN_JOB = 16
+"""A job costs about as much as 30 of its futures before the first one: smaller ones save little."""
 
 
 class RoundPlan(NamedTuple):
@@ -82,18 +87,17 @@ class RoundPlanner:
         world: World,
         *,
         start_stamp_ns: int,
+        count: int,
     ) -> RoundPlan:
-        """Return the futures of a round and its jobs."""
+        """Return a round's `count` futures and its jobs."""
         config = self._config
         scenarios = self._fitting(world, intent.path)
-        variants = self._variants_with(scenarios)
+        variants = some_of(self._variants_with(scenarios), count, turn=round_id)
         users = _road_users(said.road_users, state, world.frame)
         signals = _signals(said.signals, state)
         car_plan = _car_plan(said.plan, state, world.frame)
-        size = config.futures_per_job
         jobs = []
-        for index, first in enumerate(range(0, config.futures, size)):
-            mine = variants[first : first + size]
+        for index, mine in enumerate(self._cut(variants)):
             named = {variant.scenario_id for variant in mine}
             jobs.append(
                 FuturesJob(
@@ -115,6 +119,14 @@ class RoundPlanner:
                 )
             )
         return RoundPlan(variants, tuple(jobs))
+
+    def _cut(self, variants: tuple[Variant, ...]) -> list[tuple[Variant, ...]]:
+        """Return the futures of each job: as many jobs as for all, unless that makes them small."""
+        size, count = self._config.futures_per_job, len(variants)
+        for_all = math.ceil(self._config.futures / size)
+        jobs = max(math.ceil(count / size), min(for_all, count // LEAST_IN_JOB))
+        cuts = [count * job // jobs for job in range(jobs + 1)]
+        return [variants[low:high] for low, high in pairwise(cuts)]
 
     def _variants_with(self, scenarios: tuple[Scenario, ...]) -> tuple[Variant, ...]:
         key = tuple(scenario.id for scenario in scenarios)

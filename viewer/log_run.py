@@ -68,9 +68,12 @@ class RunLog:
             ahead = f"next **{plain_text(progress.next_intersection)}**"
             if progress.arrival_in_s is not None:
                 ahead += f" in {progress.arrival_in_s:.0f} s"
+        short = (
+            f"**{progress.too_slow}** (machine too slow for all) · " if progress.too_slow else ""
+        )
         text = (
             f"**{progress.drive_time_s:.1f} s** · {plain_text(progress.mission_state)} · {ahead} · "
-            f"{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped · "
+            f"{short}{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped · "
             f"{self._source}"
         )
         return [Row("status", drive_ns, _document(text))]
