@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.drive import PlannedTrajectory, RoadUsers, SignalState, VehicleState
+from contracts.drive import PlannedTrajectory, SignalState, VehicleState
 from contracts.errors import UserError
 from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.futures import CarPlan, FuturesJob, PathAhead, SeenRoadUser, Variant
+from contracts.futures import CarPlan, FuturesJob, PathAhead, Variant
 from contracts.scenario import Scenario
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
@@ -19,6 +19,7 @@ from orchestrator.config import DriveConfig
 from orchestrator.fewer_futures import some_of
 from orchestrator.instructions import RoundIntent
 from orchestrator.intake import Surroundings
+from orchestrator.seen_users import near_car
 from orchestrator.way_ahead import PATH_BEHIND_M
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.live import LiveScenarios
@@ -31,8 +32,6 @@ STEP_S = 0.1
 HEEDLESS_PLANNER = "constant_speed"
 PLAN_FRESH_NS = 1_000_000_000
 """An older plan of the car is not compared with a new future, nor followed in one."""
-_SEEN_FRESH_NS = 500_000_000
-_SEEN_WITHIN_M = 120.0
 _KEPT_WORLDS = 8
 LEAST_IN_JOB = 16
 """A job costs about as much as 30 of its futures before the first one: smaller ones save little."""
@@ -93,7 +92,7 @@ class RoundPlanner:
         config = self._config
         scenarios = self._fitting(world, intent.path)
         variants = some_of(self._variants_with(scenarios), count, turn=round_id)
-        users = _road_users(said.road_users, state, world.frame)
+        users = tuple(near_car(said.road_users, state, world.frame).values())
         signals = _signals(said.signals, state)
         car_plan = _car_plan(said.plan, state, world.frame)
         jobs = []
@@ -154,33 +153,6 @@ class RoundPlanner:
         if passage is None:
             return ()
         return tuple(s for s in self._scenarios if known.places(s, passage))
-
-
-def _road_users(
-    users: RoadUsers | None, state: VehicleState, frame: LocalFrame
-) -> tuple[SeenRoadUser, ...]:
-    """Return the road users seen at about the state's time, in the World's frame."""
-    if users is None or abs(state.stamp_ns - users.stamp_ns) > _SEEN_FRESH_NS:
-        return ()
-    here = local_from_geo(frame, state.position.lat_deg, state.position.lon_deg)
-    seen = []
-    for user in users.users:
-        lat, lon = user.position.lat_deg, user.position.lon_deg
-        xy = local_from_geo(frame, lat, lon)
-        if float(np.hypot(*(xy - here))) > _SEEN_WITHIN_M:
-            continue
-        seen.append(
-            SeenRoadUser(
-                kind=user.kind,
-                x_m=float(xy[0]),
-                y_m=float(xy[1]),
-                yaw_rad=float(local_from_geo_yaw(frame, user.yaw_rad, lat, lon)),
-                speed_mps=user.speed_mps,
-                length_m=user.length_m,
-                width_m=user.width_m,
-            )
-        )
-    return tuple(seen)
 
 
 def _signals(states: tuple[SignalState, ...], state: VehicleState) -> tuple[SignalState, ...]:
