@@ -11,6 +11,7 @@ import msgspec
 
 from contracts.errors import UserError
 from orchestrator.sweep_plan import WorldPlaces
+from orchestrator.sweep_road_users import digest_of
 from orchestrator.sweep_spec import Loaded
 from orchestrator.versions import versions
 from world_gen.build import GENERATOR_VERSION
@@ -113,6 +114,7 @@ def fingerprint_of(loaded: Loaded, source: str) -> str:
         loaded.scenarios,
         loaded.vehicles,
         loaded.starts,
+        None if loaded.road_users is None else digest_of(loaded.road_users),
         source,
         GENERATOR_VERSION,
         versions(),
