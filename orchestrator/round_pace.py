@@ -20,8 +20,8 @@ SPARE = 0.8
 LATE_ROUNDS, OF_ROUNDS = 2, 4
 """So many late ones among the last rounds, and the next is smaller: one alone may be a World that
 a worker has to load."""
-CALM_ROUNDS, MOST_CALM_ROUNDS = 10, 60
-"""So many rounds with room to spare, once more for each fall remembered, and the next is larger."""
+CALM_PERIODS, MOST_CALM_PERIODS, LEAST_CALM_ROUNDS = 10, 60, 4
+"""So many periods with room to spare, once more for each fall remembered, and the next is larger."""
 CALM_SHARE = 0.9
 REMEMBERED_ROUNDS = 240
 
@@ -86,7 +86,8 @@ def next_pace(history: Sequence[RoundTime], paces: Sequence[Pace], *, period_s: 
             after.pace.futures_per_period < before.pace.futures_per_period
             for before, after in pairwise(history)
         )
-        wanted = min(CALM_ROUNDS * (1 + falls), MOST_CALM_ROUNDS)
+        periods = min(CALM_PERIODS * (1 + falls), MOST_CALM_PERIODS)
+        wanted = max(LEAST_CALM_ROUNDS, periods // pace.one_of)
         calm = sorted(seconds[-wanted:])
         faster = paces[rank - 1]
         if len(calm) == wanted and fits(faster, calm[int(CALM_SHARE * (wanted - 1))]):
