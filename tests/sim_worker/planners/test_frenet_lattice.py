@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sim_worker.planners.base import SharedGround
+from sim_worker.planners.constant_speed import ConstantSpeed
 from sim_worker.planners.frenet_lattice import FrenetLattice, choose
 from sim_worker.planners.path import FrenetPath
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
@@ -113,6 +114,26 @@ def test_nobody_who_crosses_is_hit(after_s: float, walks: bool) -> None:
     )  # fmt: skip
     assert done.clearance_m.min() > 0.2
     assert done.front_m[0, -1] > 50.0
+
+
+@pytest.mark.parametrize("speed", [6.5, 9.0])
+def test_it_brakes_for_who_turns_across_as_soon_as_that_begins(speed: float) -> None:
+    path = straight()
+    angle = np.linspace(0.0, math.pi / 2, 30)
+    turn = np.array([45.0, 3.2]) + 8.0 * np.column_stack([-np.sin(angle), np.cos(angle) - 1.0])
+    line = np.concatenate([[[145.0, 3.2]], turn, turn[-1:] - np.array([0.0, 60.0])])
+    # Unhindered they meet: the ego in the junction's middle, the other one in its lane.
+    other = Other(line, 6.0, 108.0 - 6.0 * 38.0 / speed)
+    done = {
+        planner: drive(
+            planner(), path, at_rest_on(path, 0.0, speed), vehicle=VEHICLE, seconds=10.0,
+            others=[other], target_mps=speed,
+        )
+        for planner in (ConstantSpeed, FrenetLattice)
+    }  # fmt: skip
+    assert done[ConstantSpeed].clearance_m.min() == 0.0
+    assert done[FrenetLattice].clearance_m.min() > 0.2
+    assert done[FrenetLattice].states[0, -1, 3] > 3.0
 
 
 def test_it_gives_way_where_the_world_says_so() -> None:
