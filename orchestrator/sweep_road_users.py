@@ -29,9 +29,6 @@ from telemetry.logs.road_users import RoadUserLog, RoadUserTrack
 
 RoadUserMode = Literal["replayed", "predicted", "none"]
 
-_SAME_S = 1.0
-"""Who is seen for so long beside the drive, and overlaps with the car most of that time, is it."""
-
 
 class Others(NamedTuple):
     """Those around a recorded car: as they then moved, or as a live round foresees them.
@@ -94,12 +91,12 @@ def named_log(
             f"recorded.road_user_log {path}: from {log_s[0]:.1f} to {log_s[1]:.1f} s, but the "
             f"drive from {drive_s[0]:.1f} to {drive_s[1]:.1f} s: they need one clock"
         )
-    for track in found.tracks:
-        if _is_the_car(track, states, vehicle):
-            raise UserError(
-                f"recorded.road_user_log {path}: road user {track.user_id!r} is where the car "
-                f"itself is; leave_out = [{track.user_id!r}] leaves it out"
-            )
+    same = [f'"{t.user_id}"' for t in found.tracks if _is_the_car(t, states, vehicle)]
+    if same:
+        raise UserError(
+            f"recorded.road_user_log {path}: the car itself is in it: leave_out = "
+            f"[{', '.join(same)}] leaves it out"
+        )
     return found
 
 
@@ -119,11 +116,12 @@ def among(log: RoadUserLog, leave_out: Sequence[str], what: str) -> RoadUserLog:
 def _is_the_car(
     track: RoadUserTrack, states: Sequence[VehicleState], vehicle: VehicleParameters
 ) -> bool:
+    """Tell whether somebody overlaps with the car for most of the time, as nobody else can."""
     frame = LocalFrame(states[0].position)
     stamps = np.array([state.stamp_ns for state in states], dtype=np.int64)
     inside = (track.stamps_ns >= stamps[0]) & (track.stamps_ns <= stamps[-1])
     common = track.stamps_ns[inside]
-    if not len(common) or common[-1] - common[0] < _SAME_S * 1e9:
+    if not len(common):
         return False
     lat = np.array([state.position.lat_deg for state in states])
     lon = np.array([state.position.lon_deg for state in states])
