@@ -21,7 +21,7 @@ LATE_ROUNDS, OF_ROUNDS = 2, 4
 """So many late ones among the last rounds, and the next is smaller: one alone may be a World that
 a worker has to load."""
 CALM_PERIODS, MOST_CALM_PERIODS, LEAST_CALM_ROUNDS = 10, 60, 4
-"""So many periods with room to spare, once more for each fall remembered, and the next is larger."""
+"""So many periods with room to spare, as many more for each fall remembered, and it grows again."""
 CALM_SHARE = 0.9
 REMEMBERED_ROUNDS = 240
 
