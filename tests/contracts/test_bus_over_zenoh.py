@@ -108,7 +108,8 @@ def test_a_question_that_is_never_answered_times_out() -> None:
         assert replies.take(0.2) is None
 
 
-def test_no_router_is_one_clear_line() -> None:
+def test_no_router_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("contracts.bus.CONNECT_S", 0.5)
     endpoint = free_endpoint()
 
     with pytest.raises(BusUnreachable, match=f"no Zenoh router at {endpoint}"):
