@@ -11,8 +11,6 @@ from tests.system.foretwin_command import Finished, foretwin
 
 BERLIN_LOG = "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt"
 SMALL = ("--speed", "max", "--futures", "36", "--rate", "0.5")
-
-
 Drives = tuple[Finished, Finished]
 
 
