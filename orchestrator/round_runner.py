@@ -83,6 +83,7 @@ class RoundRunner:
         self._next_round_id = 0
         self._seeds: dict[int, _Seed] = {}
         self._told_slow = False
+        self._told_planners: set[str] = set()
 
     @property
     def short_of(self) -> str:
@@ -194,9 +195,21 @@ class RoundRunner:
         self._tables.add("rounds", [row])
         view = round_view(done, futures, world.frame, self._plan.drive_frame, seed.variants)
         self._bus.publish("round", view, run=self._plan.run_id)
+        self._tell_of_planners(done, seed.variants)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._comparison_desk.take_round(done, world.frame, seed.state)
             self._compare_plans(done, seed, world)
+
+    def _tell_of_planners(self, done: RoundDone, variants: tuple[Variant, ...]) -> None:
+        """Say once of each planner that it failed, or that another one had to act for it."""
+        planners = iter(variant.planner for variant in variants)
+        for result in done.results:
+            failures, remarks = result.outcome.failures, result.outcome.remarks
+            for place, planner in zip(range(len(result.variant_indices)), planners, strict=False):
+                words = (failures[place] if failures else "") or (remarks[place] if remarks else "")
+                if words and planner not in self._told_planners:
+                    self._told_planners.add(planner)
+                    self._tell(Tell("warning", f"a future driven by {planner}: {words}"))
 
     def _take_time(self, pace: Pace, seconds: float) -> None:
         """Count how long a round took, and tell where the next ones have another pace."""

@@ -122,3 +122,21 @@ def test_in_lock_step_late_rounds_change_nothing(tmp_path: Path) -> None:
     house.end()
 
     assert house.conductor.rounds.futures.rounds_of.keys() == {6}
+
+
+def test_who_acts_for_a_planner_is_said_once_for_each(tmp_path: Path) -> None:
+    house = House(tmp_path, planner="remote", futures=16, futures_per_job=8)
+    house.drive(20)
+    told: list[Event] = []
+    house.conductor.on_event = told.append
+    for worker in house.workers:
+        worker.remark = "fallback 'pure_pursuit_idm' acted from 0 s on: no answer within 1 s"
+    for _ in range(3):
+        assert house.conductor.start_round()
+        house.work()
+    house.end()
+
+    assert [(event.level, event.text[:40]) for event in told] == [
+        ("warning", "a future driven by remote: fallback 'pur"),
+        ("warning", "a future driven by constant_speed: fallb"),
+    ]
