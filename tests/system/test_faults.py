@@ -76,7 +76,7 @@ def test_a_killed_worker_is_replaced_and_no_result_counts_twice(tmp_path: Path) 
 
 def test_a_frozen_viewer_holds_nothing_up(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, *LIVE, "--end", "8") as process:
+    with started(out, *LIVE, "--end", "12") as process:
         run = under_way(out)
         os.kill(child_pids(run)["viewer"], signal.SIGSTOP)
         frozen_s = time.time()
