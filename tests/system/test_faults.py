@@ -19,7 +19,7 @@ from tests.system.foretwin_command import (
     wait_for,
 )
 
-LIVE = ("--futures", "12", "--rate", "2")
+LIVE = ("--futures", "12", "--least-futures", "12", "--rate", "2")
 
 
 def says(run: Path, text: str) -> bool:
