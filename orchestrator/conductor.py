@@ -50,7 +50,7 @@ class Conductor:
             self.mailbox,
             on_ready=self._world_ready,
             on_failed=self._world_failed,
-            on_warning=lambda text: self.tell(Tell("warning", text)),
+            tell=self.tell,
         )
         self.rounds = RoundRunner(
             plan,
