@@ -132,6 +132,7 @@ class _Drive:
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
         self._start_processes()
+        conductor.rounds.draw_cases()  # while they come up
         if not self._join_processes(bus, conductor):
             return "interrupted", EXIT_INTERRUPTED
         prepare_start(self._plan, conductor, look_after=self._look_after, stop=self._stop)

@@ -72,10 +72,13 @@ class RoundPlanner:
     def __init__(self, config: DriveConfig, vehicle: VehicleParameters) -> None:
         self._config, self._vehicle = config, vehicle
         self._scenarios = scenarios_of(config)
-        for scenario in self._scenarios:
-            cases_of(scenario, config.seed)  # before the drive, not in its first round
         self._known: dict[str, LiveScenarios] = {}
         self._variants: dict[tuple[str, ...], tuple[Variant, ...]] = {}
+
+    def draw_cases(self) -> None:
+        """Draw the cases of all scenarios: before the drive, not in its first round."""
+        for scenario in self._scenarios:
+            cases_of(scenario, self._config.seed)
 
     def plan(
         self,

@@ -75,6 +75,7 @@ class RoundRunner:
         self._tell = tell
         self._comparison_desk = ComparisonDesk(plan.drive_frame, plan.config.horizon_s)
         self._planner = RoundPlanner(plan.config, plan.vehicle)
+        self.draw_cases = self._planner.draw_cases
         self.pace = RoundPace(
             most=plan.config.futures,
             least=plan.config.fewest_futures,
