@@ -46,8 +46,8 @@ class _Instant(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def is_mcity(head: str) -> bool:
-    """Tell whether a file that begins with `head` is such a list."""
-    return head.lstrip().startswith("[") and '"timestamp"' in head and '"objs"' in head
+    """Tell whether a file that begins with `head` may be such a list; no other log is a list."""
+    return head.lstrip("\ufeff \t\r\n").startswith("[")
 
 
 def read_mcity(path: Path) -> list[tuple[int, list[Detection]]]:

@@ -106,6 +106,7 @@ def test_what_a_car_detected_is_in_its_recording(tmp_path: Path) -> None:
     [
         ('[{"timestamp": 1.0, "objs": [{"id": 1}]}]', "missing required field `lat`"),
         ('[{"timestamp": -5, "objs": []}]', r"\[0\]\.timestamp -5\.0: no UTC seconds"),
+        ('[{"timestamp": 1.0}]', "missing required field `objs`"),
         ('[{"timestamp": 1.0, "objs": []}', "expected a list of timestamp and objs"),
         ('[{"timestamp": 1.0, "objs": []}]', "no road users in it"),
     ],
