@@ -83,6 +83,14 @@ def test_who_is_not_seen_for_long_or_jumps_is_away(tmp_path: Path) -> None:
     assert np.flatnonzero(patient.tracks[0].gone_after).tolist() == [5, 7]
 
 
+def test_noise_between_samples_of_almost_one_time_is_no_jump(tmp_path: Path) -> None:
+    instants = [(k / 10.0, [_object("a", float(k), 0.0)]) for k in range(10)]
+    instants.append((0.5001, [_object("a", 5.0, 0.4)]))
+    (track,) = open_road_users(_written(tmp_path, instants)).tracks
+    assert np.flatnonzero(track.gone_after).tolist() == [10]
+    assert track.speed_mps == pytest.approx(np.full(11, 10.0), abs=1.0)
+
+
 def test_what_a_car_detected_is_in_its_recording(tmp_path: Path) -> None:
     info = VehicleInfo(vehicle_id="car", time_base="utc", start_stamp_ns=0, sends=("objects",))
     with create(tmp_path / "drive.mcap", info=info) as writer:
