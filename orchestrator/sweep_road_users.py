@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.drive import RoadUser, RoadUsers, VehicleState
@@ -91,7 +92,8 @@ def named_log(
             f"recorded.road_user_log {path}: from {log_s[0]:.1f} to {log_s[1]:.1f} s, but the "
             f"drive from {drive_s[0]:.1f} to {drive_s[1]:.1f} s: they need one clock"
         )
-    same = [f'"{t.user_id}"' for t in found.tracks if _is_the_car(t, states, vehicle)]
+    course = _course(states)
+    same = [f'"{t.user_id}"' for t in found.tracks if _is_the_car(t, course, vehicle)]
     if same:
         raise UserError(
             f"recorded.road_user_log {path}: the car itself is in it: leave_out = "
@@ -113,22 +115,36 @@ def among(log: RoadUserLog, leave_out: Sequence[str], what: str) -> RoadUserLog:
     return dataclasses.replace(log, tracks=kept)
 
 
-def _is_the_car(
-    track: RoadUserTrack, states: Sequence[VehicleState], vehicle: VehicleParameters
-) -> bool:
-    """Tell whether somebody overlaps with the car for most of the time, as nobody else can."""
+class _Course(NamedTuple):
+    """Where base_link was: positions (N, 2) and yaws (N,) without jumps, in the drive's frame."""
+
+    frame: LocalFrame
+    stamps_ns: npt.NDArray[np.int64]
+    xy_m: Array
+    yaw_rad: Array
+
+
+def _course(states: Sequence[VehicleState]) -> _Course:
     frame = LocalFrame(states[0].position)
-    stamps = np.array([state.stamp_ns for state in states], dtype=np.int64)
+    lat, lon, yaw = np.array(
+        [(s.position.lat_deg, s.position.lon_deg, s.yaw_rad) for s in states], dtype=np.float64
+    ).T
+    return _Course(
+        frame,
+        np.array([state.stamp_ns for state in states], dtype=np.int64),
+        np.asarray(local_from_geo(frame, lat, lon)),
+        np.unwrap(local_from_geo_yaw(frame, yaw, lat, lon)),
+    )
+
+
+def _is_the_car(track: RoadUserTrack, course: _Course, vehicle: VehicleParameters) -> bool:
+    """Tell whether somebody overlaps with the car for most of the time, as nobody else can."""
+    frame, stamps = course.frame, course.stamps_ns
     inside = (track.stamps_ns >= stamps[0]) & (track.stamps_ns <= stamps[-1])
-    common = track.stamps_ns[inside]
-    if not len(common):
+    if not inside.any():
         return False
-    lat = np.array([state.position.lat_deg for state in states])
-    lon = np.array([state.position.lon_deg for state in states])
-    yaw = local_from_geo_yaw(frame, np.array([state.yaw_rad for state in states]), lat, lon)
-    base = np.asarray(local_from_geo(frame, lat, lon))
-    at, since = common - stamps[0], stamps - stamps[0]
-    x, y, yaw = (np.interp(at, since, v) for v in (base[:, 0], base[:, 1], np.unwrap(yaw)))
+    at, since = track.stamps_ns[inside] - stamps[0], stamps - stamps[0]
+    x, y, yaw = (np.interp(at, since, v) for v in (*course.xy_m.T, course.yaw_rad))
     xy = np.asarray(local_from_geo(frame, track.lat_deg[inside], track.lon_deg[inside]))
     dx, dy = xy[:, 0] - x, xy[:, 1] - y
     ahead = np.cos(yaw) * dx + np.sin(yaw) * dy - box_centre_from_base_m(vehicle)
