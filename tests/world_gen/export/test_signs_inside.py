@@ -6,10 +6,11 @@ import datetime
 import json
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 from lxml import etree
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 
 from contracts.world import Connection, StopLine, World
 from tests.world_gen.export.lanelet2_file import written as written_lanelet2
@@ -18,7 +19,8 @@ from tests.world_gen.export.test_opendrive import written as written_opendrive
 from tests.world_gen.slip_roads import lines_inside, slip_world
 from world_gen.export.commonroad import write_commonroad
 from world_gen.export.geojson import write_geojson
-from world_gen.export.picture import write_picture
+from world_gen.export.picture_style import View
+from world_gen.export.picture_traffic import draw_traffic
 from world_gen.export.sdformat import write_sdf
 from world_gen.report import report_of
 
@@ -103,13 +105,16 @@ def test_geojson_and_sdformat_have_the_line(world, signed, tmp_path: Path) -> No
     assert min(np.hypot(*(np.array(at) - middle)) for at in places) < 0.002
 
 
-def test_picture_and_report_tell_of_the_sign(world, signed, tmp_path: Path) -> None:
-    write_picture(world, tmp_path / "world.svg")
-    drawn = (tmp_path / "world.svg").read_text(encoding="utf-8")
-    without = tmp_path / "without.svg"
-    bare = tuple(line for line in world.stop_lines if line.connection_id is None)
-    write_picture(msgspec.structs.replace(world, stop_lines=bare), without)
-    assert drawn.count("#e3a100") > without.read_text(encoding="utf-8").count("#e3a100")
+def test_picture_and_report_tell_of_the_sign(world, signed) -> None:
+    line, _ = signed
+    axes = Figure().add_subplot()
+    view = View(west_m=-90.0, south_m=-90.0, east_m=90.0, north_m=90.0, close=True)
+    draw_traffic(axes, world, view)
+    drawn = [c.get_segments() for c in axes.collections if isinstance(c, LineCollection)]
+    assert any(np.array_equal(part, line.ends) for parts in drawn for part in parts)
+    # Of all marks of who waits by a sign there is one, right before the line.
+    (mark,) = [item for item in axes.lines if item.get_marker() == "v"]
+    assert np.hypot(*(mark.get_xydata()[0] - line.ends.mean(axis=0))) == pytest.approx(1.6)
     (junction,) = report_of(world).junctions
     control = next(s for s in junction.subjects if s.subject == "control")
     assert control.tagged == len(world.stop_lines)
