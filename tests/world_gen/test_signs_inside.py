@@ -57,7 +57,7 @@ def test_who_comes_past_the_sign_of_a_slip_road_waits_for_everyone(word):
 
 
 def test_a_slip_road_waits_for_those_who_turn_into_its_road_across_oncoming_traffic():
-    """At a crossing under lights who turns right by a slip road meets opposing left turns."""
+    """Also if these come from a lesser road, for which the lights say when to go."""
     osm = slip_map()
     north = {5: (0.0, 120.0)}
     place = {node: node_at_origin(osm, node) for node in osm.locations}
@@ -66,7 +66,7 @@ def test_a_slip_road_waits_for_those_who_turn_into_its_road_across_oncoming_traf
             {**place, **north},
             [
                 *((w.id, w.nodes, w.tags) for w in osm.ways.values()),
-                (16, [5, 0], {"highway": "secondary", "name": "Stem"}),
+                (16, [5, 0], {"highway": "tertiary", "name": "Lane"}),
             ],
             node_tags=osm.node_tags,
         )
