@@ -24,6 +24,7 @@ from sim_worker.scenarios.ways import Way
 
 _CLEAR_M, _LANE_HALF_M = 0.3, 1.5
 """What is parked leaves the lane free, and a car's side by so much."""
+_BAY_CLEAR_M = 0.3
 
 
 class Touched(NamedTuple):
@@ -118,8 +119,22 @@ def _played(actor: CastActor, staging: Staging) -> _OnPath:
 
 
 def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
-    """Return whether the ego touches somebody beside its path, with whatever side."""
-    return bool(np.isfinite(_played(actor, staging).touch.time_s[0]))
+    """Return whether the ego touches somebody beside its path, with whatever side.
+
+    One that backs into a bay goes no farther than its way, and needs room for being off it.
+    """
+    if not staging.place.reverse:
+        return bool(np.isfinite(_played(actor, staging).touch.time_s[0]))
+    way, traits = staging.place.way_named(actor.way), actor.traits
+    wider = traits._replace(
+        length_m=traits.length_m + 2 * _BAY_CLEAR_M, width_m=traits.width_m + 2 * _BAY_CLEAR_M
+    )
+    touch = first_touch(
+        staging.ego, staging.box, Moving(way.path, 0.0, actor.lateral_m), wider,
+        ego_arc_m=np.array([staging.start_m]), actor_arc_m=np.array([actor.start_on(way)]),
+        until_s=(staging.place.ego.path.length_m - staging.start_m) / staging.ego.speed_mps,
+    )  # fmt: skip
+    return bool(np.isfinite(touch.time_s[0]))
 
 
 def run_into(actor: CastActor, staging: Staging) -> Touched | None:

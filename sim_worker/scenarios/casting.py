@@ -176,6 +176,7 @@ def _in_the_way(staging: Staging, actors: tuple[CastActor, ...], met: str) -> st
     """Return who parks where the ego must pass on its way to somebody else, or nothing."""
     for actor in actors:
         stands = actor.relation == "parked" and actor.name != met
+        stands |= staging.place.reverse and actor.conduct == "parked"
         if stands and stands_in_the_way(actor, staging):
             return f"{actor.name} would stand in the ego's way"
     return ""
