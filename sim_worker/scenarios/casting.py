@@ -32,8 +32,9 @@ _LATERAL_ACCEL_MPS2 = 4.0
 _VERGE_M = 4.0
 """Beside the road, where one may still stand or park."""
 
-_Met = dict[tuple[str, float, float, float, float], Meeting | None]
-"""Meetings by actor, its speed and share, and the ego's speed and shift: all they depend on."""
+_Met = dict[tuple[str | float, ...], Meeting | str]
+"""Meetings by actor, its numbers named here, and the ego's speed and shift: all they depend on."""
+_MEETS_BY = ("speed_mps", "impact_share", "arrives_after_s")
 
 
 def cast(
@@ -88,14 +89,13 @@ def _cast(
     for part, ways in zip(scenario.actors, place.actor_ways, strict=True):
         if part.relation in ALONG:
             continue
-        numbers = staging.number(part, "speed_mps"), staging.number(part, "impact_share")
-        key = (part.name, *numbers, ego.speed_mps, ego.offset_m)
+        numbers = [staging.number(part, name) for name in _MEETS_BY]
+        key: tuple[str | float, ...] = (part.name, *numbers, ego.speed_mps, ego.offset_m)
         if key not in met:
             met[key] = meet(part, ways, staging, ego_arc_m)
         found = met[key]
-        if found is None:
-            why = f"no way of {part.name} touches the ego's front before anything else"
-            return Unplaced(place.junction_id, why, True)
+        if isinstance(found, str):
+            return Unplaced(place.junction_id, found, True)
         meetings[part.name] = found
     start = _start_arc(staging, meetings) if ego_arc_m is None else ego_arc_m
     staging = staging._replace(start_m=start)
