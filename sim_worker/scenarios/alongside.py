@@ -137,6 +137,16 @@ def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
     return bool(np.isfinite(touch.time_s[0]))
 
 
+def stands_in_a_house(actor: CastActor, staging: Staging) -> bool:
+    """Return whether somebody parked would stand in a building."""
+    walls, way = staging.place.walls, staging.place.way_named(actor.way)
+    arc, half = actor.start_on(way), actor.traits.length_m / 2.0
+    return walls is not None and walls.block(
+        way.path, from_m=arc - half, to_m=arc + half, width_m=actor.traits.width_m,
+        left_m=actor.lateral_m,
+    )  # fmt: skip
+
+
 def run_into(actor: CastActor, staging: Staging) -> Touched | None:
     """Return the first touch of who drives ahead, if the ego's front makes it."""
     moving, touch = _played(actor, staging)

@@ -15,6 +15,7 @@ from sim_worker.scenarios.alongside import (
     beside_bay,
     closing_time_s,
     run_into,
+    stands_in_a_house,
     stands_in_the_way,
 )
 from sim_worker.scenarios.drawing import Values
@@ -173,12 +174,14 @@ def _first_touched(
 
 
 def _in_the_way(staging: Staging, actors: tuple[CastActor, ...], met: str) -> str:
-    """Return who parks where the ego must pass on its way to somebody else, or nothing."""
+    """Return who parks where the ego must pass, or in a building, or nothing."""
     for actor in actors:
         stands = actor.relation == "parked" and actor.name != met
         stands |= staging.place.reverse and actor.conduct == "parked"
         if stands and stands_in_the_way(actor, staging):
             return f"{actor.name} would stand in the ego's way"
+        if actor.conduct == "parked" and stands_in_a_house(actor, staging):
+            return f"{actor.name} would stand in a building"
     return ""
 
 

@@ -20,8 +20,11 @@ class Walls:
         """Return whether a shape touches a building."""
         return len(self._tree.query(shape, "intersects")) > 0
 
-    def block(self, path: FrenetPath, *, from_m: float, to_m: float, width_m: float) -> bool:
-        """Return whether what is so wide and goes from arc length to arc length touches one."""
+    def block(
+        self, path: FrenetPath, *, from_m: float, to_m: float, width_m: float, left_m: float = 0.0
+    ) -> bool:
+        """Return whether what is so wide touches one on its way between two arc lengths, `left_m`
+        to the left of the path."""
         arcs = np.linspace(from_m, to_m, max(2, int(to_m - from_m) + 1))
-        line: Array = path.point_at(arcs)
+        line: Array = path.point_at(arcs, left_m)
         return self.meet(shapely.LineString(line).buffer(width_m / 2.0, cap_style="flat"))
