@@ -7,11 +7,11 @@ times the arithmetic.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
@@ -21,8 +21,7 @@ _MITRE_LIMIT = 2.0
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 
 
-@dataclass(frozen=True)
-class Polylines:
+class Polylines(msgspec.Struct, frozen=True, dict=True):
     """L polylines: line i owns the points `xy_m[first[i]:first[i + 1]]`; `first` is (L + 1,)."""
 
     xy_m: Array
