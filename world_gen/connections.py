@@ -67,14 +67,10 @@ def connect(
     """Return the connections of one cluster, yet to be drawn, and enter them as successors."""
     found: list[ConnectionDraft] = []
     merging = merges(cluster, ways)
-    for leg in cluster.legs:
-        mine = [
-            m
-            for m in ways
-            if (m.toward.edge.index, m.toward.reverse) == (leg.edge.index, not leg.reverse)
-        ]
-        if not mine:
-            continue
+    by_road: dict[tuple[int, bool], list[Movement]] = {}
+    for way in ways:
+        by_road.setdefault((way.toward.edge.index, way.toward.reverse), []).append(way)
+    for mine in by_road.values():
         toward = mine[0].toward
         plans = _plans(cluster, toward, around)
         starts = lanes.incoming(toward, plans)
