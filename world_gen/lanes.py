@@ -36,6 +36,8 @@ class LaneDraft(msgspec.Struct):
     key: LaneKey
     edge: RoadEdge
     plan: LanePlan
+    kind: LaneKind
+    width_m: Quantity
     centerline: Array
     role: Role
     turns: tuple[Turn, ...]
@@ -43,16 +45,6 @@ class LaneDraft(msgspec.Struct):
     left_id: str | None = None
     right_id: str | None = None
     successors: list[str] = msgspec.field(default_factory=list)
-
-    @property
-    def kind(self) -> LaneKind:
-        """What the lane is for."""
-        return self.plan.kind
-
-    @property
-    def width_m(self) -> Quantity:
-        """Width in metres."""
-        return self.plan.width_m
 
     def finished(self) -> Lane:
         """Return the lane as the World holds it."""
@@ -148,7 +140,9 @@ def build_lanes(around: Surroundings) -> LaneSet:
             name = f"{road}.{plan.label}"
             role = roles.get((index, plan.reverse), "other") if plan.number >= 0 else "other"
             points = points[::-1] if plan.reverse else points
-            lane = LaneDraft(name, key, edge, plan, points, role, plan.turns, road)
+            lane = LaneDraft(
+                name, key, edge, plan, plan.kind, plan.width_m, points, role, plan.turns, road
+            )
             lanes[name] = lane
             mine.append(lane)
             if stretch.first:
