@@ -168,14 +168,14 @@ def offset(
     """
     into, out = directions(lines)
     first, last = lines.first[:-1], lines.first[1:] - 1
+    at_start = left_of(out[first])
     if before is not None:
         into[first] = np.where(np.isnan(before), into[first], before)
     if after is not None:
         out[last] = np.where(np.isnan(after), out[last], after)
-    normal = left_of(into) + left_of(out)
-    norm = np.hypot(normal[:, 0], normal[:, 1])
-    at_start = left_of(directions(lines)[1][first])[lines.line]
-    normal = np.where(norm[:, None] > 0.2, normal / np.maximum(norm, 0.2)[:, None], at_start)
+    normal = left_of(into + out)
+    norm = np.hypot(normal[:, 0], normal[:, 1])[:, None]
+    normal = np.where(norm > 0.2, normal / np.maximum(norm, 0.2), at_start[lines.line])
     stretch = 1.0 / np.maximum((normal * left_of(out)).sum(axis=1), 1.0 / _MITRE_LIMIT)
     shift = left_m[lines.line]
     shifted = np.where(
