@@ -15,10 +15,7 @@ from contracts.world import DrivingSide
 from world_gen.cross_section import CrossSection, cross_section
 from world_gen.extent import Extent
 from world_gen.intersections import Junction
-from world_gen.legs import RING_KINDS as RING_KINDS
-from world_gen.legs import Heads
-from world_gen.legs import heading_out as heading_out
-from world_gen.legs import is_ring_edge as is_ring_edge
+from world_gen.legs import RING_KINDS, Heads, heading_out, is_ring_edge
 from world_gen.map_index import MapIndex
 from world_gen.polyline_batch import Polylines
 from world_gen.road_graph import DirectedEdge, RoadEdge

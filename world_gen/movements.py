@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 
 from contracts.world import DrivingSide, Turn
-from world_gen.clusters import Cluster, Surroundings, heading_out, is_ring_edge
-from world_gen.legs import Heads, dot, opposed
+from world_gen.clusters import Cluster, Surroundings
+from world_gen.legs import Heads, dot, heading_out, is_ring_edge, opposed
 from world_gen.road_graph import DirectedEdge
 from world_gen.turn_restrictions import TurnRestrictions
 

@@ -148,17 +148,6 @@ def directions(lines: Polylines) -> tuple[Array, Array]:
     return before, after
 
 
-def headings(lines: Polylines, *, look_m: float = 8.0) -> Array:
-    """Return the unit direction (L, 2) from each line's start to the point `look_m` along it."""
-    every = np.arange(len(lines))
-    start = lines.xy_m[lines.first[:-1]]
-    gap = points_at(lines, every, np.minimum(look_m, lines.length_m)) - start
-    norm = np.hypot(gap[:, 0], gap[:, 1])
-    first = directions(lines)[1][lines.first[:-1]]
-    found: Array = np.where((norm > 0.1)[:, None], gap / np.maximum(norm, 1e-9)[:, None], first)
-    return found
-
-
 def offset(
     lines: Polylines, left_m: Array, *, before: Array | None = None, after: Array | None = None
 ) -> Polylines:
