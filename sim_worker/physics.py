@@ -24,7 +24,10 @@ _EXPANDED = ("actuator_delay", "actuator_biasprm", "actuator_forcerange")
 
 
 class Physics:
-    """`nsim` cars; `qpos`, `qvel`, `ctrl`, `history` and what is per car of the model are live."""
+    """`nsim` cars; `qpos`, `qvel`, `ctrl`, `history` and what is per car of the model are live.
+
+    `motion` (nsim, nq + nv) holds `qpos` and `qvel` side by side.
+    """
 
     def __init__(
         self, model: mujoco.MjModel, vehicle: VehicleParameters, *, nsim: int, threads: int
@@ -33,6 +36,8 @@ class Physics:
         self._open = mujoco_batch.Batch(compile_open(vehicle), nsim, nthread=threads)
         self._among = mujoco_batch.Batch(model, nsim, nthread=threads, persistent=True)
         self.qpos, self.qvel = self._open.bind("qpos"), self._open.bind("qvel")
+        first = mujoco.mj_stateSize(model, int(mujoco.mjtState.mjSTATE_TIME))
+        self.motion = self._open.state[:, first : first + model.nq + model.nv]
         self.ctrl, self.history = self._open.bind("ctrl"), self._open.bind("history")
         self._fields = [(self._open.expand(f), self._among.expand(f)) for f in _EXPANDED]
         self.delay, self.biasprm, self.forcerange = (here for here, _ in self._fields)
