@@ -147,8 +147,8 @@ class Stage:
         self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
         self._steer_controls = self._controls[:, :, self._actuators.steer].T
         rate = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
-        self._reach = np.repeat(rate * np.arange(1.0, self.steps_per_tick + 1), count)
-        self._reach = self._reach.reshape(self.steps_per_tick, count)
+        reach = rate * np.arange(1.0, self.steps_per_tick + 1)
+        self._reach = np.repeat(reach[:, None], count, axis=1)
         self._actuation = Actuation(
             self.vehicle,
             self._actuators,
@@ -256,7 +256,7 @@ class Stage:
     def any_diverged(self) -> bool:
         """Whether there is such a simulation."""
         sane = self._is_sane()
-        return np.count_nonzero(sane) < sane.size
+        return bool(np.count_nonzero(sane) < sane.size)
 
     def _is_sane(self) -> npt.NDArray[np.bool_]:
         return np.abs(self._states.T[:, : self._count]) < self._sane[:, : self._count]

@@ -34,7 +34,7 @@ class FrenetPoint(NamedTuple):
 
 
 class NodePlace(NamedTuple):
-    """Places between a path's nodes: the node before (…) and the share (…) of the way to the next."""
+    """Places between a path's nodes: which is before (…), what share (…) of the way to the next."""
 
     node: npt.NDArray[np.intp]
     share: Array
@@ -137,7 +137,7 @@ class FrenetPath:
         √(a_lat / |κ|) at every node, lowered so that a deceleration of `decel_mps2` suffices to
         reach what lies ahead.
         """
-        return self._curve_speeds(lateral_accel_mps2, decel_mps2)[0]
+        return np.asarray(self._curve_speeds(lateral_accel_mps2, decel_mps2)[0])
 
     @functools.cached_property
     def _profiles(self) -> dict[tuple[float, float], Array]:
@@ -171,7 +171,8 @@ class FrenetPath:
         self, place: NodePlace, *, lateral_accel_mps2: float, decel_mps2: float
     ) -> Array:
         """Return (…) the `speed_profile` at places."""
-        return _between(self._curve_speeds(lateral_accel_mps2, decel_mps2), place)[0]
+        found = _between(self._curve_speeds(lateral_accel_mps2, decel_mps2), place)
+        return np.asarray(found[0])
 
     def point_of(self, place: NodePlace, offset_m: Array | float = 0.0) -> Array:
         """Return positions (2, …), x and y, at places and offsets to the left."""
@@ -255,7 +256,7 @@ def _between(table: Array, place: NodePlace) -> Array:
     steps = found[half:]
     steps *= place.share
     steps += found[:half]
-    return steps
+    return np.asarray(steps)
 
 
 def _path_of(xy_m: Array, speed_limit_mps: Array | None, before_m: float) -> FrenetPath:

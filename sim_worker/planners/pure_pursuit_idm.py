@@ -69,7 +69,7 @@ class PurePursuitIdm:
         angle = steer_towards(view, goal.T)
         accel = self._curves(view, speed, angle, ahead.row(1))
         np.minimum(accel, self._free(view, speed), out=accel)
-        if view.stop_arc_m is not None or view.lead_gap_m.min() < np.inf:
+        if view.stop_arc_m is not None or np.count_nonzero(view.lead_gap_m < np.inf):
             accel -= self._interaction(view, speed)
         np.maximum(accel, -MAX_DECEL_MPS2, out=accel)
         command = accel + resistance_mps2(view.vehicle, speed)
@@ -102,7 +102,11 @@ class PurePursuitIdm:
     def _wishes(self, view: PlannerView) -> _Wishes:
         """Return what drivers want; mostly, that stays the same from tick to tick."""
         known, target, factor = self._wished, view.target_speed_mps, view.speed_factor
-        if known is None or known.target_speed_mps is not target or known.speed_factor is not factor:
+        if (
+            known is None
+            or known.target_speed_mps is not target
+            or known.speed_factor is not factor
+        ):
             start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(factor, 0.3), 2.0)
             stand = target < 0.05
             known = self._wished = _Wishes(

@@ -72,7 +72,7 @@ def steer_towards(view: PlannerView, goal: Array) -> Array:
     np.minimum(slope, most, out=slope)
     np.negative(most, out=most)
     np.maximum(slope, most, out=slope)
-    return np.arctan(slope, out=slope)
+    return np.asarray(np.arctan(slope, out=slope))
 
 
 def front_from_base_m(vehicle: VehicleParameters) -> float:
