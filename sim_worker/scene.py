@@ -22,6 +22,7 @@ from sim_worker.actors.right_of_way import JunctionRules, PathRules
 from sim_worker.actors.seen import SeenActors
 from sim_worker.actors.traffic import Traffic
 from sim_worker.faults import FaultArrays, fault_arrays
+from sim_worker.metrics.ground import DrivableGround
 from sim_worker.planners.base import KnownPlan, SharedGround
 from sim_worker.planners.path import FrenetPath
 from sim_worker.planners.registry import drives_backwards
@@ -110,8 +111,16 @@ class SceneMaker:
         self._live = LiveScenarios(self._network)
         self.staged = StagedScenarios(self._network)
         """The scenarios of this World at named places, away from any drive."""
+        self._ground: DrivableGround | None = None
         self.rehearsed: dict[tuple[object, ...], Any] = {}
         """Drives of egos alone that cases were cast on."""
+
+    @property
+    def drivable(self) -> DrivableGround:
+        """Where this World may be driven on; what one job looked up, the next ones know."""
+        if self._ground is None:
+            self._ground = DrivableGround(self.world)
+        return self._ground
 
     def scene(
         self,
