@@ -224,7 +224,7 @@ class Stage:
         self.looked = False
         if not self._near_statics.empty:
             near = self._near_statics_of(self.states)
-            self.looked = bool(near.any())
+            self.looked = bool(np.count_nonzero(near))
         if not self.looked:
             self._physics.advance(per_step, None if self._count == self.nsim else self._ids)
             return
@@ -235,12 +235,15 @@ class Stage:
 
     def _near_statics_of(self, states: Array) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a contact during the coming tick cannot be ruled out."""
-        yaw = states[:, 2]
-        x = states[:, 0] + self._centre_ahead_m * np.cos(yaw)
-        y = states[:, 1] + self._centre_ahead_m * np.sin(yaw)
-        near = self._near_statics.at(x, y)
-        slow = np.abs(states[:, 3:6].T) < self._bounds
-        if not slow.all():
+        columns = states.T
+        centre = np.empty((2, len(states)))
+        np.cos(columns[2], out=centre[0])
+        np.sin(columns[2], out=centre[1])
+        centre *= self._centre_ahead_m
+        centre += columns[:2]
+        near = self._near_statics.at(centre)
+        slow = np.abs(columns[3:6]) < self._bounds
+        if np.count_nonzero(slow) < slow.size:
             near |= ~slow.all(axis=0)
         return near
 
