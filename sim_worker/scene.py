@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -111,16 +112,13 @@ class SceneMaker:
         self._live = LiveScenarios(self._network)
         self.staged = StagedScenarios(self._network)
         """The scenarios of this World at named places, away from any drive."""
-        self._ground: DrivableGround | None = None
         self.rehearsed: dict[tuple[object, ...], Any] = {}
         """Drives of egos alone that cases were cast on."""
 
-    @property
+    @functools.cached_property
     def drivable(self) -> DrivableGround:
         """Where this World may be driven on; what one job looked up, the next ones know."""
-        if self._ground is None:
-            self._ground = DrivableGround(self.world)
-        return self._ground
+        return DrivableGround(self.world)
 
     def scene(
         self,
