@@ -6,15 +6,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from contracts.arrays import Array
 from contracts.scenario import ActorPart
 from sim_worker.actors.kinds import KINDS
+from sim_worker.overlap import corners
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.impact import (
     TOLERANCE_M,
     Moving,
     Touch,
+    ego_rectangles,
     first_touch,
     front_point,
     gap_m,
@@ -135,6 +138,19 @@ def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
         until_s=(staging.place.ego.path.length_m - staging.start_m) / staging.ego.speed_mps,
     )  # fmt: skip
     return bool(np.isfinite(touch.time_s[0]))
+
+
+def backs_into_a_house(staging: Staging) -> bool:
+    """Return whether an ego that keeps to its line into a bay touches a building, or nearly so."""
+    walls, path, box = staging.place.walls, staging.place.ego.path, staging.box
+    if walls is None or not staging.place.reverse:
+        return False
+    arcs = np.arange(staging.start_m, path.length_m, 0.5)
+    at = ego_rectangles(staging.ego, box, arcs)
+    wider = at._replace(
+        length_m=box.length_m + 2 * _BAY_CLEAR_M, width_m=box.width_m + 2 * _BAY_CLEAR_M
+    )
+    return any(walls.meet(shapely.Polygon(outline)) for outline in corners(wider))
 
 
 def stands_in_a_house(actor: CastActor, staging: Staging) -> bool:

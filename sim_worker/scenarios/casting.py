@@ -12,6 +12,7 @@ from contracts.vehicle import VehicleParameters
 from sim_worker.scenarios.alongside import (
     Touched,
     along,
+    backs_into_a_house,
     beside_bay,
     closing_time_s,
     run_into,
@@ -182,6 +183,8 @@ def _in_the_way(staging: Staging, actors: tuple[CastActor, ...], met: str) -> st
             return f"{actor.name} would stand in the ego's way"
         if actor.conduct == "parked" and stands_in_a_house(actor, staging):
             return f"{actor.name} would stand in a building"
+    if backs_into_a_house(staging):
+        return "the ego would touch a building on its way into the bay"
     return ""
 
 
