@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import Counter
 from typing import Any
@@ -10,6 +11,8 @@ from contracts.drive import SpeedSample, SteeringSample
 
 FRESH_NS = 1_000_000_000
 """A quantity counts as measured while its last sample is younger than this."""
+CLOCK_LEAP_NS = 10_000_000_000
+"""One stamp that is this far ahead must not make all later ones look late."""
 MOTION_FIELDS = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
 """Fields of VehicleState that are either measured or estimated."""
 _CHANNEL_FIELDS = {
@@ -41,9 +44,17 @@ class Measured:
         self._skipped = skipped
         self._sample_ns: dict[str, int] = {}
         self._field_ns: dict[str, int] = {}
+        self._leap_ns: dict[str, int] = {}
         self._steering: SteeringSample | None = None
         self.speed_mps = 0.0
         """The last measured speed; 0 before there is one."""
+
+    def copy(self, *, skipped: Counter[str]) -> Measured:
+        """Return another memory of the same samples that counts into `skipped`."""
+        other = copy.copy(self)
+        other._skipped = skipped
+        other._sample_ns, other._field_ns = self._sample_ns.copy(), self._field_ns.copy()
+        return other
 
     def take(self, channel: str, message: Any) -> bool:
         """Remember a sample; return False for one that is refused or says nothing of the motion."""
@@ -53,6 +64,9 @@ class Measured:
         stamp_ns = message.stamp_ns
         if stamp_ns < self._sample_ns.get(channel, stamp_ns):
             self._skipped[f"{channel}_time_backwards"] += 1
+            return False
+        if self._leaps(channel, stamp_ns):
+            self._skipped[f"{channel}_time_leap"] += 1
             return False
         fault = _fault(message)
         if fault is not None:
@@ -68,6 +82,14 @@ class Measured:
         elif isinstance(message, SteeringSample):
             self._steering = message
         return True
+
+    def _leaps(self, channel: str, stamp_ns: int) -> bool:
+        """Return whether the stamp is far ahead without a second one to bear witness."""
+        if stamp_ns - self._sample_ns.get(channel, stamp_ns) <= CLOCK_LEAP_NS:
+            return False
+        before_ns = self._leap_ns.get(channel)
+        self._leap_ns = {**self._leap_ns, channel: stamp_ns}
+        return before_ns is None or not 0 <= stamp_ns - before_ns <= CLOCK_LEAP_NS
 
     @property
     def anything(self) -> bool:

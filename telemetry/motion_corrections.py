@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import Any
 
@@ -21,6 +22,14 @@ class MotionCorrections:
         self._wheelbase_m = wheelbase_m
         self._speed_doubt = Doubt(0.05)
         self._yaw_doubt = Doubt(0.02)
+
+    def copy(self, measured: Measured) -> MotionCorrections:
+        """Return others with the same doubts, which read `measured`."""
+        other = copy.copy(self)
+        other._measured = measured
+        other._speed_doubt = copy.copy(self._speed_doubt)
+        other._yaw_doubt = copy.copy(self._yaw_doubt)
+        return other
 
     def correct(self, filter_: KinematicFilter, message: Any, *, convergence_rad: float) -> None:
         """Correct a filter already predicted to the sample's stamp.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import Counter, deque
 from typing import Literal, NamedTuple
@@ -44,6 +45,13 @@ class PositionGate:
         self._elsewhere: list[Placed] = []
         self.roughness_m = 0.0
         """How far fixes lie, on average, off any motion with up to 4 m/s² through the last two."""
+
+    def copy(self) -> PositionGate:
+        """Return another gate that goes on from here by itself."""
+        other = copy.copy(self)
+        other.skipped, other.recent = self.skipped.copy(), self.recent.copy()
+        other._elsewhere = self._elsewhere.copy()
+        return other
 
     def plausible(self, fix: GnssFix) -> bool:
         """Return whether the fix is a position on Earth with a stamp after the last one's."""

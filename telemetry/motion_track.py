@@ -1,0 +1,294 @@
+"""A car's motion from samples in the order of their stamps, and the state it is in: pure, causal."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
+from contracts.frames import (
+    GeoPoint,
+    LocalFrame,
+    base_from_sensor,
+    geo_from_local,
+    grid_convergence,
+    local_from_geo,
+)
+from telemetry.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
+from telemetry.measured import Measured
+from telemetry.motion_corrections import STANDING_MPS, MotionCorrections
+from telemetry.position_gate import PositionGate
+from telemetry.reported_state import moving_state, unmoved_state
+
+_UNKNOWN_STD_M = 0.01
+"""Of positions that state none, until they turn out worse."""
+_ROUGH_M = 0.3
+_CREEPING_MPS = 1.0
+_FRAME_REACH_M = 20_000.0
+_FAR_M = 1e8
+
+
+class MotionTrack:
+    """Takes samples one by one and says where base_link is, and how it moves.
+
+    Positions whose source states no standard deviation, or only positions of at most 5 cm, are
+    passed through unchanged at their own stamp; rougher ones, and those with other sensors beside
+    them, are fused. `skipped` counts refused input by reason.
+    """
+
+    def __init__(
+        self,
+        info: VehicleInfo,
+        *,
+        wheelbase_m: float = 2.7,
+        steering_ratio: float = 15.0,
+        steering_offset_rad: float = 0.0,
+    ) -> None:
+        """`steering_ratio` is steering wheel over tyre; the offset is added at the tyre."""
+        self._info = info
+        self._wheelbase_m = wheelbase_m
+        self._lever = info.body_from_antenna_m or (0.0, 0.0, 0.0)
+        self._gate = PositionGate()
+        self._measured = Measured(
+            steering_ratio=steering_ratio,
+            steering_offset_rad=steering_offset_rad,
+            skipped=self._gate.skipped,
+        )
+        self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
+        self._frame: LocalFrame | None = None
+        self._start_ns = 0
+        self._filter: KinematicFilter | None = None
+        self._filter_stamp_ns = 0
+        self._fix: GnssFix | None = None
+        self._convergence_rad = 0.0
+        self._altitude_m = 0.0
+        self._shifts = 0
+        self._standing = False
+
+    @property
+    def skipped(self) -> Counter[str]:
+        """How many samples were refused, by reason."""
+        return self._gate.skipped
+
+    def copy(self) -> MotionTrack:
+        """Return another track that goes on from here by itself."""
+        other = copy.copy(self)
+        other._gate = self._gate.copy()
+        other._measured = self._measured.copy(skipped=other._gate.skipped)
+        other._corrections = self._corrections.copy(other._measured)
+        if self._filter is not None:
+            other._filter = self._filter.copy()
+        return other
+
+    def take(self, channel: str, message: Any) -> bool:
+        """Take a sample; returns whether it was believed. Channels without motion are ignored."""
+        if channel == "gnss":
+            return self._position(message)
+        if not self._measured.take(channel, message):
+            return False
+        self._motion(message)
+        return True
+
+    @property
+    def placed(self) -> bool:
+        """Whether any position was believed."""
+        return self._fix is not None
+
+    @property
+    def started(self) -> bool:
+        """Whether there is a state to speak of between positions: a place and a heading."""
+        return self._filter is not None
+
+    # Samples beside positions.
+
+    def _motion(self, message: Any) -> None:
+        filter_ = self._advance(message.stamp_ns)
+        if isinstance(message, SpeedSample):
+            self._standing = abs(message.speed_mps) < STANDING_MPS
+        if filter_ is not None:
+            self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
+        elif isinstance(message, HeadingSample):
+            local_yaw = message.yaw_rad + self._convergence_rad
+            self._start(message.stamp_ns, local_yaw, yaw_std_rad=0.02)
+
+    # Positions.
+
+    def _position(self, fix: GnssFix) -> bool:
+        if not self._gate.plausible(fix):
+            return False
+        if self._frame is None:
+            self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
+            self._start_ns = fix.stamp_ns
+        # Beyond the frame's reach the projection says infinity: just somewhere far away.
+        xy = np.nan_to_num(
+            local_from_geo(self._frame, fix.position.lat_deg, fix.position.lon_deg),
+            nan=_FAR_M, posinf=_FAR_M, neginf=-_FAR_M,
+        )  # fmt: skip
+        time_s = (fix.stamp_ns - self._start_ns) * 1e-9
+        recent = self._gate.recent
+        held = bool(recent) and bool(np.array_equal(recent[-1].xy_m, xy))
+        if (
+            held
+            and self._measured.fresh("speed_mps", fix.stamp_ns)
+            and abs(self._measured.speed_mps) > 0.5
+        ):
+            self.skipped["gnss_repeated"] += 1  # a slow receiver's last answer, sent once more
+            return False
+        lever = self._lever[:2]
+        filter_ = self._advance(fix.stamp_ns)
+        expected = recent[-1].xy_m if recent else None
+        if filter_ is not None:
+            expected = filter_.sensor_xy(lever)
+            late_s = max(0.0, (self._filter_stamp_ns - fix.stamp_ns) * 1e-9)
+            course = filter_.mean[YAW]
+            xy = xy + filter_.mean[SPEED] * late_s * np.array([math.cos(course), math.sin(course)])
+        verdict = self._gate.judge(time_s, xy, expected)
+        if verdict == "skip":
+            return False
+        if verdict == "relocate" and math.hypot(xy[0], xy[1]) > _FRAME_REACH_M:
+            # What went before was wrong, or another place: begin anew, with a frame of this one.
+            self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
+            self._gate.restart(time_s, np.zeros(2))
+            filter_ = self._filter = None
+        self._altitude_m = fix.position.alt_m - self._lever[2]
+        self._convergence_rad = float(
+            grid_convergence(self._frame, fix.position.lat_deg, fix.position.lon_deg)
+        )
+        std = self._std_m(fix)
+        if filter_ is None:
+            self._start_from_course(fix.stamp_ns, std)
+        else:
+            self._correct(filter_, xy, std, relocate=verdict == "relocate")
+        self._fix = fix
+        return True
+
+    def _std_m(self, fix: GnssFix) -> float:
+        if fix.std_m is not None and math.isfinite(fix.std_m):
+            return min(max(fix.std_m, 1e-3), 1e4)
+        rough = self._gate.roughness_m
+        return rough if rough > _ROUGH_M else _UNKNOWN_STD_M
+
+    def _correct(self, filter_: KinematicFilter, xy: Array, std: float, *, relocate: bool) -> None:
+        lever = self._lever[:2]
+        innovation = math.hypot(*(xy - filter_.sensor_xy(lever)))
+        if relocate:
+            filter_.move_position(xy, std, lever)
+            return
+        if innovation > max(1.0, 8.0 * filter_.position_spread_m(std)):
+            self._shifts += 1
+            filter_.move_position(xy, std, lever)
+            if self._shifts >= 3:
+                self._turn_to_course(filter_)
+            return
+        self._shifts = 0
+        yaw_before = filter_.mean[YAW]
+        if abs(filter_.mean[SPEED]) < _CREEPING_MPS:
+            filter_.drift_sideways(xy, std, lever)
+        filter_.correct_position(xy, std, lever)
+        filter_.limit_turn(yaw_before, moved_m=self._gate.last_step_m)
+        if not self._measured.fresh("speed_mps", self._filter_stamp_ns):
+            self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
+            if self._standing:
+                filter_.stand()
+        if self._standing:
+            filter_.mean[YAW] = yaw_before
+        elif not filter_.may_reverse and not self._measured.fresh("yaw_rad", self._filter_stamp_ns):
+            course = self._gate.course(1.0 + 5.0 * std, within_s=3.0)
+            if course is not None and abs(math.remainder(course - yaw_before, math.tau)) > 1.75:
+                self._turn_to_course(filter_)
+
+    def _turn_to_course(self, filter_: KinematicFilter) -> None:
+        course = self._gate.course(1.0, within_s=3.0)
+        if course is not None:
+            self._start(self._filter_stamp_ns, course, yaw_std_rad=0.3)
+        self._shifts = 0
+
+    def _start_from_course(self, stamp_ns: int, std: float) -> None:
+        course = self._gate.course(max(1.0, 5.0 * std))
+        if course is None or (
+            self._measured.fresh("speed_mps", stamp_ns) and abs(self._measured.speed_mps) < 0.3
+        ):
+            return
+        if self._measured.fresh("speed_mps", stamp_ns) and self._measured.speed_mps < -0.1:
+            course += math.pi
+        self._start(stamp_ns, course, yaw_std_rad=0.15)
+
+    def _start(self, stamp_ns: int, yaw_rad: float, *, yaw_std_rad: float) -> None:
+        if not self._gate.recent:
+            return
+        measured = self._measured.fresh("speed_mps", stamp_ns)
+        xy = base_from_sensor(self._gate.recent[-1].xy_m, yaw_rad, self._lever)
+        self._filter = KinematicFilter(
+            xy_m=xy,
+            yaw_rad=yaw_rad,
+            speed_mps=self._measured.speed_mps if measured else self._gate.speed_mps(),
+            yaw_std_rad=yaw_std_rad,
+        )
+        self._filter_stamp_ns = stamp_ns
+
+    def _advance(self, stamp_ns: int) -> KinematicFilter | None:
+        if self._filter is not None and stamp_ns > self._filter_stamp_ns:
+            # After a long silence the motion is unknown: two seconds of it are enough.
+            self._filter.predict(min((stamp_ns - self._filter_stamp_ns) * 1e-9, 2.0))
+            self._filter_stamp_ns = stamp_ns
+        return self._filter
+
+    # What comes out.
+
+    def _passes_through(self, fix: GnssFix) -> bool:
+        if fix.std_m is None:
+            return self._gate.roughness_m <= _ROUGH_M
+        return fix.std_m <= 0.05 and not self._measured.anything
+
+    def _place(self, fix: GnssFix | None) -> GeoPoint:
+        assert self._frame is not None
+        if self._filter is None:
+            assert self._fix is not None
+            return self._fix.position
+        if fix is not None and self._passes_through(fix):
+            if not any(self._lever):
+                return fix.position
+            xy = base_from_sensor(self._gate.recent[-1].xy_m, self._filter.mean[YAW], self._lever)
+        else:
+            xy = self._filter.mean[:2]
+        lat_deg, lon_deg = geo_from_local(self._frame, xy)
+        return GeoPoint(float(lat_deg), float(lon_deg), self._altitude_m)
+
+    def state(self, stamp_ns: int, *, fix: GnssFix | None = None) -> VehicleState:
+        """Return the state at `stamp_ns`, at or after all samples taken.
+
+        `fix` is the believed position of this very stamp, None between positions. Raises
+        ValueError before there is any position.
+        """
+        if self._fix is None:
+            raise ValueError("no position has come yet: there is no state")
+        self._advance(stamp_ns)
+        position = self._place(fix)
+        if self._filter is None:
+            return unmoved_state(
+                self._measured,
+                vehicle_id=self._info.vehicle_id,
+                stamp_ns=stamp_ns,
+                position=position,
+                position_std_m=self._fix.std_m,
+            )
+        return moving_state(
+            self._filter,
+            self._measured,
+            vehicle_id=self._info.vehicle_id,
+            stamp_ns=stamp_ns,
+            position=position,
+            convergence_rad=self._convergence_rad,
+            wheelbase_m=self._wheelbase_m,
+            standing=self._standing,
+        )
+
+    @property
+    def gyro_bias_radps(self) -> float:
+        """The gyro's bias as learnt so far; 0 before the heading is known."""
+        return 0.0 if self._filter is None else float(self._filter.mean[GYRO_BIAS])
