@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
 from typing import NamedTuple
 
@@ -115,13 +116,11 @@ def _supporting_slope(points: list[tuple[float, float]]) -> float:
             hull.pop()
         hull.append(point)
     middle = sum(stamp for stamp, _ in points) / len(points)
-    for (x0, y0), (x1, y1) in zip(hull, hull[1:], strict=False):
+    for (x0, y0), (x1, y1) in itertools.pairwise(hull):
         if x1 >= middle and x1 > x0:
             return (y1 - y0) / (x1 - x0)
     return 0.0
 
 
-def _turns_down(
-    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
-) -> bool:
+def _turns_down(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
     return (b[0] - a[0]) * (c[1] - a[1]) <= (c[0] - a[0]) * (b[1] - a[1])

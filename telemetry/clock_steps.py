@@ -110,6 +110,10 @@ class ClockSteps:
             return False
         if not self._clock.known:
             return True
+        if known.last_ns is not None and (
+            placed_ns - known.last_ns <= _AHEAD_NS + 2 * known.period_ns
+        ):
+            return True  # it follows the last one: if it seems early, those before it were late
         ahead_ns = placed_ns - self._clock.stamp_at(received_ns)
         settled = received_ns - (self._first_received_ns or 0) > _SETTLING_NS
         # What came first may have waited for the connection: then others may be ahead of it.
@@ -139,9 +143,7 @@ class ClockSteps:
         doubt.count += 1
         return doubt.count >= _LEAST_SAMPLES and doubt.last_ns - doubt.first_ns >= CONFIRM_NS
 
-    def _step(
-        self, channel: str, known: _Channel, stamp_ns: int, received_ns: int | None
-    ) -> int:
+    def _step(self, channel: str, known: _Channel, stamp_ns: int, received_ns: int | None) -> int:
         doubt, last_ns = known.doubt, known.last_ns
         assert doubt is not None
         if received_ns is None:
@@ -151,8 +153,10 @@ class ClockSteps:
             least_ns = self._clock.offset_ns + max(known.least_excess_ns or 0, 0)
             shift_ns = doubt.least_delay_ns - least_ns
         for other in self._channels.values():
-            if other is not known and other.shift_ns and (
-                abs(other.shift_ns - shift_ns) < _SAME_STEP_NS
+            if (
+                other is not known
+                and other.shift_ns
+                and (abs(other.shift_ns - shift_ns) < _SAME_STEP_NS)
             ):
                 shift_ns = other.shift_ns
         self.steps.append(ClockStep(channel, stamp_ns, known.shift_ns - shift_ns))
@@ -167,4 +171,4 @@ def _agrees(doubt: _Doubt, stamp_ns: int, received_ns: int | None) -> bool:
     if received_ns is None:
         return 0 <= step_ns <= _GAP_NS
     elapsed_ns = received_ns - doubt.last_received_ns
-    return -_AHEAD_NS <= step_ns and abs(step_ns - elapsed_ns) <= _BEHIND_NS // 2
+    return step_ns >= -_AHEAD_NS and abs(step_ns - elapsed_ns) <= _BEHIND_NS // 2

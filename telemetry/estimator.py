@@ -87,6 +87,16 @@ class StateEstimator:
         return self._track.skipped + self._refused
 
     @property
+    def refused(self) -> Counter[str]:
+        """Those of `skipped` that never came as far as the motion."""
+        return self._refused
+
+    @property
+    def clock_steps(self) -> int:
+        """How often the vehicle's clock has stepped."""
+        return len(self._steps.steps)
+
+    @property
     def late(self) -> Counter[str]:
         """How many samples came too late to count, by channel."""
         return Counter() if self._reordering is None else self._reordering.late

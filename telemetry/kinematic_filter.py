@@ -9,7 +9,6 @@ while it stands.
 
 from __future__ import annotations
 
-import copy
 import math
 
 import numpy as np
@@ -19,6 +18,7 @@ from contracts.arrays import Array
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
 GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
 SIZE = 12
+_IDENTITY = np.eye(SIZE)
 
 MAX_CURVATURE_PM = 0.25
 """A turning circle of 8 m across: tighter than any passenger car's."""
@@ -37,8 +37,12 @@ _LATERAL_JERK_MPS3 = 5.0
 """Limits how fast the curvature changes at speed: v² dκ/dt."""
 _SLIP_DENSITY = 0.01**2
 """rad² / s: the body's direction differs from the path's by the rear tyres' slip."""
-_GYRO_SLIP_DENSITY = 0.001**2
+_GYRO_SLIP_DENSITY = 0.0005**2
 """The same where a gyro tells the body's turning from the path's and the slip is estimated."""
+_GYRO_BIAS_DENSITY = (2e-5) ** 2
+"""(rad/s)² / s: an automotive gyro warms up by 0.01 °/s in a minute."""
+_ACCEL_BIAS_DENSITY = 0.02**2
+"""(m/s²)² / s: the grade of the road changes with the place."""
 _SLIP_RADPMPS2 = (0.004, 0.002)
 """The rear axle's slip per lateral acceleration, mean and spread over passenger cars: load over
 cornering stiffness (Gillespie 1992, 6-2)."""
@@ -68,7 +72,8 @@ class KinematicFilter:
 
     def copy(self) -> KinematicFilter:
         """Return another filter that goes on from the same state."""
-        other = copy.copy(self)
+        other = object.__new__(KinematicFilter)
+        other.__dict__.update(self.__dict__)
         other.mean, other.covariance = self.mean.copy(), self.covariance.copy()
         return other
 
@@ -96,12 +101,14 @@ class KinematicFilter:
         by_accel = 0.5 * distance * curvature * half
         by_curvature = distance * (0.5 * distance - slip * speed * speed)
         by_slip = -distance * speed * speed * curvature
-        jacobian = np.eye(SIZE)
+        jacobian = _IDENTITY.copy()
         jacobian[X, YAW : CURVATURE + 1] = (
-            -distance * sin, dt * cos - side * sin, half * cos - by_accel * sin, -by_curvature * sin,
+            -distance * sin, dt * cos - side * sin, half * cos - by_accel * sin,
+            -by_curvature * sin,
         )  # fmt: skip
         jacobian[Y, YAW : CURVATURE + 1] = (
-            distance * cos, dt * sin + side * cos, half * sin + by_accel * cos, by_curvature * cos,
+            distance * cos, dt * sin + side * cos, half * sin + by_accel * cos,
+            by_curvature * cos,
         )  # fmt: skip
         jacobian[X, SLIP], jacobian[Y, SLIP] = -by_slip * sin, by_slip * cos
         jacobian[YAW, SPEED : CURVATURE + 1] = curvature * dt, curvature * half, distance
@@ -120,7 +127,7 @@ class KinematicFilter:
         noise = covariance.reshape(-1)[:: SIZE + 1]  # a view of the diagonal
         noise[YAW : ACCEL_BIAS + 1] += (
             self._slip_density * min(1.0, abs(speed) / 10.0) * dt, 0.0, _JERK_DENSITY * dt,
-            turning * turning * dt, 1e-8 * dt, 4e-4 * dt,
+            turning * turning * dt, _GYRO_BIAS_DENSITY * dt, _ACCEL_BIAS_DENSITY * dt,
         )  # fmt: skip
         if self._gnss_std_m:
             noise[GNSS_X : GNSS_Y + 1] += self._gnss_std_m**2 * (1.0 - fading * fading)
@@ -130,8 +137,8 @@ class KinematicFilter:
         """Apply one scalar measurement: `row` (12,) is its derivative by the state."""
         cross = self.covariance @ row
         variance = float(row @ cross) + std * std
-        self.mean = self.mean + cross * (residual / variance)
-        self.covariance = self.covariance - cross[:, None] * (cross / variance)
+        self.mean += cross * (residual / variance)
+        self.covariance -= cross[:, None] * (cross / variance)
         self._limit()
 
     def _limit(self) -> None:
@@ -146,20 +153,59 @@ class KinematicFilter:
         offset: Array = np.array([cos * forward - sin * left, sin * forward + cos * left])
         return self.mean[:2] + offset
 
-    def position_spread_m(self, std_m: float) -> float:
-        """Return one standard deviation of the distance between prediction and measurement."""
-        return math.sqrt(self.covariance[X, X] + self.covariance[Y, Y] + 2.0 * std_m * std_m)
+    def doubt_position(self, std_m: float) -> None:
+        """Make the place unknown within `std_m` and tell it apart from what else is known."""
+        self.covariance[:2, :] = 0.0
+        self.covariance[:, :2] = 0.0
+        self.covariance[X, X] = self.covariance[Y, Y] = std_m * std_m
 
-    def correct_position(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
-        """Apply a position (2,) of a sensor at `lever_m`."""
-        offset = self.sensor_xy(lever_m) - self.mean[:2]
+    def expect_wander(self, std_m: float) -> None:
+        """Let positions have an error of `std_m` that stays alike over GNSS_CORRELATION_S."""
+        missing = std_m * std_m - self._gnss_std_m**2
+        if missing > 0.0:
+            self.covariance[GNSS_X, GNSS_X] += missing
+            self.covariance[GNSS_Y, GNSS_Y] += missing
+        self._gnss_std_m = std_m
+
+    def forget_wander(self) -> None:
+        """Begin the receiver's error anew: it has jumped."""
+        for index in (GNSS_X, GNSS_Y):
+            self.mean[index] = 0.0
+            self.covariance[index, :] = 0.0
+            self.covariance[:, index] = 0.0
+            self.covariance[index, index] = self._gnss_std_m**2
+
+    def _position_rows(self, lever_m: tuple[float, float], *, wander: bool) -> tuple[Array, Array]:
+        """Return where a receiver should say it is (2,), and that by the state (2, 12)."""
+        expected = self.sensor_xy(lever_m)
         rows = np.zeros((2, SIZE))
         rows[0, X] = rows[1, Y] = 1.0
-        rows[0, YAW], rows[1, YAW] = -offset[1], offset[0]
+        rows[0, YAW], rows[1, YAW] = self.mean[Y] - expected[1], expected[0] - self.mean[X]
+        if wander:
+            rows[0, GNSS_X] = rows[1, GNSS_Y] = 1.0
+            expected = expected + self.mean[GNSS_X : GNSS_Y + 1]
+        return expected, rows
+
+    def position_surprise(
+        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool
+    ) -> tuple[float, float]:
+        """Return how far a position (2,) lies off the expected one, and that one's spread."""
+        expected, rows = self._position_rows(lever_m, wander=wander)
+        spread = float(np.trace(rows @ self.covariance @ rows.T)) + 2.0 * std_m * std_m
+        return float(np.hypot(*(xy_m - expected))), math.sqrt(spread)
+
+    def correct_position(
+        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool = False
+    ) -> None:
+        """Apply a position (2,) of a sensor at `lever_m` with white noise of `std_m`.
+
+        `wander` says that the receiver's own slow error lies on top, as `expect_wander` has it.
+        """
+        expected, rows = self._position_rows(lever_m, wander=wander)
         cross = self.covariance @ rows.T
         spread = rows @ cross + std_m * std_m * np.eye(2)
         gain = np.linalg.solve(spread, cross.T).T
-        self.mean = self.mean + gain @ (xy_m - self.mean[:2] - offset)
+        self.mean = self.mean + gain @ (xy_m - expected)
         covariance = self.covariance - gain @ cross.T
         self.covariance = 0.5 * (covariance + covariance.T)
         self._limit()
@@ -167,9 +213,7 @@ class KinematicFilter:
     def move_position(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
         """Put the sensor at `xy_m` and leave yaw and motion as they are: the source jumped."""
         self.mean[:2] += xy_m - self.sensor_xy(lever_m)
-        self.covariance[:2, :] = 0.0
-        self.covariance[:, :2] = 0.0
-        self.covariance[X, X] = self.covariance[Y, Y] = std_m * std_m
+        self.doubt_position(std_m)
 
     def drift_sideways(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
         """Take a step across the car as the receiver's own: a car that creeps cannot go there."""
@@ -192,10 +236,12 @@ class KinematicFilter:
         self.mean[YAW] = yaw_before_rad + min(max(change, -reach), reach)
 
     def correct_speed(self, speed_mps: float, std_mps: float) -> None:
-        """Apply a measured speed."""
+        """Apply a measured speed, whose scale is estimated."""
+        if self.covariance[SPEED_SCALE, SPEED_SCALE] == 0.0:
+            self.covariance[SPEED_SCALE, SPEED_SCALE] = _SCALE_STD**2
         row = np.zeros(SIZE)
-        row[SPEED] = 1.0
-        self.correct(row, speed_mps - self.mean[SPEED], std_mps)
+        row[SPEED], row[SPEED_SCALE] = 1.0 + self.mean[SPEED_SCALE], self.mean[SPEED]
+        self.correct(row, speed_mps - self.mean[SPEED] * row[SPEED], std_mps)
 
     def correct_yaw(self, yaw_rad: float, std_rad: float) -> None:
         """Apply a measured yaw in the local frame."""
@@ -209,9 +255,17 @@ class KinematicFilter:
         row[SPEED], row[CURVATURE] = self.mean[CURVATURE], self.mean[SPEED]
         expected = self.yaw_rate_radps
         if biased:
+            self._know_slip()
             row[GYRO_BIAS] = 1.0
             expected += self.mean[GYRO_BIAS]
         self.correct(row, rate_radps - expected, std_radps)
+
+    def _know_slip(self) -> None:
+        """Tell the body's heading from the path's: a gyro shows how they part."""
+        self._slip_density = _GYRO_SLIP_DENSITY
+        if self.covariance[SLIP, SLIP] == 0.0:
+            self.mean[SLIP], std = _SLIP_RADPMPS2
+            self.covariance[SLIP, SLIP] = std * std
 
     def correct_accel(self, accel_mps2: float, std_mps2: float) -> None:
         """Apply a forward specific force: acceleration plus a slow bias, such as the grade's."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections import Counter
 from typing import Any
@@ -51,7 +50,8 @@ class Measured:
 
     def copy(self, *, skipped: Counter[str]) -> Measured:
         """Return another memory of the same samples that counts into `skipped`."""
-        other = copy.copy(self)
+        other = object.__new__(Measured)
+        other.__dict__.update(self.__dict__)
         other._skipped = skipped
         other._sample_ns, other._field_ns = self._sample_ns.copy(), self._field_ns.copy()
         return other
@@ -132,6 +132,12 @@ class Doubt:
         self._least = least
         self._mean_square = 0.0
 
+    def copy(self) -> Doubt:
+        """Return another one that goes on from here by itself."""
+        other = Doubt(self._least)
+        other._mean_square = self._mean_square
+        return other
+
     def std(self, surprise: float) -> float:
         """Take the latest surprise and return the standard deviation to use for it."""
         self._mean_square += 0.02 * (surprise * surprise - self._mean_square)
@@ -142,9 +148,8 @@ def _fault(message: Any) -> str | None:
     """Return why a sample cannot be a road vehicle's, or None."""
     for name in message.__struct_fields__:
         value = getattr(message, name)
-        numbers = value if isinstance(value, tuple) else (value,)
-        for number in numbers:
-            if not isinstance(number, float):
+        for number in value if type(value) is tuple else (value,):
+            if type(number) is not float:
                 continue
             if not math.isfinite(number):
                 return "not_finite"

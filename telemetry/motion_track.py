@@ -1,8 +1,7 @@
-"""A car's motion from samples in the order of their stamps, and the state it is in: pure, causal."""
+"""A car's motion from samples in the order of their stamps: pure and causal."""
 
 from __future__ import annotations
 
-import copy
 import math
 from collections import Counter
 from typing import Any
@@ -28,6 +27,10 @@ from telemetry.reported_state import moving_state, unmoved_state
 _UNKNOWN_STD_M = 0.01
 """Of positions that state none, until they turn out worse."""
 _ROUGH_M = 0.3
+_WANDER_M = 0.5
+_WHITE_SHARE = 0.1
+"""Of the stated error of a receiver that wanders: what changes from fix to fix."""
+_UNKNOWN_PLACE_M = 1000.0
 _CREEPING_MPS = 1.0
 _FRAME_REACH_M = 20_000.0
 _FAR_M = 1e8
@@ -77,7 +80,8 @@ class MotionTrack:
 
     def copy(self) -> MotionTrack:
         """Return another track that goes on from here by itself."""
-        other = copy.copy(self)
+        other = object.__new__(MotionTrack)
+        other.__dict__.update(self.__dict__)
         other._gate = self._gate.copy()
         other._measured = self._measured.copy(skipped=other._gate.skipped)
         other._corrections = self._corrections.copy(other._measured)
@@ -155,6 +159,7 @@ class MotionTrack:
             self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
             self._gate.restart(time_s, np.zeros(2))
             filter_ = self._filter = None
+        self._fix = fix
         self._altitude_m = fix.position.alt_m - self._lever[2]
         self._convergence_rad = float(
             grid_convergence(self._frame, fix.position.lat_deg, fix.position.lon_deg)
@@ -164,7 +169,6 @@ class MotionTrack:
             self._start_from_course(fix.stamp_ns, std)
         else:
             self._correct(filter_, xy, std, relocate=verdict == "relocate")
-        self._fix = fix
         return True
 
     def _std_m(self, fix: GnssFix) -> float:
@@ -175,21 +179,28 @@ class MotionTrack:
 
     def _correct(self, filter_: KinematicFilter, xy: Array, std: float, *, relocate: bool) -> None:
         lever = self._lever[:2]
-        innovation = math.hypot(*(xy - filter_.sensor_xy(lever)))
+        wander, white = self._wanders, std
+        if wander:
+            filter_.expect_wander(std)
+            white = _WHITE_SHARE * std
         if relocate:
-            filter_.move_position(xy, std, lever)
+            self._move(filter_, xy, std)
             return
-        if innovation > max(1.0, 8.0 * filter_.position_spread_m(std)):
+        away_m, spread_m = filter_.position_surprise(xy, white, lever, wander=wander)
+        if away_m > max(1.0, 8.0 * spread_m):
             self._shifts += 1
-            filter_.move_position(xy, std, lever)
+            if wander and self._shifts < 3:
+                self.skipped["gnss_outlier"] += 1
+                return
+            self._move(filter_, xy, std)
             if self._shifts >= 3:
                 self._turn_to_course(filter_)
             return
         self._shifts = 0
         yaw_before = filter_.mean[YAW]
-        if abs(filter_.mean[SPEED]) < _CREEPING_MPS:
+        if abs(filter_.mean[SPEED]) < _CREEPING_MPS and not wander:
             filter_.drift_sideways(xy, std, lever)
-        filter_.correct_position(xy, std, lever)
+        filter_.correct_position(xy, white, lever, wander=wander)
         filter_.limit_turn(yaw_before, moved_m=self._gate.last_step_m)
         if not self._measured.fresh("speed_mps", self._filter_stamp_ns):
             self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
@@ -201,6 +212,17 @@ class MotionTrack:
             course = self._gate.course(1.0 + 5.0 * std, within_s=3.0)
             if course is not None and abs(math.remainder(course - yaw_before, math.tau)) > 1.75:
                 self._turn_to_course(filter_)
+
+    def _move(self, filter_: KinematicFilter, xy: Array, std: float) -> None:
+        filter_.move_position(xy, std, self._lever[:2])
+        if self._wanders:
+            filter_.forget_wander()
+
+    @property
+    def _wanders(self) -> bool:
+        """Whether the receiver itself says that it is rough: then its error wanders slowly."""
+        std = None if self._fix is None else self._fix.std_m
+        return std is not None and std >= _WANDER_M
 
     def _turn_to_course(self, filter_: KinematicFilter) -> None:
         course = self._gate.course(1.0, within_s=3.0)
@@ -230,6 +252,13 @@ class MotionTrack:
             yaw_std_rad=yaw_std_rad,
         )
         self._filter_stamp_ns = stamp_ns
+        if self._wanders:
+            assert self._fix is not None
+            std = self._std_m(self._fix)
+            self._filter.doubt_position(_UNKNOWN_PLACE_M)
+            self._filter.expect_wander(std)
+            at = self._gate.recent[-1].xy_m
+            self._filter.correct_position(at, _WHITE_SHARE * std, self._lever[:2], wander=True)
 
     def _advance(self, stamp_ns: int) -> KinematicFilter | None:
         if self._filter is not None and stamp_ns > self._filter_stamp_ns:

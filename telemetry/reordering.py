@@ -1,4 +1,4 @@
-"""Samples that come out of order, put back in order: the motion is recomputed from where they lie."""
+"""Samples that come out of order, put back in order: the motion is computed anew from there."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from collections import deque
 
 WATCHED = ("gnss", "imu", "speed", "heading", "steering", "control", "plan")
 """Channels that come at a steady rate."""
-OVERDUE_NS = 170_000_000
+OVERDUE_NS = 150_000_000
 """A channel is overdue at the latest this long after its next sample should have come."""
 _REMEMBERED = 64
 _LEAST_SAMPLES = 5

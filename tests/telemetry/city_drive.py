@@ -1,4 +1,4 @@
-"""A minute and a half of the stand-in car in a town, and its positions as other receivers say."""
+"""A minute of the stand-in car in a town, and its positions as other receivers say."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ from tests.telemetry.standin_drive import FRAME, Drive
 
 Sample = tuple[str, Any]
 LEGS = (
-    (120.0, 0.0), (12.0 * math.pi / 2, 1 / 12), (80.0, 0.0), (15.0 * math.pi / 2, -1 / 15),
-    (100.0, 0.0), (95.0, 1 / 32), (60.0, 0.0), (14.0 * math.pi / 2, -1 / 14), (120.0, 0.0),
-    (10.0 * math.pi / 2, 1 / 10), (100.0, 0.0),
+    (90.0, 0.0), (6.0 * math.pi, 1 / 12), (70.0, 0.0), (7.5 * math.pi, -1 / 15), (60.0, 0.0),
+    (95.0, 1 / 32), (90.0, 0.0),
 )  # fmt: skip
 """Length and curvature of each."""
-STOP_AT_M = 205.0
-LONG_BEND_M = (334.0, 429.0)
-"""Where the bend of 32 m radius lies, which takes over ten seconds."""
+STOP_AT_M = 140.0
+LONG_BEND_FROM_M = 262.5
+"""Where the bend of 32 m radius begins, which takes over ten seconds."""
 
 
 @functools.cache

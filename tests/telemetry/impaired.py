@@ -34,13 +34,14 @@ class ForeignClock(NamedTuple):
 
 PERFECT = Network(loss=0.0, doubled=0.0, delay_s=0.0, jitter_s=0.0)
 BAD = Network()
+SAME_CLOCK = ForeignClock()
 
 
 def impaired(
     samples: Iterable[tuple[str, Any]],
     network: Network,
     *,
-    clock: ForeignClock = ForeignClock(),
+    clock: ForeignClock = SAME_CLOCK,
     seed: int = 0,
 ) -> list[Arrival]:
     """Return what arrives of `samples`, in the order of its arrival."""
