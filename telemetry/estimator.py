@@ -129,12 +129,12 @@ class StateEstimator:
         `received_ns` is the receiver's monotonic clock, at the pace of the vehicle's. Channels
         that say nothing of the motion are watched for staleness alone.
         """
-        stamp_ns = getattr(message, "stamp_ns", None)
-        if stamp_ns is None:
-            return None
         kind = _KINDS.get(channel)
         if kind is not None and not isinstance(message, kind):
             self._refused[f"{channel}_wrong_type"] += 1
+            return None
+        stamp_ns = getattr(message, "stamp_ns", None)
+        if stamp_ns is None:
             return None
         if kind is None:
             self._watch(channel, stamp_ns + self._steps.shift_ns(channel), received_ns)
@@ -204,7 +204,9 @@ class StateEstimator:
             return None
         self._track = reordering.track()
         fix = newest.message if newest.channel == "gnss" else None
-        if not self._track.placed or (fix is None and not self._track.started):
+        if fix is not None and self._track.fix is not fix:
+            return None  # refused: the next sample gives the state
+        if self._track.fix is None or (fix is None and not self._track.started):
             return None
         state = self._track.state(newest.stamp_ns, fix=fix)
         return self._leave(state, self._clock.stamp_at(received_ns))

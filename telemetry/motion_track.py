@@ -99,9 +99,9 @@ class MotionTrack:
         return True
 
     @property
-    def placed(self) -> bool:
-        """Whether any position was believed."""
-        return self._fix is not None
+    def fix(self) -> GnssFix | None:
+        """The last position that was believed."""
+        return self._fix
 
     @property
     def started(self) -> bool:

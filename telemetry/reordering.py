@@ -47,18 +47,30 @@ class Reordering:
         self._taken = 0
         """How many of `_samples` the head has taken."""
         self._checkpoints: deque[_Checkpoint] = deque()
+        """The first lies before all samples that may yet come."""
         self._seen: set[tuple[str, int]] = set()
         self._number = 0
+
+    @property
+    def waiting(self) -> int:
+        """How many samples are kept for those that may yet come before them."""
+        return len(self._samples)
 
     def add(self, channel: str, message: Any) -> bool:
         """Put a sample in its place; returns whether it counts."""
         stamp_ns: int = message.stamp_ns
-        if self.newest is not None and stamp_ns < self.newest.stamp_ns - WINDOW_NS:
+        if len(self._samples) > _MOST_WAITING:
+            self.track()
+        if self.newest is not None and stamp_ns < max(
+            self.newest.stamp_ns - WINDOW_NS, self._checkpoints[0].stamp_ns + 1
+        ):
             self.late[channel] += 1
             return False
         if (channel, stamp_ns) in self._seen:
             self.doubled[channel] += 1
             return False
+        if not self._checkpoints:
+            self._keep(stamp_ns - WINDOW_NS - 1)
         self._seen.add((channel, stamp_ns))
         self._number += 1
         rank = _ORDER.index(channel) if channel in _ORDER else len(_ORDER)
@@ -86,12 +98,11 @@ class Reordering:
         """Return the track with all samples taken; it stays this object's own."""
         while self._taken < len(self._samples):
             sample = self._samples[self._taken]
-            before = self._samples[self._taken - 1].stamp_ns if self._taken else None
-            last = self._checkpoints[-1].stamp_ns if self._checkpoints else None
-            if before is None:
-                self._keep(sample.stamp_ns - 1)
-            elif before < sample.stamp_ns and (last is None or before - last >= _CHECKPOINT_NS):
-                self._keep(before)
+            if self._taken:
+                before_ns = self._samples[self._taken - 1].stamp_ns
+                due_ns = self._checkpoints[-1].stamp_ns + _CHECKPOINT_NS
+                if due_ns <= before_ns < sample.stamp_ns:
+                    self._keep(before_ns)
             self._head.take(sample.channel, sample.message)
             self._taken += 1
         self._forget()
@@ -105,12 +116,12 @@ class Reordering:
         if self.newest is None:
             return
         horizon_ns = self.newest.stamp_ns - WINDOW_NS
-        too_many = len(self._samples) > _MOST_WAITING
-        while len(self._checkpoints) > 1 and (
-            self._checkpoints[1].stamp_ns < horizon_ns or too_many
-        ):
+        while len(self._checkpoints) > 1 and self._checkpoints[1].stamp_ns < horizon_ns:
             self._checkpoints.popleft()
-        first_ns = self._checkpoints[0].stamp_ns if self._checkpoints else horizon_ns
+        if len(self._samples) > _MOST_WAITING:
+            self._checkpoints.clear()
+            self._keep(self._samples[-1].stamp_ns)
+        first_ns = self._checkpoints[0].stamp_ns
         gone = bisect.bisect(self._samples, first_ns, key=lambda sample: sample.stamp_ns)
         for sample in self._samples[:gone]:
             self._seen.discard((sample.channel, sample.stamp_ns))
