@@ -10,15 +10,9 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
-from contracts.frames import (
-    GeoPoint,
-    LocalFrame,
-    base_from_sensor,
-    geo_from_local,
-    grid_convergence,
-    local_from_geo,
-)
+from contracts.frames import GeoPoint, base_from_sensor
 from telemetry.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
+from telemetry.local_place import LocalPlace
 from telemetry.measured import Measured
 from telemetry.motion_corrections import STANDING_MPS, MotionCorrections
 from telemetry.position_gate import PositionGate
@@ -32,8 +26,6 @@ _WHITE_SHARE = 0.1
 """Of the stated error of a receiver that wanders: what changes from fix to fix."""
 _UNKNOWN_PLACE_M = 1000.0
 _CREEPING_MPS = 1.0
-_FRAME_REACH_M = 20_000.0
-_FAR_M = 1e8
 
 
 class MotionTrack:
@@ -63,13 +55,11 @@ class MotionTrack:
             skipped=self._gate.skipped,
         )
         self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
-        self._frame: LocalFrame | None = None
+        self._place: LocalPlace | None = None
         self._start_ns = 0
         self._filter: KinematicFilter | None = None
         self._filter_stamp_ns = 0
         self._fix: GnssFix | None = None
-        self._convergence_rad = 0.0
-        self._altitude_m = 0.0
         self._shifts = 0
         self._standing = False
 
@@ -125,14 +115,10 @@ class MotionTrack:
     def _position(self, fix: GnssFix) -> bool:
         if not self._gate.plausible(fix):
             return False
-        if self._frame is None:
-            self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
+        if self._place is None:
+            self._place = LocalPlace.around(fix.position)
             self._start_ns = fix.stamp_ns
-        # Beyond the frame's reach the projection says infinity: just somewhere far away.
-        xy = np.nan_to_num(
-            local_from_geo(self._frame, fix.position.lat_deg, fix.position.lon_deg),
-            nan=_FAR_M, posinf=_FAR_M, neginf=-_FAR_M,
-        )  # fmt: skip
+        xy = self._place.xy_m(fix.position)
         time_s = (fix.stamp_ns - self._start_ns) * 1e-9
         recent = self._gate.recent
         held = bool(recent) and bool(np.array_equal(recent[-1].xy_m, xy))
@@ -154,16 +140,13 @@ class MotionTrack:
         verdict = self._gate.judge(time_s, xy, expected)
         if verdict == "skip":
             return False
-        if verdict == "relocate" and math.hypot(xy[0], xy[1]) > _FRAME_REACH_M:
+        if verdict == "relocate" and not self._place.reaches(xy):
             # What went before was wrong, or another place: begin anew, with a frame of this one.
-            self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
+            self._place = LocalPlace.around(fix.position)
             self._gate.restart(time_s, np.zeros(2))
             filter_ = self._filter = None
         self._fix = fix
-        self._altitude_m = fix.position.alt_m - self._lever[2]
-        self._convergence_rad = float(
-            grid_convergence(self._frame, fix.position.lat_deg, fix.position.lon_deg)
-        )
+        self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
         std = self._std_m(fix)
         if filter_ is None:
             self._start_from_course(fix.stamp_ns, std)
@@ -267,6 +250,10 @@ class MotionTrack:
             self._filter_stamp_ns = stamp_ns
         return self._filter
 
+    @property
+    def _convergence_rad(self) -> float:
+        return 0.0 if self._place is None else self._place.convergence_rad
+
     # What comes out.
 
     def _passes_through(self, fix: GnssFix) -> bool:
@@ -274,8 +261,8 @@ class MotionTrack:
             return self._gate.roughness_m <= _ROUGH_M
         return fix.std_m <= 0.05 and not self._measured.anything
 
-    def _place(self, fix: GnssFix | None) -> GeoPoint:
-        assert self._frame is not None
+    def _position_out(self, fix: GnssFix | None) -> GeoPoint:
+        assert self._place is not None
         if self._filter is None:
             assert self._fix is not None
             return self._fix.position
@@ -285,8 +272,7 @@ class MotionTrack:
             xy = base_from_sensor(self._gate.recent[-1].xy_m, self._filter.mean[YAW], self._lever)
         else:
             xy = self._filter.mean[:2]
-        lat_deg, lon_deg = geo_from_local(self._frame, xy)
-        return GeoPoint(float(lat_deg), float(lon_deg), self._altitude_m)
+        return self._place.position(xy)
 
     def state(self, stamp_ns: int, *, fix: GnssFix | None = None) -> VehicleState:
         """Return the state at `stamp_ns`, at or after all samples taken.
@@ -297,7 +283,7 @@ class MotionTrack:
         if self._fix is None:
             raise ValueError("no position has come yet: there is no state")
         self._advance(stamp_ns)
-        position = self._place(fix)
+        position = self._position_out(fix)
         if self._filter is None:
             return unmoved_state(
                 self._measured,
