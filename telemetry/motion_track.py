@@ -18,9 +18,6 @@ from telemetry.motion_corrections import STANDING_MPS, MotionCorrections
 from telemetry.position_gate import PositionGate
 from telemetry.reported_state import moving_state, unmoved_state
 
-_UNKNOWN_STD_M = 0.01
-"""Of positions that state none, until they turn out worse."""
-_ROUGH_M = 0.3
 _WANDER_M = 0.5
 _WHITE_SHARE = 0.1
 """Of the stated error of a receiver that wanders: what changes from fix to fix."""
@@ -147,18 +144,12 @@ class MotionTrack:
             filter_ = self._filter = None
         self._fix = fix
         self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
-        std = self._std_m(fix)
+        std = self._gate.std_m(fix)
         if filter_ is None:
             self._start_from_course(fix.stamp_ns, std)
         else:
             self._correct(filter_, xy, std, relocate=verdict == "relocate")
         return True
-
-    def _std_m(self, fix: GnssFix) -> float:
-        if fix.std_m is not None and math.isfinite(fix.std_m):
-            return min(max(fix.std_m, 1e-3), 1e4)
-        rough = self._gate.roughness_m
-        return rough if rough > _ROUGH_M else _UNKNOWN_STD_M
 
     def _correct(self, filter_: KinematicFilter, xy: Array, std: float, *, relocate: bool) -> None:
         lever = self._lever[:2]
@@ -237,7 +228,7 @@ class MotionTrack:
         self._filter_stamp_ns = stamp_ns
         if self._wanders:
             assert self._fix is not None
-            std = self._std_m(self._fix)
+            std = self._gate.std_m(self._fix)
             self._filter.doubt_position(_UNKNOWN_PLACE_M)
             self._filter.expect_wander(std)
             at = self._gate.recent[-1].xy_m
@@ -258,7 +249,7 @@ class MotionTrack:
 
     def _passes_through(self, fix: GnssFix) -> bool:
         if fix.std_m is None:
-            return self._gate.roughness_m <= _ROUGH_M
+            return not self._gate.rough
         return fix.std_m <= 0.05 and not self._measured.anything
 
     def _position_out(self, fix: GnssFix | None) -> GeoPoint:

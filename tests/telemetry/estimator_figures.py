@@ -48,11 +48,12 @@ class PositionsAlone(NamedTuple):
     def text(self) -> str:
         """Return the figures in one line."""
         course, rate = np.degrees(np.abs(self.course_rad)), np.abs(self.yaw_rate_radps)
+        mounted = np.degrees(np.abs(self.course_rad - self.mounting_rad))
         return (
             f"course p50 {np.median(course):.2f} p95 {np.percentile(course, 95):.2f} deg, "
             f"in bends p95 {np.percentile(course[self.bend], 95):.2f} deg, "
             f"without the mounting ({self.lever_m:.2f} m ahead) p95 "
-            f"{np.percentile(np.degrees(np.abs(self.course_rad - self.mounting_rad)), 95):.2f} deg, "
+            f"{np.percentile(mounted, 95):.2f} deg, "
             f"lag {self.course_lag_s:.2f} s; "
             f"yaw rate rms {np.sqrt(np.mean(rate**2)):.4f} p95 {np.percentile(rate, 95):.4f} rad/s,"
             f" lag {self.yaw_rate_lag_s:.2f} s; {len(course)} states"
