@@ -5,3 +5,8 @@ from __future__ import annotations
 
 class UserError(ValueError):
     """One line that names the file, field or value at fault and what would be right."""
+
+
+def one_line(error: Exception) -> str:
+    """Return an error as one line of text."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -79,6 +79,28 @@ class SeenRoadUser(msgspec.Struct, frozen=True, kw_only=True):
     width_m: float
 
 
+class RecordedRoadUser(msgspec.Struct, frozen=True, kw_only=True):
+    """A road user that every future has where it was recorded, whatever the others do.
+
+    It is on the road from its first sample to its last. Between two of them position, yaw (the
+    short way round) and speed are linear in time; after a sample of `gone_after` it is away until
+    the next one.
+    """
+
+    user_id: str
+    kind: RoadUserKind
+    time_s: Array
+    """(N,) of the samples from the job's state, rising."""
+    poses: Array
+    """(N, 3) x, y, yaw of its box centre in the World's frame."""
+    speed_mps: Array
+    """(N,) along its yaw."""
+    gone_after: Array
+    """(N,) bool."""
+    size_m: tuple[float, float] | None = None
+    """Length and width; None where they were not recorded: those of its kind."""
+
+
 class CarPlan(msgspec.Struct, frozen=True, kw_only=True):
     """The car's own plan in the World's frame: base_link at `time_s` (N,) from the job's state.
 
@@ -111,6 +133,8 @@ class FuturesJob(msgspec.Struct, frozen=True, kw_only=True):
     starts: Array | None = None
     """(S, 8) where futures do not begin with the car's state, in the World's frame."""
     road_users: tuple[SeenRoadUser, ...] = ()
+    replayed: tuple[RecordedRoadUser, ...] = ()
+    """The first road users of every future, in this order."""
     signals: tuple[SignalState, ...] = ()
     """Live colours, the newest of each group."""
     drive_time_s: float = 0.0

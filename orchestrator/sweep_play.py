@@ -13,6 +13,7 @@ import numpy as np
 
 from contracts.arrays import Array32
 from contracts.drive import VehicleState
+from contracts.errors import one_line
 from contracts.frames import GeoPoint
 from contracts.futures import Accident, FuturesJob, FuturesResult, PathAhead, Variant
 from contracts.scenario import Scenario
@@ -29,7 +30,8 @@ from sim_worker.rehearsal import off_plan_m, staged_cases
 from sim_worker.scenarios.roles import Cast
 from sim_worker.scene import SceneMaker
 from sim_worker.stage import Stage
-from sim_worker.worker import StageCache, load_world, one_line
+from sim_worker.worker import StageCache
+from sim_worker.world_file import load_world
 
 COLLISION_WITH = ("", "road_user", "static")
 _KEPT_STAGES = 2

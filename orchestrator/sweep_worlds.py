@@ -14,7 +14,7 @@ from contracts.errors import UserError
 from orchestrator.map_choice import junction_by_id, node_of_id, parse_bbox
 from orchestrator.map_opening import NodeClip, open_map
 from orchestrator.sweep_spec import SweepSpec, worlds_folder
-from sim_worker.worker import load_world
+from sim_worker.world_file import load_world
 from world_gen.intersections import Junction
 from world_gen.map_index import index_map
 from world_gen.osm_map import LatLonBounds

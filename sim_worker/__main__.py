@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 from contracts.bus import Bus
 from contracts.process import ProcessLife, run_process
 from contracts.setup import WorkerSetup
-from sim_worker.mirror_process import serve_mirror
-from sim_worker.worker import serve_futures
 
-ROLES = {"futures": serve_futures, "mirror": serve_mirror}
+ROLES = {
+    "futures": ("sim_worker.worker", "serve_futures"),
+    "mirror": ("sim_worker.mirror_process", "serve_mirror"),
+}
+"""Module and function of each role: the mirror starts without what plays futures."""
 
 
 def serve(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     """Do the work of the setup's role; raises ValueError naming the known ones."""
     if setup.role not in ROLES:
         raise ValueError(f"unknown role {setup.role!r}; known: {', '.join(sorted(ROLES))}")
-    ROLES[setup.role](setup, bus, life)
+    module, name = ROLES[setup.role]
+    getattr(import_module(module), name)(setup, bus, life)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.drive import ControlCommand
 from contracts.vehicle import VehicleParameters
-from sim_worker.vehicle.actuation import resistance_mps2
+from sim_worker.vehicle.resistance import resistance_mps2
 
 _STANDS_MPS = 0.05
 _HOLD_MPS2 = -2.0

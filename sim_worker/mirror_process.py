@@ -9,11 +9,12 @@ from pathlib import Path
 
 from contracts.bus import Bus, Mailbox, Received, Request
 from contracts.drive import ControlCommand, VehicleState
+from contracts.errors import one_line
 from contracts.process import ProcessLife
 from contracts.setup import WorkerSetup
 from contracts.simulation import ActiveWorld
 from sim_worker.twin import Mirror
-from sim_worker.worker import load_world, one_line
+from sim_worker.world_file import load_world
 
 _DEPTH = 4096
 _IDLE_S = 0.2

@@ -180,13 +180,15 @@ class SceneMaker:
                 cast = (*seen, *players)
             casts.append(cast)
         fault_columns = fault_arrays(faults)
-        crowd = casting(casts, ego_path=path)
-        taken = [self._rules.taken(one) for one in crowd.paths]
+        crowd = casting(casts, ego_path=path, replayed=job.replayed)
+        # Where recorded road users go, no rule binds.
+        taken = [self._rules.taken(one) for one in crowd.paths] + [()] * len(job.replayed)
         rules = self._rules.between(taken)
         traffic = sight = None
         if crowd.crowd.present.any():
-            table = PathTable(crowd.paths)
-            traffic = Traffic(crowd.crowd, table, rules)
+            tracks = () if crowd.replay is None else crowd.replay.tracks
+            table = PathTable(crowd.paths, tracks)
+            traffic = Traffic(crowd.crowd, table, rules, crowd.replay)
             sight = Sight(
                 traffic,
                 table.along(path),

@@ -11,21 +11,22 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
+import scipy.spatial  # noqa: F401  A search for many points needs it: not within the first job.
 
 from contracts.bus import Bus, Mailbox, Request
-from contracts.codec import read_message
+from contracts.errors import one_line
 from contracts.frames import local_from_geo
 from contracts.futures import FuturesJob, FuturesResult
 from contracts.process import ProcessLife
 from contracts.setup import WorkerSetup
 from contracts.simulation import PrepareReply, PrepareRequest
 from contracts.vehicle import VehicleParameters
-from contracts.world import World
 from sim_worker.futures import run_job
 from sim_worker.planners.registry import load_planner
 from sim_worker.planners.remote import RemotePlanner
 from sim_worker.scene import SceneMaker
 from sim_worker.stage import Controls, Stage
+from sim_worker.world_file import load_world
 
 NSIM = 32
 """Simulations of a stage: two workers share a round of 64."""
@@ -83,13 +84,6 @@ class StageCache:
         return world_id in self._stages
 
 
-def load_world(worlds_dir: Path, world_id: str) -> World:
-    """Read a World's file; raises FileNotFoundError or SchemaMismatch naming the file."""
-    if not world_id or "/" in world_id or "\\" in world_id or world_id.startswith("."):
-        raise FileNotFoundError(f"world id {world_id!r} names no file in {worlds_dir}")
-    return read_message(worlds_dir / f"{world_id}.world", World)
-
-
 class FuturesWorker:
     """Answers `prepare` and `job`; a question that cannot be answered is refused with one line."""
 
@@ -145,11 +139,6 @@ def warm_up(stage: Stage) -> None:
     local_from_geo(stage.world.frame, origin.lat_deg, origin.lon_deg)
     stage.seed(np.zeros((1, 8)), steering_delay_s=np.zeros(1), friction_factor=np.ones(1))
     stage.step(Controls(np.zeros(1), np.zeros(1)))
-
-
-def one_line(error: Exception) -> str:
-    """Return an error as one line of text."""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
 
 def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:

@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from contracts.drive import RoadUserKind
+from contracts.futures import RecordedRoadUser
 from contracts.scenario import Conduct
 from sim_worker.actors.crowd import Crowd
 from sim_worker.actors.kinds import KINDS
 from sim_worker.actors.path_table import Indices
+from sim_worker.actors.replay import Replay
 from sim_worker.planners.path import FrenetPath
 
 KIND_NAMES: tuple[RoadUserKind, ...] = tuple(KINDS)
@@ -42,7 +44,8 @@ class Player(NamedTuple):
 class Casting(NamedTuple):
     """The crowd of a job, and what else is known of it: (S, R) where nothing else is said.
 
-    `paths` are all that anybody drives on, the ego's first.
+    `paths` are all that anybody drives on, the ego's first; `replay` has where those are who come
+    first in every future, if they were recorded.
     """
 
     crowd: Crowd
@@ -50,11 +53,21 @@ class Casting(NamedTuple):
     kinds: Indices
     hidden_by: Indices
     walks: npt.NDArray[np.bool_]
+    replay: Replay | None = None
 
 
-def casting(casts: Sequence[Sequence[Player]], *, ego_path: FrenetPath) -> Casting:
-    """Lay the road users of S futures out as arrays; places without one are not present."""
-    shape = (len(casts), max(map(len, casts), default=0))
+def casting(
+    casts: Sequence[Sequence[Player]],
+    *,
+    ego_path: FrenetPath,
+    replayed: Sequence[RecordedRoadUser] = (),
+) -> Casting:
+    """Lay the road users of S futures out as arrays; places without one are not present.
+
+    Those `replayed` come first in each; their `path_of` counts on after the paths.
+    """
+    first = len(replayed)
+    shape = (len(casts), first + max(map(len, casts), default=0))
     # Futures have many road users in common: each is looked at once.
     known: dict[int, int] = {}
     players: list[Player] = []
@@ -64,15 +77,17 @@ def casting(casts: Sequence[Sequence[Player]], *, ego_path: FrenetPath) -> Casti
             if id(player) not in known:
                 players.append(player)
                 known[id(player)] = len(players)
-        which[s, : len(cast)] = [known[id(player)] for player in cast]
-        for r, player in enumerate(cast):
+        which[s, first : first + len(cast)] = [known[id(player)] for player in cast]
+        for r, player in enumerate(cast, start=first):
             if player.hidden_by:
-                hidden[s, r] = [other.name for other in cast].index(player.hidden_by)
+                hidden[s, r] = first + [other.name for other in cast].index(player.hidden_by)
     paths = {id(ego_path): ego_path}
     for player in players:
         paths.setdefault(id(player.path), player.path)
     places = {path: place for place, path in enumerate(paths)}
     rows = [_NOBODY, *(_row(player, places) for player in players)]
+    which[:, :first] = len(rows) + np.arange(first)
+    rows += [_recorded_row(user, len(paths) + place) for place, user in enumerate(replayed)]
     present, lawful, walks, path_of, kinds, columns = (
         np.array(column)[which] for column in zip(*rows, strict=True)
     )
@@ -94,7 +109,8 @@ def casting(casts: Sequence[Sequence[Player]], *, ego_path: FrenetPath) -> Casti
         brakes_at_s=brakes_at,
         brakes_by_mps2=brakes_by,
     )
-    return Casting(crowd, tuple(paths.values()), kinds, hidden, walks)
+    replay = Replay(replayed) if replayed else None
+    return Casting(crowd, tuple(paths.values()), kinds, hidden, walks, replay)
 
 
 class _Row(NamedTuple):
@@ -111,6 +127,18 @@ class _Row(NamedTuple):
 _NOBODY = _Row(
     False, False, False, 0, 0, (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
 )  # fmt: skip
+
+
+def _recorded_row(user: RecordedRoadUser, path: int) -> _Row:
+    traits = KINDS[user.kind]
+    length, width = user.size_m or (traits.length_m, traits.width_m)
+    return _NOBODY._replace(
+        present=True,
+        walks=not traits.keeps_lane,
+        path=path,
+        kind=KIND_NAMES.index(user.kind),
+        numbers=(length, width, *_NOBODY.numbers[2:]),
+    )
 
 
 def _row(player: Player, places: Mapping[int, int]) -> _Row:

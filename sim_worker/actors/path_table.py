@@ -33,18 +33,21 @@ class Place(NamedTuple):
 class PathTable:
     """The nodes of P paths in one array, so that look-ups for all road users are one call.
 
-    Beyond a path's ends, places stay at the end.
+    Beyond a path's ends, places stay at the end. After the paths come `tracks` of poses (N, 3)
+    without jumps of yaw, whose nodes are those of a clock instead of an arc length: who knows the
+    time says where on them somebody is.
     """
 
-    def __init__(self, paths: Sequence[FrenetPath]) -> None:
+    def __init__(self, paths: Sequence[FrenetPath], tracks: Sequence[Array] = ()) -> None:
         if not paths:
             raise ValueError("a table needs at least one path")
         self.paths = tuple(paths)
-        counts = np.array([len(path.arc_m) for path in paths])
+        nodes = [*(path.node_poses for path in paths), *tracks]
+        counts = np.array([len(poses) for poses in nodes])
         self._begin: Indices = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
-        self._first_arc = np.array([path.arc_m[0] for path in paths])
+        self._first_arc = np.array([path.arc_m[0] for path in paths] + [0.0] * len(tracks))
         self._last = counts - 1.0
-        self._poses: Array = np.concatenate([path.node_poses for path in paths])
+        self._poses: Array = np.concatenate(nodes)
         """(M, 3) x, y and heading without jumps, of all nodes."""
         self._steps = np.diff(self._poses, axis=0, append=self._poses[-1:])
 

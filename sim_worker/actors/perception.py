@@ -72,8 +72,7 @@ class Sight:
         self._past: list[tuple[npt.NDArray[Any], ...]] = [_now(traffic)] * kept
         self._anybody_late = bool(self._late.any())
         self._ever_lost = bool((faults.lost_for_s > 0.0).any())
-        self._absent = ~crowd.present
-        self._all_there = not self._absent.any()
+        self._all_there = traffic.replay is None and bool(crowd.present.all())
         self._beside_m = crowd.lateral_m if crowd.lateral_m.any() else None
         self._sizes = np.stack([crowd.length_m.ravel(), crowd.width_m.ravel()])
         half_diagonal = 0.5 * np.hypot(crowd.length_m, crowd.width_m)
@@ -129,10 +128,10 @@ class Sight:
     def _unseen(
         self, tick: int | npt.NDArray[np.intp], poses: Array, eyes_xy_m: Array
     ) -> Flags | None:
-        """(S, R) bool: who is absent, lost or hidden; None where everybody is seen."""
+        """(S, R) bool: who is away, lost or hidden; None where everybody is seen."""
         if self._all_there and not self._ever_lost and not self.anybody_hidden:
             return None
-        unseen = self._absent.copy()
+        unseen = np.isnan(poses[..., 0])
         if self._ever_lost:
             unseen |= self._lost(np.asarray(tick) * self._tick_s)[:, None]
         if self.anybody_hidden:

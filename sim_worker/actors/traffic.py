@@ -1,7 +1,8 @@
 """Other road users of S futures, up to R in each, moved together along paths of their own.
 
 Their motion along a path is all there is to it: arc length and speed. Law-abiding ones decide a few
-times a second, as people do, and keep the acceleration in between.
+times a second, as people do, and keep the acceleration in between. Recorded ones are where they
+were at the time.
 """
 
 from __future__ import annotations
@@ -12,15 +13,22 @@ from contracts.arrays import Array
 from sim_worker.actors.crowd import Crowd, EgoBoxes, Flags
 from sim_worker.actors.law_abiding import LawAbiding, Now
 from sim_worker.actors.path_table import Indices, PathTable
+from sim_worker.actors.replay import Replay
 from sim_worker.actors.right_of_way import PathRules
 
 
 class Traffic:
-    """The road users of one job; `arc_m`, `speed_mps` (S, R) and `poses` (S, R, 3) are now."""
+    """The road users of one job; `arc_m`, `speed_mps` (S, R) and `poses` (S, R, 3) are now.
 
-    def __init__(self, crowd: Crowd, table: PathTable, rules: PathRules) -> None:
-        self.crowd, self.table, self._rules = crowd, table, rules
+    The first of each future are those of `replay`; while one is away, its speed is NaN too.
+    """
+
+    def __init__(
+        self, crowd: Crowd, table: PathTable, rules: PathRules, replay: Replay | None = None
+    ) -> None:
+        self.crowd, self.table, self.replay, self._rules = crowd, table, replay, rules
         self._on = table.on(crowd.path_of)
+        self._now_s: float | Array = 0.0
         self._absent = None if crowd.present.all() else ~crowd.present
         self.arc_m = crowd.start_arc_m.copy()
         self.speed_mps = np.where(crowd.present, crowd.start_speed_mps, 0.0)
@@ -33,13 +41,26 @@ class Traffic:
 
     def _put(self) -> None:
         self.place = self.table.place(self._on, self.arc_m)
+        gone = None if self.replay is None else self._play_back(self.replay)
         self.poses = self.table.poses(self.place, self.crowd.lateral_m)
+        if gone is not None:
+            self.poses[:, : gone.shape[1]][gone] = np.nan
         if self._absent is not None:
             self.poses[self._absent] = np.nan
 
+    def _play_back(self, replay: Replay) -> Flags:
+        """Put recorded road users where they are now; returns (S, T) who of them is away."""
+        now, count = replay.at(self._now_s), len(replay)
+        mine = (slice(None), slice(count))
+        self.place.node[mine] = self._on.begin[mine] + now.node
+        self.place.share[mine] = now.share
+        self.speed_mps[mine] = now.speed_mps
+        return np.broadcast_to(now.gone, (len(self.arc_m), count))
+
     def begun(self, futures: Indices) -> Traffic:
         """Return traffic (K, R) that begins as that of these futures did."""
-        return Traffic(Crowd._make(f[futures] for f in self.crowd), self.table, self._rules)
+        crowd = Crowd._make(f[futures] for f in self.crowd)
+        return Traffic(crowd, self.table, self._rules, self.replay)
 
     def carry_on(self, before: Traffic, futures: Flags) -> None:
         """Let the `futures` (S,) go on from where traffic of the same paths has them."""
@@ -49,11 +70,14 @@ class Traffic:
             (self._accel, before._accel),
         ):
             mine[futures] = theirs[futures]
+        if self.replay is not None:
+            self._now_s = np.where(futures[:, None], before._now_s, self._now_s)
         self._put()
 
     def step(self, *, time_s: float | Array, dt_s: float) -> None:
         """Advance by `dt_s` from `time_s`, one or (S, 1), with what was decided last."""
         crowd = self.crowd
+        self._now_s = time_s + dt_s
         if self.reacts or self._brakes:
             accel = self._accel
             if self._brakes:
@@ -63,6 +87,8 @@ class Traffic:
             self.speed_mps = after
         else:
             self.arc_m += self.speed_mps * dt_s
+        if self.replay is not None:
+            self.arc_m[:, : len(self.replay)] = 0.0
         self._put()
 
     def decide(self, ego: EgoBoxes, red_arcs_m: Array) -> None:

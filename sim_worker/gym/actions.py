@@ -9,7 +9,7 @@ import numpy as np
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
 from sim_worker.planners.tracking import pure_pursuit
-from sim_worker.vehicle.actuation import resistance_mps2
+from sim_worker.vehicle.resistance import resistance_mps2
 
 Control = Literal["free", "along_path"]
 """`free`: acceleration and tyre angle; `along_path`: acceleration, steered by pure pursuit."""

@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from contracts.arrays import Array
 from sim_worker.metrics.rollout import Flags, Measure
@@ -78,6 +77,9 @@ def _operator(count: int, step_s: float, window_s: float, derivative: int) -> Ar
     order = min(max(_ORDER, derivative), window - 1)
     if order < derivative:
         return np.zeros((count, count))
+    # Half of what a worker's start takes, for metrics that drives do not ask for.
+    from scipy.signal import savgol_filter
+
     operator: Array = savgol_filter(
         np.eye(count), window, order, deriv=derivative, delta=step_s, axis=1
     )

@@ -27,7 +27,7 @@ from sim_worker.planners.lattice_rating import (
 from sim_worker.planners.polynomials import Floats, Motions, joined, to_place, to_speed
 from sim_worker.planners.prediction import Changes, changes
 from sim_worker.planners.tracking import front_from_base_m, pure_pursuit
-from sim_worker.vehicle.actuation import resistance_mps2
+from sim_worker.vehicle.resistance import resistance_mps2
 
 REPLAN_S = 0.5
 _AT_ONCE_S, _LEAD_BRAKES_MPS2 = 0.15, 2.5

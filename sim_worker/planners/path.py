@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from contracts.arrays import Array
 
@@ -160,6 +159,9 @@ class FrenetPath:
     def _nearest(self, xy_m: Array, end: int) -> npt.NDArray[np.intp]:
         """Return which of the nodes before `end` is nearest to each of the points."""
         if len(xy_m) > _MANY:
+            # Slower to import than all else that the process of a hosted planner needs.
+            from scipy.spatial import cKDTree
+
             return np.asarray(cKDTree(self._nodes[:end, :2]).query(xy_m)[1], dtype=np.intp)
         dx, dy = self._x[:end] - xy_m[:, 0, None], self._y[:end] - xy_m[:, 1, None]
         dx *= dx

@@ -7,7 +7,7 @@ import numpy as np
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
 from sim_worker.planners.tracking import front_from_base_m, pure_pursuit, turning_speed
-from sim_worker.vehicle.actuation import resistance_mps2
+from sim_worker.vehicle.resistance import resistance_mps2
 
 MAX_ACCEL_MPS2 = 1.5
 COMFORT_DECEL_MPS2 = 2.0

@@ -9,7 +9,7 @@ import numpy as np
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
 from sim_worker.planners.tracking import lookahead_m, steer_towards
-from sim_worker.vehicle.actuation import resistance_mps2
+from sim_worker.vehicle.resistance import resistance_mps2
 
 _NEAR_S = 3.0
 """A car is looked for on its trajectory within this time of where it should be."""

@@ -146,11 +146,3 @@ class Actuation:
         np.copyto(self._drive_n, drive)
         np.subtract(drive, brake, out=self._along_low)
         np.add(drive, brake, out=self._along_high)
-
-
-def resistance_mps2(vehicle: VehicleParameters, speed_mps: Array) -> Array:
-    """Return the deceleration by drag and rolling at `speed_mps`, for a command to undo."""
-    speed = np.abs(speed_mps)
-    force = vehicle.drag_npv2.value * speed * speed_mps
-    force += (speed > 0.1) * np.sign(speed_mps) * vehicle.rolling_resistance_n.value
-    return np.asarray(force / vehicle.mass_kg.value)
