@@ -142,9 +142,11 @@ class KinematicFilter:
         self._limit()
 
     def _limit(self) -> None:
-        if not self.may_reverse and self.mean[SPEED] < 0.0:
-            self.mean[SPEED] = 0.0
-        self.mean[CURVATURE] = min(max(self.mean[CURVATURE], -MAX_CURVATURE_PM), MAX_CURVATURE_PM)
+        mean = self.mean
+        if not self.may_reverse and mean[SPEED] < 0.0:
+            mean[SPEED] = 0.0
+        if abs(mean[CURVATURE]) > MAX_CURVATURE_PM:
+            mean[CURVATURE] = math.copysign(MAX_CURVATURE_PM, mean[CURVATURE])
 
     def sensor_xy(self, lever_m: tuple[float, float]) -> Array:
         """Return where a sensor at `lever_m` (forward, left) of base_link is, shape (2,)."""
@@ -203,8 +205,10 @@ class KinematicFilter:
         """
         expected, rows = self._position_rows(lever_m, wander=wander)
         cross = self.covariance @ rows.T
-        spread = rows @ cross + std_m * std_m * np.eye(2)
-        gain = np.linalg.solve(spread, cross.T).T
+        (a, b), (_, d) = (rows @ cross).tolist()
+        a, d = a + std_m * std_m, d + std_m * std_m
+        inverse = np.array([[d, -b], [-b, a]]) / (a * d - b * b)
+        gain = cross @ inverse
         self.mean = self.mean + gain @ (xy_m - expected)
         covariance = self.covariance - gain @ cross.T
         self.covariance = 0.5 * (covariance + covariance.T)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -35,16 +36,13 @@ class LocalPlace(NamedTuple):
 
     def at(self, position: GeoPoint, *, antenna_up_m: float) -> LocalPlace:
         """Return the place with angle and height as at an antenna's `position`."""
-        convergence = grid_convergence(self.frame, position.lat_deg, position.lon_deg)
-        return LocalPlace(self.frame, float(convergence), position.alt_m - antenna_up_m)
+        *_, convergence_rad = _projected(self.frame, position.lat_deg, position.lon_deg)
+        return LocalPlace(self.frame, convergence_rad, position.alt_m - antenna_up_m)
 
     def xy_m(self, position: GeoPoint) -> Array:
         """Return the position in the frame, shape (2,)."""
-        # Beyond the frame's reach the projection says infinity: just somewhere far away.
-        return np.nan_to_num(
-            local_from_geo(self.frame, position.lat_deg, position.lon_deg),
-            nan=_FAR_M, posinf=_FAR_M, neginf=-_FAR_M,
-        )  # fmt: skip
+        x_m, y_m, _ = _projected(self.frame, position.lat_deg, position.lon_deg)
+        return np.array([x_m, y_m])
 
     def reaches(self, xy_m: Array) -> bool:
         """Whether the frame is still a good one at `xy_m` (2,)."""
@@ -54,3 +52,12 @@ class LocalPlace(NamedTuple):
         """Return where `xy_m` (2,) lies on Earth."""
         lat_deg, lon_deg = geo_from_local(self.frame, xy_m)
         return GeoPoint(float(lat_deg), float(lon_deg), self.altitude_m)
+
+
+@functools.lru_cache(maxsize=256)
+def _projected(frame: LocalFrame, lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
+    """Return x, y and the grid's convergence; samples out of order ask for the same once more."""
+    xy = local_from_geo(frame, lat_deg, lon_deg)
+    # Beyond the frame's reach the projection says infinity: just somewhere far away.
+    xy = np.nan_to_num(xy, nan=_FAR_M, posinf=_FAR_M, neginf=-_FAR_M)
+    return float(xy[0]), float(xy[1]), float(grid_convergence(frame, lat_deg, lon_deg))
