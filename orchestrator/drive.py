@@ -27,6 +27,7 @@ from orchestrator.progress import ProgressLine
 from orchestrator.results import ResultTables
 from orchestrator.run_record import reserve_record, run_record, write_record
 from orchestrator.start_worlds import prepare_start
+from orchestrator.summary import summary_text
 from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
 from orchestrator.versions import versions
 from orchestrator.way_ahead import WayAhead
@@ -128,6 +129,7 @@ class _Drive:
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
         self._start_processes()
+        conductor.rounds.draw_cases()  # while they come up
         if not self._join_processes(bus, conductor):
             return "interrupted", EXIT_INTERRUPTED
         prepare_start(self._plan, conductor, look_after=self._look_after, stop=self._stop)
@@ -276,25 +278,3 @@ def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
         source="live telemetry",
         reference_point="antenna",
     )
-
-
-def summary_text(record: dict[str, object]) -> str:
-    """Return what the engineer reads at the end of a drive."""
-    futures = record["futures"]
-    assert isinstance(futures, dict)
-    junctions = record["intersections"]
-    assert isinstance(junctions, list)
-    latency = record["state_to_result_ms_p95"]
-    lines = [
-        f"{record['exit']}: {len(junctions)} junctions, {futures['count']} futures in "
-        f"{futures['rounds']} rounds ({futures['missed_rounds']} missed)"
-        + ("" if latency is None else f", state to result p95 {latency:.0f} ms")
-    ]
-    lines += [
-        f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "
-        f"{junction['name'] or junction['id']}  world ready "
-        f"{junction['world_ready_before_s']:.1f} s before"
-        for junction in junctions
-    ]
-    attribution = record["map"]["attribution"]  # type: ignore[index]
-    return "\n".join([*lines, attribution])

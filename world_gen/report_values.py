@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import msgspec
 
-from contracts.provenance import Provenance
+from contracts.provenance import PROVENANCES, Provenance
 
 SOURCE_CONFIDENCE: Mapping[Provenance, float] = {"tagged": 1.0, "inferred": 0.7, "default": 0.3}
 """What a value is worth by where it came from: a convention to compare junctions by.
@@ -30,7 +29,6 @@ SUBJECT_WEIGHT: Mapping[str, float] = {
     "building heights": 1.0,
 }
 """How much a subject counts in a junction: most, what would hurt a driver if it were wrong."""
-_SOURCES: tuple[Provenance, ...] = ("tagged", "inferred", "default")
 
 
 class SubjectReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -48,8 +46,7 @@ class SubjectReport(msgspec.Struct, frozen=True, kw_only=True):
     """One sentence for each road and value that the map does not say outright."""
 
 
-@dataclass(frozen=True, slots=True)
-class Value:
+class Value(msgspec.Struct, frozen=True):
     """One value of a subject: of which road, what it is, where it came from."""
 
     of: str
@@ -72,7 +69,7 @@ def subject_report(subject: str, values: Iterable[Value]) -> SubjectReport:
         guessed=tuple(
             f"{of}: {words}, {source}" + (f" ({n} times)" if n > 1 else "")
             for (of, words, source), n in sorted(
-                alike.items(), key=lambda item: (_SOURCES.index(item[0][2]) * -1, *item[0][:2])
+                alike.items(), key=lambda item: (PROVENANCES.index(item[0][2]) * -1, *item[0][:2])
             )
         ),
     )

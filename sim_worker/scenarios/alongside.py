@@ -21,10 +21,10 @@ from sim_worker.scenarios.impact import (
 )
 from sim_worker.scenarios.roles import CastActor, Meeting, Staging
 from sim_worker.scenarios.ways import Way
-from world_gen.polyline import length
 
 _CLEAR_M, _LANE_HALF_M = 0.3, 1.5
 """What is parked leaves the lane free, and a car's side by so much."""
+_BAY_CLEAR_M = 0.3
 
 
 class Touched(NamedTuple):
@@ -110,18 +110,41 @@ def _played(actor: CastActor, staging: Staging) -> _OnPath:
     after = actor.acts_after_s if actor.conduct == "stops" else math.inf
     path = staging.place.ego.path
     moving = Moving(path, actor.speed_mps, actor.lateral_m, after, actor.decel_mps2)
-    # Its path may have been led back: on the ego's it starts by so much earlier.
-    start = actor.start_arc_m - (length(actor.xy_m) - length(staging.place.ego.xy_m))
     touch = first_touch(
         staging.ego, staging.box, moving, actor.traits, ego_arc_m=np.array([staging.start_m]),
-        actor_arc_m=np.array([start]), until_s=staging.scenario.horizon_s,
+        actor_arc_m=np.array([actor.start_on(staging.place.ego)]),
+        until_s=staging.scenario.horizon_s,
     )  # fmt: skip
     return _OnPath(moving, touch)
 
 
 def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
-    """Return whether the ego touches somebody beside its path, with whatever side."""
-    return bool(np.isfinite(_played(actor, staging).touch.time_s[0]))
+    """Return whether the ego touches somebody beside its path, with whatever side.
+
+    One that backs into a bay goes no farther than its way, and needs room for being off it.
+    """
+    if not staging.place.reverse:
+        return bool(np.isfinite(_played(actor, staging).touch.time_s[0]))
+    way, traits = staging.place.way_named(actor.way), actor.traits
+    wider = traits._replace(
+        length_m=traits.length_m + 2 * _BAY_CLEAR_M, width_m=traits.width_m + 2 * _BAY_CLEAR_M
+    )
+    touch = first_touch(
+        staging.ego, staging.box, Moving(way.path, 0.0, actor.lateral_m), wider,
+        ego_arc_m=np.array([staging.start_m]), actor_arc_m=np.array([actor.start_on(way)]),
+        until_s=(staging.place.ego.path.length_m - staging.start_m) / staging.ego.speed_mps,
+    )  # fmt: skip
+    return bool(np.isfinite(touch.time_s[0]))
+
+
+def stands_in_a_house(actor: CastActor, staging: Staging) -> bool:
+    """Return whether somebody parked would stand in a building."""
+    walls, way = staging.place.walls, staging.place.way_named(actor.way)
+    arc, half = actor.start_on(way), actor.traits.length_m / 2.0
+    return walls is not None and walls.block(
+        way.path, from_m=arc - half, to_m=arc + half, width_m=actor.traits.width_m,
+        left_m=actor.lateral_m,
+    )  # fmt: skip
 
 
 def run_into(actor: CastActor, staging: Staging) -> Touched | None:
