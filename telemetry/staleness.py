@@ -10,6 +10,10 @@ WATCHED = ("gnss", "imu", "speed", "heading", "steering", "control", "plan")
 """Channels that come at a steady rate."""
 OVERDUE_NS = 150_000_000
 """A channel is overdue at the latest this long after its next sample should have come."""
+_PATIENCE_NS = 100_000_000
+"""And not sooner than this: senders and receivers that share a busy machine pause for as long."""
+_USUAL_NS = 300_000_000
+"""So late may all samples of a channel be and count as fresh; no receiver needs longer."""
 _REMEMBERED = 64
 _LEAST_SAMPLES = 5
 _RELEARN = 16
@@ -48,11 +52,12 @@ class _Channel:
         # Losses make steps longer, never shorter: the period is among the shorter ones.
         period_ns = steps[len(steps) // 4]
         lost = 1.0 - len(steps) / max(1.0, (stamps[-1] - stamps[0]) / period_ns)
-        in_a_row = math.log(_RARE) / math.log(min(lost, 0.9)) if lost > 0.02 else 1.5
+        in_a_row = math.log(_RARE) / math.log(min(lost, 0.9)) if lost > 0.02 else 1.0
         usual_ns, latest_ns = min(self._late_ns), max(self._late_ns)
         slack_ns = round((in_a_row - 1.0) * period_ns) + latest_ns - usual_ns + _MARGIN_NS
         self.period_ns = period_ns
-        self._patience_ns = usual_ns + period_ns + min(slack_ns, OVERDUE_NS)
+        slack_ns = min(max(slack_ns, _PATIENCE_NS), OVERDUE_NS)
+        self._patience_ns = min(usual_ns, _USUAL_NS) + period_ns + slack_ns
 
     def overdue(self, now_ns: int) -> bool:
         if self.period_ns is None or self.period_ns > _LONGEST_PERIOD_NS:
