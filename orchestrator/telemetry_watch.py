@@ -26,17 +26,20 @@ class TelemetryWatch:
         self._wrong: set[str] = set()
 
     def overdue(self, channels: tuple[str, ...], now_ns: int) -> list[str]:
-        """Take which channels are overdue now; return a warning for each that is so newly."""
-        warnings = []
+        """Take which channels are overdue now; return a warning of those that are so newly."""
+        newly = []
         for channel in channels:
             if channel not in self._silent:
                 self.stale[channel] += 1
             before_ns = self._overdue_until_ns.get(channel)
             self._overdue_until_ns[channel] = now_ns
             if before_ns is None or now_ns - before_ns > REARM_NS:
-                warnings.append(f"telemetry: {channel} is overdue; states go on without it")
+                newly.append(channel)
         self._silent = channels
-        return warnings
+        if not newly:
+            return []
+        verb = "is" if len(newly) == 1 else "are"
+        return [f"telemetry: {', '.join(newly)} {verb} overdue; states go on without"]
 
     def estimator(self, estimator: StateEstimator) -> list[str]:
         """Return a warning for each new step of the clock and each channel of a wrong type."""
