@@ -178,6 +178,8 @@ class VehicleState(msgspec.Struct, frozen=True, kw_only=True):
     yaw_std_rad: float | None = None
     speed_std_mps: float | None = None
     estimated: tuple[str, ...] = ()
+    stale: tuple[str, ...] = ()
+    """Channels that the vehicle sends and that are overdue at this instant."""
     yaw_valid: bool = True
     """False until the vehicle has moved far enough for a heading to be known."""
 

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts import drive, futures, planner_link, simulation
+from contracts import drive, futures, gap, planner_link, simulation, tuning
 
 PREFIX = "foretwin/v1"
 
@@ -87,6 +87,10 @@ CHANNELS: dict[str, Channel] = {
              REQUEST, "load a World", simulation.PrepareReply),
         _row("use_world", f"{_RUN}/worker/{{process}}/use_world", simulation.ActiveWorld, None,
              REQUEST, "the mirror's World", simulation.ActiveWorld),
+        _row("use_vehicle", f"{_RUN}/worker/{{process}}/use_vehicle", tuning.UseVehicle, None,
+             REQUEST, "parameters from now on", tuning.UseVehicle),
+        _row("set", f"{_RUN}/set", tuning.SetRequest, None, REQUEST, "change a running drive",
+             tuning.SetReply),
         _row("build", f"{_RUN}/builder/{{process}}/build", simulation.BuildRequest, None, REQUEST,
              "build a World", simulation.BuildReply),
         # What those who watch receive.
@@ -97,6 +101,13 @@ CHANNELS: dict[str, Channel] = {
              "the car's plan against ours"),
         _row("mirror", f"{_RUN}/mirror", simulation.MirrorSample, 10, RESULT,
              "twin, shadow, ghost and their gap"),
+        _row("gap", f"{_RUN}/gap", gap.GapSample, 4, RESULT, "model against reality"),
+        _row("gap_alarm", f"{_RUN}/gap_alarm", gap.GapAlarm, None, RESULT, "a gap beyond limits"),
+        _row("verdict", f"{_RUN}/verdict", gap.Verdict, None, RESULT, "which of the two is wrong"),
+        _row("identification", f"{_RUN}/identification", tuning.Identification, 0.2, RESULT,
+             "what the driving says of the vehicle"),
+        _row("parameter", f"{_RUN}/parameter", tuning.ParameterChange, None, RESULT,
+             "a parameter that counts from now on"),
         _row("active_world", f"{_RUN}/active_world", simulation.ActiveWorld, None, RESULT,
              "which World counts"),
         _row("world", f"{_RUN}/world", simulation.WorldNotice, None, RESULT, "a World is ready"),
