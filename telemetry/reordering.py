@@ -77,7 +77,7 @@ class Reordering:
         sample = Sample(stamp_ns, rank, self._number, channel, message)
         place = bisect.bisect(self._samples, sample[:3], key=_place)
         self._samples.insert(place, sample)
-        if place < self._taken:
+        if place < self._taken or stamp_ns <= self._checkpoints[-1].stamp_ns:
             self._go_back(place)
         if self.newest is None or sample[:3] > self.newest[:3]:
             self.newest = sample

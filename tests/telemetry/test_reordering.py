@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from contracts.drive import GnssFix, SpeedSample
@@ -31,6 +31,8 @@ def in_order() -> MotionTrack:
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000), st.booleans())
+@example(84, True)
+@example(512, True)
 def test_the_order_of_arrival_does_not_matter(seed: int, doubled: bool) -> None:
     random = np.random.default_rng(seed)
     given_samples = samples() * (2 if doubled else 1)
