@@ -26,7 +26,7 @@ format: setup
 	$(BIN)/ruff check --fix .
 
 test: setup
-	$(BIN)/pytest
+	$(BIN)/pytest -n logical --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks

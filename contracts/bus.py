@@ -36,6 +36,10 @@ __all__ = [
 ]
 
 
+CONNECT_S = 5.0
+"""How long a client looks for its router."""
+
+
 class BusUnreachable(ConnectionError):  # noqa: N818
     """No router answers at the endpoint."""
 
@@ -116,7 +120,7 @@ def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
     }  # fmt: skip
     if not router:
         settings["connect/endpoints"] = [setup.endpoint]
-        settings["connect/timeout_ms"] = 5000
+        settings["connect/timeout_ms"] = round(1e3 * CONNECT_S)
         settings["connect/retry"] = {
             "period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2,
         }  # fmt: skip

@@ -7,6 +7,7 @@ by up to 0.4 m per kilometre.
 
 from __future__ import annotations
 
+import math
 import threading
 from functools import lru_cache
 from typing import NamedTuple
@@ -51,6 +52,8 @@ class LocalPoses(NamedTuple):
 
 def wrap_angle(angle_rad: Array | float) -> Array:
     """Return angles in radians, any shape, wrapped into [-π, π]."""
+    if isinstance(angle_rad, float):
+        return np.asarray((angle_rad + math.pi) % math.tau - math.pi)
     return (np.asarray(angle_rad, dtype=np.float64) + np.pi) % (2.0 * np.pi) - np.pi
 
 
@@ -81,6 +84,9 @@ def _projection_of(frame: LocalFrame) -> pyproj.Proj:
 
 def local_from_geo(frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | float) -> Array:
     """Project positions in degrees, shape (N,) or scalar, to (N, 2) or (2,) metres in `frame`."""
+    if isinstance(lat_deg, float) and isinstance(lon_deg, float):
+        # One position is asked for at every sample: as an array it would cost five times as much.
+        return np.array(_projection_of(frame)(lon_deg, lat_deg))
     x_m, y_m = _projection_of(frame)(
         np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64)
     )
@@ -90,6 +96,9 @@ def local_from_geo(frame: LocalFrame, lat_deg: Array | float, lon_deg: Array | f
 def geo_from_local(frame: LocalFrame, xy_m: Array) -> Array:
     """Return (N, 2) or (2,) latitude, longitude in degrees of metres in `frame`."""
     xy = np.asarray(xy_m, dtype=np.float64)
+    if xy.shape == (2,):
+        lon, lat = _projection_of(frame)(float(xy[0]), float(xy[1]), inverse=True)
+        return np.array([lat, lon])
     lon_deg, lat_deg = _projection_of(frame)(xy[..., 0], xy[..., 1], inverse=True)
     return np.stack([np.asarray(lat_deg), np.asarray(lon_deg)], axis=-1)
 
@@ -110,6 +119,13 @@ def grid_convergence(frame: LocalFrame, lat_deg: Array | float, lon_deg: Array |
     (Snyder, 1987, Map Projections, chapter 8). Within 100 km the ellipsoid changes it by less
     than 1e-6 rad.
     """
+    if (
+        isinstance(lat_deg, float)
+        and isinstance(lon_deg, float)
+        and math.isfinite(lat_deg + lon_deg)
+    ):
+        east = math.tan(math.radians(lon_deg - frame.origin.lon_deg))
+        return np.asarray(math.atan(east * math.sin(math.radians(lat_deg))))
     dlon = np.radians(np.asarray(lon_deg, dtype=np.float64) - frame.origin.lon_deg)
     lat = np.radians(np.asarray(lat_deg, dtype=np.float64))
     return np.asarray(np.arctan(np.tan(dlon) * np.sin(lat)))
@@ -122,7 +138,10 @@ def local_from_geo_yaw(
     lon_deg: Array | float,
 ) -> Array:
     """Turn yaws from true east at their own position into yaws from the x axis of `frame`."""
-    return wrap_angle(np.asarray(yaw_rad) + grid_convergence(frame, lat_deg, lon_deg))
+    convergence_rad = grid_convergence(frame, lat_deg, lon_deg)
+    if isinstance(yaw_rad, float) and convergence_rad.ndim == 0:
+        return wrap_angle(yaw_rad + float(convergence_rad))
+    return wrap_angle(np.asarray(yaw_rad) + convergence_rad)
 
 
 def geo_from_local_yaw(frame: LocalFrame, yaw_rad: Array | float, xy_m: Array) -> Array:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import msgspec
 
 Provenance = Literal["tagged", "inferred", "default"]
 """Said by the map, following from what it says, or neither."""
+PROVENANCES: tuple[Provenance, ...] = get_args(Provenance)
+"""From the best known to the least."""
 
 
 class Quantity(msgspec.Struct, frozen=True):

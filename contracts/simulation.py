@@ -176,6 +176,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     arrival_in_s: float | None
     futures_per_s: float
     dropped: int
+    too_slow: str = ""
+    """What is run of what was asked for where the machine is too slow for all; empty where not."""
 
 
 class RunEnd(msgspec.Struct, frozen=True, kw_only=True):

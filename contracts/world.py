@@ -173,12 +173,22 @@ class Conflict(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StopLine(msgspec.Struct, frozen=True, kw_only=True):
-    """Where vehicles of a lane stop; `ends` (2, 2) from left to right."""
+    """Where vehicles stop; `ends` (2, 2) from left to right.
+
+    It lies across the lane `lane_id`, or, where `connection_id` is given, at a sign inside the
+    junction: across that connection, which begins at the lane.
+    """
 
     id: str
     lane_id: str
     ends: Array
     control: Choice
+    connection_id: str | None = None
+
+    @property
+    def across_id(self) -> str:
+        """The lane or connection that it lies across."""
+        return self.connection_id or self.lane_id
 
 
 class Crossing(msgspec.Struct, frozen=True, kw_only=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -65,6 +65,8 @@ class FuturesCount:
     sim_seconds: float = 0.0
     cpu_seconds: float = 0.0
     latencies_ms: list[float] = field(default_factory=list)
+    rounds_of: Counter[int] = field(default_factory=Counter)
+    """Complete rounds by the number of their futures."""
     _hash: Any = field(default_factory=hashlib.sha256)
 
     def take(self, done: RoundDone, *, distinct: int) -> str:
@@ -74,10 +76,12 @@ class FuturesCount:
         for result in done.results:
             own.update(np.ascontiguousarray(result.trajectory.states).tobytes())
             own.update(np.ascontiguousarray(result.outcome.collided).tobytes())
-            self.count += len(result.variant_indices)
             self.sim_seconds += result.sim_seconds
             self.cpu_seconds += result.cpu_seconds
         self._hash.update(own.digest())
+        futures = sum(len(result.variant_indices) for result in done.results)
+        self.count += futures
+        self.rounds_of[futures] += 1
         self.rounds += 1
         self.distinct += distinct
         self.distinct_min = (
@@ -86,16 +90,22 @@ class FuturesCount:
         self.latencies_ms.append(done.latency_ms)
         return own.hexdigest()
 
-    def record(self, *, missed: int, unseeded: int) -> dict[str, Any]:
+    def record(self, *, wanted: int, missed: int, spared: int, unseeded: int) -> dict[str, Any]:
         """Return the `futures` part of run.json; `rounds` counts the complete ones.
 
-        `missed_rounds` were due and late, `unseeded_rounds` had nothing to start from.
+        `missed_rounds` were due and late, `unseeded_rounds` had nothing to start from. Since the
+        machine was too slow, `smaller_rounds` had fewer futures than `wanted` and `spared_rounds`
+        were not run.
         """
         return {
             "count": self.count,
+            "wanted_per_round": wanted,
+            "smaller_rounds": sum(n for size, n in self.rounds_of.items() if size < wanted),
+            "rounds_by_futures": {str(size): n for size, n in sorted(self.rounds_of.items())},
             "distinct": self.distinct,
             "distinct_min_per_round": self.distinct_min,
             "missed_rounds": missed,
+            "spared_rounds": spared,
             "unseeded_rounds": unseeded,
             "rounds": self.rounds,
             "sim_seconds": round(self.sim_seconds, 3),

@@ -50,6 +50,13 @@ def drive(
     ] = None,
     workers: Annotated[int | None, typer.Option(help="worker processes [default: 2]")] = None,
     futures: Annotated[int | None, typer.Option(help="futures per round [default: 64]")] = None,
+    least_futures: Annotated[
+        int | None,
+        typer.Option(
+            help="futures per round where the machine is too slow for all; "
+            "as many as --futures holds them fixed [default: a quarter]"
+        ),
+    ] = None,
     rate: Annotated[float | None, typer.Option(help="rounds per wall second [default: 2]")] = None,
     horizon: Annotated[float | None, typer.Option(help="seconds ahead [default: 8]")] = None,
     planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
@@ -68,9 +75,9 @@ def drive(
         config,
         {
             "map": map_file, "route": route, "log": log, "source": source, "start_s": start,
-            "end_s": end, "speed": speed, "workers": workers, "futures": futures, "rate_hz": rate,
-            "horizon_s": horizon, "planner": planner, "seed": seed, "vehicle": vehicle,
-            "view": view, "out": out,
+            "end_s": end, "speed": speed, "workers": workers, "futures": futures,
+            "least_futures": least_futures, "rate_hz": rate, "horizon_s": horizon,
+            "planner": planner, "seed": seed, "vehicle": vehicle, "view": view, "out": out,
         },
     )  # fmt: skip
     raise typer.Exit(run_drive(settings))

@@ -50,7 +50,7 @@ class Conductor:
             self.mailbox,
             on_ready=self._world_ready,
             on_failed=self._world_failed,
-            on_warning=lambda text: self.tell(Tell("warning", text)),
+            tell=self.tell,
         )
         self.rounds = RoundRunner(
             plan,
@@ -59,10 +59,12 @@ class Conductor:
             tables,
             world_of=self.worlds.world,
             on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
-            on_error=lambda text: self.tell(Tell("error", text)),
+            tell=self.tell,
         )
         self.alive: set[str] = set()
         self.missed_rounds = 0
+        self.spared_rounds = 0
+        """Rounds that were not due since the machine is too slow for them."""
         self.unseeded_rounds = 0
         """Rounds that no machine could have run: no heading known yet, or no road ahead."""
         self.mirror_asked = 0
@@ -143,6 +145,7 @@ class Conductor:
 
     def start_round(self) -> bool:
         """Start a round where the mission wants one; returns whether it did."""
+        started_mono_ns = time.monotonic_ns()
         intent = self.mission.plan_round()
         latest = self.intake.latest
         if intent is None or latest is None:
@@ -153,7 +156,7 @@ class Conductor:
             else:
                 self.unseeded_rounds += 1
             return False
-        self.rounds.start(intent, latest, self.intake.surroundings)
+        self.rounds.start(intent, latest, self.intake.surroundings, started_mono_ns=started_mono_ns)
         return True
 
     def finish(self) -> None:

@@ -39,6 +39,9 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     speed: float | None = 1.0
     workers: int = 2
     futures: int = 64
+    least_futures: int | None = None
+    """A live round may run so few where the machine is too slow for all; None is a quarter of them,
+    as many as `futures` holds every round at all."""
     futures_per_job: int = 32
     rate_hz: float = 2.0
     horizon_s: float = 8.0
@@ -65,6 +68,10 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         checks: tuple[tuple[bool, str], ...] = (
             (self.workers >= 1, f"--workers {self.workers}: at least 1"),
             (self.futures >= 1, f"--futures {self.futures}: at least 1"),
+            (
+                self.least_futures is None or 1 <= self.least_futures <= self.futures,
+                f"--least-futures {self.least_futures}: 1 to --futures, which is {self.futures}",
+            ),
             (self.futures_per_job >= 1, f"futures_per_job {self.futures_per_job}: at least 1"),
             (0.0 < self.rate_hz <= 50.0, f"--rate {self.rate_hz}: above 0, at most 50"),
             (1.0 <= self.horizon_s <= 60.0, f"--horizon {self.horizon_s}: 1 to 60 seconds"),
@@ -107,6 +114,13 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     def lock_step(self) -> bool:
         """Whether no clock runs: every round complete, results a pure function of the input."""
         return self.speed is None
+
+    @property
+    def fewest_futures(self) -> int:
+        """How few futures a round may run; in lock step, where nothing is late, all."""
+        if self.lock_step:
+            return self.futures
+        return max(1, self.futures // 4) if self.least_futures is None else self.least_futures
 
     @property
     def resolved_source(self) -> Literal["log", "standin", "live"]:

@@ -8,6 +8,7 @@ import logging
 import signal
 import time
 from types import FrameType
+from typing import Any
 
 from contracts.bus import Mailbox, Reply, ZenohBus
 from contracts.drive import InfoRequest, VehicleInfo
@@ -39,6 +40,9 @@ END_GRACE_S = 10.0
 INTERRUPT_GRACE_S = 1.2
 HUNG_AFTER_S = 1.0
 """A process whose token is gone for so long while it runs (a stopped one, say) is killed."""
+
+BEGINNING_S = 0.5
+"""Where a junction is near so soon, the drive began near it."""
 
 EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -128,6 +132,7 @@ class _Drive:
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
         self._start_processes()
+        conductor.rounds.draw_cases()  # while they come up
         if not self._join_processes(bus, conductor):
             return "interrupted", EXIT_INTERRUPTED
         prepare_start(self._plan, conductor, look_after=self._look_after, stop=self._stop)
@@ -278,6 +283,16 @@ def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
     )
 
 
+def _readiness(junction: dict[str, Any]) -> str:
+    """Say how long before the car came near a World was ready; a drive may begin near one."""
+    before_s = junction["world_ready_before_s"]
+    if before_s < 0.0:
+        return f"world {-before_s:.1f} s late"
+    if junction["within_radius_at_s"] < BEGINNING_S:
+        return "world ready before the drive began"
+    return f"world ready {before_s:.1f} s before the car came near"
+
+
 def summary_text(record: dict[str, object]) -> str:
     """Return what the engineer reads at the end of a drive."""
     futures = record["futures"]
@@ -290,10 +305,15 @@ def summary_text(record: dict[str, object]) -> str:
         f"{futures['rounds']} rounds ({futures['missed_rounds']} missed)"
         + ("" if latency is None else f", state to result p95 {latency:.0f} ms")
     ]
+    if futures["smaller_rounds"] or futures["spared_rounds"]:
+        sizes = ", ".join(f"{n} of {size}" for size, n in futures["rounds_by_futures"].items())
+        lines.append(
+            f"  machine too slow for {futures['wanted_per_round']} futures in every round: "
+            f"{sizes} futures, {futures['spared_rounds']} rounds spared"
+        )
     lines += [
         f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "
-        f"{junction['name'] or junction['id']}  world ready "
-        f"{junction['world_ready_before_s']:.1f} s before"
+        f"{junction['name'] or junction['id']}  {_readiness(junction)}"
         for junction in junctions
     ]
     attribution = record["map"]["attribution"]  # type: ignore[index]

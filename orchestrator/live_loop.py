@@ -22,8 +22,8 @@ class LiveLoop:
     A round falls due `rate_hz` times a wall second. It starts with the first state received from
     then on, so that a slow GNSS does not make results older than need be, and at the latest half
     a period later. A round that is not complete when the next one should start has missed its
-    deadline: it counts as missed, is let finish, and the next one is left out. So a machine that
-    is too slow gives fewer results, not none.
+    deadline: it counts as missed, is let finish, and the next one is left out. `round_pace`
+    then makes the rounds after it smaller or rarer, so that a slow machine gives less, not late.
     """
 
     def __init__(
@@ -60,10 +60,12 @@ class LiveLoop:
             fresh = conductor.intake.states > seen
             if now_s >= next_due_s and (fresh or now_s >= next_due_s + 0.5 * self._period_s):
                 # A machine that was asleep does not catch up on rounds; the grid stays.
-                left_out = int((now_s - next_due_s) / self._period_s)
-                next_due_s += (left_out + 1) * self._period_s
+                one_of = conductor.rounds.pace.now.one_of
+                left_out = int((now_s - next_due_s) / (one_of * self._period_s))
+                next_due_s += (left_out + 1) * one_of * self._period_s
                 if self._start_round(now_s):
                     conductor.missed_rounds += left_out
+                    conductor.spared_rounds += one_of - 1
             if conductor.intake.end is not None and not self._telemetry_waits():
                 self._let_finish()
                 return True
@@ -80,7 +82,7 @@ class LiveLoop:
         if conductor.rounds.desk.open_rounds:
             conductor.missed_rounds += 1
             if now_s - self._started_s > GIVE_UP_ROUND_S:
-                conductor.rounds.desk.drop()
+                conductor.rounds.drop()
             return True
         if not conductor.start_round():
             return False

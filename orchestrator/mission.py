@@ -214,7 +214,7 @@ class Mission:
         ]
         for ahead in self._way.junctions:
             if ahead.distance_m <= self._settings.radius_m:
-                self._visits.enter(ahead.junction.summary.id, mono_s=mono_s)
+                self._visits.enter(ahead.junction.summary.id, mono_s=mono_s, drive_time_s=at_s)
         return told
 
     def _choose_current(self) -> list[Instruction]:

@@ -85,6 +85,7 @@ class ProgressLine:
             arrival_in_s=ahead[1] if ahead else None,
             futures_per_s=rate,
             dropped=conductor.mailbox.dropped + conductor.tables.dropped,
+            too_slow=conductor.rounds.short_of,
         )
 
     def _workers(self, stamp_ns: int) -> list[WorkerStatus]:
@@ -112,8 +113,9 @@ class ProgressLine:
         ahead = "no junction ahead"
         if progress.next_intersection is not None:
             ahead = f"{progress.next_intersection} in {progress.arrival_in_s:.0f} s"
+        short = f"{progress.too_slow} (machine too slow for all)  " if progress.too_slow else ""
         return (
-            f"{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}  "
+            f"{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}  {short}"
             f"{progress.futures_per_s:.0f} futures/s  "
             f"workers {len(conductor.rounds.desk.workers)}/{conductor.plan.config.workers}  "
             f"missed {conductor.missed_rounds}  "

@@ -34,7 +34,10 @@ class FutureRows(NamedTuple):
 
 
 def future_rows(done: RoundDone, variants: Sequence[Variant]) -> FutureRows:
-    """Return the futures of a round as rows, each with its difference from the nominal one."""
+    """Return the futures of a round as rows, each with its difference from the nominal one.
+
+    `variants` are those of the round, in the order of its jobs.
+    """
     futures = RoundFutures(
         np.concatenate([r.trajectory.states for r in done.results]).astype(np.float64),
         np.concatenate([r.outcome.collided for r in done.results]).astype(bool),
@@ -50,7 +53,7 @@ def future_rows(done: RoundDone, variants: Sequence[Variant]) -> FutureRows:
     for result in done.results:
         outcome = result.outcome
         for place, variant_index in enumerate(result.variant_indices):
-            variant = variants[variant_index]
+            variant = variants[number]
             end = futures.states[number, -1]
             rows.append(
                 {

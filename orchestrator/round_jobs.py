@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from contracts.drive import PlannedTrajectory, RoadUsers, SignalState, VehicleState
+from contracts.drive import PlannedTrajectory, SignalState, VehicleState
 from contracts.errors import UserError
 from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.futures import CarPlan, FuturesJob, PathAhead, SeenRoadUser, Variant
+from contracts.futures import CarPlan, FuturesJob, PathAhead, Variant
 from contracts.scenario import Scenario
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from orchestrator.config import DriveConfig
+from orchestrator.fewer_futures import some_of
 from orchestrator.instructions import RoundIntent
 from orchestrator.intake import Surroundings
+from orchestrator.seen_users import near_car
 from orchestrator.way_ahead import PATH_BEHIND_M
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.live import LiveScenarios
@@ -28,9 +32,9 @@ STEP_S = 0.1
 HEEDLESS_PLANNER = "constant_speed"
 PLAN_FRESH_NS = 1_000_000_000
 """An older plan of the car is not compared with a new future, nor followed in one."""
-_SEEN_FRESH_NS = 500_000_000
-_SEEN_WITHIN_M = 120.0
 _KEPT_WORLDS = 8
+LEAST_IN_JOB = 16
+"""A job costs about as much as 30 of its futures before the first one: smaller ones save little."""
 
 
 class RoundPlan(NamedTuple):
@@ -68,10 +72,13 @@ class RoundPlanner:
     def __init__(self, config: DriveConfig, vehicle: VehicleParameters) -> None:
         self._config, self._vehicle = config, vehicle
         self._scenarios = scenarios_of(config)
-        for scenario in self._scenarios:
-            cases_of(scenario, config.seed)  # before the drive, not in its first round
         self._known: dict[str, LiveScenarios] = {}
         self._variants: dict[tuple[str, ...], tuple[Variant, ...]] = {}
+
+    def draw_cases(self) -> None:
+        """Draw the cases of all scenarios: before the drive, not in its first round."""
+        for scenario in self._scenarios:
+            cases_of(scenario, self._config.seed)
 
     def plan(
         self,
@@ -82,18 +89,17 @@ class RoundPlanner:
         world: World,
         *,
         start_stamp_ns: int,
+        count: int,
     ) -> RoundPlan:
-        """Return the futures of a round and its jobs."""
+        """Return a round's `count` futures and its jobs."""
         config = self._config
         scenarios = self._fitting(world, intent.path)
-        variants = self._variants_with(scenarios)
-        users = _road_users(said.road_users, state, world.frame)
+        variants = some_of(self._variants_with(scenarios), count, turn=round_id)
+        users = tuple(near_car(said.road_users, state, world.frame).values())
         signals = _signals(said.signals, state)
         car_plan = _car_plan(said.plan, state, world.frame)
-        size = config.futures_per_job
         jobs = []
-        for index, first in enumerate(range(0, config.futures, size)):
-            mine = variants[first : first + size]
+        for index, mine in enumerate(self._cut(variants)):
             named = {variant.scenario_id for variant in mine}
             jobs.append(
                 FuturesJob(
@@ -115,6 +121,14 @@ class RoundPlanner:
                 )
             )
         return RoundPlan(variants, tuple(jobs))
+
+    def _cut(self, variants: tuple[Variant, ...]) -> list[tuple[Variant, ...]]:
+        """Return the futures of each job: as many jobs as for all, unless that makes them small."""
+        size, count = self._config.futures_per_job, len(variants)
+        for_all = math.ceil(self._config.futures / size)
+        jobs = max(math.ceil(count / size), min(for_all, count // LEAST_IN_JOB))
+        cuts = [count * job // jobs for job in range(jobs + 1)]
+        return [variants[low:high] for low, high in pairwise(cuts)]
 
     def _variants_with(self, scenarios: tuple[Scenario, ...]) -> tuple[Variant, ...]:
         key = tuple(scenario.id for scenario in scenarios)
@@ -142,33 +156,6 @@ class RoundPlanner:
         if passage is None:
             return ()
         return tuple(s for s in self._scenarios if known.places(s, passage))
-
-
-def _road_users(
-    users: RoadUsers | None, state: VehicleState, frame: LocalFrame
-) -> tuple[SeenRoadUser, ...]:
-    """Return the road users seen at about the state's time, in the World's frame."""
-    if users is None or abs(state.stamp_ns - users.stamp_ns) > _SEEN_FRESH_NS:
-        return ()
-    here = local_from_geo(frame, state.position.lat_deg, state.position.lon_deg)
-    seen = []
-    for user in users.users:
-        lat, lon = user.position.lat_deg, user.position.lon_deg
-        xy = local_from_geo(frame, lat, lon)
-        if float(np.hypot(*(xy - here))) > _SEEN_WITHIN_M:
-            continue
-        seen.append(
-            SeenRoadUser(
-                kind=user.kind,
-                x_m=float(xy[0]),
-                y_m=float(xy[1]),
-                yaw_rad=float(local_from_geo_yaw(frame, user.yaw_rad, lat, lon)),
-                speed_mps=user.speed_mps,
-                length_m=user.length_m,
-                width_m=user.width_m,
-            )
-        )
-    return tuple(seen)
 
 
 def _signals(states: tuple[SignalState, ...], state: VehicleState) -> tuple[SignalState, ...]:

@@ -88,8 +88,9 @@ def _met(
     number = 0
     for result in done.results:
         poses, states = result.road_users.poses, result.trajectory.states
-        for place, variant_index in enumerate(result.variant_indices):
+        for place in range(len(result.variant_indices)):
             shown = number in worst and criticality[number] >= _SHOWN_FROM
+            variant = variants[number]
             number += 1
             there = np.flatnonzero(np.isfinite(poses[place, 0, :, 0]))
             if not len(there):
@@ -102,6 +103,6 @@ def _met(
                 time_s = float(result.outcome.collision_time_s[place])
                 instant = int(np.searchsorted(result.trajectory.time_s, time_s))
                 touches.append(poses[place, min(instant, poses.shape[1] - 1), nearest, :2])
-                names.append(variants[variant_index].scenario_id)
+                names.append(variant.scenario_id)
     found = np.array(tracks, dtype=np.float64).reshape(-1, len(kept), 2)
     return _Met(found, np.array(touches, dtype=np.float64).reshape(-1, 2), tuple(names))

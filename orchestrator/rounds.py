@@ -31,16 +31,21 @@ class RoundOrder:
     junction_id: str
     world_id: str
     receipt_mono_ns: int
+    started_mono_ns: int
     jobs: tuple[FuturesJob, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoundDone:
-    """A complete round: results in the order of its jobs, and how long it took."""
+    """A complete round: results in the order of its jobs, and how long it took.
+
+    `latency_ms` from the receipt of the state to the last result, `seconds` from the round's start.
+    """
 
     order: RoundOrder
     results: tuple[FuturesResult, ...]
     latency_ms: float
+    seconds: float
 
 
 @dataclass(slots=True)
@@ -152,6 +157,7 @@ class RoundDesk:
             order=round_.order,
             results=tuple(round_.results[j.job_index] for j in round_.order.jobs),
             latency_ms=(received_mono_ns - round_.order.receipt_mono_ns) / 1e6,
+            seconds=(received_mono_ns - round_.order.started_mono_ns) / 1e9,
         )
 
     def _holds(self, round_: _Open, job: FuturesJob) -> bool:

@@ -49,7 +49,10 @@ def run_record(
         "intersections": mission.records(mono_s=mono_s),
         "telemetry": conductor.intake.counts.record(conductor.intake.skipped_invalid),
         "futures": futures.record(
-            missed=conductor.missed_rounds, unseeded=conductor.unseeded_rounds
+            wanted=plan.config.futures,
+            missed=conductor.missed_rounds,
+            spared=conductor.spared_rounds,
+            unseeded=conductor.unseeded_rounds,
         ),
         "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
         "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),

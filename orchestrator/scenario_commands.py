@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import collections
-import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +20,7 @@ from orchestrator.map_choice import (
     parse_place,
 )
 from orchestrator.map_opening import Clip, NodeClip, OpenMap, open_map
+from orchestrator.progress_bar import progress_bar
 from sim_worker.scenarios.drawing import draw_cases
 from sim_worker.scenarios.placement import places
 from sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
@@ -95,7 +95,8 @@ def place_scenarios(request: PlaceRequest, *, as_json: bool) -> int:
     """
     chosen = [find_scenario(name) for name in request.scenarios] or list(catalogue().values())
     opened, junctions = asked_junctions(request)
-    found = placed_on(opened, junctions, chosen, show_progress=not as_json)
+    with progress_bar(len(junctions), "junctions") as (advance, _):
+        found = placed_on(opened, junctions, chosen, advance=advance)
     if as_json:
         _print_json(found)
     else:
@@ -127,13 +128,16 @@ def placed_on(
     junctions: Sequence[Junction],
     scenarios: Sequence[Scenario],
     *,
-    show_progress: bool = False,
+    advance: Callable[[str], None] = lambda _: None,
 ) -> list[PlacedScenario]:
-    """Return where scenarios take place on junctions of a map: one place for each is enough."""
+    """Return where scenarios take place on junctions of a map: one place for each is enough.
+
+    `advance` is told each junction that has been looked at.
+    """
     found = [PlacedScenario(id=s.id, title=s.title, source=s.source) for s in scenarios]
     index = index_map(opened.osm, opened.graph, opened.junctions)
     vehicle = load_vehicle()
-    for junction in _with_progress(junctions) if show_progress else junctions:
+    for junction in junctions:
         world = build_world(
             opened.osm, opened.graph, junction, radius_m=RADIUS_M, index=index, ground=False
         )
@@ -150,18 +154,10 @@ def placed_on(
                 else:
                     count = row.does_not_apply.get(unplaced.reason, 0)
                     row.does_not_apply[unplaced.reason] = count + 1
+        advance(junction.summary.id)
     for row in found:
         row.applies = row.placed + len(row.unplaced)
     return found
-
-
-def _with_progress(junctions: Sequence[Junction]) -> Iterable[Junction]:
-    if len(junctions) < 10 or not sys.stderr.isatty():
-        return junctions
-    from rich.console import Console
-    from rich.progress import track
-
-    return track(junctions, "junctions", console=Console(stderr=True))
 
 
 def _print_table(map_file: Path, found: list[PlacedScenario]) -> None:

@@ -11,6 +11,7 @@ import msgspec
 
 from contracts.errors import UserError
 from orchestrator.sweep_plan import WorldPlaces
+from orchestrator.sweep_road_users import digest_of
 from orchestrator.sweep_spec import Loaded
 from orchestrator.versions import versions
 from world_gen.build import GENERATOR_VERSION
@@ -77,18 +78,20 @@ class SweepFolder:
             "versions": versions(),
             **what,
         }
-        partial = self.path / f"{SUMMARY}.writing"
-        partial.write_bytes(msgspec.json.format(msgspec.json.encode(whole), indent=2) + b"\n")
-        partial.replace(self.path / SUMMARY)
+        self._write(SUMMARY, msgspec.json.format(msgspec.json.encode(whole), indent=2) + b"\n")
         return whole
 
     def save_places(self, found: tuple[WorldPlaces, ...], failures: dict[str, str]) -> FoundPlaces:
         """Keep where scenarios take place: it need not be found out again."""
         places = FoundPlaces(fingerprint=self.fingerprint, worlds=found, failures=failures)
-        partial = self.path / f"{PLAN}.writing"
-        partial.write_bytes(msgspec.msgpack.encode(places))
-        partial.replace(self.path / PLAN)
+        self._write(PLAN, msgspec.msgpack.encode(places))
         return places
+
+    def _write(self, name: str, data: bytes) -> None:
+        """Write a file that is whole or not there."""
+        partial = self.path / f"{name}.writing"
+        partial.write_bytes(data)
+        partial.replace(self.path / name)
 
     def places(self) -> FoundPlaces | None:
         """Return what was kept, None where there is nothing."""
@@ -113,6 +116,7 @@ def fingerprint_of(loaded: Loaded, source: str) -> str:
         loaded.scenarios,
         loaded.vehicles,
         loaded.starts,
+        None if loaded.road_users is None else digest_of(loaded.road_users),
         source,
         GENERATOR_VERSION,
         versions(),

@@ -8,7 +8,7 @@ from contracts.frames import local_from_geo
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from orchestrator.sweep_plan import NotPlaced, PlacedHere, WorldPlaces
-from orchestrator.sweep_spec import Loaded
+from orchestrator.sweep_spec import AS_RECORDED, Loaded
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.live import LiveScenarios
 from sim_worker.scenarios.placement import places
@@ -57,8 +57,16 @@ def _places_recorded(
         arc = path.locate(np.asarray(here)[None])
         passage = known.on(path, float(arc.arc_m[0]), vehicle).passage
         for scenario in loaded.scenarios:
-            found = () if passage is None else known.places(scenario, passage)
             name = f"round {start.round_id}"
+            if scenario.id == AS_RECORDED:
+                placed.append(
+                    PlacedHere(
+                        scenario_id=scenario.id, junction_id=start.junction_id, place=name,
+                        ego=name, start=number,
+                    )
+                )  # fmt: skip
+                continue
+            found = () if passage is None else known.places(scenario, passage)
             placed += [
                 PlacedHere(
                     scenario_id=scenario.id, junction_id=start.junction_id,

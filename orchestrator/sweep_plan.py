@@ -14,9 +14,10 @@ import msgspec
 import numpy as np
 
 from contracts.errors import UserError
-from contracts.scenario import Scenario
+from contracts.scenario import FAULTS, Scenario
 from orchestrator.sweep_spec import (
     AIM_NAMES,
+    AS_RECORDED,
     FACTORS,
     FUTURES_PER_JOB,
     STEP_S,
@@ -100,6 +101,10 @@ class SweepPlan(msgspec.Struct, frozen=True, kw_only=True):
 
 def cases_of(scenario: Scenario, spec: SweepSpec) -> tuple[tuple[int, Values], ...]:
     """Return the cases of a scenario that a sweep plays, each with its number among all."""
+    if scenario.id == AS_RECORDED:
+        # The car drives as fast as it did.
+        (values,) = draw_cases(scenario)
+        return ((0, {name: v for name, v in values.items() if name.startswith(f"{FAULTS}.")}),)
     cases = tuple(enumerate(draw_cases(scenario, seed=spec.seed)))
     if spec.cases == "all" or spec.cases >= len(cases):
         return cases

@@ -2,38 +2,39 @@
 
 from __future__ import annotations
 
-import hashlib
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
-from contracts.arrays import Array32
 from contracts.drive import VehicleState
 from contracts.errors import one_line
 from contracts.frames import GeoPoint
-from contracts.futures import Accident, FuturesJob, FuturesResult, PathAhead, Variant
-from contracts.scenario import Scenario
-from contracts.vehicle import VehicleParameters
+from contracts.futures import Faults, FuturesJob, PathAhead, Variant
+from contracts.scenario import FAULTS, Scenario
 from contracts.world import World
 from orchestrator.sweep_places import places_in
 from orchestrator.sweep_plan import Cell, SweepJob, WorldPlaces
 from orchestrator.sweep_pool import Lost
+from orchestrator.sweep_road_users import NOBODY, Others, others_at
 from orchestrator.sweep_rows import Row, blank_row
-from orchestrator.sweep_spec import FUTURES_PER_JOB, STEP_S, Loaded
-from sim_worker.actors.cast import KIND_NAMES
+from orchestrator.sweep_spec import (
+    AS_RECORDED,
+    FAULT_NAMES,
+    FUTURES_PER_JOB,
+    STEP_S,
+    Loaded,
+)
+from orchestrator.sweep_told import told, told_of_case
 from sim_worker.futures import run_job
-from sim_worker.rehearsal import off_plan_m, staged_cases
+from sim_worker.rehearsal import staged_cases
 from sim_worker.scenarios.roles import Cast
 from sim_worker.scene import SceneMaker
 from sim_worker.stage import Stage
 from sim_worker.worker import StageCache
 from sim_worker.world_file import load_world
 
-COLLISION_WITH = ("", "road_user", "static")
 _KEPT_STAGES = 2
 
 
@@ -106,25 +107,37 @@ class SweepWorker:
             for index, cell in enumerate(cells):
                 case = meant[index]
                 assert isinstance(case, Cast)
-                rows[cell.number] |= _told(result, index, case, vehicle)
+                rows[cell.number] |= told_of_case(result, index, case, vehicle)
         return list(rows.values())
 
     def _play_recorded(self, job: SweepJob, stage: Stage, scenes: SceneMaker) -> list[Row]:
         """Play cases around a car that was recorded; those who meet it are timed to it."""
-        start = self._loaded.starts[job.cells[0].start or 0]
+        loaded, first = self._loaded, job.cells[0].start
+        start, frame = loaded.starts[first or 0], scenes.world.frame
+        path = start.path(frame)
+        others = NOBODY
+        if loaded.road_users is not None and loaded.spec.recorded is not None:
+            others = others_at(
+                loaded.road_users, loaded.spec.recorded.road_users, start.state, frame,
+                horizon_s=job.horizon_s, way_xy_m=path.xy_m,
+            )  # fmt: skip
         futures = _futures_job(
-            job, list(job.cells), self._loaded, self._scenarios, world_id=start.world_id,
-            state=start.state, path=start.path(scenes.world.frame),
-            cruise_speed_mps=start.cruise_speed_mps, drive_time_s=start.drive_time_s,
+            job, list(job.cells), loaded, self._scenarios, world_id=start.world_id,
+            state=start.state, path=path, cruise_speed_mps=start.cruise_speed_mps,
+            drive_time_s=start.drive_time_s, others=others,
         )  # fmt: skip
         result = run_job(futures, stage, scenes=scenes)
-        vehicle = self._loaded.vehicles[job.vehicle]
+        known = {"start_stamp_ns": start.state.stamp_ns, "recorded_road_users": len(others.names)}
         return [
-            blank_row(job, cell, self._loaded.spec)
-            | {"start_stamp_ns": start.state.stamp_ns}
-            | _told(result, index, None, vehicle)
+            blank_row(job, cell, loaded.spec)
+            | known
+            | told(result, index, (*others.names, *self._actors(cell)))
             for index, cell in enumerate(job.cells)
         ]
+
+    def _actors(self, cell: Cell) -> tuple[str, ...]:
+        """Return the names of those whom a cell's scenario adds, in its order."""
+        return tuple(actor.name for actor in self._scenarios[cell.scenario_id].actors)
 
 
 def failed_rows(job: SweepJob, loaded: Loaded, reason: str) -> list[Row]:
@@ -174,6 +187,7 @@ def _futures_job(
     path: PathAhead,
     cruise_speed_mps: float,
     drive_time_s: float = 0.0,
+    others: Others = NOBODY,
 ) -> FuturesJob:
     spec = loaded.spec
     return FuturesJob(
@@ -182,22 +196,16 @@ def _futures_job(
         world_id=world_id,
         state=state,
         path=path,
-        variants=tuple(
-            Variant(
-                index=index, name=f"{cell.scenario_id} {cell.case}", planner=job.planner,
-                scenario_id=cell.scenario_id, values=cell.values, place_rank=cell.rank,
-                place=cell.place if cell.start is None else "",
-                target_speed_factor=cell.parameters.get("target_speed_factor", 1.0),
-                target_speed_offset_mps=cell.parameters.get("target_speed_offset_mps", 0.0),
-                lateral_shift_m=cell.parameters.get("lateral_shift_m", 0.0),
-            )
-            for index, cell in enumerate(cells)
-        ),
+        variants=tuple(_variant(index, cell, job.planner) for index, cell in enumerate(cells)),
         horizon_s=job.horizon_s,
         step_s=STEP_S,
         seed=spec.seed,
         cruise_speed_mps=cruise_speed_mps,
-        scenarios=tuple(scenarios[id_] for id_ in sorted({c.scenario_id for c in cells})),
+        scenarios=tuple(
+            scenarios[id_] for id_ in sorted({c.scenario_id for c in cells} - {AS_RECORDED})
+        ),
+        road_users=others.predicted,
+        replayed=others.replayed,
         drive_time_s=drive_time_s,
         lights_by_plan=spec.lights_by_plan,
         metrics=spec.metrics,
@@ -205,65 +213,16 @@ def _futures_job(
     )  # fmt: skip
 
 
-def _told(result: FuturesResult, index: int, case: Cast | None, vehicle: VehicleParameters) -> Row:
-    """Return the columns that the playing of one future fills."""
-    outcome = result.outcome
-    accident = next((a for a in result.accidents if a.future == index), None)
-    states = np.ascontiguousarray(result.trajectory.states[index])
-    users = np.ascontiguousarray(result.road_users.poses[index])
-    row: Row = {
-        "valid": bool(outcome.valid[index]),
-        "failure": outcome.failures[index] if outcome.failures else "",
-        "left_out": result.left_out[index],
-        "planned_impact_time_s": None if case is None else _number(case.impact_time_s),
-        "planned_impact_with": "" if case is None else case.impact_with,
-        "collided": bool(outcome.collided[index]),
-        "collision_time_s": _number(outcome.collision_time_s[index]),
-        "collision_with": COLLISION_WITH[int(outcome.collision_with[index])],
-        "min_clearance_m": _number(outcome.min_clearance_m[index]),
-        "progress_m": _number(outcome.progress_m[index]),
-        "trajectory_sha256": hashlib.sha256(states.tobytes() + users.tobytes()).hexdigest(),
-    }
-    row |= {f"metric_{name}": _number(values[index]) for name, values in result.metrics.items()}
-    if accident is None:
-        return row
-    row |= _accident(result, index, accident)
-    if case is None:
-        return row
-    row["accident_with"] = case.actors[accident.road_user].name
-    if row["accident_with"] == case.impact_with:
-        row["planned_impact_off_m"] = _off_m(states, accident.time_s, case, vehicle)
-    return row
-
-
-def _off_m(states: Array32, time_s: float, case: Cast, vehicle: VehicleParameters) -> float:
-    """Return how far the point of the ego that was to be hit is from where that was planned.
-
-    The ego goes on from the last instant before the touch as it moves then.
-    """
-    last = max(math.ceil(time_s / STEP_S - 1e-6) - 1, 0)
-    x, y, yaw, ahead_mps, left_mps, yaw_rate = states[last, :6].astype(np.float64)
-    since_s = time_s - last * STEP_S
-    heading = yaw + yaw_rate * since_s / 2.0
-    x += (ahead_mps * np.cos(heading) - left_mps * np.sin(heading)) * since_s
-    y += (ahead_mps * np.sin(heading) + left_mps * np.cos(heading)) * since_s
-    there = np.array([x, y, yaw + yaw_rate * since_s])
-    return off_plan_m(case, there, vehicle)
-
-
-def _accident(result: FuturesResult, index: int, accident: Accident) -> Row:
-    kind = KIND_NAMES[int(result.road_users.kinds[index, accident.road_user])]
-    return {
-        "accident_kind": kind,
-        "accident_time_s": accident.time_s,
-        "accident_x_m": float(accident.point_m[0]),
-        "accident_y_m": float(accident.point_m[1]),
-        "accident_angle_rad": accident.angle_rad,
-        "accident_closing_mps": accident.closing_mps,
-        "accident_ego_delta_v_mps": accident.ego_delta_v_mps,
-        "accident_user_delta_v_mps": accident.user_delta_v_mps,
-    }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _variant(index: int, cell: Cell, planner: str) -> Variant:
+    variant = Variant(
+        index=index, name=f"{cell.scenario_id} {cell.case}", planner=planner,
+        scenario_id=cell.scenario_id, values=cell.values, place_rank=cell.rank,
+        place=cell.place if cell.start is None else "",
+        target_speed_factor=cell.parameters.get("target_speed_factor", 1.0),
+        target_speed_offset_mps=cell.parameters.get("target_speed_offset_mps", 0.0),
+        lateral_shift_m=cell.parameters.get("lateral_shift_m", 0.0),
+    )  # fmt: skip
+    if cell.scenario_id != AS_RECORDED:
+        return variant
+    faults = Faults(**{name: cell.values[f"{FAULTS}.{name}"] for name in FAULT_NAMES})
+    return msgspec.structs.replace(variant, scenario_id="", values={}, faults=faults)

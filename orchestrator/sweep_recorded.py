@@ -1,10 +1,10 @@
-"""Starts of a sweep from where a real car was: the rounds of a recorded run."""
+"""Starts of a sweep from where a real car was, and who was around it: a recorded run."""
 
 from __future__ import annotations
 
 import bisect
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -12,19 +12,41 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from contracts.arrays import Array
-from contracts.drive import VehicleState
+from contracts.drive import RoadUsers, VehicleState
 from contracts.errors import UserError
 from contracts.frames import LocalFrame, local_from_geo
 from contracts.futures import PathAhead
 from contracts.vehicle import VehicleParameters
+from orchestrator.sweep_road_users import RoadUserMode, among, named_log
 from telemetry.estimator import StateEstimator
 from telemetry.logs import open_log
+from telemetry.logs.road_users import (
+    LONGEST_GAP_S,
+    RoadUserLog,
+    detections_of,
+    log_of_detections,
+)
 
 WORLDS = "worlds"
 _ROUNDS, _DRIVE = Path("results/rounds.parquet"), "drive.mcap"
 _BEFORE_S, _AHEAD_S = 4.0, 30.0
 """The path is what the car drove from so long before a start to so long after it."""
 _STEP_M, _LEAST_M = 1.0, 20.0
+
+
+class Recorded(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Start where a real car was: the folder of a run of `foretwin drive`, and how often."""
+
+    run: str
+    every_s: float = 2.0
+    road_users: RoadUserMode = "replayed"
+    """Whether others are where they were recorded, go on as a live round predicts, or are not."""
+    road_user_log: str | None = None
+    """Of others, in place of what the car itself detected, by the same clock."""
+    leave_out: tuple[str, ...] = ()
+    """Ids of road users who are not to be there: the car itself, in a log of somebody else's."""
+    longest_gap_s: float = LONGEST_GAP_S
+    """Who is not seen for longer is away until seen again."""
 
 
 class RecordedStart(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,18 +67,37 @@ class RecordedStart(msgspec.Struct, frozen=True, kw_only=True):
         return PathAhead(xy_m=xy, speed_limit_mps=np.full(len(xy), np.inf))
 
 
-def read_starts(
-    run: Path, vehicle: VehicleParameters, *, every_s: float
-) -> tuple[RecordedStart, ...]:
-    """Return starts from a run's folder: one round of every `every_s` seconds of the drive.
+class RecordedDrive(NamedTuple):
+    """Where a sweep starts, and who was around then; None where nobody is to be."""
+
+    starts: tuple[RecordedStart, ...]
+    road_users: RoadUserLog | None
+
+
+def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedDrive:
+    """Return starts from a run's folder, one round of every `every_s` seconds, and road users.
 
     Rounds after which the car hardly moved on are left out. Raises FileNotFoundError for a folder
-    that is none of a run, and UserError where nothing can be started from.
+    that is none of a run, and UserError where nothing can be started from, or a log of road users
+    does not go with the drive.
     """
+    run = Path(recorded.run)
     for part in (_ROUNDS, Path(_DRIVE), Path(WORLDS)):
         if not (run / part).exists():
             raise FileNotFoundError(f"recorded.run {run}: no {part} in it")
-    states = _states(run / _DRIVE, vehicle)
+    states, said = _states(run / _DRIVE, vehicle, longest_gap_s=recorded.longest_gap_s)
+    starts = _starts(run, states, every_s=recorded.every_s)
+    if recorded.road_users == "none":
+        return RecordedDrive(starts, None)
+    if recorded.road_user_log is not None:
+        path = Path(recorded.road_user_log)
+        said = named_log(path, states, vehicle, recorded.leave_out, recorded.longest_gap_s)
+    else:
+        said = among(said, recorded.leave_out, "the car's detections")
+    return RecordedDrive(starts, said if said.tracks else None)
+
+
+def _starts(run: Path, states: list[VehicleState], *, every_s: float) -> tuple[RecordedStart, ...]:
     stamps = [state.stamp_ns for state in states]
     starts: list[RecordedStart] = []
     next_s = -np.inf
@@ -89,8 +130,11 @@ def _rounds(file: Path) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: (row["stamp_ns"], row["round_id"]))
 
 
-def _states(file: Path, vehicle: VehicleParameters) -> list[VehicleState]:
-    """Return the states that the drive had, estimated from what was recorded as it was then."""
+def _states(
+    file: Path, vehicle: VehicleParameters, *, longest_gap_s: float
+) -> tuple[list[VehicleState], RoadUserLog]:
+    """Return the states that the drive had, estimated from what was recorded as it was then, and
+    who was detected."""
     recorded = open_log(file)
     estimator = StateEstimator(
         recorded.info,
@@ -98,8 +142,14 @@ def _states(file: Path, vehicle: VehicleParameters) -> list[VehicleState]:
         steering_ratio=vehicle.steering_ratio.value,
         steering_offset_rad=vehicle.steering_offset_rad.value,
     )
-    found = (estimator.handle(channel, message) for channel, message in recorded.samples())
-    return [state for state in found if state is not None]
+    states, seen = [], []
+    for channel, message in recorded.samples():
+        if isinstance(message, RoadUsers):
+            seen.append(detections_of(message))
+        state = estimator.handle(channel, message)
+        if state is not None:
+            states.append(state)
+    return states, log_of_detections(seen, recorded.declared, longest_gap_s=longest_gap_s)
 
 
 def _line(states: list[VehicleState], stamps: list[int], place: int) -> Array | None:

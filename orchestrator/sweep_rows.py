@@ -21,9 +21,10 @@ _CELL = (
     ("place", pa.string()), ("scenario", pa.string()), ("case", pa.int32()),
     ("values", pa.map_(pa.string(), pa.float64())), ("planner", pa.string()),
     ("vehicle", pa.string()), ("seed", pa.int64()),
-    ("start_stamp_ns", pa.int64()), ("horizon_s", pa.float64()),
+    ("start_stamp_ns", pa.int64()), ("road_users", pa.string()), ("horizon_s", pa.float64()),
 )  # fmt: skip
 _PLAYED = (
+    ("recorded_road_users", pa.int32()),
     ("valid", pa.bool_()), ("failure", pa.string()), ("left_out", pa.string()),
     ("planned_impact_time_s", pa.float64()), ("planned_impact_with", pa.string()),
     ("planned_impact_off_m", pa.float64()),
@@ -52,6 +53,7 @@ def blank_row(job: SweepJob, cell: Cell, spec: SweepSpec) -> Row:
         "junction": cell.junction_id, "place": cell.place, "scenario": cell.scenario_id,
         "case": cell.case, "values": list(cell.values.items()), "planner": job.planner,
         "vehicle": job.vehicle, "seed": spec.seed, "horizon_s": job.horizon_s,
+        "road_users": None if spec.recorded is None else spec.recorded.road_users,
         **{f"parameter_{name}": value for name, value in cell.parameters.items()},
         "failure": "", "left_out": "",
     }  # fmt: skip

@@ -13,13 +13,14 @@ from contracts.futures import Faults
 from contracts.scenario import Scenario
 from contracts.vehicle import VehicleParameters
 from orchestrator.map_choice import node_of_id, parse_bbox
-from orchestrator.sweep_recorded import WORLDS, RecordedStart, read_starts
+from orchestrator.sweep_recorded import WORLDS, Recorded, RecordedStart, read_drive
 from orchestrator.world_command import MAX_RADIUS_M, MIN_RADIUS_M
 from sim_worker.metrics.table import METRICS
 from sim_worker.planners.registry import check_planner
 from sim_worker.scenarios.reading import catalogue, find_scenario
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.vehicle.planar import TIMESTEP_S
+from telemetry.logs.road_users import RoadUserLog
 
 DEFAULT_METRICS = (
     "ttc", "pet", "thw", "drac", "required_deceleration", "impact_speed", "delta_v",
@@ -37,14 +38,12 @@ _NOT_NEGATIVE = frozenset({
 })  # fmt: skip
 _MAX_EXTRA_DELAY_S = 0.4
 STEP_S = 0.1
+AS_RECORDED = "as_recorded"
+JUST_RECORDED = Scenario(
+    id=AS_RECORDED, title="As recorded", source="the drive",
+    shows="The ego drives on from where the car was, among those who were there.",
+)  # fmt: skip
 FUTURES_PER_JOB = 64
-
-
-class Recorded(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Start where a real car was: the folder of a run of `foretwin drive`, and how often."""
-
-    run: str
-    every_s: float = 2.0
 
 
 class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -63,7 +62,8 @@ class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     radius_m: float = 150.0
     service_roads: bool = False
     scenarios: tuple[str, ...] | None = None
-    """Ids of the catalogue or TOML files; None takes the whole catalogue."""
+    """Ids of the catalogue or TOML files; None takes the whole catalogue. From where a real car
+    was, `as_recorded` adds nobody to those who were there."""
     places: int = 1
     """At most so many places of a scenario at one junction."""
     cases: Literal["all"] | int = "all"
@@ -92,6 +92,8 @@ class Loaded(msgspec.Struct, frozen=True, kw_only=True):
     vehicles: dict[str, VehicleParameters]
     starts: tuple[RecordedStart, ...] = ()
     """Where a recorded car was; without them, egos start where their cases say."""
+    road_users: RoadUserLog | None = None
+    """Who was around the recorded car."""
 
 
 def load_spec(path: Path) -> Loaded:
@@ -134,11 +136,13 @@ def check_spec(spec: SweepSpec) -> Loaded:
     _check_parameters(spec.parameters)
     scenarios = _scenarios(spec)
     vehicles = {name: load_vehicle(name) for name in spec.vehicles}
-    starts: tuple[RecordedStart, ...] = ()
-    if spec.recorded is not None:
-        first = vehicles[spec.vehicles[0]]
-        starts = read_starts(Path(spec.recorded.run), first, every_s=spec.recorded.every_s)
-    return Loaded(spec=spec, scenarios=scenarios, vehicles=vehicles, starts=starts)
+    if spec.recorded is None:
+        return Loaded(spec=spec, scenarios=scenarios, vehicles=vehicles)
+    drive = read_drive(spec.recorded, vehicles[spec.vehicles[0]])
+    return Loaded(
+        spec=spec, scenarios=scenarios, vehicles=vehicles, starts=drive.starts,
+        road_users=drive.road_users,
+    )  # fmt: skip
 
 
 def worlds_folder(spec: SweepSpec) -> Path | None:
@@ -177,6 +181,8 @@ def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
          f"control_hz {spec.control_hz:g}: must be a multiple of {1.0 / STEP_S:g}"),
         (spec.job_timeout_s > 0.0, f"job_timeout_s {spec.job_timeout_s:g}: above 0"),
         (spec.recorded is None or spec.recorded.every_s > 0.0, "recorded.every_s: above 0"),
+        (spec.recorded is None or spec.recorded.longest_gap_s > 0.0,
+         "recorded.longest_gap_s: above 0"),
         (spec.seed >= 0, f"seed {spec.seed}: not negative"),
     )  # fmt: skip
 
@@ -215,7 +221,11 @@ def _scenarios(spec: SweepSpec) -> tuple[Scenario, ...]:
     if spec.scenarios is None:
         found = tuple(catalogue().values())
     else:
-        found = tuple(find_scenario(name) for name in spec.scenarios)
+        found = tuple(
+            JUST_RECORDED if name == AS_RECORDED else find_scenario(name) for name in spec.scenarios
+        )
+        if AS_RECORDED in spec.scenarios and spec.recorded is None:
+            raise UserError(f"scenarios: {AS_RECORDED} needs `recorded`")
     names = [scenario.id for scenario in found]
     if not names:
         raise UserError("scenarios: at least one id or file, or none of the setting for all")

@@ -21,9 +21,15 @@ class Visit:
     ready_mono_s: float | None = None
     built_at_s: float | None = None
     entered_mono_s: float | None = None
+    entered_at_s: float | None = None
     arrived_at_s: float | None = None
     rounds: int = 0
     futures: int = 0
+
+    def enter(self, *, mono_s: float, drive_time_s: float) -> None:
+        """The car is within the junction's radius; the first time counts."""
+        if self.entered_mono_s is None:
+            self.entered_mono_s, self.entered_at_s = mono_s, drive_time_s
 
     def take_world(self, world: World, *, mono_s: float, drive_time_s: float) -> None:
         """The World is ready."""
@@ -43,6 +49,7 @@ class Visit:
             "lon": summary.lon,
             "arrived_at_s": _rounded(self.arrived_at_s),
             "built_at_s": _rounded(self.built_at_s),
+            "within_radius_at_s": _rounded(self.entered_at_s),
             "world_ready_before_s": round(entered - ready, 3),
             "rounds": self.rounds,
             "futures": self.futures,
@@ -64,11 +71,11 @@ class VisitBook:
         """Return the latest visit of a junction; raises KeyError where it was never seen."""
         return self._latest[junction_id]
 
-    def enter(self, junction_id: str, *, mono_s: float) -> None:
+    def enter(self, junction_id: str, *, mono_s: float, drive_time_s: float) -> None:
         """The way to the junction's centre is below the radius; the first time counts."""
         visit = self._latest.get(junction_id)
-        if visit is not None and visit.arrived_at_s is None and visit.entered_mono_s is None:
-            visit.entered_mono_s = mono_s
+        if visit is not None and visit.arrived_at_s is None:
+            visit.enter(mono_s=mono_s, drive_time_s=drive_time_s)
 
     def see(self, junction: Junction, *, load: bool, mono_s: float, drive_time_s: float) -> bool:
         """Note a junction ahead; returns whether its World must be built or loaded.
@@ -106,8 +113,7 @@ class VisitBook:
         """The car is at the junction's centre."""
         visit = self._latest[junction_id]
         visit.arrived_at_s = drive_time_s
-        if visit.entered_mono_s is None:
-            visit.entered_mono_s = mono_s
+        visit.enter(mono_s=mono_s, drive_time_s=drive_time_s)
         self.arrived.append(visit)
         return visit
 

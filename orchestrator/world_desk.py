@@ -11,6 +11,7 @@ from contracts.bus import Bus, Mailbox, Reply
 from contracts.codec import SchemaMismatch, read_message
 from contracts.simulation import BuildRequest, PrepareRequest, WorldNotice
 from contracts.world import World
+from orchestrator.instructions import Tell
 from orchestrator.plan import DrivePlan
 from orchestrator.processes import BUILDER
 
@@ -45,14 +46,14 @@ class WorldDesk:
         *,
         on_ready: Callable[[str, World], None],
         on_failed: Callable[[str, str], None],
-        on_warning: Callable[[str], None],
+        tell: Callable[[Tell], None],
     ) -> None:
         self._plan = plan
         self._bus = bus
         self._mailbox = mailbox
         self._on_ready = on_ready
         self._on_failed = on_failed
-        self._on_warning = on_warning
+        self._tell = tell
         self._orders: dict[str, _Order] = {}
         self._junction_of: dict[str, str] = {}
 
@@ -162,7 +163,8 @@ class WorldDesk:
             # Just started or just gone; a job loads the World too.
             log.info("world %s not loaded by %s beforehand", world_id, worker_id)
         elif reply.message is None:
-            self._on_warning(f"{worker_id} could not load world {world_id}: {reply.error}")
+            text = f"{worker_id} could not load world {world_id}: {reply.error}"
+            self._tell(Tell("warning", text))
         else:
             taken_s = time.perf_counter() - asked_s
             log.info("world %s loaded by %s in %.2f s", world_id, worker_id, taken_s)

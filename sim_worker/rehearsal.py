@@ -27,7 +27,6 @@ from sim_worker.scenarios.ways import Way
 from sim_worker.scene import SceneMaker
 from sim_worker.stage import Stage
 from sim_worker.touch import first_touches
-from world_gen.polyline import length
 
 _FORWARDS, _BACKWARDS = "constant_speed", "reverse_pursuit"
 _STRAIGHT_PM = 1e-3
@@ -243,7 +242,7 @@ def _from_line(actor: CastActor, later_s: float, line: DrivenLine, way: Way) -> 
         return actor._replace(start_arc_m=actor.start_arc_m - actor.speed_mps * later_s)
     if actor.way != way.name:
         return actor
-    arc = np.array([actor.start_arc_m - (length(actor.xy_m) - length(line.way.xy_m))])
+    arc = np.array([actor.start_on(line.way)])
     place = way.path.locate(line.way.path.point_at(arc), near_arc_m=arc)
     return actor._replace(xy_m=way.xy_m, start_arc_m=float(place.arc_m[0]))
 

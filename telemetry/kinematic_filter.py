@@ -30,6 +30,7 @@ _LATERAL_JERK_MPS3 = 5.0
 """Limits how fast the curvature changes at speed: v² dκ/dt."""
 _SLIP_DENSITY = 0.01**2
 """rad² / s: the body's direction differs from the path's by the rear tyres' slip."""
+_IDENTITY = np.eye(8)
 
 
 class KinematicFilter:
@@ -64,7 +65,7 @@ class KinematicFilter:
         distance = (speed + 0.5 * accel * dt) * dt
         heading = yaw + 0.5 * curvature * distance
         cos, sin = math.cos(heading), math.sin(heading)
-        jacobian = np.eye(8)
+        jacobian = _IDENTITY.copy()
         half = 0.5 * dt * dt
         side = 0.5 * distance * curvature
         jacobian[X, YAW] = -distance * sin
@@ -105,7 +106,7 @@ class KinematicFilter:
         gain = self.covariance @ row
         gain = gain / (float(row @ gain) + std * std)
         self.mean = self.mean + gain * residual
-        covariance = self.covariance - np.outer(gain, row @ self.covariance)
+        covariance = self.covariance - gain[:, None] * (row @ self.covariance)
         self.covariance = 0.5 * (covariance + covariance.T)
         self._limit()
 

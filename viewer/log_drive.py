@@ -39,6 +39,9 @@ GAP_LIMITS = {"pos_m": 1.5, "yaw_deg": 5.0, "speed_mps": 1.0}
 TRAIL_S = 10.0
 PERIOD_NS = 95_000_000
 """Cars and gaps are logged at most at about 10 Hz of drive time."""
+TRAIL_PERIOD_NS = 195_000_000
+LIMIT_PERIOD_NS = 995_000_000
+"""Lines that stay where they are need few points."""
 FOCUS_REACH_M = 32.0
 MARK_HEIGHT_M = 60.0
 FOCUS_TIME_CONSTANT_S = 1.5
@@ -66,6 +69,19 @@ def static_rows() -> list[Row]:
                 ),
             )
         )
+    # Said once for all instants: turned into Rerun's form each time, colours cost most of a row.
+    mark, place, fix = (rr.Radius.ui_points(size) for size in (6, 9, 3))
+    rows += [
+        static("map/ego", rr.Points3D.from_fields(radii=mark, colors=[TWIN])),
+        static("geo/ego/real", rr.GeoPoints.from_fields(radii=place, colors=[TWIN])),
+        static(
+            "geo/ego/trail",
+            rr.GeoLineStrings.from_fields(radii=rr.Radius.ui_points(2.5), colors=[TWIN]),
+        ),
+        static("geo/gnss", rr.GeoPoints.from_fields(radii=fix, colors=[GHOST])),
+        static("world/ego/trail/real", rr.LineStrips3D.from_fields(radii=0.12, colors=[TRAIL])),
+        static("world/plan", rr.LineStrips3D.from_fields(radii=0.22, colors=[PLAN])),
+    ]
     for quantity in GAP_LIMITS:
         for name, colour, width in (("twin", TWIN, 2.0), ("shadow", SHADOW, 1.5)):
             rows.append(
@@ -99,9 +115,9 @@ class DriveLog:
         self._junction: Array | None = None
         self._focus: Array | None = None
 
-    def _due(self, what: str, drive_ns: int) -> bool:
+    def _due(self, what: str, drive_ns: int, period_ns: int = PERIOD_NS) -> bool:
         last = self._last_ns.get(what)
-        if last is not None and 0 <= drive_ns - last < PERIOD_NS:
+        if last is not None and 0 <= drive_ns - last < period_ns:
             return False
         self._last_ns[what] = drive_ns
         return True
@@ -132,40 +148,24 @@ class DriveLog:
             Row(
                 "map/ego",
                 drive_ns,
-                rr.Points3D(
-                    [[float(here[0]), float(here[1]), MARK_HEIGHT_M]],
-                    radii=rr.Radius.ui_points(6),
-                    colors=[TWIN],
-                ),
+                rr.Points3D([[float(here[0]), float(here[1]), MARK_HEIGHT_M]]),
             ),
-            Row(
-                "geo/ego/real",
-                drive_ns,
-                rr.GeoPoints(lat_lon=[lat_lon], radii=rr.Radius.ui_points(9), colors=[TWIN]),
-            ),
+            Row("geo/ego/real", drive_ns, rr.GeoPoints(lat_lon=[lat_lon])),
         ]
-        if len(self._trail) > 1:
+        if len(self._trail) > 1 and self._due("trail", drive_ns, TRAIL_PERIOD_NS):
             path = np.array([point for _, point, _ in self._trail])
             rows.append(
                 Row(
                     "world/ego/trail/real",
                     drive_ns,
-                    rr.LineStrips3D(
-                        [np.column_stack([path, np.full(len(path), 0.1)])],
-                        colors=[TRAIL],
-                        radii=0.12,
-                    ),
+                    rr.LineStrips3D([np.column_stack([path, np.full(len(path), 0.1)])]),
                 )
             )
             rows.append(
                 Row(
                     "geo/ego/trail",
                     drive_ns,
-                    rr.GeoLineStrings(
-                        lat_lon=[[place for _, _, place in self._trail]],
-                        radii=rr.Radius.ui_points(2.5),
-                        colors=[TWIN],
-                    ),
+                    rr.GeoLineStrings(lat_lon=[[place for _, _, place in self._trail]]),
                 )
             )
         return rows
@@ -192,8 +192,7 @@ class DriveLog:
         if not self._due("gnss", drive_ns):
             return []
         place = [fix.position.lat_deg, fix.position.lon_deg]
-        points = rr.GeoPoints(lat_lon=[place], radii=rr.Radius.ui_points(3), colors=[GHOST])
-        return [Row("geo/gnss", drive_ns, points)]
+        return [Row("geo/gnss", drive_ns, rr.GeoPoints(lat_lon=[place]))]
 
     def plan(self, plan: PlannedTrajectory, drive_ns: int) -> list[Row]:
         """Return the car's own plan as a line."""
@@ -201,7 +200,7 @@ class DriveLog:
             return []
         xy_m = local_from_geo(self._frame, plan.lat_deg, plan.lon_deg)
         line = np.column_stack([xy_m, np.full(len(xy_m), 0.22)])
-        return [Row("world/plan", drive_ns, rr.LineStrips3D([line], colors=[PLAN], radii=0.22))]
+        return [Row("world/plan", drive_ns, rr.LineStrips3D([line]))]
 
     def mirror(self, sample: MirrorSample, drive_ns: int) -> list[Row]:
         """Return the poses of twin, shadow and ghost, and the gaps to the real car."""
@@ -213,15 +212,15 @@ class DriveLog:
             for name, car in (("twin", sample.twin), ("shadow", shadow), ("ghost", sample.ghost))
         ]
         twin_gap = (sample.gap_m, np.degrees(sample.gap_yaw_rad), sample.gap_speed_mps)
-        for (quantity, limit), twin, other in zip(
-            GAP_LIMITS.items(), twin_gap, _gap(shadow, real), strict=True
-        ):
-            limits = [limit] if quantity == "pos_m" else [limit, -limit]
+        for quantity, twin, other in zip(GAP_LIMITS, twin_gap, _gap(shadow, real), strict=True):
             rows += [
                 Row(f"gap/{quantity}/twin", drive_ns, rr.Scalars(float(twin))),
                 Row(f"gap/{quantity}/shadow", drive_ns, rr.Scalars(float(other))),
-                Row(f"gap/{quantity}/limit", drive_ns, rr.Scalars(limits)),
             ]
+        if self._due("limit", drive_ns, LIMIT_PERIOD_NS):
+            for quantity, limit in GAP_LIMITS.items():
+                limits = [limit] if quantity == "pos_m" else [limit, -limit]
+                rows.append(Row(f"gap/{quantity}/limit", drive_ns, rr.Scalars(limits)))
         return rows
 
 

@@ -68,10 +68,12 @@ class RunLog:
             ahead = f"next **{plain_text(progress.next_intersection)}**"
             if progress.arrival_in_s is not None:
                 ahead += f" in {progress.arrival_in_s:.0f} s"
+        short = f"**{progress.too_slow}** (too slow for all) · " if progress.too_slow else ""
         text = (
-            f"**{progress.drive_time_s:.1f} s** · {plain_text(progress.mission_state)} · {ahead} · "
-            f"{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped · "
-            f"{self._source}"
+            # The map's source early on: where the line is too long, its end is cut off.
+            f"**{progress.drive_time_s:.1f} s** · {self._source} · "
+            f"{plain_text(progress.mission_state)} · {ahead} · "
+            f"{short}{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped"
         )
         return [Row("status", drive_ns, _document(text))]
 

@@ -16,13 +16,15 @@ from world_gen.met_on_the_way import (
     NodeTags,
     is_light,
     lights_behind,
-    met_inside,
+    lights_inside,
     met_toward,
+    own_sign,
     passed_on,
     sign_of,
 )
 from world_gen.priority_roads import Entry, Rank, Standing, opposites, outward, standings
 from world_gen.road_graph import DirectedEdge
+from world_gen.signs_inside import SignsInside, shared_signs
 
 OWN_LINE_M = 3.0
 """A sign or signal farther than this from the junction's node stands at the stop line."""
@@ -51,6 +53,8 @@ class Approach(msgspec.Struct, kw_only=True):
     """Key of the approach that lies straight ahead."""
     lit_inside: bool = False
     """Its light stands on the way through the junction, past where a slip road may part."""
+    signed_inside: bool = False
+    """Its sign stands inside the junction, where all ways from it lead past."""
 
     @property
     def junction_id(self) -> str:
@@ -72,6 +76,7 @@ class _Draft(msgspec.Struct, frozen=True, kw_only=True):
     met: list[Met]
     lights: list[Met]
     sign: Met | None
+    sign_inside: YieldRule | None
 
 
 def approaches(
@@ -79,11 +84,14 @@ def approaches(
     node_tags: NodeTags,
     connections: Sequence[ConnectionDraft],
     junction_lights: Collection[int],
+    signs: SignsInside,
 ) -> tuple[Approach, ...]:
     """Return every approach to a whole junction with its control.
 
-    `junction_lights` are the nodes of the lights that are known to govern some junction.
-    Roads of a ring are approaches only where a light stands on them.
+    `junction_lights` are the nodes of the lights that are known to govern some junction,
+    `signs` what `signs_inside` finds.
+    Roads of a ring are approaches only where a light stands on them, ways past it only where
+    they have a sign.
     """
     tagged_on = passed_on(around.edges, node_tags)
     inside: dict[tuple[int, bool], list[Met]] = {}
@@ -91,20 +99,22 @@ def approaches(
         if connection.cluster.whole and connection.movement.inside:
             toward = connection.movement.toward
             met = inside.setdefault((toward.edge.index, toward.reverse), [])
-            met.extend(met_inside(connection.movement.inside, node_tags))
+            met.extend(lights_inside(connection.movement.inside, node_tags))
+    shared = shared_signs(connections, signs, around.driving_side)
     plain_from = {
         leg.start_node: cluster
         for cluster in around.clusters
         if cluster.plain
         for leg in cluster.legs
     }
+    whole = {id(junction) for junction in around.junctions}
     drafts: dict[str, list[_Draft]] = {}
     behind: dict[str, list[tuple[int, DirectedEdge]]] = {}
     for cluster in around.clusters:
         junction = cluster.junction
-        if not cluster.whole or junction is None:
+        if junction is None or id(junction) not in whole:
             continue
-        signalled = junction.summary.control == "signals" and not cluster.ring
+        signalled = cluster.whole and not cluster.ring and junction.summary.control == "signals"
         for leg in cluster.legs:
             toward = DirectedEdge(leg.edge, not leg.reverse)
             if not toward.allowed:
@@ -113,14 +123,16 @@ def approaches(
                 behind.setdefault(junction.summary.id, []).extend(lights_out)
                 continue
             on_ring = cluster.ring and is_ring_edge(leg.edge)
-            if not on_ring and not cluster.ring and leg.edge.index in junction.inner:
+            past_ring = not cluster.ring and leg.edge.index in junction.inner
+            if past_ring == cluster.whole:
                 continue
             met = met_toward(leg, plain_from, node_tags, junction.nodes, tagged_on)
             lights = [m for m in met if is_light(m.tags) and m.node in junction.lights]
-            if on_ring and not lights:
+            sign = own_sign(met, toward, cluster, around.edges)
+            if (on_ring and not lights) or (past_ring and sign is None):
                 continue
             passed = inside.get((toward.edge.index, toward.reverse), [])
-            lights = lights or [m for m in passed if is_light(m.tags)]
+            lights = lights or passed
             if signalled and not lights:
                 # A light on a crossing that the finder took for one of walkers alone.
                 lights = [
@@ -136,7 +148,8 @@ def approaches(
                     toward=toward,
                     met=met,
                     lights=lights,
-                    sign=_own_sign(met, cluster),
+                    sign=sign,
+                    sign_inside=shared.get((toward.edge.index, toward.reverse)),
                 )
             )
     found: list[Approach] = []
@@ -168,21 +181,13 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
         ahead.signal_nodes = (*ahead.signal_nodes, node)
 
 
-def _own_sign(met: list[Met], cluster: Cluster) -> Met | None:
-    """Return the nearest sign for this road; one on the junction's own node cannot tell."""
-    signs = [
-        m
-        for m in met
-        if sign_of(m.tags) and m.distance_m <= 40.0 and (m.distance_m > 0.1 or cluster.ring)
-    ]
-    return min(signs, key=lambda m: m.distance_m, default=None)
-
-
 def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
     junction = drafts[0].cluster.junction
     assert junction is not None
     kind, control = junction.summary.kind, junction.summary.control
-    words: list[YieldRule | None] = [sign_of(d.sign.tags) if d.sign else None for d in drafts]
+    words: list[YieldRule | None] = [
+        sign_of(d.sign.tags) if d.sign else d.sign_inside for d in drafts
+    ]
     at_node = {
         sign_of(m.tags)
         for d in drafts
@@ -241,7 +246,8 @@ def _for_all(drafts: list[_Draft]) -> bool:
 
 
 def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> Approach:
-    sign_nearer = d.sign is not None and not d.lights
+    inside = d.sign is None and d.sign_inside is not None
+    sign_nearer = (inside or d.sign is not None) and not d.lights
     if signalled and (d.lights or (for_all and not sign_nearer and standing.rank > Rank.YARD)):
         on_leg = [m for m in d.lights if math.isfinite(m.distance_m)]
         far = max(on_leg, key=lambda m: m.distance_m, default=None)
@@ -254,13 +260,15 @@ def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> 
         return Approach(
             cluster=d.cluster, toward=d.toward, control=word, line_m=line, signal_nodes=nodes,
             standing=standing, opposite=None, lit_inside=bool(d.lights) and not on_leg,
+            signed_inside=inside,
         )  # fmt: skip
     line = None
     if d.sign is not None and OWN_LINE_M < d.sign.distance_m <= _SIGN_NEAR_M:
         line = d.sign.distance_m
     return Approach(
-        cluster=d.cluster, toward=d.toward, control=_word(standing), line_m=line,
-        signal_nodes=(), standing=standing, opposite=None,
+        cluster=d.cluster, toward=d.toward,
+        control=Choice("none", "inferred") if inside else _word(standing), line_m=line,
+        signal_nodes=(), standing=standing, opposite=None, signed_inside=inside,
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ from world_gen.osm_map import LatLonBounds, MapError, OsmMap
 from world_gen.road_graph import RoadGraph
 from world_gen.tram_tracks import tram_tracks
 
-GENERATOR_VERSION = 6
+GENERATOR_VERSION = 7
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 

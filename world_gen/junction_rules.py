@@ -12,12 +12,13 @@ from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.lanes import LaneSet
 from world_gen.lone_lights import lone_lights
-from world_gen.met_on_the_way import NodeTags, is_light, met_inside, sign_of
+from world_gen.met_on_the_way import NodeTags, lights_inside
 from world_gen.right_of_way import right_of_way
 from world_gen.signal_groups import lane_groups, walk_groups
 from world_gen.signal_heads import signal_heads
 from world_gen.signal_plan import signal_plans
-from world_gen.stop_lines import line_controls, stop_lines
+from world_gen.signs_inside import SignsInside, signs_inside
+from world_gen.stop_lines import line_controls, lines_at_signs, stop_lines
 
 
 class JunctionRules(NamedTuple):
@@ -46,12 +47,13 @@ def junction_rules(
     `junction_lights` are the nodes of the lights of all junctions of the map.
     Connections learn their control, their signal group and their conflicts.
     """
-    found = approaches(around, node_tags, connections, junction_lights)
+    signs = signs_inside(connections, node_tags, around)
+    found = approaches(around, node_tags, connections, junction_lights, signs)
     lines = stop_lines(found, around, lanes)
-    _control(connections, found, lines, node_tags, around)
+    _control(connections, found, lines, signs, node_tags, around)
     whole = {id(junction) for junction in around.junctions}
     ruled = [c for c in connections if id(c.cluster.junction) in whole]
-    conflicts, met = right_of_way(ruled, found, node_tags, around.driving_side)
+    conflicts, met = right_of_way(ruled, found, signs, around.driving_side)
     groups = lane_groups(found, around, lanes, ruled)
     walks = walk_groups(groups, crossings, around)
     heads = signal_heads(groups, {line.lane_id: line for line in lines}, around)
@@ -59,7 +61,7 @@ def junction_rules(
     lone = lone_lights(around, node_tags, lanes, crossings, known)
     return JunctionRules(
         # Where a lane has two lines the one at the junction stands last, so that it wins by lane.
-        stop_lines=(*lone.stop_lines, *lines),
+        stop_lines=(*lone.stop_lines, *lines, *lines_at_signs(connections, signs)),
         signals=(*heads, *lone.signals),
         conflicts=conflicts,
         plans=signal_plans(groups, walks, ruled, conflicts, met),
@@ -71,12 +73,14 @@ def _control(
     connections: Sequence[ConnectionDraft],
     found: Sequence[Approach],
     lines: Sequence[StopLine],
+    signs: SignsInside,
     node_tags: NodeTags,
     around: Surroundings,
 ) -> None:
     """Tell connections what controls them: their lane's line, or a sign on a slip road.
 
     A slip road to the near side that passes no light of its own is not under the junction's.
+    Elsewhere a sign farther in counts where the lane has neither a light nor a tagged sign.
     """
     controls = line_controls(lines)
     near = "right" if around.driving_side == "right" else "left"
@@ -85,12 +89,15 @@ def _control(
         c.control = controls.get(c.start.id, "none")
         toward = c.movement.toward
         approach = by_road.get((toward.edge.index, toward.reverse))
-        if approach is None or not c.movement.inside or c.turn != near:
+        if approach is None or not c.movement.inside:
             continue
-        met = met_inside(c.movement.inside, node_tags)
-        sign = next((word for m in met if (word := sign_of(m.tags))), None)
-        lit = any(is_light(m.tags) for m in met)
-        if sign is not None and not lit:
+        sign = next((sign.rule for sign in signs.get(c.id, ())), None)
+        told = approach.control
+        if c.turn == near:
+            slips = not lights_inside(c.movement.inside, node_tags)
+        else:
+            slips = told.value == "none" or (told.value != "signal" and told.source != "tagged")
+        if slips and sign is not None:
             c.control = "stop" if sign == "stop" else "give_way"
-        elif approach.lit_inside and not lit:
+        elif slips and c.turn == near and approach.lit_inside:
             c.control = "give_way"

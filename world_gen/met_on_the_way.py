@@ -100,22 +100,37 @@ def met_toward(
     return list(unique.values())
 
 
-def met_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[Met]:
-    """Return lights and signs met between a junction's nodes, in driving order.
+def own_sign(
+    met: Sequence[Met], toward: DirectedEdge, cluster: Cluster, edges: Mapping[int, RoadEdge]
+) -> Met | None:
+    """Return the nearest sign on a road; one on a node that others come to as well cannot tell."""
+    signs = (m for m in met if sign_of(m.tags) and m.distance_m <= LOOK_BACK_M)
+    for sign in sorted(signs, key=lambda m: m.distance_m):
+        if sign.distance_m > 0.1 or cluster.ring or _comes_alone(toward, cluster, edges):
+            return sign
+    return None
 
-    A sign on a node where roads meet counts only where it says whom it faces.
-    """
+
+def _comes_alone(toward: DirectedEdge, cluster: Cluster, edges: Mapping[int, RoadEdge]) -> bool:
+    """Return whether no other road of a cluster may be driven to the node where this one ends."""
+    node = toward.end_node
+    inner = (edges[i] for i in cluster.inner if i in edges)
+    return not any(
+        (edge.forward and edge.end_node == node) or (edge.backward and edge.start_node == node)
+        for edge in (*inner, *(leg.edge for leg in cluster.legs))
+        if edge.index != toward.edge.index
+    )
+
+
+def lights_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[Met]:
+    """Return the lights met between a junction's nodes, in driving order."""
     found = []
     for part in inside:
         nodes = part.edge.node_ids[::-1] if part.reverse else part.edge.node_ids
         for node in nodes:
             tags = node_tags.get(node)
-            if not tags or not (is_light(tags) or sign_of(tags)):
-                continue
             # Who drives along the nodes meets what faces forward.
-            facing = faces(tags, not part.reverse)
-            at_end = node in (nodes[0], nodes[-1])
-            if facing or (facing is None and (is_light(tags) or not at_end)):
+            if tags and is_light(tags) and faces(tags, not part.reverse) is not False:
                 found.append(Met(node, math.inf, tags))
     return found
 

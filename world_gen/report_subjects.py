@@ -194,10 +194,11 @@ def _line(at: Neighbourhood, line: StopLine) -> Value:
         "signal": "stops at a signal", "stop": "stops at a sign", "give_way": "gives way at a sign",
         "none": "no sign or signal",
     }  # fmt: skip
-    lane = at.lanes[line.lane_id]
-    return Value(
-        at.road_name(lane), words.get(line.control.value, line.control.value), line.control.source
-    )
+    told = words.get(line.control.value, line.control.value)
+    onto = at.connections.get(line.connection_id or "")
+    if onto is not None:
+        told = f"{told} on the way into {at.road_name(at.lanes[onto.to_lane_id])}"
+    return Value(at.road_name(at.lanes[line.lane_id]), told, line.control.source)
 
 
 def _signals(at: Neighbourhood, junction: WorldJunction, heads: Iterable[Signal]) -> list[Value]:

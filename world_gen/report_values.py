@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from contracts.provenance import Provenance
+from contracts.provenance import PROVENANCES, Provenance
 
 SOURCE_CONFIDENCE: Mapping[Provenance, float] = {"tagged": 1.0, "inferred": 0.7, "default": 0.3}
 """What a value is worth by where it came from: a convention to compare junctions by.
@@ -30,7 +30,6 @@ SUBJECT_WEIGHT: Mapping[str, float] = {
     "building heights": 1.0,
 }
 """How much a subject counts in a junction: most, what would hurt a driver if it were wrong."""
-_SOURCES: tuple[Provenance, ...] = ("tagged", "inferred", "default")
 
 
 class SubjectReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -72,7 +71,7 @@ def subject_report(subject: str, values: Iterable[Value]) -> SubjectReport:
         guessed=tuple(
             f"{of}: {words}, {source}" + (f" ({n} times)" if n > 1 else "")
             for (of, words, source), n in sorted(
-                alike.items(), key=lambda item: (_SOURCES.index(item[0][2]) * -1, *item[0][:2])
+                alike.items(), key=lambda item: (PROVENANCES.index(item[0][2]) * -1, *item[0][:2])
             )
         ),
     )

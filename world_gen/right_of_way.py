@@ -12,7 +12,8 @@ Rules stand in the order in which they are asked:
 4. Under lights of both, who turns across oncoming traffic waits (§37 (2) 1, §9 (3), (4); Highway
    Code 180; UVC 11-402): signs count only where the lights are out.
 5. The standing of the roads: stop and give-way signs, priority roads, ways out of yards, roads of
-   lower class (see `priority_roads.standings`), and signs on slip roads past which a path leads.
+   lower class (see `priority_roads.standings`), and signs on slip roads past which a path leads:
+   who comes past the sign of a slip road waits for all but those whom another sign inside stops.
 6. Of equals whose roads lie opposite, who turns across the other waits (§9 (3), (4)). Two who
    both turn so pass in front of each other; where they have no room for that, the later id.
 7. Of equals the one whose near side the other comes from: right before left where traffic
@@ -36,10 +37,10 @@ from contracts.world import Conflict, DrivingSide, YieldRule
 from world_gen.approaches import Approach
 from world_gen.conflicts import Meetings, meetings
 from world_gen.connections import ConnectionDraft
-from world_gen.met_on_the_way import NodeTags, met_inside, sign_of
 from world_gen.polyline import arc_lengths, locate
 from world_gen.polyline_batch import Polylines
 from world_gen.priority_roads import Rank, Standing, has_priority, importance
+from world_gen.signs_inside import SignsInside
 
 ALONGSIDE_RAD, FAST_ALONGSIDE_RAD = math.radians(10.0), math.radians(50.0)
 """Roads that meet at less run together; on motorways and trunk roads they merge at more."""
@@ -75,6 +76,10 @@ class Way(msgspec.Struct, kw_only=True):
     sign: Standing | None
     """A sign inside the junction, on a slip road or in a median, from `sign_m` on."""
     sign_m: float
+    sign_node: int | None
+    """Two who pass the same sign do not wait for each other by it."""
+    slip: bool
+    """Turns to the near side; a sign inside is not that of its whole road, but a slip road's."""
     centerline: Array
     on_main: bool
     """Has run along the main road between the two mouths of a staggered junction."""
@@ -86,7 +91,7 @@ class Way(msgspec.Struct, kw_only=True):
 def right_of_way(
     connections: Sequence[ConnectionDraft],
     found: Sequence[Approach],
-    node_tags: NodeTags,
+    signs: SignsInside,
     driving_side: DrivingSide,
 ) -> tuple[tuple[Conflict, ...], Meetings]:
     """Return every conflict with its answer, and fill what the connections say of them.
@@ -94,7 +99,7 @@ def right_of_way(
     Each of `connections` belongs to a junction that lies whole in the World.
     """
     met = meetings(connections)
-    ways = _ways(connections, found, node_tags, driving_side)
+    ways = _ways(connections, found, signs, driving_side)
     headings = np.array([way.heading for way in ways])
     turned = headings[met.second] - headings[met.first]
     angle = np.arctan2(np.sin(turned), np.cos(turned)) if len(met.first) else turned
@@ -107,10 +112,11 @@ def right_of_way(
     )  # fmt: skip
     for i, j, merging, point, area, apart_m, from_first in rows:
         a, b = ways[i], ways[j]
-        standing = (
-            a.standing if a.sign is None else _standing_at(a, area, a.sign),
-            b.standing if b.sign is None else _standing_at(b, area, b.sign),
-        )
+        standing = a.standing, b.standing
+        if a.sign_node != b.sign_node:
+            standing = (
+                _standing_at(a, area, point, merging), _standing_at(b, area, point, merging)
+            )  # fmt: skip
         answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side)
         loser, winner = (i, j) if answer.first_waits else (j, i)
         conflicting[i].append(b.id)
@@ -137,7 +143,7 @@ def right_of_way(
 def _ways(
     connections: Sequence[ConnectionDraft],
     found: Sequence[Approach],
-    node_tags: NodeTags,
+    signs: SignsInside,
     driving_side: DrivingSide,
 ) -> list[Way]:
     by_road: dict[tuple[int, bool], Approach] = {item.key: item for item in found}
@@ -166,7 +172,7 @@ def _ways(
         junction = c.cluster.junction
         name = junction.summary.id if junction is not None else ""
         kind = junction.summary.kind if junction is not None else "other"
-        sign, sign_m = _sign_inside(c, node_tags) if c.movement.inside else (None, math.inf)
+        sign = next(iter(signs.get(c.id, ())), None)
         ways.append(
             Way(
                 id=c.id,
@@ -178,10 +184,12 @@ def _ways(
                 road=(toward.edge.index, toward.reverse),
                 opposite=None if mine is None else mine.opposite,
                 on_ring=c.start.role == "ring",
-                standing=plain if mine is None else mine.standing,
+                standing=plain if mine is None or mine.signed_inside else mine.standing,
                 signalled=c.control == "signal",
-                sign=sign,
-                sign_m=sign_m,
+                sign=None if sign is None else Standing(Rank.MINOR, sign.rule, "tagged"),
+                sign_m=math.inf if sign is None else sign.at_m,
+                sign_node=None if sign is None else sign.node,
+                slip=c.turn == near and not (mine is not None and mine.signed_inside),
                 centerline=c.centerline,
                 on_main=kind == "staggered" and _runs_along_main(c, tops, classes, name),
                 fast=toward.edge.road_class in _FAST,
@@ -190,18 +198,6 @@ def _ways(
             )
         )
     return ways
-
-
-def _sign_inside(c: ConnectionDraft, node_tags: NodeTags) -> tuple[Standing | None, float]:
-    """Return the sign on the way through a junction, and where along the path it stands."""
-    for met in met_inside(c.movement.inside, node_tags):
-        if word := sign_of(met.tags):
-            for part in c.movement.inside:
-                nodes = part.edge.node_ids
-                if met.node in nodes:
-                    at = locate(c.centerline, part.edge.xy_m[nodes.index(met.node)])
-                    return Standing(Rank.MINOR, word, "tagged"), at
-    return None, math.inf
 
 
 def _runs_along_main(
@@ -244,6 +240,13 @@ def _answer(
     if oncoming and a.signalled and b.signalled:
         return _across(a, b)
     first, second = standing
+    a_slips, b_slips = (
+        way.slip and way.sign is at for way, at in zip((a, b), standing, strict=True)
+    )
+    if a_slips and second is not b.sign:
+        return Answer(True, first.rule, first.source)
+    if b_slips and first is not a.sign:
+        return Answer(False, second.rule, second.source)
     if first.rank != second.rank:
         loser, winner = sorted((first, second))
         told = loser if loser.rank < Rank.PLAIN else winner
@@ -258,14 +261,16 @@ def _answer(
     return _beside(a, b)
 
 
-def _standing_at(way: Way, area: Array, sign: Standing) -> Standing:
+def _standing_at(way: Way, area: Array, point: Array, merging: bool) -> Standing:
     """Return the standing with which a path comes to the ground that it shares with another."""
-    if way.standing.rank <= sign.rank:
+    if way.sign is None or way.standing.rank < way.sign.rank:
         return way.standing
     xy = way.centerline
     gaps = np.hypot(*(area[:, None] - xy[None]).transpose(2, 0, 1))
     reached_m = float(arc_lengths(xy)[gaps.argmin(axis=1)].min())
-    return sign if reached_m > way.sign_m else way.standing
+    # Where paths merge their middles may meet well behind the first ground that they share.
+    reached_m = max(reached_m, locate(xy, point)) if merging else reached_m
+    return way.sign if reached_m > way.sign_m else way.standing
 
 
 def _passes(mover: Way, waiting: Way, driving_side: DrivingSide) -> bool:

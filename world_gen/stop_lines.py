@@ -1,4 +1,4 @@
-"""Stop lines across the lanes that enter junctions."""
+"""Stop lines across the lanes that enter junctions, and at the signs inside them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from contracts.arrays import Array
 from contracts.provenance import Choice
 from contracts.world import LineControl, StopLine
 from world_gen.approaches import Approach
 from world_gen.clusters import Surroundings
+from world_gen.connections import ConnectionDraft
 from world_gen.lanes import LaneDraft, LaneSet
 from world_gen.polyline import left_of
 from world_gen.polyline_batch import Polylines
+from world_gen.signs_inside import SignsInside
 
 LINE_SETBACK_M = 0.3
 
@@ -60,19 +63,46 @@ def lines_across(
     paths = Polylines.of([lane.centerline for lane in lanes])
     total = paths.length_m
     at_m = np.maximum(total - np.array(back_m), np.minimum(0.5, 0.5 * total))
-    half_m = np.array([lane.width_m.value for lane in lanes]) / 2.0
+    ends = _ends_across(paths, at_m, [lane.width_m.value for lane in lanes])
+    return tuple(
+        StopLine(id=f"{lane.id}:{name}", lane_id=lane.id, ends=mine, control=control)
+        for lane, mine, control in zip(lanes, ends, controls, strict=True)
+    )
+
+
+def lines_at_signs(
+    connections: Sequence[ConnectionDraft], signs: SignsInside
+) -> tuple[StopLine, ...]:
+    """Return a line across each connection where a sign inside the junction stands."""
+    signed = [(c, sign) for c in connections for sign in signs.get(c.id, ()) if sign.on_path]
+    ends = _ends_across(
+        Polylines.of([c.centerline for c, _ in signed]),
+        np.array([sign.at_m for _, sign in signed]),
+        [c.width_m.value for c, _ in signed],
+    )
+    return tuple(
+        StopLine(
+            id=f"{c.id}:sign{sign.node}",
+            lane_id=c.start.id,
+            connection_id=c.id,
+            ends=mine,
+            control=Choice(sign.rule, "tagged"),
+        )
+        for (c, sign), mine in zip(signed, ends, strict=True)
+    )
+
+
+def _ends_across(paths: Polylines, at_m: Array, width_m: Sequence[float]) -> Array:
+    """Return (L, 2, 2) the ends, left and right, of a line across each of L paths at `at_m`."""
+    half_m = np.array(width_m) / 2.0
     # A key that grows along each lane and from lane to lane finds all segments in one search.
-    room = np.concatenate([[0.0], np.cumsum(total + 1.0)])
+    room = np.concatenate([[0.0], np.cumsum(paths.length_m + 1.0)])
     i = np.searchsorted(paths.arc_m + room[paths.line], at_m + room[:-1], side="right") - 1
     i = np.clip(i, paths.first[:-1], paths.first[1:] - 2)
     ahead = paths.steps[0][i] / np.maximum(paths.steps[1][i], 1e-9)[:, None]
     centre = paths.xy_m[i] + ahead * (at_m - paths.arc_m[i])[:, None]
     left = left_of(ahead) * half_m[:, None]
-    ends = np.stack([centre + left, centre - left], axis=1).round(3)
-    return tuple(
-        StopLine(id=f"{lane.id}:{name}", lane_id=lane.id, ends=mine, control=control)
-        for lane, mine, control in zip(lanes, ends, controls, strict=True)
-    )
+    return np.asarray(np.stack([centre + left, centre - left], axis=1).round(3))
 
 
 def line_controls(lines: Sequence[StopLine]) -> dict[str, LineControl]:

@@ -15,6 +15,7 @@ from contracts.world import Connection, World
 from sim_worker.actors.path_table import Indices
 from sim_worker.planners.base import SharedGround
 from sim_worker.planners.path import FrenetPath
+from world_gen.polyline import direction_at
 
 _ON_PATH_M, _ON_PATH_RAD = 1.5, 0.6
 _GREEN_KEEPS = ("turn_across", "u_turn", "merge_order")
@@ -84,7 +85,8 @@ class JunctionRules:
                 if not waits:
                     mine, theirs, other = theirs, mine, wait
                 if waits or go == one.connection.id:
-                    yaw = _heading(lines[other], sum(theirs) / 2.0)
+                    x, y = direction_at(lines[other], sum(theirs) / 2.0)
+                    yaw = float(np.arctan2(y, x))
                     rows.append((one.from_arc_m + mine[0], one.from_arc_m + mine[1], waits, yaw))
         if not rows:
             return None
@@ -142,14 +144,6 @@ def _signals(
         for k, (arc, group) in enumerate(line):
             arcs[p, k], places[p, k] = arc, groups.index(group)
     return arcs, places, groups
-
-
-def _heading(line: Array, arc_m: float) -> float:
-    """Return the heading of a polyline at an arc length."""
-    steps = np.diff(line, axis=0)
-    ends = np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))
-    step = min(int(np.searchsorted(ends, arc_m)), len(steps) - 1)
-    return float(np.arctan2(steps[step, 1], steps[step, 0]))
 
 
 def _probe(line: Array) -> Array:

@@ -28,6 +28,7 @@ class SeenActors:
 
     def __init__(self, network: RoadNetwork) -> None:
         self._network = network
+        self._lanes = _Lanes(tuple(network.lanes.values()))
         self._path_of_lane: dict[str, FrenetPath] = {}
 
     def actors(self, users: Sequence[SeenRoadUser]) -> tuple[Player, ...]:
@@ -39,7 +40,7 @@ class SeenActors:
     def _lane_path(self, user: SeenRoadUser) -> FrenetPath | None:
         if user.kind == "pedestrian" or user.speed_mps < _STANDS_MPS:
             return None
-        lane = _lane_under(user, self._network)
+        lane = self._lanes.under(user)
         if lane is None:
             return None
         if lane.id not in self._path_of_lane:
@@ -69,19 +70,30 @@ def _actor(number: int, user: SeenRoadUser, path: FrenetPath | None) -> Player:
     )
 
 
-def _lane_under(user: SeenRoadUser, network: RoadNetwork) -> Lane | None:
-    """Return the lane that a road user is on and heads along, the nearest of them."""
-    best, best_m = None, _LANE_WITHIN_M
-    point = np.array([user.x_m, user.y_m])
-    for lane in network.lanes.values():
-        steps = np.diff(lane.centerline, axis=0)
-        length = np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)
-        along = ((point - lane.centerline[:-1]) * steps).sum(axis=1) / length**2
-        nearest = lane.centerline[:-1] + np.clip(along, 0.0, 1.0)[:, None] * steps
-        away = np.hypot(*(nearest - point).T)
-        step = int(away.argmin())
-        heading = math.atan2(steps[step, 1], steps[step, 0])
-        turned = abs(float(wrap_angle(heading - user.yaw_rad)))
-        if away[step] < best_m and turned < _LANE_WITHIN_RAD:
-            best, best_m = lane, float(away[step])
-    return best
+class _Lanes:
+    """The steps of all lanes of a World in one array, to find the lane under a road user."""
+
+    def __init__(self, lanes: Sequence[Lane]) -> None:
+        self._lanes = tuple(lanes)
+        lines = [lane.centerline for lane in lanes]
+        self._from = np.concatenate([line[:-1] for line in lines] or [np.zeros((0, 2))])
+        self._steps = np.concatenate([np.diff(line, axis=0) for line in lines] or [self._from])
+        self._square = np.maximum(np.square(self._steps).sum(axis=1), 1e-18)
+        self._heading = np.arctan2(self._steps[:, 1], self._steps[:, 0])
+        steps = np.array([len(line) - 1 for line in lines], dtype=np.intp)
+        self._lane_of = np.repeat(np.arange(len(lines)), steps)
+
+    def under(self, user: SeenRoadUser) -> Lane | None:
+        """Return the lane that a road user is on and heads along, the nearest of them."""
+        to_user = np.array([user.x_m, user.y_m]) - self._from
+        along = np.clip((to_user * self._steps).sum(axis=1) / self._square, 0.0, 1.0)
+        away = np.hypot(*(to_user - along[:, None] * self._steps).T)
+        best, best_m = None, _LANE_WITHIN_M
+        near = np.flatnonzero(away < _LANE_WITHIN_M)
+        for lane in np.unique(self._lane_of[near]):
+            mine = near[self._lane_of[near] == lane]
+            step = mine[away[mine].argmin()]
+            turned = abs(float(wrap_angle(self._heading[step] - user.yaw_rad)))
+            if away[step] < best_m and turned < _LANE_WITHIN_RAD:
+                best, best_m = self._lanes[lane], float(away[step])
+        return best

@@ -44,18 +44,18 @@ class Traffic:
         gone = None if self.replay is None else self._play_back(self.replay)
         self.poses = self.table.poses(self.place, self.crowd.lateral_m)
         if gone is not None:
-            self.poses[:, : gone.shape[1]][gone] = np.nan
+            np.copyto(self.poses[:, : gone.shape[1]], np.nan, where=gone[..., None])
         if self._absent is not None:
             self.poses[self._absent] = np.nan
 
     def _play_back(self, replay: Replay) -> Flags:
-        """Put recorded road users where they are now; returns (S, T) who of them is away."""
+        """Put recorded road users where they are now; returns (1 or S, T) who of them is away."""
         now, count = replay.at(self._now_s), len(replay)
         mine = (slice(None), slice(count))
         self.place.node[mine] = self._on.begin[mine] + now.node
         self.place.share[mine] = now.share
         self.speed_mps[mine] = now.speed_mps
-        return np.broadcast_to(now.gone, (len(self.arc_m), count))
+        return now.gone
 
     def begun(self, futures: Indices) -> Traffic:
         """Return traffic (K, R) that begins as that of these futures did."""

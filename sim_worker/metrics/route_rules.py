@@ -52,14 +52,16 @@ class RouteRules:
         self.world = world
         taken = connections_taken(world, path)
         self.connections = tuple(c.id for c in taken)
+        # Of a lane's line the light of the connection counts; a sign on the way has none.
         entered = {c.from_lane_id: c.signal_group_id for c in taken}
+        entered |= {c.id: None for c in taken}
         self.lines = tuple(
             LineAhead(
                 line.id, np.asarray(line.ends), _control(line.control.value),
-                entered[line.lane_id],
+                entered[line.across_id],
             )
             for line in world.stop_lines
-            if line.lane_id in entered
+            if line.across_id in entered
         )  # fmt: skip
         by_id = {c.id: c for c in world.connections}
         own = {c.id for c in taken}

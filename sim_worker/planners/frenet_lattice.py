@@ -23,8 +23,9 @@ from sim_worker.planners.lattice_rating import (
     collisions,
     rate_across,
     rate_along,
+    still_free,
 )
-from sim_worker.planners.polynomials import Floats, Motions, joined, to_place, to_speed
+from sim_worker.planners.polynomials import Floats, Motions, braked, joined, to_place, to_speed
 from sim_worker.planners.prediction import Changes, changes
 from sim_worker.planners.tracking import front_from_base_m, pure_pursuit
 from sim_worker.vehicle.resistance import resistance_mps2
@@ -32,6 +33,8 @@ from sim_worker.vehicle.resistance import resistance_mps2
 REPLAN_S = 0.5
 _AT_ONCE_S, _LEAD_BRAKES_MPS2 = 0.15, 2.5
 """Sooner where somebody ahead brakes harder than this."""
+_TURNS_RADPS, _GAINS_MPS = 0.15, 1.0
+"""Who turns or drives otherwise by more than when a motion was chosen is looked at again."""
 _SPEED_SHARES = np.array([1.0, 0.8, 0.6, 0.35, 0.0])
 _SPEED_TIMES_S = np.array([2.5, 5.0])
 _ASIDE_M = np.array([0.0, -0.5, 0.5, -1.0, 1.0, -1.5, 1.5])
@@ -74,18 +77,25 @@ class LatticeDriver:
         self._looked_s = 0.0
         self._seen: SeenUsers | None = None
         self._lead_mps: Array | None = None
+        self._next_s = np.inf
+        self._known: tuple[Array, Array] | None = None
+        """How others turned and how fast they were when motions were looked at last."""
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
         passed_s = np.broadcast_to(view.time_s - self._since_s, view.arc_m.shape)
-        due = (passed_s > REPLAN_S - 1e-6) | self._sees_somebody_new(view)
-        due |= self._lead_brakes(view) & (passed_s > _AT_ONCE_S)
+        changing = self._changes(view)
         if self._chosen is None:
+            due = np.ones(len(passed_s), dtype=bool)
             chosen = choose(view)
-        elif due.any():
-            chosen = self._renewed(self._chosen, view, np.flatnonzero(due), passed_s)
         else:
             chosen = self._chosen
+            due = self._due(chosen, view, passed_s, changing)
+            if due.any():
+                chosen = self._renewed(chosen, view, np.flatnonzero(due), passed_s, changing)
+        if due.all():
+            self._next_s = view.time_s + REPLAN_S
+        self._note(view, due, changing)
         self._chosen = chosen
         self._since_s = np.where(due, view.time_s, self._since_s)
         self._looked_s, self._seen = view.time_s, view.users
@@ -104,11 +114,65 @@ class LatticeDriver:
         command = command + resistance_mps2(view.vehicle, present)
         return PlannerOutput(np.where(hold, _HOLD_MPS2, command), angle)
 
+    def _due(
+        self,
+        chosen: tuple[Motions, Motions],
+        view: PlannerView,
+        passed_s: Array,
+        changing: Changes | None,
+    ) -> npt.NDArray[np.bool_]:
+        """Return (S,) who chooses anew: everybody at the same times, some in between."""
+        if view.time_s > self._next_s - 1e-6:
+            return np.ones(len(passed_s), dtype=bool)
+        due = self._sees_somebody_new(view)
+        due |= self._lead_brakes(view) & (passed_s > _AT_ONCE_S)
+        return due | self._endangered(chosen, view, passed_s, changing, ~due)
+
     def _sees_somebody_new(self, view: PlannerView) -> npt.NDArray[np.bool_]:
         if view.users is None or self._seen is None:
             return np.zeros(len(view.arc_m), dtype=bool)
         new = np.isfinite(view.users.arc_m) & ~np.isfinite(self._seen.arc_m)
         return np.asarray(new.any(axis=1))
+
+    def _changes(self, view: PlannerView) -> Changes | None:
+        if view.users is None or self._seen is None:
+            return None
+        return changes(self._seen, view.users, passed_s=view.time_s - self._looked_s)
+
+    def _endangered(
+        self, chosen: tuple[Motions, Motions], view: PlannerView, passed_s: Array,
+        changing: Changes | None, open_: npt.NDArray[np.bool_],
+    ) -> npt.NDArray[np.bool_]:  # fmt: skip
+        """Return (S,) of the `open_` ones whose motion leads into somebody who drives otherwise
+        than when that was looked at last."""
+        endangered = np.zeros(len(view.arc_m), dtype=bool)
+        users, known = view.users, self._known
+        if users is None or changing is None or known is None:
+            return endangered
+        new = np.abs(changing.yaw_rate_radps - known[0]) > _TURNS_RADPS
+        new |= np.abs(users.speed_mps - known[1]) > _GAINS_MPS
+        rows = np.flatnonzero(new.any(axis=1) & open_)
+        if not len(rows):
+            return endangered
+        known[0][rows], known[1][rows] = changing.yaw_rate_radps[rows], users.speed_mps[rows]
+        along, across = (Motions(m.coefficients[:, rows], m.end_s[rows]) for m in chosen)
+        changing = Changes(*(values[rows] for values in changing))
+        free = still_free(rows_of(view, rows), along, across, passed_s[rows], changing)
+        endangered[rows] = ~free
+        return endangered
+
+    def _note(
+        self, view: PlannerView, due: npt.NDArray[np.bool_], changing: Changes | None
+    ) -> None:
+        """Remember how others drive as motions are chosen."""
+        if view.users is None:
+            return
+        speed = view.users.speed_mps
+        turns = np.zeros_like(speed) if changing is None else changing.yaw_rate_radps
+        if self._known is None or self._known[1].shape != speed.shape:
+            self._known = turns.copy(), speed.copy()
+        else:
+            self._known[0][due], self._known[1][due] = turns[due], speed[due]
 
     def _lead_brakes(self, view: PlannerView) -> npt.NDArray[np.bool_]:
         if self._lead_mps is None:
@@ -122,12 +186,9 @@ class LatticeDriver:
         view: PlannerView,
         rows: npt.NDArray[np.intp],
         passed_s: Array,
+        changing: Changes | None,
     ) -> tuple[Motions, Motions]:
         """Return the motions with those of some rows chosen anew."""
-        changing = None
-        if view.users is not None and self._seen is not None:
-            now_s = view.time_s - self._looked_s
-            changing = changes(self._seen, view.users, passed_s=now_s)
         along, across = chosen
         if len(rows) == len(passed_s):
             return choose(view, _planned(along, across, passed_s), changing)
@@ -211,8 +272,9 @@ def _along(view: PlannerView, speed: Array, accel: Floats, stop: Array) -> Motio
     times = np.repeat(_SPEED_TIMES_S, len(_SPEED_SHARES))
     keeping = to_speed(arc, speed, accel, end_speed=ends, end_s=times)
 
-    brake_s = np.maximum(speed / np.array([MAX_DECEL_MPS2 - 1.0, 3.5]) * 1.3, 0.5)
+    brake_s = np.maximum(speed / np.array([6.0, 3.5]) * 1.3, 0.5)
     braking = to_speed(arc, speed, accel, end_speed=np.zeros_like(brake_s), end_s=brake_s)
+    emergency = braked(arc, speed, decel=MAX_DECEL_MPS2)
 
     way = np.minimum(np.maximum(stop[:, None] - _LINE_GAP_M - arc, 0.0), 150.0)
     stop_s = np.clip(2.0 * way / np.maximum(speed, 2.0), 1.0, 12.0) * np.array([1.0, 1.4])
@@ -227,7 +289,7 @@ def _along(view: PlannerView, speed: Array, accel: Floats, stop: Array) -> Motio
         arc, speed, accel, end_place=arc + np.maximum(room, 0.0),
         end_speed=np.broadcast_to(lead, room.shape), end_s=_SPEED_TIMES_S,
     )  # fmt: skip
-    return joined(keeping, braking, stopping, following)
+    return joined(keeping, braking, stopping, following, emergency)
 
 
 def _across(view: PlannerView, offset: Floats, slide: Floats, push: Floats) -> Motions:

@@ -6,6 +6,7 @@ In single precision, with instants on the first axis, so that sums over them are
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerView
@@ -17,16 +18,19 @@ from sim_worker.vehicle.planar import box_centre_from_base_m
 HORIZON_S, _INSTANTS = 4.0, 12
 _INSTANTS_S: Array = np.linspace(HORIZON_S / _INSTANTS, HORIZON_S, _INSTANTS)
 _ROUGH_INSTANTS_S = _INSTANTS_S.astype(np.float32)[:, None, None]
-_SOONER = np.arange(_INSTANTS, 0, -1, dtype=np.float32)[:, None, None, None]
-_NEAREST = 6
-MAX_ACCEL_MPS2, MAX_DECEL_MPS2 = 2.5, 7.0
+_NEAREST, _BITS = 6, 4
+"""So few others are looked at that their number, twice if all turn, fits into so many bits."""
+_DIGITS = np.exp2(_BITS * np.arange(_INSTANTS - 1, -1, -1.0))[:, None, None, None]
+MAX_ACCEL_MPS2, MAX_DECEL_MPS2 = 2.5, 8.0
 LATERAL_ACCEL_MPS2, _MAX_LATERAL_MPS2 = 2.5, 4.0
 _ALONG_MARGIN_M, _ACROSS_MARGIN_M = 0.8, 0.4
 _SLOPE = 0.3
 """Of the own speed, how fast a car may move across its path."""
 _WEIGHT_SPEED, _WEIGHT_ACCEL, _WEIGHT_JERK = 0.15, 0.25, 0.05
 _WEIGHT_ASIDE, _WEIGHT_ACROSS_JERK = 0.6, 0.1
-_FORBIDDEN, _CROSSES_LINE, _COLLIDES = 1e3, 300.0, 100.0
+_FORBIDDEN, _CROSSES_LINE = 1e4, 300.0
+_COLLIDES, _SOONER, _HARDER = 100.0, 5.0, 4.0
+"""At all, by each instant sooner, by each m²/s² of the own speed: far more than comfort counts."""
 
 
 def rate_along(view: PlannerView, along: Motions, stop: Array) -> tuple[Floats, Floats, Floats]:
@@ -41,7 +45,7 @@ def rate_along(view: PlannerView, along: Motions, stop: Array) -> tuple[Floats, 
         + _WEIGHT_JERK * np.square(np.minimum(np.abs(jerk), np.float32(20.0)))
     ).sum(axis=0) / _INSTANTS
     most = MAX_ACCEL_MPS2 * np.clip(view.speed_factor, 0.3, 2.0)[:, None]
-    wrong = (accel.max(axis=0) > most) | (accel.min(axis=0) < -MAX_DECEL_MPS2 - 1.0)
+    wrong = (accel.max(axis=0) > most) | (accel.min(axis=0) < -MAX_DECEL_MPS2 - 0.5)
     wrong |= speed.min(axis=0) < -0.1
     bends = np.abs(view.path.curvature_pm).astype(np.float32)
     here = ((view.arc_m - view.path.arc_m[0]) / SPACING_M + 0.5).astype(np.float32)
@@ -70,13 +74,27 @@ def rate_across(view: PlannerView, across: Motions, speed: Array) -> tuple[Float
     return cost + _FORBIDDEN * steep, offset
 
 
+def still_free(
+    view: PlannerView, along: Motions, across: Motions, now_s: Array, changing: Changes | None
+) -> npt.NDArray[np.bool_]:
+    """Return (S,) whether motions that began `now_s` (S,) ago go on to touch nobody."""
+    later = now_s + _INSTANTS_S[:, None]
+    place, speed, _ = along.at(later)
+    place = place - view.arc_m
+    offset = across.place_at(later)
+    cost = collisions(view, place[..., None], speed[..., None], offset[..., None], changing)
+    return np.broadcast_to(cost[:, 0, 0] == 0.0, now_s.shape)
+
+
 def collisions(
     view: PlannerView, place: Floats, speed: Floats, offset: Floats, changing: Changes | None
 ) -> Floats:
-    """Return (S, L, D) what touching others costs: more the sooner and the longer.
+    """Return (S, L, D) what touching others costs: more the sooner, and the faster one still is.
 
-    Boxes along the path; between two instants each may be half a step farther. Whether two overlap
-    is a product of overlaps along and across, summed over others and instants.
+    What would follow on the first touch counts for nothing. Boxes along the path; between two
+    instants each may be half a step farther. Whether two overlap is a product of overlaps along
+    and across, summed over others and instants: of digits to a base that no instant's sum reaches,
+    so that the highest one tells the first instant.
     """
     found = courses(view, _INSTANTS_S, nearest=_NEAREST, changing=changing)
     if found is None:
@@ -90,14 +108,16 @@ def collisions(
     width = 0.5 * vehicle.width_m.value + _ACROSS_MARGIN_M + found.half_across_m
     width = width + half_step * np.abs(found.across_mps)
     across = np.abs(offset[:, :, None] - _single(found.offset_m)) < _single(width)
-    count = place.shape[1]
-    instants = along.shape[0] * along.shape[2]
-    weighted = along * _SOONER
-    first = weighted.transpose(1, 3, 0, 2).reshape(count, -1, instants)
-    second = across.transpose(1, 0, 2, 3).reshape(count, instants, -1).astype(np.float32)
-    # Sums of small whole numbers: exact, in whatever order.
-    touched = first @ second
-    return np.where(touched > 0.5, _COLLIDES + 10.0 * touched, 0.0)
+    count, instants = place.shape[1], along.shape[0] * along.shape[2]
+    weighted = along * _DIGITS
+    overlaps = weighted.transpose(1, 3, 0, 2).reshape(count, -1, instants)
+    beside = across.transpose(1, 0, 2, 3).reshape(count, instants, -1).astype(np.float64)
+    # Sums of whole numbers below 2**53: exact, in whatever order.
+    digits = overlaps @ beside
+    first = _INSTANTS - 1 - (np.frexp(digits)[1] - 1) // _BITS
+    hit = digits > 0.5
+    then = np.take_along_axis(np.square(speed).transpose(1, 2, 0), np.where(hit, first, 0), axis=2)
+    return np.where(hit, _COLLIDES + _SOONER * (_INSTANTS - first) + _HARDER * then, 0.0)
 
 
 def _single(values: Array) -> Floats:

@@ -99,6 +99,13 @@ def to_place(
     return Motions(c, t)
 
 
+def braked(place: Floats, speed: Floats, *, decel: float) -> Motions:
+    """Return motions that brake evenly from now on until they stand; their jerk is not told."""
+    c = np.zeros((6, *np.broadcast_shapes(place.shape, speed.shape)))
+    c[0], c[1], c[2] = place, speed, -0.5 * decel
+    return Motions(c, np.broadcast_to(speed / decel, c.shape[1:]))
+
+
 def joined(*parts: Motions) -> Motions:
     """Return several sets of motions as one, along the last axis, that of candidates."""
     return Motions(

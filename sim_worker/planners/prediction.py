@@ -10,8 +10,10 @@ import numpy.typing as npt
 from contracts.arrays import Array
 from contracts.frames import wrap_angle
 from sim_worker.planners.base import PlannerView, SeenUsers
+from sim_worker.planners.path import FrenetPath
 
-_KEEPS_LANE_RAD = 0.35
+_KEEPS_LANE = 0.34
+"""The sine of the angle to the road within which one drives along it, either way."""
 _SIGHT_M = 60.0
 _WAY_M, _BEYOND_M, _GAINS_MPS = 7.0, 15.0, 3.0
 """Who stays farther beside the way, or beyond what a car can reach of it, is no matter."""
@@ -21,10 +23,10 @@ _LEAST_SCALE = 0.2
 
 
 class Courses(NamedTuple):
-    """Box centres of N others of S cars at K instants along the path, infinite where none.
+    """Boxes of N others of S cars at K instants along the path, all (K, S, N).
 
-    `arc_m` and `offset_m` (K, S, N), `along_mps` and `across_mps` likewise; half extents along and
-    across the path `half_along_m`, `half_across_m` (S, N).
+    `arc_m`, infinite where there is none, and `offset_m` of their centres, `along_mps` and
+    `across_mps`; half extents along and across the path `half_along_m`, `half_across_m`.
     """
 
     arc_m: Array
@@ -69,8 +71,8 @@ def courses(
     """Predict the `nearest` others of each car at even instants; None where nobody is near.
 
     Those along the path keep their angle to it, as lanes do; the rest go straight on, and those
-    seen `changing` brake or turn on for a while. Who follows in the car's own lane is left out:
-    not to be hit from behind is not the car's part.
+    seen `changing` brake, and turn on for a while or else not any more. Who follows in the car's
+    own lane is left out: not to be hit from behind is not the car's part.
     """
     users = view.users
     if users is None or users.poses.shape[1] == 0:
@@ -78,8 +80,8 @@ def courses(
     away = np.square(users.poses[..., 0] - view.states[:, None, 0])
     away += np.square(users.poses[..., 1] - view.states[:, None, 1])
     turned = wrap_angle(users.turned_rad)
-    along_lane = (np.abs(turned) < _KEEPS_LANE_RAD) & ~users.walks
-    behind = along_lane & (users.arc_m < view.arc_m[:, None])
+    along_lane = (np.abs(np.sin(turned)) < _KEEPS_LANE) & ~users.walks
+    behind = along_lane & (np.cos(turned) > 0.0) & (users.arc_m < view.arc_m[:, None])
     behind &= np.abs(users.offset_m - view.offset_m[:, None]) < 2.0
     counts = (away < _SIGHT_M**2) & ~behind & _may_meet(view, users, float(instants_s[-1]))
     if not counts.any():
@@ -91,38 +93,88 @@ def courses(
         return np.take_along_axis(values, chosen, axis=1)
 
     there = np.take_along_axis(counts, chosen, axis=1)
-    arc = np.where(there, pick(users.arc_m), np.inf)
-    offset, turned = pick(users.offset_m), pick(turned)
-    speed = np.where(there, pick(users.speed_mps), 0.0)
-    keeps = np.take_along_axis(along_lane, chosen, axis=1)
-    cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
-    length, width = pick(users.size_m[..., 0]), pick(users.size_m[..., 1])
-    turned = np.where(there, turned, 0.0)
-    offset = np.where(there, offset, 0.0)
-    brakes, yaw_rate = np.zeros_like(speed), np.zeros_like(speed)
+    brakes = yaw_rate = np.zeros(chosen.shape)
     if changing is not None:
         brakes, yaw_rate = pick(changing.brakes_mps2), pick(changing.yaw_rate_radps)
+    now = _Boxes(
+        arc_m=np.where(there, pick(users.arc_m), np.inf),
+        offset_m=np.where(there, pick(users.offset_m), 0.0),
+        turned_rad=np.where(there, pick(turned), 0.0),
+        speed_mps=np.where(there, pick(users.speed_mps), 0.0),
+        length_m=pick(users.size_m[..., 0]),
+        width_m=pick(users.size_m[..., 1]),
+        brakes_mps2=brakes,
+        yaw_rate_radps=yaw_rate,
+        keeps_lane=np.take_along_axis(along_lane, chosen, axis=1),
+    )
+    if changing is not None:
+        now = _either_way(now, view.path)
+    return _led_on(now, view.path, instants_s)
+
+
+class _Boxes(NamedTuple):
+    """Others as they are now, all (S, N); see `SeenUsers` and `Changes`."""
+
+    arc_m: Array
+    offset_m: Array
+    turned_rad: Array
+    speed_mps: Array
+    length_m: Array
+    width_m: Array
+    brakes_mps2: Array
+    yaw_rate_radps: Array
+    keeps_lane: npt.NDArray[np.bool_]
+
+
+def _either_way(now: _Boxes, path: FrenetPath) -> _Boxes:
+    """Return the boxes with those that turn off the road twice: they may turn on, or go straight.
+
+    Nobody sees where a turn ends before it has.
+    """
+    bend = _bend(now.arc_m, path)
+    along = _along(now.turned_rad, bend, now.offset_m)
+    turns = np.abs(now.yaw_rate_radps - bend * along * now.speed_mps) >= _TURNS_OFF_RADPS
+    turns &= np.isfinite(now.arc_m)
+    now = now._replace(keeps_lane=now.keeps_lane & ~turns)
+    columns = np.flatnonzero(turns.any(axis=0))
+    if not len(columns):
+        return now
+    straight = _Boxes._make(values[:, columns] for values in now)._replace(
+        arc_m=np.where(turns, now.arc_m, np.inf)[:, columns],
+        yaw_rate_radps=np.zeros((len(turns), len(columns))),
+    )
+    return _Boxes._make(np.concatenate(pair, axis=1) for pair in zip(now, straight, strict=True))
+
+
+def _bend(arc_m: Array, path: FrenetPath) -> Array:
+    there = np.isfinite(arc_m)
+    return path.at_nodes(path.curvature_pm, np.where(there, arc_m, 0.0))
+
+
+def _along(turned_rad: Array, bend_pm: Array, offset_m: Array) -> Array:
+    """Return how far along the path a box comes on each metre of its own way."""
+    return np.asarray(np.cos(turned_rad) / np.maximum(1.0 - bend_pm * offset_m, _LEAST_SCALE))
+
+
+def _led_on(now: _Boxes, path: FrenetPath, instants_s: Array) -> Courses:
+    arc, offset, turned, speed, length, width = now[:6]
     rows: list[list[Array]] = []
     for k, passed_s in enumerate(np.diff(instants_s, prepend=0.0).tolist()):
-        after = np.maximum(speed - passed_s * brakes, 0.0)
+        after = np.maximum(speed - passed_s * now.brakes_mps2, 0.0)
         mean, speed = 0.5 * (speed + after), after
         # The bend changes slowly: every second step is as the one before.
         if k % 2 == 0:
-            bend = view.path.at_nodes(view.path.curvature_pm, np.where(there, arc, 0.0))
-            along = np.cos(turned) / np.maximum(1.0 - bend * offset, _LEAST_SCALE)
-            across = np.sin(turned)
-            goes_on = yaw_rate if instants_s[k] < _TURNS_ON_S else 0.0
-            off_the_road = goes_on - bend * along * mean
-            if k == 0 and changing is not None:
-                keeps = keeps & (np.abs(off_the_road) < _TURNS_OFF_RADPS)
-            turning = np.where(keeps, 0.0, off_the_road)
+            bend = _bend(arc, path)
+            goes_on = now.yaw_rate_radps if instants_s[k] < _TURNS_ON_S else 0.0
+            turning = goes_on - bend * _along(turned, bend, offset) * mean
+            turning = np.where(now.keeps_lane, 0.0, turning)
+            middle = turned + passed_s * turning
+            along, across = _along(middle, bend, offset), np.sin(middle)
+            cos, sin = np.abs(np.cos(middle)), np.abs(across)
+            half_along, half_across = length * cos + width * sin, length * sin + width * cos
         ahead, aside = along * mean, across * mean
         arc = arc + passed_s * ahead
         offset = offset + passed_s * aside
         turned = turned + passed_s * turning
-        rows.append([arc, offset, ahead, aside])
-    found = [np.stack(column) for column in zip(*rows, strict=True)]
-    return Courses(
-        found[0], found[1], found[2], found[3],
-        0.5 * (length * cos + width * sin), 0.5 * (length * sin + width * cos),
-    )  # fmt: skip
+        rows.append([arc, offset, ahead, aside, 0.5 * half_along, 0.5 * half_across])
+    return Courses(*(np.stack(column) for column in zip(*rows, strict=True)))

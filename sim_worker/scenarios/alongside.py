@@ -21,7 +21,6 @@ from sim_worker.scenarios.impact import (
 )
 from sim_worker.scenarios.roles import CastActor, Meeting, Staging
 from sim_worker.scenarios.ways import Way
-from world_gen.polyline import length
 
 _CLEAR_M, _LANE_HALF_M = 0.3, 1.5
 """What is parked leaves the lane free, and a car's side by so much."""
@@ -110,11 +109,10 @@ def _played(actor: CastActor, staging: Staging) -> _OnPath:
     after = actor.acts_after_s if actor.conduct == "stops" else math.inf
     path = staging.place.ego.path
     moving = Moving(path, actor.speed_mps, actor.lateral_m, after, actor.decel_mps2)
-    # Its path may have been led back: on the ego's it starts by so much earlier.
-    start = actor.start_arc_m - (length(actor.xy_m) - length(staging.place.ego.xy_m))
     touch = first_touch(
         staging.ego, staging.box, moving, actor.traits, ego_arc_m=np.array([staging.start_m]),
-        actor_arc_m=np.array([start]), until_s=staging.scenario.horizon_s,
+        actor_arc_m=np.array([actor.start_on(staging.place.ego)]),
+        until_s=staging.scenario.horizon_s,
     )  # fmt: skip
     return _OnPath(moving, touch)
 

@@ -107,17 +107,18 @@ class PathScenarios(NamedTuple):
             if there_s < LEAST_TIME_S:
                 return Unplaced(junction, "the place of the impact is behind the car", True)
             later_s = there_s - played.impact_time_s
-        ways = {way.name: way for options in place.actor_ways for way in options}
         return tuple(
             self._beside(actor, played, place, ego_arc_m)
             if actor.relation in ALONG
-            else _coming(actor, ways[actor.way], later_s + values[f"{actor.name}{_LATE}"])
+            else _coming(
+                actor, place.way_named(actor.way), later_s + values[f"{actor.name}{_LATE}"]
+            )
             for actor in played.actors
         )
 
     def _beside(self, actor: CastActor, played: Cast, place: Place, ego_arc_m: float) -> Player:
         """Return who moves along the ego's path; what is parked stays where it stands."""
-        arc = actor.start_arc_m - (_length(actor.xy_m) - _length(place.ego.xy_m))
+        arc = actor.start_on(place.ego)
         if actor.relation == "parked":
             stands = place.ego.path.point_at(np.array([arc]))
             arc = float(self.path.locate(stands).arc_m[0])
@@ -127,9 +128,4 @@ class PathScenarios(NamedTuple):
 
 
 def _coming(actor: CastActor, way: Way, later_s: float) -> Player:
-    arc = actor.start_arc_m - (_length(actor.xy_m) - _length(way.xy_m))
-    return player_on(actor, way.path, arc - actor.speed_mps * later_s)
-
-
-def _length(xy: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
-    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
+    return player_on(actor, way.path, actor.start_on(way) - actor.speed_mps * later_s)

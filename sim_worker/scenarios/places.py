@@ -28,6 +28,11 @@ class Place(NamedTuple):
     edges_m: tuple[float, float] = (10.0, -10.0)
     """How far left and, negative, right of the ego's way the road reaches where it comes from."""
 
+    def way_named(self, name: str) -> Way:
+        """Return the way of that name, the ego's for those who move along it."""
+        ways = (way for options in self.actor_ways for way in options if way.name == name)
+        return next(ways, self.ego)
+
     @property
     def near_sign(self) -> float:
         """Return +1 where the near side is the right one, else -1."""

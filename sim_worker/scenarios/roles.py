@@ -14,6 +14,7 @@ from sim_worker.scenarios.drawing import Values
 from sim_worker.scenarios.impact import EgoBox, Impact, Moving
 from sim_worker.scenarios.places import Place
 from sim_worker.scenarios.ways import Way
+from world_gen.polyline import length
 
 ALONG: tuple[Relation, ...] = ("ahead", "behind", "beside", "parked")
 """Relations of those who have no way of their own: they are on the ego's path or beside it."""
@@ -40,6 +41,10 @@ class CastActor(NamedTuple):
     hidden_by: str
     way: str
     """The connections or the line that it takes."""
+
+    def start_on(self, way: Way) -> float:
+        """Return where it starts on the way that it takes; its own path may begin before that."""
+        return self.start_arc_m - (length(self.xy_m) - length(way.xy_m))
 
     @property
     def traits(self) -> KindTraits:

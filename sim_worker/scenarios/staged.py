@@ -23,7 +23,6 @@ from sim_worker.scenarios.roads import RoadNetwork
 from sim_worker.scenarios.roles import Cast, CastActor
 from sim_worker.scenarios.ways import Way
 from sim_worker.seeding import kinematic_tire_angle, rear_slip_velocity
-from world_gen.polyline import length
 
 _Case = tuple[object, ...]
 
@@ -97,14 +96,11 @@ def _named(scenario: Scenario, network: RoadNetwork, name: str) -> Place | None:
 
 def staged_players(played: Cast, path: FrenetPath) -> tuple[Player, ...]:
     """Return the road users of a case; `path` is the ego's way, shared by all that go along it."""
-    ways = {way.name: way for options in played.place.actor_ways for way in options}
     ego = played.place.ego
     players = []
     for actor in played.actors:
-        way = ways.get(actor.way, ego)
-        # A path that was led back for its actor begins by so much before its way.
-        arc = actor.start_arc_m - (length(actor.xy_m) - length(way.xy_m))
-        players.append(player_on(actor, path if way is ego else way.path, arc))
+        way = played.place.way_named(actor.way)
+        players.append(player_on(actor, path if way is ego else way.path, actor.start_on(way)))
     return tuple(players)
 
 

@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from telemetry.logs.log import Log, LogError
-from telemetry.logs.opening import open_log
+from telemetry.logs.opening import open_log, open_road_users
 from telemetry.logs.route_line import RouteLine, line_of_log, read_line
 
-__all__ = ["Log", "LogError", "RouteLine", "line_of_log", "open_log", "read_line"]
+__all__ = [
+    "Log",
+    "LogError",
+    "RouteLine",
+    "line_of_log",
+    "open_log",
+    "open_road_users",
+    "read_line",
+]

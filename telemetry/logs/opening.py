@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from contracts.drive import RoadUsers
 from telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
 from telemetry.logs.geojson import open_geojson
 from telemetry.logs.gpx import open_gpx
 from telemetry.logs.log import Log, LogError
+from telemetry.logs.mcity import DECLARED, is_mcity, read_mcity
+from telemetry.logs.road_users import LONGEST_GAP_S, RoadUserLog, detections_of, log_of_detections
 from telemetry.logs.smartloc import is_smartloc, open_smartloc
 
 KINDS = (
@@ -29,8 +32,7 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
         if is_comma2k19(path):
             return open_comma2k19(path)
         raise LogError(f"{path}: a folder that is no comma2k19 segment; known logs: {KINDS}")
-    with path.open("rb") as file:
-        head = file.read(4096)
+    head = _head(path)
     if not head:
         raise LogError(f"{path}: the file is empty")
     suffix = path.suffix.lower()
@@ -50,3 +52,28 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
 
         return open_csv(path, declaration=declaration)
     raise LogError(f"{path}: no known log; known are {KINDS}")
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(4096)
+
+
+def open_road_users(path: Path, *, longest_gap_s: float = LONGEST_GAP_S) -> RoadUserLog:
+    """Read the road users of a log: Mcity's JSON, or what the car of any other log detected.
+
+    Raises FileNotFoundError for a missing file and LogError for one without road users.
+    """
+    path = Path(path)
+    if path.is_file() and is_mcity(_head(path).decode("utf-8", errors="replace")):
+        found = log_of_detections(read_mcity(path), DECLARED, longest_gap_s=longest_gap_s)
+    else:
+        log = open_log(path)
+        found = log_of_detections(
+            (detections_of(said) for _, said in log.samples() if isinstance(said, RoadUsers)),
+            log.declared,
+            longest_gap_s=longest_gap_s,
+        )
+    if not found.tracks:
+        raise LogError(f"{path}: no road users in it (a car's own drive is no such log)")
+    return found

@@ -128,7 +128,7 @@ def _bare_ms(question_bytes: int, answer_bytes: int) -> float:
     question = bytes(question_bytes)
     with (
         zenoh.open(zenoh_config(setup, router=True)) as session,
-        python(ANSWERER, setup.endpoint, BARE_KEY, str(answer_bytes)),
+        python("-c", ANSWERER, setup.endpoint, BARE_KEY, str(answer_bytes)),
     ):
         while not list(session.get(BARE_KEY, payload=question)):
             pass

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from contracts.bus import Bus, Mailbox, Received, ZenohBus
@@ -73,11 +75,11 @@ def zenoh_sides(*, lossless: bool = False) -> Iterator[Sides]:
 
 
 @contextmanager
-def python(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """Run code in a fresh interpreter that says `ready`; it is ended with the block."""
+def python(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a fresh interpreter whose program says `ready`; it is ended with the block."""
     process = subprocess.Popen(
-        [sys.executable, "-c", code, *arguments],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        [sys.executable, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
     )  # fmt: skip
     with process:
         try:

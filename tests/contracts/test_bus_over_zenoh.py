@@ -31,7 +31,7 @@ def test_a_killed_process_is_seen_at_once_and_its_questions_end() -> None:
     alive, replies = Mailbox(10), Mailbox(10)
     with ZenohBus(setup, router=True) as bus:
         bus.watch_alive(alive_key(run="r1", process="*"), alive)
-        with python(MEMBER, setup.endpoint, alive_key(**W0)) as member:
+        with python("-c", MEMBER, setup.endpoint, alive_key(**W0)) as member:
             assert take(alive).up
             deadline = time.monotonic() + 10.0
             bus.request("prepare", PrepareRequest(world_id="abc"), replies, **W0)
@@ -54,7 +54,7 @@ def test_clients_find_a_router_that_was_killed_and_started_again() -> None:
     setup = BusSetup(endpoint=free_endpoint())
     mailbox, alive = Mailbox(10), Mailbox(10)
     with ExitStack() as stack:
-        router = stack.enter_context(python(ROUTER, setup.endpoint))
+        router = stack.enter_context(python("-c", ROUTER, setup.endpoint))
         sender = stack.enter_context(ZenohBus(setup))
         receiver = stack.enter_context(ZenohBus(setup))
         receiver.subscribe("speed", mailbox, vehicle="ego")
@@ -66,7 +66,7 @@ def test_clients_find_a_router_that_was_killed_and_started_again() -> None:
         router.kill()
         assert not take(alive).up
         sender.publish("speed", SpeedSample(stamp_ns=1, speed_mps=1.0), vehicle="ego")
-        stack.enter_context(python(ROUTER, setup.endpoint))
+        stack.enter_context(python("-c", ROUTER, setup.endpoint))
 
         publish_until_received(sender, mailbox)
         assert take_until(alive, lambda item: item.up).key == alive_key(**W0)
@@ -108,7 +108,8 @@ def test_a_question_that_is_never_answered_times_out() -> None:
         assert replies.take(0.2) is None
 
 
-def test_no_router_is_one_clear_line() -> None:
+def test_no_router_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("contracts.bus.CONNECT_S", 0.5)
     endpoint = free_endpoint()
 
     with pytest.raises(BusUnreachable, match=f"no Zenoh router at {endpoint}"):

@@ -182,6 +182,28 @@ def test_points_off_the_earth_are_refused(lat_deg: float, lon_deg: float, text: 
     assert GeoPoint(52.0, 13.0).validate() == GeoPoint(52.0, 13.0)
 
 
+@given(
+    frame=FRAMES,
+    lat_deg=st.floats(-90.0, 90.0) | st.floats(),
+    lon_deg=st.floats(-180.0, 180.0) | st.floats(),
+    yaw_rad=st.floats(-1e4, 1e4) | st.sampled_from([math.nan, math.inf]),
+)
+def test_one_position_gives_what_an_array_of_it_gives(
+    frame: LocalFrame, lat_deg: float, lon_deg: float, yaw_rad: float
+) -> None:
+    lats, lons, yaws = np.array([lat_deg]), np.array([lon_deg]), np.array([yaw_rad])
+    with np.errstate(invalid="ignore", over="ignore"):
+        xy = local_from_geo(frame, lat_deg, lon_deg)
+        assert np.array_equal(xy, local_from_geo(frame, lats, lons)[0], equal_nan=True)
+        back = geo_from_local(frame, xy)
+        assert np.array_equal(back, geo_from_local(frame, xy[None])[0], equal_nan=True)
+        np.testing.assert_allclose(
+            local_from_geo_yaw(frame, yaw_rad, lat_deg, lon_deg),
+            local_from_geo_yaw(frame, yaws, lats, lons)[0],
+            atol=1e-12,
+        )
+
+
 def test_threads_project_side_by_side() -> None:
     expected = geo_from_local(BERLIN, np.array([[100.0, 200.0]]))
     results: list[bool] = []

@@ -96,8 +96,9 @@ def round_done(
     return RoundDone(
         order=RoundOrder(
             round_id=round_id, stamp_ns=stamp_ns, junction_id="n4", world_id="w",
-            receipt_mono_ns=0, jobs=tuple(orders),
+            receipt_mono_ns=0, started_mono_ns=0, jobs=tuple(orders),
         ),
         results=tuple(results),
         latency_ms=latency_ms,
+        seconds=latency_ms / 1000.0,
     )  # fmt: skip

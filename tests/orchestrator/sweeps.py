@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orchestrator.sweep_play import PlaySetup, SweepWorker
 from orchestrator.sweep_pool import Task
-from orchestrator.sweep_spec import Loaded
+from orchestrator.sweep_spec import Loaded, worlds_folder
 from tests.sim_worker.scenarios.worlds import cross
 from world_gen.world_store import WorldStore
 
@@ -36,7 +36,8 @@ class Alone:
     """A crew of this process alone: what it answers is what any worker would."""
 
     def __init__(self, loaded: Loaded) -> None:
-        self._worker = SweepWorker(PlaySetup(loaded=loaded, worlds_dir=loaded.spec.worlds or ""))
+        worlds = worlds_folder(loaded.spec)
+        self._worker = SweepWorker(PlaySetup(loaded=loaded, worlds_dir=str(worlds)))
 
     def run(self, tasks: Sequence[Task], done: Callable[[Task, object], None]) -> None:
         for task in tasks:

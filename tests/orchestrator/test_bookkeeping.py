@@ -74,7 +74,7 @@ def test_futures_are_counted_and_hashed_in_order() -> None:
         count = FuturesCount()
         for done in rounds:
             count.take(done, distinct=1)  # type: ignore[arg-type]
-        return count.record(missed=0, unseeded=0)["sha256"]
+        return count.record(wanted=64, missed=0, spared=0, unseeded=0)["sha256"]
 
     assert hash_of(one, other) == hash_of(one, other)
     assert len({hash_of(one, other), hash_of(other, one), hash_of(one), hash_of()}) == 4
@@ -90,14 +90,16 @@ def test_the_hash_knows_no_worker_and_no_latency() -> None:
     others = tuple(msgspec.structs.replace(r, worker_id="w9") for r in done.results)
     slow.take(replace(done, results=others, latency_ms=900.0), distinct=2)
 
-    assert quick.record(missed=0, unseeded=0) == slow.record(missed=0, unseeded=0)
+    assert quick.record(wanted=64, missed=0, spared=0, unseeded=0) == slow.record(
+        wanted=64, missed=0, spared=0, unseeded=0
+    )
 
 
 def test_a_futures_record_adds_up() -> None:
     count = FuturesCount()
     count.take(round_done(straight(), straight((0.0, 1.0)), latency_ms=80.0), distinct=2)
     count.take(round_done(straight(), latency_ms=120.0), distinct=1)
-    record = count.record(missed=3, unseeded=1)
+    record = count.record(wanted=64, missed=3, spared=0, unseeded=1)
 
     assert (record["count"], record["rounds"], record["distinct"]) == (3, 2, 3)
     assert record["distinct_min_per_round"] == 1

@@ -27,6 +27,8 @@ def test_no_file_and_no_flags_is_the_embedded_drive() -> None:
     ("flags", "named"),
     [
         ({"workers": 0}, "--workers 0"),
+        ({"least_futures": 0}, "--least-futures 0"),
+        ({"futures": 8, "least_futures": 9}, "--least-futures 9: 1 to --futures, which is 8"),
         ({"rate_hz": 0.0}, "--rate 0.0"),
         ({"speed": "fast"}, "--speed fast"),
         ({"speed": -1.0}, "--speed -1.0"),
@@ -59,3 +61,18 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 def test_speed_is_a_number_or_max() -> None:
     assert parse_speed("max") is None
     assert parse_speed("2.5") == 2.5
+
+
+@pytest.mark.parametrize(
+    ("settings", "fewest"),
+    [
+        ({}, 16),
+        ({"futures": 3}, 1),
+        ({"least_futures": 40}, 40),
+        ({"least_futures": 64}, 64),
+        ({"speed": "max"}, 64),
+        ({"speed": "max", "least_futures": 8}, 64),
+    ],
+)
+def test_how_few_futures_a_slow_machine_may_run(settings: dict[str, object], fewest: int) -> None:
+    assert load_config(None, settings).fewest_futures == fewest

@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator import live_loop
 from orchestrator.live_loop import LiveLoop
+from orchestrator.round_pace import Pace
 
 
 class Clock:
@@ -55,6 +56,7 @@ class Conductor:
         round_s: float = 0.1,
         rate_hz: float = 2.0,
         handling: Callable[[float], None] = lambda _: None,
+        one_of: int = 1,
     ) -> None:
         self._clock = clock
         self._round_s = round_s
@@ -63,8 +65,9 @@ class Conductor:
         self.plan = SimpleNamespace(config=SimpleNamespace(rate_hz=rate_hz, speed=1.0))
         self.mailbox = Mailbox(clock, [(100 + s, "state") for s in states_s] + [(100 + end_s, "z")])
         self.intake = SimpleNamespace(states=0, latest=None, end=None)
-        self.rounds = SimpleNamespace(desk=self)
-        self.missed_rounds = 0
+        pace = SimpleNamespace(now=Pace(64, one_of))
+        self.rounds = SimpleNamespace(desk=self, drop=self.drop, pace=pace)
+        self.missed_rounds = self.spared_rounds = 0
         self.started_s: list[float] = []
         self.dropped_s: list[float] = []
 
@@ -182,3 +185,11 @@ def test_a_loop_that_is_stopped_says_so(monkeypatch: pytest.MonkeyPatch) -> None
     assert not loop.run()
     assert clock.now_s < 102.2
     assert len(kept) == pytest.approx(20, abs=2)
+
+
+def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7, one_of=2)
+
+    assert conductor.started_s == pytest.approx([*range(10)], abs=0.03)
+    assert conductor.missed_rounds == 0
+    assert conductor.spared_rounds == 10

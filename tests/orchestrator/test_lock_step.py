@@ -136,7 +136,11 @@ def test_results_do_not_depend_on_who_arrives_first_nor_on_the_number_of_workers
         add_mirror(house)
         Car(house, until_s=8.0, channels=channels)
         assert loop(house).run()
-        hashes.add(house.conductor.rounds.futures.record(missed=0, unseeded=0)["sha256"])
+        hashes.add(
+            house.conductor.rounds.futures.record(wanted=6, missed=0, spared=0, unseeded=0)[
+                "sha256"
+            ]
+        )
         latest = house.conductor.intake.latest
         assert latest is not None
         states.add(msgspec.json.encode(latest.state))

@@ -10,6 +10,7 @@ import pytest
 from contracts.mailbox import Mailbox
 from contracts.simulation import Event
 from orchestrator.progress import ProgressLine
+from orchestrator.round_pace import Pace
 from tests.orchestrator.house import House
 
 
@@ -110,3 +111,18 @@ def test_troubles_are_said_at_once_and_the_rest_is_not(
     line.tell(Event(stamp_ns=0, level="warning", source="recorder", text="the [disk] is full"))
 
     assert capsys.readouterr().err.strip() == "warning: recorder: the [disk] is full"
+
+
+def test_the_line_says_what_a_slow_machine_leaves_out(
+    house: House, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen = watched(house, "progress")
+    house.drive(5)
+    with ProgressLine(house.conductor, house.mission) as line:
+        for number, pace in enumerate((Pace(6), Pace(3), Pace(1, 4)), start=1):
+            house.conductor.rounds.pace.now = pace
+            line.update(line._last_plain_s + 11.0 * number)
+    said = [progress.too_slow for progress in messages(seen)]
+
+    assert said == ["", "3 of 6 futures", "1 of 6 futures in 1 of 4 rounds"]
+    assert "  3 of 6 futures (machine too slow for all)  " in capsys.readouterr().err

@@ -40,7 +40,7 @@ def meeting(*users_xy: tuple[float, float]) -> RoundDone:
         kind_names=("car",),
     )
     result = msgspec.structs.replace(done.results[0], road_users=tracks)
-    return RoundDone(order=done.order, results=(result,), latency_ms=done.latency_ms)
+    return RoundDone(order=done.order, results=(result,), latency_ms=100.0, seconds=0.1)
 
 
 def test_the_nearest_road_user_of_critical_futures_is_shown_and_where_it_is_touched() -> None:

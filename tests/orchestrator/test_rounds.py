@@ -25,6 +25,7 @@ def order(round_id: int, jobs: int = 2) -> RoundOrder:
         junction_id="j",
         world_id="w",
         receipt_mono_ns=1_000_000,
+        started_mono_ns=2_000_000,
         jobs=tuple(
             FuturesJob(
                 round_id=round_id, job_index=index, world_id="w", state=STATE,

@@ -107,3 +107,40 @@ def test_the_summary_names_every_junction_and_the_maps_source(house: House) -> N
     assert text.splitlines()[0].startswith("completed: 1 junctions, ")
     assert "Mill Lane" in text
     assert text.splitlines()[-1] == house.plan.osm.attribution
+
+
+@pytest.mark.parametrize(
+    ("before_s", "within_at_s", "said"),
+    [
+        (0.008, 0.1, "world ready before the drive began"),
+        (17.82, 20.1, "world ready 17.8 s before the car came near"),
+        (-2.34, 0.1, "world 2.3 s late"),
+        (-2.34, 20.1, "world 2.3 s late"),
+    ],
+)
+def test_the_summary_says_when_a_world_was_ready(
+    house: House, before_s: float, within_at_s: float, said: str
+) -> None:
+    house.drive(200, round_every=5)
+    house.end()
+    record = record_of(house)
+    record["intersections"][0] |= {
+        "world_ready_before_s": before_s, "within_radius_at_s": within_at_s,
+    }  # fmt: skip
+
+    assert said in summary_text(record)
+
+
+def test_the_summary_owns_up_to_what_a_slow_machine_left_out(house: House) -> None:
+    house.drive(200, round_every=5)
+    house.end()
+    record = record_of(house)
+    assert "too slow" not in summary_text(record)
+    record["futures"] |= {
+        "smaller_rounds": 12, "spared_rounds": 3, "rounds_by_futures": {"3": 12, "6": 2},
+    }  # fmt: skip
+
+    assert (
+        "too slow for 6 futures in every round: 12 of 3, 2 of 6 futures, 3 rounds spared"
+        in summary_text(record)
+    )

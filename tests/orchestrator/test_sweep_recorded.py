@@ -5,19 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 
-from contracts.drive import GnssFix, VehicleInfo
 from contracts.errors import UserError
-from contracts.frames import GeoPoint, geo_from_local, local_from_geo
+from contracts.frames import geo_from_local, local_from_geo
 from orchestrator.sweep_plan import WorldPlaces, plan_sweep
 from orchestrator.sweep_play import PlaceQuestion, PlaySetup, SweepWorker
-from orchestrator.sweep_spec import Loaded, Recorded, SweepSpec, check_spec, worlds_folder
-from telemetry.mcap_file import create
+from orchestrator.sweep_recorded import Recorded
+from orchestrator.sweep_spec import Loaded, SweepSpec, check_spec, worlds_folder
+from tests.orchestrator.recorded_runs import write_run
 from tests.sim_worker.scenarios.worlds import cross
-from world_gen.world_store import WorldStore
 
 SPEED_MPS, START_X_M = 8.0, -70.0
 START_NS = 1_000_000_000_000
@@ -26,31 +23,13 @@ START_NS = 1_000_000_000_000
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a drive to the east, with a round each second."""
-    folder, world = tmp_path_factory.mktemp("run"), cross()
-    WorldStore(folder / "worlds").save(world)
-    info = VehicleInfo(
-        vehicle_id="car", time_base="utc", start_stamp_ns=START_NS,
-        reference_point="base_link", body_from_antenna_m=(0.0, 0.0, 0.0), sends=("gnss",),
+    world, tenths = cross(), np.arange(180)
+    xy = np.column_stack([START_X_M + SPEED_MPS * tenths / 10.0, np.full(180, -1.5)])
+    return write_run(
+        tmp_path_factory.mktemp("run"), world, rounds_s=range(1, 18), speed_mps=SPEED_MPS,
+        stamps_ns=(START_NS + tenths * 100_000_000).tolist(),
+        lat_lon_deg=geo_from_local(world.frame, xy),
     )  # fmt: skip
-    with create(folder / "drive.mcap", info=info) as writer:
-        for tenth in range(180):
-            xy = np.array([START_X_M + SPEED_MPS * tenth / 10.0, -1.5])
-            lat, lon = geo_from_local(world.frame, xy)
-            stamp_ns = START_NS + tenth * 100_000_000
-            writer.add(
-                "gnss", GnssFix(stamp_ns=stamp_ns, position=GeoPoint(float(lat), float(lon)))
-            )
-    rounds = [
-        {
-            "round_id": second, "stamp_ns": START_NS + second * 1_000_000_000,
-            "drive_time_s": float(second), "intersection_id": world.intersection.id,
-            "world_id": world.id, "cruise_speed_mps": SPEED_MPS,
-        }
-        for second in range(1, 18)
-    ]  # fmt: skip
-    (folder / "results").mkdir()
-    pq.write_table(pa.Table.from_pylist(rounds), folder / "results" / "rounds.parquet")
-    return folder
 
 
 def _loaded(run: Path, *, every_s: float = 2.0) -> Loaded:

@@ -27,19 +27,20 @@ def ready_before_s(book: VisitBook, *, mono_s: float) -> float:
 def test_a_world_is_ready_before_by_the_time_until_the_car_enters_its_radius() -> None:
     book = seen()
     book.take_world(NAME, WORLD, mono_s=103.0, drive_time_s=3.0)
-    book.enter(NAME, mono_s=120.0)
-    book.enter(NAME, mono_s=121.0)
+    book.enter(NAME, mono_s=120.0, drive_time_s=20.0)
+    book.enter(NAME, mono_s=121.0, drive_time_s=21.0)
     book.arrive(NAME, mono_s=135.0, drive_time_s=35.0)
 
     (visit,) = book.arrived
     record = visit.record(mono_s=500.0)
     assert (record["built_at_s"], record["arrived_at_s"]) == (3.0, 35.0)
+    assert record["within_radius_at_s"] == 20.0
     assert record["world_ready_before_s"] == 17.0
 
 
 def test_a_world_that_came_after_the_car_is_late_by_the_time_between() -> None:
     book = seen()
-    book.enter(NAME, mono_s=120.0)
+    book.enter(NAME, mono_s=120.0, drive_time_s=20.0)
     book.arrive(NAME, mono_s=135.0, drive_time_s=35.0)
     book.take_world(NAME, WORLD, mono_s=140.0, drive_time_s=40.0)
 
@@ -48,7 +49,7 @@ def test_a_world_that_came_after_the_car_is_late_by_the_time_between() -> None:
 
 def test_a_world_that_never_came_is_late_and_never_null() -> None:
     book = seen()
-    book.enter(NAME, mono_s=120.0)
+    book.enter(NAME, mono_s=120.0, drive_time_s=20.0)
     book.arrive(NAME, mono_s=135.0, drive_time_s=35.0)
 
     assert ready_before_s(book, mono_s=150.0) == -30.0
@@ -80,7 +81,7 @@ def test_a_junction_never_seen_has_no_visit() -> None:
     assert book.get(NAME) is None
     with pytest.raises(KeyError):
         book.latest(NAME)
-    book.enter(NAME, mono_s=0.0)
+    book.enter(NAME, mono_s=0.0, drive_time_s=0.0)
     assert book.arrived == []
 
 

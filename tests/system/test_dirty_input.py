@@ -15,17 +15,18 @@ from world_gen.read_osm import read_map
 
 SPEED_MPS = 9.0
 RATE_HZ = 5
-AWAY_S = (30.0, 38.0)
+DRIVE_S = 45
+AWAY_S = (25.0, 33.0)
 NOT_FINITE, ZEROS, JUMPS = (40, 41, 90), (60, 120), (75,)
 
 
 def dirty_gpx(path: Path) -> Path:
-    """Write the embedded route driven at 9 m/s for 60 s, with what receivers do to it."""
+    """Write the embedded route driven at 9 m/s for 45 s, with what receivers do to it."""
     frame = read_map(EMBEDDED_MAP).frame
     line = read_line(EMBEDDED_ROUTE)
     route = local_from_geo(frame, line.lat_deg, line.lon_deg)
     points = []
-    for number in range(60 * RATE_HZ):
+    for number in range(DRIVE_S * RATE_HZ):
         time_s = number / RATE_HZ
         xy = point_along(route, 20.0 + SPEED_MPS * time_s)
         if AWAY_S[0] <= time_s < AWAY_S[1]:
@@ -53,7 +54,7 @@ def test_dirty_positions_are_counted_and_the_drive_goes_on(tmp_path: Path) -> No
     log = dirty_gpx(tmp_path / "dirty.gpx")
     run = foretwin(
         tmp_path / "runs", "--map", str(EMBEDDED_MAP), "--log", str(log), "--speed", "max",
-        "--futures", "8", "--rate", "1",
+        "--futures", "4", "--rate", "1",
     )  # fmt: skip
     assert run.code == 0, run.screen
     record = run.record()
@@ -69,18 +70,3 @@ def test_dirty_positions_are_counted_and_the_drive_goes_on(tmp_path: Path) -> No
     kinds = [junction["kind"] for junction in record["intersections"]]
     assert kinds.count("roundabout") <= 1
     assert len({junction["id"] for junction in record["intersections"]}) == len(kinds)
-
-
-def test_a_shifted_plan_is_reported_by_its_shift(tmp_path: Path) -> None:
-    offsets = {}
-    for shift in (0.0, 1.0):
-        config = tmp_path / f"shift{shift:g}.toml"
-        config.write_text(f"standin_plan_shift_m = {shift}\n")
-        run = foretwin(
-            tmp_path / f"runs{shift:g}", "--config", str(config), "--speed", "max",
-            "--futures", "4", "--rate", "1", "--end", "12",
-        )  # fmt: skip
-        assert run.code == 0, run.screen
-        offsets[shift] = run.record()["plan_comparison"]["path_offset_m"]
-    assert abs(offsets[0.0]) < 0.05
-    assert abs(offsets[1.0] - offsets[0.0] - 1.0) < 0.02

@@ -19,7 +19,7 @@ from tests.system.foretwin_command import (
     wait_for,
 )
 
-LIVE = ("--futures", "12", "--rate", "2")
+LIVE = ("--futures", "12", "--least-futures", "12", "--rate", "2")
 
 
 def says(run: Path, text: str) -> bool:
@@ -55,7 +55,7 @@ def assert_readable(run: Path) -> None:
 
 def test_a_killed_worker_is_replaced_and_no_result_counts_twice(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, *LIVE, "--end", "14") as process:
+    with started(out, *LIVE, "--end", "9") as process:
         run = under_way(out)
         victim = child_pids(run)["w0"]
         os.kill(victim, signal.SIGKILL)

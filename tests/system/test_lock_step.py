@@ -7,24 +7,44 @@ from pathlib import Path
 import pytest
 
 from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
-from tests.system.foretwin_command import foretwin
+from tests.system.foretwin_command import Finished, foretwin
 
 BERLIN_LOG = "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt"
 SMALL = ("--speed", "max", "--futures", "36", "--rate", "0.5")
+Drives = tuple[Finished, Finished]
 
 
-def test_one_worker_and_two_give_the_same_results(tmp_path: Path) -> None:
-    runs = [
-        foretwin(tmp_path / f"runs{workers}", *SMALL, "--end", "9", "--workers", str(workers))
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory: pytest.TempPathFactory) -> Drives:
+    """The same drive with one worker and with two."""
+    folder = tmp_path_factory.mktemp("drives")
+    one, two = (
+        foretwin(folder / f"runs{workers}", *SMALL, "--end", "9", "--workers", str(workers))
         for workers in (1, 2)
-    ]
-    assert [run.code for run in runs] == [0, 0], runs[0].screen + runs[1].screen
-    one, two = (run.record() for run in runs)
+    )
+    assert (one.code, two.code) == (0, 0), one.screen + two.screen
+    return one, two
+
+
+def test_one_worker_and_two_give_the_same_results(drives: Drives) -> None:
+    one, two = (run.record() for run in drives)
     assert one["futures"]["count"] >= 36 * 3
     assert one["futures"]["sha256"] == two["futures"]["sha256"]
     assert one["futures"]["missed_rounds"] == 0
     for table in ("comparisons", "plan_comparisons", "mirror"):
-        assert runs[0].rows(table) == runs[1].rows(table)
+        assert drives[0].rows(table) == drives[1].rows(table)
+
+
+def test_a_shifted_plan_is_reported_by_its_shift(drives: Drives, tmp_path: Path) -> None:
+    config = tmp_path / "shift.toml"
+    config.write_text("standin_plan_shift_m = 1.0\n")
+    shifted = foretwin(tmp_path / "runs", *SMALL, "--config", str(config), "--end", "9")
+    assert shifted.code == 0, shifted.screen
+    offset_m, shifted_m = (
+        run.record()["plan_comparison"]["path_offset_m"] for run in (drives[0], shifted)
+    )
+    assert abs(offset_m) < 0.05
+    assert abs(shifted_m - offset_m - 1.0) < 0.02
 
 
 @pytest.mark.real_data
@@ -37,8 +57,8 @@ def test_cutting_the_log_changes_nothing_before_the_cut(tmp_path: Path, data_dir
     berlin = str(data_dir / "osm-berlin-mitte" / "berlin-mitte.osm")
     runs = [
         foretwin(
-            tmp_path / name, *SMALL, "--map", berlin, "--log", str(log), "--start", "20",
-            "--end", "50",
+            tmp_path / name, *SMALL, "--map", berlin, "--log", str(log), "--start", "26",
+            "--end", "46",
         )
         for name, log in (("whole", whole), ("cut", cut))
     ]  # fmt: skip
@@ -57,10 +77,9 @@ def test_cutting_the_log_changes_nothing_before_the_cut(tmp_path: Path, data_dir
         assert full == part, table
 
 
-def test_a_recording_replays_to_the_same_futures(tmp_path: Path) -> None:
+def test_a_recording_replays_to_the_same_futures(drives: Drives, tmp_path: Path) -> None:
     """What drive.mcap holds is all that the futures depend on."""
-    driven = foretwin(tmp_path / "driven", *SMALL, "--end", "9")
-    assert driven.code == 0, driven.screen
+    driven, _ = drives
     assert driven.run is not None
     again = foretwin(
         tmp_path / "again", *SMALL, "--map", str(EMBEDDED_MAP), "--route", str(EMBEDDED_ROUTE),

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 
 import numpy as np
 
@@ -18,28 +17,17 @@ from sim_worker.planners.registry import load_planner
 from sim_worker.planners.remote import RemotePlanner
 from sim_worker.stage import Stage
 from sim_worker.vehicle.parameters import load_vehicle
-from tests.contracts.bus_sides import free_endpoint
+from tests.contracts.bus_sides import free_endpoint, python
 from tests.sim_worker.places import crossroads, job
 from tests.sim_worker.planners.driven import at_rest_on, drive, straight
-from tests.system.foretwin_command import REPOSITORY
+from tests.system.foretwin_command import REPOSITORY, Finished, run_folder, started
 
 EXAMPLE = REPOSITORY / "examples" / "remote_planner.py"
 VEHICLE = load_vehicle()
 
 
-@contextmanager
-def example(endpoint: str) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen(
-        [sys.executable, str(EXAMPLE), "--endpoint", endpoint],
-        stdout=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
-    )  # fmt: skip
-    with process:
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "ready\n"
-            yield process
-        finally:
-            process.kill()
+def example(endpoint: str) -> AbstractContextManager[subprocess.Popen[str]]:
+    return python(str(EXAMPLE), "--endpoint", endpoint)
 
 
 @contextmanager
@@ -100,3 +88,23 @@ def test_futures_of_a_job_are_driven_by_it_beside_others() -> None:
     assert result.outcome.valid.all()
     assert result.outcome.progress_m[1] > 25.0
     assert len(shown) > 30
+
+
+def test_a_whole_drive_is_driven_by_it(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    config = tmp_path / "remote.toml"
+    config.write_text(f'endpoint = "{endpoint}"\nscenarios = []\n')
+    out = tmp_path / "runs"
+    with started(
+        out, "--config", str(config), "--planner", "remote", "--speed", "max", "--end", "3",
+        "--rate", "1", "--futures", "4", "--horizon", "2", "--workers", "1",
+    ) as drive, example(endpoint):  # fmt: skip
+        screen, _ = drive.communicate(timeout=120.0)
+    run = Finished(drive.returncode, screen, run_folder(out))
+    assert run.code == 0, run.screen
+    driven = [row for row in run.rows("futures") if row["planner"] == "remote"]
+    assert len(driven) >= 4
+    assert all(row["valid"] for row in driven)
+    answered = [row for row in driven if not row["remark"]]
+    assert answered, run.screen
+    assert max(row["progress_m"] for row in answered) > 1.0

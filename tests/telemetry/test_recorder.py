@@ -146,6 +146,29 @@ def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:
     process.finish()
 
 
+def test_losses_are_told_again_when_there_are_twice_as_many_and_at_the_end(tmp_path: Path) -> None:
+    bus, events, wall = MemoryBus(), Mailbox(32), Wall()
+    bus.subscribe("event", events, run="r1")
+    recording = Recording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    process = recorder(bus, recording, lossless=False, mono_s=wall)
+    nobody = Mailbox(1)
+    sample = SpeedSample(stamp_ns=START_NS, speed_mps=0.0)
+    process._messages, kept = nobody, process._messages
+    for second in range(10):
+        bus.publish("speed", sample, vehicle="car")
+        bus.publish("speed", sample, vehicle="car")
+        kept.take()  # every second one is lost
+        nobody.put(kept.take())
+        wall.now_s = 2.0 * second
+        assert process.step()
+    process.finish()
+    told = []
+    while (item := events.take()) is not None:
+        told.append(int(item.message().text.split()[0]))
+
+    assert told == [1, 3, 7, 9]
+
+
 @pytest.fixture
 def endpoint() -> str:
     with socket.socket() as free:

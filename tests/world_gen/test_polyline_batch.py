@@ -13,11 +13,11 @@ from world_gen.polyline_batch import Polylines
 coordinate = st.integers(-400, 400).map(lambda tenths: tenths / 10)
 points = st.tuples(coordinate, coordinate)
 line = (
-    st.lists(points, min_size=2, max_size=9, unique=True)
+    st.lists(points, min_size=2, max_size=6, unique=True)
     .map(lambda xy: polyline.without_repeats(np.array(xy)))
     .filter(lambda xy: len(xy) >= 2)
 )
-lines = st.lists(line, min_size=1, max_size=6)
+lines = st.lists(line, min_size=1, max_size=4)
 
 
 def same(found: Polylines, expected: list[np.ndarray]) -> None:

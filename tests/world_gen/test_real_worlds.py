@@ -15,6 +15,7 @@ from shapely.geometry import LineString
 from contracts.codec import content_bytes, decode, encode
 from contracts.world import Lane, Road, World
 from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
+from tests.world_gen.slip_roads import check_lines
 from world_gen.build import build_world
 from world_gen.build_graph import build_road_graph
 from world_gen.export.mjcf import world_spec
@@ -86,9 +87,11 @@ def _check(world: World, junction: Junction) -> None:
               if _off_reference_m(road, lane) > 0.02]  # fmt: skip
     # In hairpins no lane can follow the inside.
     assert len(astray) <= max(4, 0.02 * len(lanes)), astray
+    paths = {part.id: part.centerline for part in (*world.lanes, *world.connections)}
     for line in world.stop_lines:
         across = LineString(line.ends)
-        assert across.distance(LineString(lanes[line.lane_id].centerline)) < 0.001
+        assert across.distance(LineString(paths[line.across_id])) < 0.001
+    assert check_lines(world) == sum(line.connection_id is not None for line in world.stop_lines)
     for signal in world.signals:
         assert set(signal.lane_ids) <= lanes.keys()
     approaches = {lane.id for lane in world.lanes if lane.role in ("approach", "ring")}

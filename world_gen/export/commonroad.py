@@ -116,7 +116,7 @@ class _Lanelets:
         self._lanes = {lane.id: lane for lane in world.lanes}
         self._markings = lane_markings(world, borders)
         self._stop_lines = {
-            line.lane_id: line for line in world.stop_lines if line.control.value != "none"
+            line.across_id: line for line in world.stop_lines if line.control.value != "none"
         }
         self._before: dict[str, list[int]] = {}
         self._after: dict[str, list[int]] = {}
@@ -142,7 +142,7 @@ class _Lanelets:
                 ref(lanelet, name, self._ids[marking.beyond_id]).set(
                     "drivingDir", "opposite" if marking.oncoming else "same"
                 )
-        self._stop_line(lanelet, lane, signs, lights)
+        self._stop_line(lanelet, lane.id, lights)
         self._end(lanelet, self._types(lane), lane.kind, signs, lights)
         return lanelet
 
@@ -150,6 +150,7 @@ class _Lanelets:
         """Return the lanelet of a connection; users are those of its narrower lane."""
         kind_of = narrower_lane(connection, self._lanes)
         lanelet = self._begun(connection.id, "no_marking", "no_marking")
+        self._stop_line(lanelet, connection.id, ())
         types = self._types(kind_of)
         if connection.junction_id:
             types.append("intersection")
@@ -172,10 +173,8 @@ class _Lanelets:
             ref(lanelet, "successor", other)
         return lanelet
 
-    def _stop_line(
-        self, lanelet: Any, lane: Lane, signs: Sequence[int], lights: Sequence[int]
-    ) -> None:
-        line = self._stop_lines.get(lane.id)
+    def _stop_line(self, lanelet: Any, name: str, lights: Sequence[int]) -> None:
+        line = self._stop_lines.get(name)
         if line is None:
             return
         element = child(lanelet, "stopLine")

@@ -105,7 +105,7 @@ def _together(lanes: Iterable[Lane]) -> list[list[Lane]]:
 
 
 def _add_line_signs(world: World, signs: Signs, *, near_right: bool) -> None:
-    lines = {line.lane_id: line for line in world.stop_lines}
+    lines = {line.across_id: line for line in world.stop_lines}
     names: tuple[SignName, ...] = ("stop", "give_way")
     for sign in names:
         signed = [
@@ -122,6 +122,14 @@ def _add_line_signs(world: World, signs: Signs, *, near_right: bool) -> None:
                 [lane.id for lane in group],
                 virtual=line.control.source != "tagged",
             )
+        for line in world.stop_lines:
+            if line.connection_id is not None and line.control.value == sign:
+                signs.add(
+                    sign,
+                    line.ends[1 if near_right else 0],
+                    [line.connection_id],
+                    virtual=line.control.source != "tagged",
+                )
 
 
 def _add_priority(
@@ -130,15 +138,17 @@ def _add_priority(
     """Put up priority signs where others wait by a sign for who comes from a lane without one."""
     connections = {c.id: c for c in world.connections}
     waiting = {
-        line.lane_id for line in world.stop_lines if line.control.value in ("stop", "give_way")
+        line.across_id for line in world.stop_lines if line.control.value in ("stop", "give_way")
     }
     first: dict[str, bool] = {}
     for conflict in world.conflicts:
         if conflict.rule not in _SIGNED_RULES:
             continue
         winner = conflict.goes_id
-        if winner in connections and connections[winner].from_lane_id not in waiting:
-            lane_id = connections[winner].from_lane_id
+        if winner not in connections:
+            continue
+        lane_id = connections[winner].from_lane_id
+        if waiting.isdisjoint((winner, lane_id)):
             first[lane_id] = first.get(lane_id, False) or conflict.source == "tagged"
     for group in _together(lane for lane in world.lanes if lane.id in first):
         nearest = borders[group[-1 if near_right else 0].id]

@@ -154,7 +154,10 @@ def _ways(world: World) -> Iterable[_Draft]:
 
 def _control(world: World) -> Iterable[_Draft]:
     for line in world.stop_lines:
-        properties = {"lane_id": line.lane_id, **_valued("control", line.control)}
+        properties = {
+            "lane_id": line.lane_id, "connection_id": line.connection_id,
+            **_valued("control", line.control),
+        }  # fmt: skip
         yield _line("stop_line", line.id, line.ends, properties)
     for crossing in world.crossings:
         yield _line(

@@ -10,7 +10,7 @@ import shapely
 
 from contracts.arrays import Array
 from contracts.signals import Signal, SignalPlan
-from contracts.world import Connection, Lane, StopLine, World
+from contracts.world import Conflict, Connection, Lane, StopLine, World
 from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
 from world_gen.polyline import left_of
 
@@ -57,12 +57,27 @@ class _StopLines:
     def __init__(self, world: World, drawn: Lanelet2Map) -> None:
         self._drawn = drawn
         self.of_lane = {
-            line.lane_id: line for line in world.stop_lines if line.control.value != "none"
+            line.lane_id: line
+            for line in world.stop_lines
+            if line.control.value != "none" and line.connection_id is None
+        }
+        self._at_sign = {
+            line.connection_id: line for line in world.stop_lines if line.connection_id
         }
         self._ways: dict[tuple[str, ...], int] = {}
         for lane_id, line in self.of_lane.items():
             if line.control.value != "signal":
                 self.way((lane_id,))
+
+    def where_it_waits(self, connection: Connection, conflict: Conflict) -> int | None:
+        """Return the last line before the ground that a connection shares with another."""
+        line = self._at_sign.get(connection.id)
+        if line is not None:
+            path = shapely.LineString(connection.centerline)
+            shared = path.project(shapely.points(conflict.area))
+            if np.min(shared) > path.project(shapely.Point(line.ends.mean(axis=0))):
+                return self._drawn_once([line])
+        return self.way((connection.from_lane_id,))
 
     def way(self, lane_ids: Iterable[str]) -> int | None:
         """Return one line across all these lanes that have a stop line, from left to right."""
@@ -71,9 +86,12 @@ class _StopLines:
             return None
         across = mine[0].ends[1] - mine[0].ends[0]
         mine.sort(key=lambda line: float(line.ends[0] @ across))
-        key = tuple(line.id for line in mine)
+        return self._drawn_once(mine)
+
+    def _drawn_once(self, lines: list[StopLine]) -> int:
+        key = tuple(line.id for line in lines)
         if key not in self._ways:
-            self._ways[key] = self._draw(mine)
+            self._ways[key] = self._draw(lines)
         return self._ways[key]
 
     def _draw(self, lines: list[StopLine]) -> int:
@@ -205,13 +223,13 @@ def _add_right_of_way(
     rules: LaneletRules,
     drawn: Lanelet2Map,
 ) -> None:
-    """Add, for each connection that waits, a rule with all for which it does.
+    """Add, for each connection that waits, a rule at each of its lines with all for which it does.
 
     Those that no two lights ever let go together are a fallback for when the lights are off.
     """
     connections = {c.id: c for c in world.connections if c.id in ids}
     together = _green_together(world)
-    waits: dict[tuple[str, bool], list[str]] = {}
+    waits: dict[tuple[str, bool, int | None], list[str]] = {}
     for conflict in world.conflicts:
         loser, winner = conflict.yields_id, conflict.goes_id
         if loser not in connections or winner not in connections:
@@ -220,11 +238,11 @@ def _add_right_of_way(
             continue
         groups = {connections[n].signal_group_id for n in (loser, winner)}
         fallback = None not in groups and len(groups) == 2 and frozenset(groups) not in together
-        waits.setdefault((loser, fallback), []).append(winner)
-    for (loser, fallback), winners in waits.items():
+        line = lines.where_it_waits(connections[loser], conflict)
+        waits.setdefault((loser, fallback, line), []).append(winner)
+    for (loser, fallback, line), winners in waits.items():
         members = [Member("relation", ids[loser], "yield")]
         members += [Member("relation", ids[name], "right_of_way") for name in winners]
-        line = lines.way((connections[loser].from_lane_id,))
         members += _refers([] if line is None else [line], "ref_line")
         tags = _rule("right_of_way", **({"fallback": "yes"} if fallback else {}))
         rules.add(drawn.relation(members, tags), [loser, *winners])

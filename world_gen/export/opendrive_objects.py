@@ -84,8 +84,8 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
         kind = _CROSSWALKS.get(crossing.kind.value, "pedestrian")
         yield _Thing("crosswalk", kind, crossing.id, (_stripe(crossing),))
     for line in world.stop_lines:
-        if line.control.value != "none" and line.lane_id in network.road_of:
-            road = network.road_of[line.lane_id]
+        road = network.road_across(line.across_id)
+        if line.control.value != "none" and road is not None:
             yield _Thing("roadMark", "signalLines", line.id, (_painted(line),), road=road)
 
 

@@ -64,6 +64,12 @@ class OdrNetwork:
     road_of: Mapping[str, OdrRoad]
     areas_on_foot: tuple[Area, ...]
     """Sidewalks that are not lanes of a road."""
+    connecting: Mapping[str, OdrRoad]
+    """The connecting roads of junctions by the World's connections."""
+
+    def road_across(self, name: str) -> OdrRoad | None:
+        """Return the road of a lane or connection, None where it has none of its own."""
+        return self.road_of.get(name) or self.connecting.get(name)
 
 
 class _PlainEnd(NamedTuple):
@@ -116,6 +122,7 @@ def network_of(world: World) -> OdrNetwork:
         junctions=tuple(junctions),
         road_of=road_of,
         areas_on_foot=sidewalks.others,
+        connecting={item.connection.id: item.road for j in junctions for item in j.connections},
     )
 
 

@@ -50,20 +50,26 @@ def add_signals(
         for road, mine in _by_road(signal.lane_ids, lanes, network):
             own = next(ids)
             _add(
-                elements[road.id], road, mine, own, _light(signal), signal.position,
+                elements[road.id], road, _ruled(road, mine), own, _light(signal), signal.position,
                 signal.yaw_rad, version,
             )  # fmt: skip
             groups.setdefault(signal.group_id, []).append(own)
             into = leads_into.setdefault(signal.group_id, set())
             into.update(junction_of[lane.id] for lane in mine if lane.id in junction_of)
     for lines in _signed(world.stop_lines, lanes, network):
-        mine = [lanes[line.lane_id] for line in lines]
         place, yaw = _beside(lines, network.side)
-        road = network.road_of[mine[0].id]
-        _add(
-            elements[road.id], road, mine, next(ids), _sign(lines[0], network.side), place, yaw,
-            version,
-        )  # fmt: skip
+        road = network.road_of[lines[0].lane_id]
+        ruled = _ruled(road, [lanes[line.lane_id] for line in lines])
+        face = _sign(lines[0], network.side)
+        _add(elements[road.id], road, ruled, next(ids), face, place, yaw, version)
+    for line in world.stop_lines:
+        over = network.connecting.get(line.connection_id or "")
+        if over is not None and line.control.value in _SIGNS:
+            place, yaw = _beside([line], network.side)
+            # A connecting road runs as it is driven, and has one lane.
+            ruled = _Ruled(True, [over.lanes[0].number])
+            face = _sign(line, network.side)
+            _add(elements[over.id], over, ruled, next(ids), face, place, yaw, version)
     return [
         Controller(i, frozenset(leads_into[name]), _controller(i, name, members))
         for i, (name, members) in enumerate(groups.items(), start=1)
@@ -78,6 +84,17 @@ class _Face(NamedTuple):
     dynamic: bool
     width_m: float
     height_m: float
+
+
+class _Ruled(NamedTuple):
+    """The lanes of a road, by number, that a signal is for, and whether they run along it."""
+
+    along: bool
+    numbers: list[int]
+
+
+def _ruled(road: OdrRoad, lanes: Sequence[Lane]) -> _Ruled:
+    return _Ruled(not lanes[0].reverse, [road.numbers[lane.id] for lane in lanes])
 
 
 def _light(signal: Signal) -> _Face:
@@ -115,7 +132,7 @@ def _signed(
     """Return the stop lines that have a sign, together those of one road and direction."""
     found: dict[tuple[int, bool, str], list[StopLine]] = {}
     for line in lines:
-        if line.control.value in _SIGNS and line.lane_id in network.road_of:
+        if line.control.value in _SIGNS and line.across_id in network.road_of:
             key = (network.road_of[line.lane_id].id, lanes[line.lane_id].reverse)
             found.setdefault((*key, line.control.value), []).append(line)
     return list(found.values())
@@ -137,7 +154,7 @@ def _beside(lines: Sequence[StopLine], side: DrivingSide) -> tuple[Array, float]
 def _add(
     element: etree._Element,
     road: OdrRoad,
-    lanes: Sequence[Lane],
+    ruled: _Ruled,
     own: int,
     face: _Face,
     position: Array,
@@ -149,9 +166,8 @@ def _add(
         signals = etree.SubElement(element, "signals")
     s, t = road.curve.locate(position[:2])
     _, direction = road.curve.at(s)
-    along = not lanes[0].reverse
     heading = math.atan2(direction[0, 1], direction[0, 0])
-    usual = heading + math.pi if along else heading
+    usual = heading + math.pi if ruled.along else heading
     item = etree.SubElement(
         signals,
         "signal",
@@ -159,7 +175,7 @@ def _add(
         s=number(s[0]),
         t=number(t[0]),
         dynamic="yes" if face.dynamic else "no",
-        orientation="+" if along else "-",
+        orientation="+" if ruled.along else "-",
         # The file asks for the lower edge, the World says where the middle is.
         zOffset=number(float(position[2]) - face.height_m / 2.0),
         width=number(face.width_m),
@@ -170,7 +186,7 @@ def _add(
         hOffset=number(float(wrap_angle(yaw_rad - usual))),
     )
     item.set("id", str(own))
-    for first, last in _runs([road.numbers[lane.id] for lane in lanes]):
+    for first, last in _runs(ruled.numbers):
         etree.SubElement(item, "validity", fromLane=str(first), toLane=str(last))
     if version == "1.8":
         etree.SubElement(etree.SubElement(item, "semantics"), "priority", type=face.meaning)

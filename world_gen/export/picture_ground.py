@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection, PathCollection, PolyCollectio
 from matplotlib.path import Path as Outline
 
 from contracts.arrays import Array
-from contracts.provenance import Provenance
+from contracts.provenance import PROVENANCES, Provenance
 from contracts.world import Area, Building, Crossing, Road, World
 from world_gen.export.picture_style import (
     DASH,
@@ -35,7 +35,6 @@ from world_gen.polyline import left_of, offset
 
 OVERHANG_M = 2.5
 """What begins higher is drawn see-through: cars pass below it."""
-_SOURCES: tuple[Provenance, ...] = ("tagged", "inferred", "default")
 
 
 def draw_ground(axes: Axes, world: World, view: View) -> None:
@@ -50,7 +49,7 @@ def draw_ground(axes: Axes, world: World, view: View) -> None:
     _areas(axes, view, world.road_surface, facecolor=ROAD, edgecolor="none", zorder=1.0)
     junctions = [j.area for j in world.junctions if j.area is not None]
     _areas(axes, view, junctions, facecolor=JUNCTION, edgecolor="none", zorder=1.1)
-    for source in _SOURCES:
+    for source in PROVENANCES:
         islands = [island for island in world.islands if island.source == source]
         style = {"linestyle": DASH[source], "linewidth": 0.9, "zorder": 2.0}
         _areas(axes, view, islands, facecolor=ISLAND, edgecolor=ISLAND_EDGE, **style)

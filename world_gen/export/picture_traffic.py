@@ -30,7 +30,7 @@ from world_gen.export.picture_style import (
     WAITS,
     View,
 )
-from world_gen.polyline import direction_at, left_of, length, offset, points_at
+from world_gen.polyline import direction_at, left_of, length, offset, points_at, unit
 
 ARROW_SPACING_M = 24.0
 _KIND_COLOUR: Mapping[str, str] = {"bus": BUS, "bicycle": BICYCLE, "tram": TRAM}
@@ -209,31 +209,46 @@ def _draw_conflicts(axes: Axes, world: World, view: View) -> None:
 
 def _draw_who_waits(axes: Axes, world: World, view: View) -> None:
     """Draw at the end of each lane why its drivers wait: a sign, a lesser road, the near side."""
-    line_of = {line.lane_id: line for line in world.stop_lines}
-    rules = _rules_by_lane(world.connections, world.conflicts)
+    line_of = {line.across_id: line for line in world.stop_lines}
+    rules = _rules_by_lane(world.connections, world.conflicts, line_of)
     for lane in world.lanes:
-        found, line = rules.get(lane.id, {}), line_of.get(lane.id)
-        mark = _mark(found, line)
-        end = lane.centerline[-1]
-        if mark is None or not view.holds(end):
-            continue
-        shape, source = mark
-        back = end - 1.6 * direction_at(lane.centerline, length(lane.centerline))
-        colour = LINE_COLOUR["stop"] if shape == "8" else WAITS
-        axes.plot(
-            *back, marker=shape, markersize=9.0, color=colour if source == "tagged" else "white",
-            markeredgecolor=colour, markeredgewidth=1.4, linestyle="", zorder=7.8,
-        )  # fmt: skip
+        mark = _mark(rules.get(lane.id, {}), line_of.get(lane.id))
+        if mark is not None:
+            ahead = direction_at(lane.centerline, length(lane.centerline))
+            _draw_mark(axes, view, lane.centerline[-1], ahead, *mark)
+    for line in world.stop_lines:
+        mark = None if line.connection_id is None else _mark({}, line)
+        if mark is not None:
+            left, right = line.ends
+            _draw_mark(axes, view, (left + right) / 2.0, left_of(unit(right - left)), *mark)
+
+
+def _draw_mark(
+    axes: Axes, view: View, at: Array, ahead: Array, shape: str, source: Provenance
+) -> None:
+    """Draw a mark just before a place (2,) at which drivers wait."""
+    if not view.holds(at):
+        return
+    colour = LINE_COLOUR["stop"] if shape == "8" else WAITS
+    axes.plot(
+        *(at - 1.6 * ahead), marker=shape, markersize=9.0,
+        color=colour if source == "tagged" else "white",
+        markeredgecolor=colour, markeredgewidth=1.4, linestyle="", zorder=7.8,
+    )  # fmt: skip
 
 
 def _rules_by_lane(
-    connections: Iterable[Connection], conflicts: Iterable[Conflict]
+    connections: Iterable[Connection],
+    conflicts: Iterable[Conflict],
+    line_of: Mapping[str, StopLine],
 ) -> dict[str, dict[YieldRule, Provenance]]:
-    """Return for lanes the rules under which their connections wait."""
+    """Return for lanes the rules under which their connections wait, but for signs inside."""
     start = {c.id: c.from_lane_id for c in connections}
     found: dict[str, dict[YieldRule, Provenance]] = {}
     for conflict in conflicts:
-        found.setdefault(start[conflict.yields_id], {})[conflict.rule] = conflict.source
+        line = line_of.get(conflict.yields_id)
+        if line is None or line.control.value != conflict.rule:
+            found.setdefault(start[conflict.yields_id], {})[conflict.rule] = conflict.source
     return found
 
 

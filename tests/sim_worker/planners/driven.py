@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,24 +80,31 @@ def at_rest_on(path: FrenetPath, arc_m: float, speed_mps: float = 0.0, count: in
 def see(
     path: FrenetPath, others: list[Other], time_s: float, count: int
 ) -> tuple[SeenUsers, Array]:
-    poses = np.array([other.at(time_s) for other in others])
+    """What each of `count` cars sees of the same others, and where these (R, 3) are."""
+    seen, poses = see_each(path, [others] * count, time_s)
+    return seen, poses[0]
+
+
+def see_each(
+    path: FrenetPath, others: Sequence[list[Other]], time_s: float
+) -> tuple[SeenUsers, Array]:
+    """What each car sees of others of its own, R for each, and where these (S, R, 3) are."""
+    known = list({id(other): other for row in others for other in row}.values())
+    number = {id(other): i for i, other in enumerate(known)}
+    which = np.array([[number[id(other)] for other in row] for row in others])
+    poses = np.array([other.at(time_s) for other in known])
     place = path.locate(poses[:, :2])
     turned = wrap_angle(poses[:, 2] - path.pose_at(place.arc_m).yaw_rad)
-
-    def rows(values: Any) -> Array:
-        array = np.asarray(values)
-        return np.repeat(array[None], count, axis=0)
-
     seen = SeenUsers(
-        poses=rows(poses),
-        speed_mps=rows([other.speed_mps for other in others]),
-        size_m=rows([other.size_m for other in others]),
-        arc_m=rows(place.arc_m),
-        offset_m=rows(place.offset_m),
-        walks=rows([other.walks for other in others]),
-        turned_rad=rows(turned),
+        poses=poses[which],
+        speed_mps=np.array([other.speed_mps for other in known])[which],
+        size_m=np.array([other.size_m for other in known])[which],
+        arc_m=place.arc_m[which],
+        offset_m=place.offset_m[which],
+        walks=np.array([other.walks for other in known])[which],
+        turned_rad=turned[which],
     )
-    return seen, poses
+    return seen, poses[which]
 
 
 def lead_of(
@@ -136,10 +144,13 @@ def view_of(
 
 def drive(
     planner: Planner, path: FrenetPath, starts: Array, *, vehicle: VehicleParameters,
-    seconds: float, others: list[Other] | None = None, target_mps: Any = 8.0,
+    seconds: float, others: list[Other] | None = None,
+    others_of: Sequence[list[Other]] | None = None, target_mps: Any = 8.0,
     red_until_s: float = 0.0, red_arc_m: float = np.inf, stage: Stage | None = None, **fields: Any,
 ) -> Drive:  # fmt: skip
+    """Drive all cars from `starts` (S, 8) among the same `others`, or each among `others_of` it."""
     count, ticks = len(starts), round(seconds / TICK_S)
+    others_of = [others] * count if others else others_of
     stage = _stage(vehicle.name, count) if stage is None else stage
     stage.seed(
         starts,
@@ -164,16 +175,16 @@ def drive(
         arcs.append(view.arc_m)
         offsets.append(view.offset_m)
         nearest = np.full(count, np.inf)
-        if others:
-            seen, poses = see(path, others, time_s, count)
+        if others_of:
+            seen, poses = see_each(path, others_of, time_s)
             gap, speed = lead_of(seen, view.arc_m, view.offset_m, vehicle)
             view = view._replace(users=seen, lead_gap_m=gap, lead_speed_mps=speed)
-            size = np.array([other.size_m for other in others])
+            size = seen.size_m
             yaw = now[:, None, 2]
             ego = now[:, None, :2] + centre_m * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
             nearest = clearance(
                 Rectangles(ego, yaw, vehicle.length_m.value, vehicle.width_m.value),
-                Rectangles(poses[None, :, :2], poses[None, :, 2], size[:, 0], size[:, 1]),
+                Rectangles(poses[..., :2], poses[..., 2], size[..., 0], size[..., 1]),
             ).min(axis=1)
         away.append(nearest)
         if tick == ticks:

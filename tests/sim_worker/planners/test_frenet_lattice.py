@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sim_worker.planners.base import SharedGround
+from sim_worker.planners.constant_speed import ConstantSpeed
 from sim_worker.planners.frenet_lattice import FrenetLattice, choose
 from sim_worker.planners.path import FrenetPath
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
@@ -56,18 +57,18 @@ def test_it_slows_down_for_a_bend_and_stays_on_its_path(radius_m: float) -> None
     assert done.arc_m[0, -1] > 45.0 + radius_m
 
 
-@pytest.mark.parametrize("speed", [0.0, 3.0, 6.0])
-def test_it_follows_a_slower_car_and_stops_behind_a_standing_one(speed: float) -> None:
+def test_it_follows_a_slower_car_and_stops_behind_a_standing_one() -> None:
     path = straight(300.0)
-    lead = Other(ALONG, speed, 45.0)
+    speeds = np.array([0.0, 3.0, 6.0])
     done = drive(
-        FrenetLattice(), path, at_rest_on(path, 0.0, 10.0), vehicle=VEHICLE, seconds=16.0,
-        others=[lead], target_mps=10.0,
+        FrenetLattice(), path, at_rest_on(path, 0.0, 10.0, 3), vehicle=VEHICLE, seconds=16.0,
+        others_of=[[Other(ALONG, speed, 45.0)] for speed in speeds], target_mps=10.0,
     )  # fmt: skip
     assert done.clearance_m.min() > 0.7
-    assert done.states[0, -1, 3] == pytest.approx(speed, abs=0.8)
-    gap = 45.0 + 16.0 * speed - 2.25 - done.front_m[0, -1]
-    assert 0.7 < gap < 5.0 + 2.0 * speed
+    assert done.states[:, -1, 3] == pytest.approx(speeds, abs=0.8)
+    gaps = 45.0 + 16.0 * speeds - 2.25 - done.front_m[:, -1]
+    assert (gaps > 0.7).all()
+    assert (gaps < 5.0 + 2.0 * speeds).all()
 
 
 def test_it_stops_at_a_red_light_and_goes_on() -> None:
@@ -98,21 +99,38 @@ def test_it_evades_what_reaches_a_little_into_its_lane() -> None:
     assert plain.front_m[0, -1] < 40.0
 
 
-@pytest.mark.parametrize("walks", [True, False])
-@pytest.mark.parametrize("after_s", [3.0, 4.0, 5.0, 6.0])
-def test_nobody_who_crosses_is_hit(after_s: float, walks: bool) -> None:
+def test_nobody_who_crosses_is_hit() -> None:
     path = straight()
     line = np.array([[45.0, -150.0], [45.0, 150.0]])
-    speed = 1.5 if walks else 8.0
-    other = walker(line, speed, 150.0 - speed * after_s)
-    if not walks:
-        other = Other(line, speed, 150.0 - speed * after_s)
+    after_s = (3.0, 4.0, 5.0, 6.0)
+    crossing = [walker(line, 1.5, 150.0 - 1.5 * at_s) for at_s in after_s]
+    crossing += [Other(line, 8.0, 150.0 - 8.0 * at_s) for at_s in after_s]
     done = drive(
-        FrenetLattice(), path, at_rest_on(path, 0.0, 8.0), vehicle=VEHICLE, seconds=14.0,
-        others=[other],
+        FrenetLattice(), path, at_rest_on(path, 0.0, 8.0, len(crossing)), vehicle=VEHICLE,
+        seconds=14.0, others_of=[[one] for one in crossing],
     )  # fmt: skip
     assert done.clearance_m.min() > 0.2
-    assert done.front_m[0, -1] > 50.0
+    assert (done.front_m[:, -1] > 50.0).all()
+
+
+@pytest.mark.parametrize("speed", [6.5, 9.0])
+def test_it_brakes_for_who_turns_across_as_soon_as_that_begins(speed: float) -> None:
+    path = straight()
+    angle = np.linspace(0.0, math.pi / 2, 30)
+    turn = np.array([45.0, 3.2]) + 8.0 * np.column_stack([-np.sin(angle), np.cos(angle) - 1.0])
+    line = np.concatenate([[[145.0, 3.2]], turn, turn[-1:] - np.array([0.0, 60.0])])
+    # Unhindered they meet: the ego in the junction's middle, the other one in its lane.
+    other = Other(line, 6.0, 108.0 - 6.0 * 38.0 / speed)
+    done = {
+        planner: drive(
+            planner(), path, at_rest_on(path, 0.0, speed), vehicle=VEHICLE, seconds=10.0,
+            others=[other], target_mps=speed,
+        )
+        for planner in (ConstantSpeed, FrenetLattice)
+    }  # fmt: skip
+    assert done[ConstantSpeed].clearance_m.min() == 0.0
+    assert done[FrenetLattice].clearance_m.min() > 0.2
+    assert done[FrenetLattice].states[0, -1, 3] > 3.0
 
 
 def test_it_gives_way_where_the_world_says_so() -> None:

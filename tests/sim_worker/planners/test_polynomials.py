@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_worker.planners.polynomials import joined, to_place, to_speed
+from sim_worker.planners.polynomials import braked, joined, to_place, to_speed
 
 VALUES = st.floats(-20.0, 20.0)
 TIMES = st.floats(0.5, 6.0)
@@ -52,6 +52,14 @@ def test_speed_acceleration_and_jerk_are_derivatives(
         motion.jerk_at(now), abs=1e-2 * scale
     )
     assert motion.speed_at(now) == pytest.approx(present, abs=1e-9 * scale)
+
+
+def test_even_braking_ends_at_rest() -> None:
+    motion = braked(*arrays(3.0, 12.0), decel=8.0)
+    place, speed, accel = motion.at(np.array([[0.5], [1.4], [1.6], [4.0]]))
+    assert speed[:, 0] == pytest.approx([8.0, 0.8, 0.0, 0.0])
+    assert accel[:, 0] == pytest.approx([-8.0, -8.0, 0.0, 0.0])
+    assert place[2:, 0] == pytest.approx(3.0 + 12.0**2 / 16.0)
 
 
 def test_sets_of_motions_become_one() -> None:

@@ -89,4 +89,8 @@ def test_who_brakes_comes_to_a_stop_and_who_turns_turns_on() -> None:
     assert braking[-1, 0] == pytest.approx(40.0 - 6.0**2 / 8.0, abs=1.5)
     turning = course(Changes(none, np.full((1, 1), 0.5)))
     assert turning[-1, 1] < -5.0
+    either = courses(view, INSTANTS_S, nearest=3, changing=Changes(none, np.full((1, 1), 0.5)))
+    assert either is not None
+    assert either.offset_m[-1, 0, 1] == pytest.approx(3.0)
+    assert either.half_across_m[-1, 0, 0] > 1.3 * either.half_across_m[-1, 0, 1]
     assert course(Changes(none, none))[-1] == pytest.approx([40.0 - 24.0, 3.0])

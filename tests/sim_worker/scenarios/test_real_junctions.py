@@ -48,9 +48,9 @@ def worlds_of(file: Path, *, most: int | None = None) -> Iterator[World]:
     osm = read_map(file)
     graph = build_road_graph(osm)
     junctions: Sequence = find_intersections(osm, graph)
+    index = index_map(osm, graph, junctions)
     if most is not None:
         junctions = random.Random(4).sample(junctions, min(most, len(junctions)))
-    index = index_map(osm, graph, find_intersections(osm, graph))
     for junction in junctions:
         yield build_world(osm, graph, junction, index=index)
 
