@@ -13,13 +13,16 @@ Array = npt.NDArray[np.float64]
 Array32 = npt.NDArray[np.float32]
 """Float32 array, for trajectories on the wire."""
 
+_FLOAT64 = np.dtype("<f8")
 _WIRE_TYPES = ("<f8", "<f4", "<i8", "<i4", "|u1", "|b1")
 
 
 def array_to_wire(array: np.ndarray[Any, Any]) -> tuple[str, tuple[int, ...], bytes]:
     """Return (dtype, shape, bytes) of an array, little-endian and C-contiguous."""
-    # Asking numpy to see to it costs more than most arrays' bytes: a World has thousands.
-    contiguous = array if array.flags.c_contiguous and array.ndim else np.ascontiguousarray(array)
+    # A World has tens of thousands of small arrays: what numpy is asked costs more than the bytes.
+    if array.dtype is _FLOAT64 and array.ndim:
+        return "<f8", array.shape, array.tobytes()
+    contiguous = np.ascontiguousarray(array)
     if contiguous.dtype.byteorder == ">":
         contiguous = contiguous.astype(contiguous.dtype.newbyteorder("<"))
     return contiguous.dtype.str, contiguous.shape, contiguous.tobytes()

@@ -8,7 +8,6 @@ import logging
 import signal
 import time
 from types import FrameType
-from typing import Any
 
 from contracts.bus import Mailbox, Reply, ZenohBus
 from contracts.drive import InfoRequest, VehicleInfo
@@ -28,6 +27,7 @@ from orchestrator.progress import ProgressLine
 from orchestrator.results import ResultTables
 from orchestrator.run_record import reserve_record, run_record, write_record
 from orchestrator.start_worlds import prepare_start
+from orchestrator.summary import summary_text
 from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
 from orchestrator.versions import versions
 from orchestrator.way_ahead import WayAhead
@@ -40,9 +40,6 @@ END_GRACE_S = 10.0
 INTERRUPT_GRACE_S = 1.2
 HUNG_AFTER_S = 1.0
 """A process whose token is gone for so long while it runs (a stopped one, say) is killed."""
-
-BEGINNING_S = 0.5
-"""Where a junction is near so soon, the drive began near it."""
 
 EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -281,40 +278,3 @@ def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
         source="live telemetry",
         reference_point="antenna",
     )
-
-
-def _readiness(junction: dict[str, Any]) -> str:
-    """Say how long before the car came near a World was ready; a drive may begin near one."""
-    before_s = junction["world_ready_before_s"]
-    if before_s < 0.0:
-        return f"world {-before_s:.1f} s late"
-    if junction["within_radius_at_s"] < BEGINNING_S:
-        return "world ready before the drive began"
-    return f"world ready {before_s:.1f} s before the car came near"
-
-
-def summary_text(record: dict[str, object]) -> str:
-    """Return what the engineer reads at the end of a drive."""
-    futures = record["futures"]
-    assert isinstance(futures, dict)
-    junctions = record["intersections"]
-    assert isinstance(junctions, list)
-    latency = record["state_to_result_ms_p95"]
-    lines = [
-        f"{record['exit']}: {len(junctions)} junctions, {futures['count']} futures in "
-        f"{futures['rounds']} rounds ({futures['missed_rounds']} missed)"
-        + ("" if latency is None else f", state to result p95 {latency:.0f} ms")
-    ]
-    if futures["smaller_rounds"] or futures["spared_rounds"]:
-        sizes = ", ".join(f"{n} of {size}" for size, n in futures["rounds_by_futures"].items())
-        lines.append(
-            f"  machine too slow for {futures['wanted_per_round']} futures in every round: "
-            f"{sizes} futures, {futures['spared_rounds']} rounds spared"
-        )
-    lines += [
-        f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "
-        f"{junction['name'] or junction['id']}  {_readiness(junction)}"
-        for junction in junctions
-    ]
-    attribution = record["map"]["attribution"]  # type: ignore[index]
-    return "\n".join([*lines, attribution])

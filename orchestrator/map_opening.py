@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
@@ -24,14 +24,13 @@ LARGE_MAP_BYTES = 64_000_000
 """Of larger files, what is needed is clipped from an index on disk, made on first use."""
 CLIP_MARGIN_M = 600.0
 """Beyond what is asked for: junctions at the edge must be whole, and know their neighbours."""
-_COLLECT_AFTER = 20_000
+_COLLECT_AFTER = 200_000
 """Maps and Worlds are a million objects that stay: the collector need not look after every 700."""
 MAX_REGION_M = 50_000.0
 """A plane of this size is true to 8 parts in a million at its edges."""
 
 
-@dataclass(frozen=True, slots=True)
-class OpenMap:
+class OpenMap(msgspec.Struct, frozen=True):
     """A map that was read, its roads, and its junctions by id."""
 
     file: Path
@@ -47,16 +46,14 @@ class OpenMap:
         return OpenMap(self.file, self.osm, graph, find_intersections(self.osm, graph))
 
 
-@dataclass(frozen=True, slots=True)
-class Clip:
+class Clip(msgspec.Struct, frozen=True):
     """The part of a map that is needed: what lies within `margin_m` of a line (N, 2) of degrees."""
 
     line_deg: Array
     margin_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class NodeClip:
+class NodeClip(msgspec.Struct, frozen=True):
     """The part of a map that is needed: what lies within `margin_m` of one of its nodes."""
 
     node: int

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -84,9 +85,8 @@ class _Loop:
         if stage.looked:
             self._contact[:, tick] = stage.static_contact
         self._note_users(tick)
-        diverged = stage.diverged()
-        if not self._sound or diverged.any() or self._planners.any_failed:
-            well = ~diverged & ~self._planners.failed
+        if not self._sound or self._planners.any_failed or stage.any_diverged():
+            well = ~stage.diverged() & ~self._planners.failed
             self._valid[:, tick] = self._valid[:, tick - 1] & well
             self._sound = bool(self._valid[:, tick].all())
 
@@ -152,8 +152,9 @@ class _Planners:
             # The others go on without it, whatever it was.
             self._fail(name, rows, f"{type(error).__name__}: {error}", view.time_s)
             return PlannerOutput(np.zeros(len(rows)), np.zeros(len(rows)))
-        fine = np.isfinite(accel + angle)
-        if not fine.all():
+        # Of what is no number, the sum of all products is none either.
+        if not math.isfinite(np.dot(accel, angle)):
+            fine = np.isfinite(accel + angle)
             said = getattr(planner, "remarks", {})
             for place in np.flatnonzero(~fine):
                 reason = said.get(int(place), "answers what is no number")

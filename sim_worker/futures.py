@@ -52,7 +52,7 @@ def run_job(
         record = drive(scene, stage, ticks=ticks)
         states = record.states[:, ::every].astype(np.float32)
     sizes = _sizes(scene)
-    measured = measure(job, scene, record, sizes, vehicle=stage.vehicle, every=every)
+    measured = measure(job, scene, record, sizes, vehicle=stage.vehicle, every=every, scenes=maker)
     outcome, touches = judge(
         stage.vehicle, record, sizes, measured.clearance_m, tick_s=stage.control_dt_s
     )

@@ -12,12 +12,11 @@ from contracts.vehicle import VehicleParameters
 from sim_worker.actors.cast import KIND_NAMES
 from sim_worker.actors.kinds import KINDS
 from sim_worker.closed_loop import DriveRecord
-from sim_worker.metrics.ground import DrivableGround
 from sim_worker.metrics.rollout import Rollout
 from sim_worker.metrics.route_rules import RouteRules
 from sim_worker.metrics.scene import Context
 from sim_worker.metrics.table import METRICS, evaluate
-from sim_worker.scene import Scene
+from sim_worker.scene import Scene, SceneMaker
 
 CLEARANCE = "min_clearance"
 
@@ -37,9 +36,11 @@ def measure(
     *,
     vehicle: VehicleParameters,
     every: int,
-    ground: DrivableGround | None = None,
+    scenes: SceneMaker,
 ) -> Measured:
     """Measure what the job names, and the clearance, at the instants of the result.
+
+    `scenes` are those of the job's World.
 
     Raises ValueError for a metric that is unknown, or that a job cannot give what it needs.
     """
@@ -63,7 +64,7 @@ def measure(
     needs = {need for name in names if name in METRICS for need in METRICS[name].needs}
     context = Context(
         path=scene.path,
-        ground=(ground or DrivableGround(scene.lights.world)) if "ground" in needs else None,
+        ground=scenes.drivable if "ground" in needs else None,
         rules=RouteRules(scene.lights.world, scene.path) if "rules" in needs else None,
         user_mass_kg=_masses(scene) if "user_mass_kg" in needs else None,
         start_s=job.drive_time_s,

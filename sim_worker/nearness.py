@@ -58,13 +58,17 @@ class NearStatics:
             np.maximum(distance, out, out=distance)
         cells[first[0] : end[0], first[1] : end[1]] |= distance <= reach_m
 
-    def at(self, x_m: Array, y_m: Array) -> Flags:
-        """Return (S,) bool: whether something static may be in reach of points (S,)."""
+    def at(self, xy_m: Array) -> Flags:
+        """Return (S,) bool: whether something static may be in reach of points (2, S), x and y."""
+        place = xy_m - self._low[:, None]
+        place /= _CELL_M
         # fmax and fmin turn what is not a number into a place on the border.
-        column = np.fmin(np.fmax((x_m - self._low[0]) / _CELL_M, 0.0), self._last[0])
-        row = np.fmin(np.fmax((y_m - self._low[1]) / _CELL_M, 0.0), self._last[1])
-        cell = column.astype(np.intp) * self._stride + row.astype(np.intp)
-        return np.asarray(self._cells[cell])
+        np.fmax(place, 0.0, out=place)
+        np.fmin(place, self._last[:, None], out=place)
+        column, row = place.astype(np.intp)
+        column *= self._stride
+        column += row
+        return np.asarray(self._cells[column])
 
 
 def _outlines(model: mujoco.MjModel) -> list[Array]:

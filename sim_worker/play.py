@@ -18,6 +18,9 @@ Rows = npt.NDArray[np.intp]
 
 DECIDE_EVERY_S = 0.2
 """How often law-abiding road users think again."""
+_MAX_PACE_MPS = 80.0
+"""No car gets on faster along its path: much more than any drives, since one that is beside a bend
+on the inner side gets on faster than it drives."""
 
 
 class Play:
@@ -43,6 +46,7 @@ class Play:
         self.centre_m = box_centre_from_base_m(stage.vehicle)
         self.front_m = self.centre_m + stage.vehicle.length_m.value / 2.0
         self._decide_every = max(round(decide_every_s / stage.control_dt_s), 1)
+        self._tick_reach_m = _MAX_PACE_MPS * stage.control_dt_s
         self._red = np.full((1, 0), np.inf)
 
     def restart(self, rows: Rows, scene: Scene, *, looked: bool) -> None:
@@ -94,7 +98,9 @@ class Play:
             scene.traffic.step(time_s=time_s, dt_s=stage.control_dt_s)
 
     def _locate(self, now: Array) -> FrenetPoint:
-        place = self.scene.path.locate(now[:, :2], near_arc_m=self.arc_m)
+        place = self.scene.path.locate(
+            now[:, :2], near_arc_m=self.arc_m, within_m=self._tick_reach_m
+        )
         self.arc_m = place.arc_m
         return place
 

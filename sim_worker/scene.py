@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -22,6 +23,7 @@ from sim_worker.actors.right_of_way import JunctionRules, PathRules
 from sim_worker.actors.seen import SeenActors
 from sim_worker.actors.traffic import Traffic
 from sim_worker.faults import FaultArrays, fault_arrays
+from sim_worker.metrics.ground import DrivableGround
 from sim_worker.planners.base import KnownPlan, SharedGround
 from sim_worker.planners.path import FrenetPath
 from sim_worker.planners.registry import drives_backwards
@@ -112,6 +114,11 @@ class SceneMaker:
         """The scenarios of this World at named places, away from any drive."""
         self.rehearsed: dict[tuple[object, ...], Any] = {}
         """Drives of egos alone that cases were cast on."""
+
+    @functools.cached_property
+    def drivable(self) -> DrivableGround:
+        """Where this World may be driven on; what one job looked up, the next ones know."""
+        return DrivableGround(self.world)
 
     def scene(
         self,

@@ -75,8 +75,6 @@ class Stage:
         self.control_dt_s = 1.0 / control_hz
         self.steps_per_tick = round(steps)
         self.timestep_s = TIMESTEP_S
-        rate = vehicle.max_tire_rate_radps.value * TIMESTEP_S
-        self._reach = rate * np.arange(1, self.steps_per_tick + 1)
         self.model = compile_stage(world_spec(world), vehicle)
         """Of the World, with one vehicle in it."""
         self._physics = Physics(self.model, vehicle, nsim=nsim, threads=threads)
@@ -86,6 +84,7 @@ class Stage:
         self._count = 0
         # Columns that lie together in memory: each is read far more often than a row.
         self._states = np.zeros((8, nsim)).T
+        self._sane = np.repeat(_SANE, nsim, axis=1)
 
     def _bind(self) -> None:
         model = self.model
@@ -145,28 +144,28 @@ class Stage:
             self._tire_command = given[:, -1].copy()
         self._physics.history[rows, self._steer_history] = history
         self._physics.delay[rows, self._actuators.steer] = steering_delay_s
+        self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
+        self._steer_controls = self._controls[:, :, self._actuators.steer].T
+        rate = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
+        reach = rate * np.arange(1.0, self.steps_per_tick + 1)
+        self._reach = np.repeat(reach[:, None], count, axis=1)
         self._actuation = Actuation(
             self.vehicle,
             self._actuators,
             friction=self.vehicle.friction.value * np.asarray(friction_factor, dtype=np.float64),
-            ctrl=self._physics.ctrl[rows],
+            ctrl=self._controls,
             biasprm=self._physics.biasprm[rows],
             forcerange=self._physics.forcerange[rows],
             tick_s=self.control_dt_s,
             accel_mps2=start[:, 7],
             backwards=backwards,
         )
-        self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
-        self._steer_controls = self._controls[:, :, self._actuators.steer]
-        self._drive_controls = self._controls[:, :, self._actuators.drive]
-        self._drive_command = self._physics.ctrl[rows, None, self._actuators.drive]
-        self._joint_now = self._physics.qpos[rows, self._joints]
-        self._rate_now = self._physics.qvel[rows, self._dofs]
         self.static_contact = np.zeros(count, dtype=bool)
         """(S,) bool: whether the vehicle touched a building or island during the last tick."""
         self.looked = False
         """Whether contacts were looked for in any simulation during the last tick."""
-        self._positions, self._velocities = np.empty((4, count)).T, np.empty((4, count)).T
+        self._motion_now = self._physics.motion[rows]
+        self._motion = np.empty((8, count)).T
 
     def reseed(
         self,
@@ -204,24 +203,28 @@ class Stage:
         """Advance one control tick."""
         rows = slice(0, self._count)
         states = self._states[rows]
-        speed = states[:, 3].copy()
+        speed, accel = states[:, 3], states[:, 7]
         self._actuation.apply(speed_mps=speed, accel_mps2=controls.accel_mps2)
-        np.copyto(self._drive_controls, self._drive_command)
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
-        change = (controls.tire_angle_rad - self._tire_command)[:, None]
-        change = np.minimum(np.maximum(change, -self._reach), self._reach)
-        np.add(self._tire_command[:, None], change, out=self._steer_controls)
-        self._tire_command = self._steer_controls[:, -1].copy()
-        self._advance(self._controls, self._near_statics_of(states))
-        np.copyto(self._positions, self._joint_now)
-        np.copyto(self._velocities, self._rate_now)
-        base_from_cog(self.vehicle, self._positions, self._velocities, states)
-        np.divide(states[:, 3] - speed, self.control_dt_s, out=states[:, 7])
+        change = controls.tire_angle_rad - self._tire_command
+        ramp = np.minimum(change, self._reach)
+        np.maximum(ramp, -self._reach, out=ramp)
+        np.add(ramp, self._tire_command, out=self._steer_controls)
+        np.copyto(self._tire_command, self._steer_controls[-1])
+        self._advance(self._controls)
+        np.negative(speed, out=accel)
+        np.copyto(self._motion, self._motion_now)
+        base_from_cog(self.vehicle, self._motion[:, :4], self._motion[:, 4:], states)
+        accel += speed
+        accel /= self.control_dt_s
 
-    def _advance(self, per_step: Array, near: npt.NDArray[np.bool_]) -> None:
+    def _advance(self, per_step: Array) -> None:
         if self.looked:
             self.static_contact[:] = False
-        self.looked = bool(near.any())
+        self.looked = False
+        if not self._near_statics.empty:
+            near = self._near_statics_of(self.states)
+            self.looked = bool(np.count_nonzero(near))
         if not self.looked:
             self._physics.advance(per_step, None if self._count == self.nsim else self._ids)
             return
@@ -232,14 +235,15 @@ class Stage:
 
     def _near_statics_of(self, states: Array) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a contact during the coming tick cannot be ruled out."""
-        if self._near_statics.empty:
-            return np.zeros(len(states), dtype=bool)
-        yaw = states[:, 2]
-        x = states[:, 0] + self._centre_ahead_m * np.cos(yaw)
-        y = states[:, 1] + self._centre_ahead_m * np.sin(yaw)
-        near = self._near_statics.at(x, y)
-        slow = np.abs(states[:, 3:6].T) < self._bounds
-        if not slow.all():
+        columns = states.T
+        centre = np.empty((2, len(states)))
+        np.cos(columns[2], out=centre[0])
+        np.sin(columns[2], out=centre[1])
+        centre *= self._centre_ahead_m
+        centre += columns[:2]
+        near = self._near_statics.at(centre)
+        slow = np.abs(columns[3:6]) < self._bounds
+        if np.count_nonzero(slow) < slow.size:
             near |= ~slow.all(axis=0)
         return near
 
@@ -250,4 +254,12 @@ class Stage:
 
     def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""
-        return np.asarray(~(np.abs(self.states.T) < _SANE).all(axis=0))
+        return np.asarray(~self._is_sane().all(axis=0))
+
+    def any_diverged(self) -> bool:
+        """Whether there is such a simulation."""
+        sane = self._is_sane()
+        return bool(np.count_nonzero(sane) < sane.size)
+
+    def _is_sane(self) -> npt.NDArray[np.bool_]:
+        return np.abs(self._states.T[:, : self._count]) < self._sane[:, : self._count]

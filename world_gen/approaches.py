@@ -9,8 +9,9 @@ import msgspec
 
 from contracts.provenance import Choice
 from contracts.world import LineControl, YieldRule
-from world_gen.clusters import RING_KINDS, Cluster, Surroundings, heading_out, is_ring_edge
+from world_gen.clusters import Cluster, Surroundings
 from world_gen.connections import ConnectionDraft
+from world_gen.legs import RING_KINDS, dot, heading_out, is_ring_edge
 from world_gen.met_on_the_way import (
     Met,
     NodeTags,
@@ -177,7 +178,7 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
         nearest.signal_nodes = (*nearest.signal_nodes, node)
     for node, leg in behind:
         out = heading_out(leg, 15.0)
-        ahead = min(lit, key=lambda item: float(out @ outward(item.toward)))
+        ahead = min(lit, key=lambda item: dot(out, outward(item.toward)))
         ahead.signal_nodes = (*ahead.signal_nodes, node)
 
 

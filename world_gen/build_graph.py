@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
         raise MapError(f"{osm.file}: the map holds no roads for cars")
     paths = [_without_repeats(way.nodes) for way in ways]
     kept = [(way, path) for way, path in zip(ways, paths, strict=True) if len(path) >= 2]
-    flat = np.fromiter((node for _, path in kept for node in path), dtype=np.int64)
+    flat = np.fromiter(chain.from_iterable(path for _, path in kept), dtype=np.int64)
     ids, row, uses = np.unique(flat, return_inverse=True, return_counts=True)
     lat_lon = _positions(osm, ids)
     xy_m = local_from_geo(osm.frame, lat_lon[:, 0], lat_lon[:, 1])
@@ -65,6 +66,8 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
 
 
 def _without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
+    if not any(map(operator.eq, nodes, nodes[1:])):
+        return nodes
     return nodes[:1] + tuple(b for a, b in pairwise(nodes) if a != b)
 
 

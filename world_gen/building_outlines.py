@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import shapely
@@ -23,8 +23,7 @@ MIN_PIECE_M2 = 0.05
 Indices = npt.NDArray[np.intp]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OutlineTable:
+class OutlineTable(msgspec.Struct, frozen=True, kw_only=True):
     """Every building and building part of a map, as it stands there.
 
     Entry `k` is made of the rings from `first_ring[k]` to before `first_ring[k + 1]`: one for a

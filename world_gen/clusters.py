@@ -15,9 +15,7 @@ from contracts.world import DrivingSide
 from world_gen.cross_section import CrossSection, cross_section
 from world_gen.extent import Extent
 from world_gen.intersections import Junction
-from world_gen.legs import RING_KINDS as RING_KINDS
-from world_gen.legs import heading_out as heading_out
-from world_gen.legs import is_ring_edge as is_ring_edge
+from world_gen.legs import RING_KINDS, Heads, heading_out, is_ring_edge
 from world_gen.map_index import MapIndex
 from world_gen.polyline_batch import Polylines
 from world_gen.road_graph import DirectedEdge, RoadEdge
@@ -65,6 +63,8 @@ class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
     clusters: tuple[Cluster, ...]
     trims_m: Mapping[tuple[int, bool], float]
     """Metres cut off an edge's lanes by (edge index, at its end node)."""
+    heads: Heads
+    """Where every leg of a cluster leaves it."""
     ring_edges: frozenset[int]
     shifts_m: Mapping[int, tuple[float, float]]
     """How far left of their way roads in a transition begin and end, by edge index."""
@@ -117,6 +117,7 @@ def surroundings(
     inner = {i for junction in whole.values() for i in junction.inner}
     ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
     shifts = transition_shifts(clusters, edges, sections)
+    heads = {(leg.edge.index, leg.reverse): heading_out(leg) for c in clusters for leg in c.legs}
     return Surroundings(
         frame=frame,
         junctions=tuple(whole.values()),
@@ -125,7 +126,8 @@ def surroundings(
         edges=edges,
         sections=sections,
         clusters=clusters,
-        trims_m=trims(clusters, edges, sections, shifts),
+        trims_m=trims(clusters, edges, sections, shifts, heads),
+        heads=heads,
         shifts_m=shifts,
         ring_edges=ring_edges,
         notes=restriction_notes(index.restrictions, [c.inner for c in clusters], edges),

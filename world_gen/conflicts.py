@@ -68,7 +68,8 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
     a, b = a[near], b[near]
     # Most neighbours do not touch: prepared geometries tell that in a tenth of the time.
     shapely.prepare(swept)
-    near = (end[a] == end[b]) | shapely.intersects(swept[a], swept[b])
+    near = end[a] == end[b]
+    near[~near] = shapely.intersects(swept[a[~near]], swept[b[~near]])
     a, b = a[near], b[near]
     merging = end[a] == end[b]
     shared = shapely.intersection(swept[a], swept[b])

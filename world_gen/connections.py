@@ -67,14 +67,10 @@ def connect(
     """Return the connections of one cluster, yet to be drawn, and enter them as successors."""
     found: list[ConnectionDraft] = []
     merging = merges(cluster, ways)
-    for leg in cluster.legs:
-        mine = [
-            m
-            for m in ways
-            if (m.toward.edge.index, m.toward.reverse) == (leg.edge.index, not leg.reverse)
-        ]
-        if not mine:
-            continue
+    by_road: dict[tuple[int, bool], list[Movement]] = {}
+    for way in ways:
+        by_road.setdefault((way.toward.edge.index, way.toward.reverse), []).append(way)
+    for mine in by_road.values():
         toward = mine[0].toward
         plans = _plans(cluster, toward, around)
         starts = lanes.incoming(toward, plans)
@@ -160,6 +156,8 @@ def _starting_lanes(
     `room` is the number of lanes it leads to. Where a one-way road forks, `beside` is that of
     the branch straight on, else 0: there one lane at most leads into both branches.
     """
+    if len(starts) == 1 and starts[0].plan.turns_source != "tagged":
+        return starts
     turn = movement.turn
     far: Turn = "left" if driving_side == "right" else "right"
     cars = [lane for lane in starts if lane.kind == "driving"] or starts
@@ -205,6 +203,8 @@ def _pairs(
     only_way: bool,
 ) -> list[tuple[LaneDraft, LaneDraft]]:
     """Pair lanes from the side to which the movement turns; surplus lanes merge into the last."""
+    if len(starts) == len(ends) == 1:
+        return [(starts[0], ends[0])]
     buses = [lane for lane in starts if lane.kind == "bus"]
     reserved = [lane for lane in ends if lane.kind == "bus"]
     if buses and reserved and len(buses) < len(starts):

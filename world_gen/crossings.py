@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from contracts.arrays import Array
 from contracts.provenance import Choice, Quantity
 from contracts.world import Crossing
 from world_gen.beside_roads import BesideRoads
 from world_gen.clusters import Surroundings
-from world_gen.polyline import arc_lengths, direction_at, left_of
+from world_gen.polyline import left_of, unit
 
 CROSSING_WIDTH_M = 4.0
 _MARKED = ("zebra", "marked", "uncontrolled", "traffic_signals")
@@ -25,7 +26,7 @@ def crossings(
 
     A node is one by its own tags, or since a way tagged as a crossing (`beside`) meets the road.
     """
-    found: dict[int, Crossing] = {}
+    places: dict[int, tuple[int, int, Mapping[str, str]]] = {}
     drawn = beside.crossed_at if beside is not None else {}
     amid = {n for c in around.clusters if len(c.legs) > 2 for n in c.nodes} if drawn else set()
     for index, edge in sorted(around.edges.items()):
@@ -36,24 +37,38 @@ def crossings(
                 if way is None or node in amid:
                     continue
                 tags = {**way.tags, **(tags or {})}
-            at = edge.xy_m[i]
-            if tags.get("crossing") == "no" or node in found:
-                continue
-            if not around.extent.holds(at[None])[0]:
-                continue
-            section = around.sections[index]
-            along = float(arc_lengths(edge.xy_m)[i])
-            left = left_of(direction_at(edge.xy_m, along))
-            line = np.stack([at + left * section.left_m, at + left * section.right_m])
-            found[node] = Crossing(
-                id=f"n{node}",
-                line=np.round(line, 3),
-                width_m=Quantity(CROSSING_WIDTH_M, "default"),
-                kind=_kind(tags),
-                osm_node=node,
-                island=tags.get("crossing:island") == "yes",
-            )
-    return tuple(found[node] for node in sorted(found))
+            if tags.get("crossing") != "no":
+                places.setdefault(node, (index, i, tags))
+    if not places:
+        return ()
+    nodes = sorted(places)
+    on = [(around.edges[index].xy_m, i) for index, i, _ in map(places.__getitem__, nodes)]
+    sections = [around.sections[places[node][0]] for node in nodes]
+    at = np.array([xy[i] for xy, i in on])
+    left = left_of(np.array([_ahead(xy, i) for xy, i in on]))
+    kerbs_m = np.array([(section.left_m, section.right_m) for section in sections])
+    lines = np.round(at[:, None] + left[:, None] * kerbs_m[:, :, None], 3)
+    return tuple(
+        Crossing(
+            id=f"n{node}",
+            line=line,
+            width_m=Quantity(CROSSING_WIDTH_M, "default"),
+            kind=_kind(places[node][2]),
+            osm_node=node,
+            island=places[node][2].get("crossing:island") == "yes",
+        )
+        for node, line, within in zip(nodes, lines, around.extent.holds(at).tolist(), strict=True)
+        if within
+    )
+
+
+def _ahead(xy_m: Array, i: int) -> Array:
+    """Return the unit direction (2,) in which a way (N, 2) leaves its point `i`."""
+    last = len(xy_m) - 2
+    i = min(i, last)
+    while i < last and (xy_m[i + 1] == xy_m[i]).all():
+        i += 1
+    return unit(xy_m[i + 1] - xy_m[i])
 
 
 def _kind(tags: Mapping[str, str]) -> Choice:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 import shapely
 
@@ -18,8 +18,7 @@ MIN_PIECE_M = 0.5
 """Shorter pieces of road at the World's edge are left out."""
 
 
-@dataclass(frozen=True, slots=True)
-class Disc:
+class Disc(msgspec.Struct, frozen=True):
     """All within `radius_m` of the World's origin."""
 
     radius_m: float
@@ -54,8 +53,7 @@ class Disc:
         return found
 
 
-@dataclass(frozen=True, slots=True)
-class Rectangle:
+class Rectangle(msgspec.Struct, frozen=True):
     """All between `west_m`, `south_m`, `east_m` and `north_m` of the World's origin."""
 
     west_m: float

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from functools import cached_property
+from typing import NamedTuple
 
 import msgspec
 
@@ -38,7 +40,7 @@ class LanePlan(msgspec.Struct, frozen=True, kw_only=True):
     counted: bool = True
 
 
-class CrossSection(msgspec.Struct, frozen=True, kw_only=True):
+class CrossSection(msgspec.Struct, frozen=True, kw_only=True, dict=True):
     """Lanes from left to right along the way's nodes, and the carriageway's edges.
 
     `left_m` and `right_m` are the distances of the edges to the left of the way, so `right_m` is
@@ -65,33 +67,52 @@ class CrossSection(msgspec.Struct, frozen=True, kw_only=True):
 
         To the left and to the right as their driver sees it; NaN where there are none.
         """
-        side = -1.0 if reverse else 1.0
-        lefts = [
-            side * lane.left_m for lane in self.lanes if lane.reverse == reverse and lane.counted
-        ]
-        return (max(lefts), -min(lefts)) if lefts else (math.nan, math.nan)
+        return self._by_direction[reverse].reach_m
 
     def driven(self, *, reverse: bool) -> tuple[LanePlan, ...]:
         """Return the counted lanes of one direction from the left as their driver sees them."""
-        lanes = (lane for lane in self.lanes if lane.reverse == reverse and lane.counted)
-        return tuple(sorted(lanes, key=lambda lane: lane.number))
+        return self._by_direction[reverse].driven
 
     def abreast(self, *, reverse: bool) -> tuple[LanePlan, ...]:
         """Return all lanes of one direction that cars or buses drive, from their drivers' left."""
-        lanes = (p for p in self.lanes if p.kind in ("driving", "bus") and p.reverse == reverse)
-        return tuple(sorted(lanes, key=lambda lane: lane.left_m, reverse=not reverse))
+        return self._by_direction[reverse].abreast
 
     def cycled(self, *, reverse: bool) -> tuple[LanePlan, ...]:
         """Return the bicycle lanes of one direction, from left to right along the way."""
-        return tuple(p for p in self.lanes if p.kind == "bicycle" and p.reverse == reverse)
+        return self._by_direction[reverse].cycled
 
     def turning(self, *, reverse: bool) -> tuple[LanePlan, ...]:
         """Return the lanes in the middle from which both directions turn, of one direction."""
-        return tuple(
-            lane
-            for lane in self.lanes
-            if lane.reverse == reverse and not lane.counted and lane.kind == "driving"
-        )
+        return self._by_direction[reverse].turning
+
+    @cached_property
+    def _by_direction(self) -> tuple[_OneWay, _OneWay]:
+        """Along the nodes and against them: thousands of roads ask the few sections of a town."""
+        return _one_way(self.lanes, False), _one_way(self.lanes, True)
+
+
+class _OneWay(NamedTuple):
+    """The lanes of one direction, as the methods of `CrossSection` that are named so tell them."""
+
+    reach_m: tuple[float, float]
+    driven: tuple[LanePlan, ...]
+    abreast: tuple[LanePlan, ...]
+    cycled: tuple[LanePlan, ...]
+    turning: tuple[LanePlan, ...]
+
+
+def _one_way(lanes: tuple[LanePlan, ...], reverse: bool) -> _OneWay:
+    mine = [lane for lane in lanes if lane.reverse == reverse]
+    counted = [lane for lane in mine if lane.counted]
+    lefts = [-lane.left_m if reverse else lane.left_m for lane in counted]
+    abreast = [lane for lane in mine if lane.kind in ("driving", "bus")]
+    return _OneWay(
+        reach_m=(max(lefts), -min(lefts)) if lefts else (math.nan, math.nan),
+        driven=tuple(sorted(counted, key=lambda lane: lane.number)),
+        abreast=tuple(sorted(abreast, key=lambda lane: lane.left_m, reverse=not reverse)),
+        cycled=tuple(lane for lane in mine if lane.kind == "bicycle"),
+        turning=tuple(lane for lane in mine if not lane.counted and lane.kind == "driving"),
+    )
 
 
 def metres(text: str | None) -> float | None:

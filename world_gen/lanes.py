@@ -36,6 +36,8 @@ class LaneDraft(msgspec.Struct):
     key: LaneKey
     edge: RoadEdge
     plan: LanePlan
+    kind: LaneKind
+    width_m: Quantity
     centerline: Array
     role: Role
     turns: tuple[Turn, ...]
@@ -43,16 +45,6 @@ class LaneDraft(msgspec.Struct):
     left_id: str | None = None
     right_id: str | None = None
     successors: list[str] = msgspec.field(default_factory=list)
-
-    @property
-    def kind(self) -> LaneKind:
-        """What the lane is for."""
-        return self.plan.kind
-
-    @property
-    def width_m(self) -> Quantity:
-        """Width in metres."""
-        return self.plan.width_m
 
     def finished(self) -> Lane:
         """Return the lane as the World holds it."""
@@ -87,29 +79,29 @@ class LaneSet(msgspec.Struct, frozen=True):
     roads: tuple[Road, ...]
     edges: Mapping[str, tuple[Array, Array]]
     """Left and right edge (N, 2) of each road's carriageway, along its reference line."""
-    begins: Mapping[LaneKey, str]
-    ends: Mapping[LaneKey, str]
+    begins: Mapping[tuple[int, bool, int], LaneDraft]
+    ends: Mapping[tuple[int, bool, int], LaneDraft]
     notes: tuple[str, ...]
 
     def ending(self, toward: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
         """Return the lane of a plan that ends where `toward` ends; None where it was left out."""
-        name = self.ends.get(LaneKey(toward.edge.index, toward.reverse, plan.number))
-        return None if name is None else self.lanes[name]
+        return self.ends.get((toward.edge.index, toward.reverse, plan.number))
 
     def beginning(self, away: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
         """Return the lane of a plan that begins where `away` begins; None where it was left out."""
-        name = self.begins.get(LaneKey(away.edge.index, away.reverse, plan.number))
-        return None if name is None else self.lanes[name]
+        return self.begins.get((away.edge.index, away.reverse, plan.number))
 
     def incoming(self, toward: DirectedEdge, plans: tuple[LanePlan, ...]) -> list[LaneDraft]:
         """Return the lanes that end where `toward` ends, from the left."""
-        keys = [LaneKey(toward.edge.index, toward.reverse, p.number) for p in plans]
-        return [self.lanes[self.ends[k]] for k in keys if k in self.ends]
+        index, reverse = toward.edge.index, toward.reverse
+        found = [self.ends.get((index, reverse, plan.number)) for plan in plans]
+        return [lane for lane in found if lane is not None]
 
     def outgoing(self, away: DirectedEdge, plans: tuple[LanePlan, ...]) -> list[LaneDraft]:
         """Return the lanes that begin where `away` begins, from the left."""
-        keys = [LaneKey(away.edge.index, away.reverse, p.number) for p in plans]
-        return [self.lanes[self.begins[k]] for k in keys if k in self.begins]
+        index, reverse = away.edge.index, away.reverse
+        found = [self.begins.get((index, reverse, plan.number)) for plan in plans]
+        return [lane for lane in found if lane is not None]
 
 
 def build_lanes(around: Surroundings) -> LaneSet:
@@ -119,7 +111,9 @@ def build_lanes(around: Surroundings) -> LaneSet:
     sections = [around.sections[stretch.edge] for stretch in stretches]
     for index in dict.fromkeys(stretch.edge for stretch in stretches):
         notes.extend(around.sections[index].notes)
-    curves = iter(_offsets(stretches, sections))
+    lines = Polylines.of([stretch.line for stretch in stretches])
+    references = iter(Polylines(np.round(lines.xy_m, 3), lines.first).split())
+    curves = iter(_offsets(lines, stretches, sections))
     legs = {
         (leg.edge.index, leg.reverse): (cluster.key, leg)
         for cluster in around.clusters
@@ -130,14 +124,14 @@ def build_lanes(around: Surroundings) -> LaneSet:
     roads: list[Road] = []
     borders: dict[str, tuple[Array, Array]] = {}
     names: set[str] = set()
-    begins: dict[LaneKey, str] = {}
-    ends: dict[LaneKey, str] = {}
+    begins: dict[tuple[int, bool, int], LaneDraft] = {}
+    ends: dict[tuple[int, bool, int], LaneDraft] = {}
     roles = _roles(around)
     for stretch, section in zip(stretches, sections, strict=True):
         index, edge = stretch.edge, around.edges[stretch.edge]
         road = _road_id(edge, names)
         borders[road] = (_line(next(curves)), _line(next(curves)))
-        mine: list[str] = []
+        mine: list[LaneDraft] = []
         for plan in section.lanes:
             points = next(curves)
             if len(points) < 2:
@@ -146,23 +140,26 @@ def build_lanes(around: Surroundings) -> LaneSet:
             name = f"{road}.{plan.label}"
             role = roles.get((index, plan.reverse), "other") if plan.number >= 0 else "other"
             points = points[::-1] if plan.reverse else points
-            lanes[name] = LaneDraft(name, key, edge, plan, points, role, plan.turns, road)
-            mine.append(name)
+            lane = LaneDraft(
+                name, key, edge, plan, plan.kind, plan.width_m, points, role, plan.turns, road
+            )
+            lanes[name] = lane
+            mine.append(lane)
             if stretch.first:
-                (ends if plan.reverse else begins)[key] = name
+                (ends if plan.reverse else begins)[key] = lane
             if stretch.last:
-                (begins if plan.reverse else ends)[key] = name
-        _join_neighbours(mine, lanes)
+                (begins if plan.reverse else ends)[key] = lane
+        _join_neighbours(mine)
         roads.append(
             Road(
                 id=road,
                 osm_way=edge.way_id,
                 name=edge.name,
                 road_class=edge.road_class,
-                reference_line=np.round(stretch.line, 3),
+                reference_line=next(references),
                 left_m=round(section.left_m, 3),
                 right_m=round(section.right_m, 3),
-                lane_ids=tuple(mine),
+                lane_ids=tuple([lane.id for lane in mine]),
                 lane_count_source=_lane_count_source(edge),
                 from_place=places.get((index, False)) if stretch.first else None,
                 to_place=places.get((index, True)) if stretch.last else None,
@@ -172,7 +169,9 @@ def build_lanes(around: Surroundings) -> LaneSet:
             )
         )
     led_through = places_led_through(
-        legs, ((key.edge, key.reverse) for key in begins), ((key.edge, key.reverse) for key in ends)
+        legs,
+        {(edge, reverse) for edge, reverse, _ in begins},
+        {(edge, reverse) for edge, reverse, _ in ends},
     )
     known = tuple(without_dead_places(roads, led_through))
     return LaneSet(lanes, known, borders, begins, ends, tuple(notes))
@@ -189,7 +188,9 @@ def _lane_count_source(edge: RoadEdge) -> Provenance:
     return next((s for s in ("default", "inferred") if s in counts), "tagged")
 
 
-def _offsets(stretches: list[Stretch], sections: list[CrossSection]) -> list[Array]:
+def _offsets(
+    lines: Polylines, stretches: list[Stretch], sections: list[CrossSection]
+) -> list[Array]:
     """Return for each stretch its left and right edge and its lanes' middles, along the nodes."""
     if not stretches:
         return []
@@ -198,11 +199,10 @@ def _offsets(stretches: list[Stretch], sections: list[CrossSection]) -> list[Arr
         for section in sections
     ]
     row = np.repeat(np.arange(len(stretches)), [len(mine) for mine in left_m])
-    lines = Polylines.of([stretch.line for stretch in stretches]).rows(row)
     before = np.array([stretch.before for stretch in stretches])[row]
     after = np.array([stretch.after for stretch in stretches])[row]
     shift = np.array([value for mine in left_m for value in mine])
-    shifted = without_repeats(offset(lines, shift, before=before, after=after))
+    shifted = without_repeats(offset(lines.rows(row), shift, before=before, after=after))
     return Polylines(np.round(shifted.xy_m, 3), shifted.first).split()
 
 
@@ -241,9 +241,8 @@ def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:
     return roles
 
 
-def _join_neighbours(names: list[str], lanes: Mapping[str, LaneDraft]) -> None:
+def _join_neighbours(mine: list[LaneDraft]) -> None:
     """Tell lanes that cars drive the same way side by side of each other."""
-    mine = (lanes[name] for name in names)
     of_number = {(lane.plan.reverse, lane.plan.number): lane for lane in mine if lane.plan.counted}
     for (reverse, number), lane in of_number.items():
         right = of_number.get((reverse, number + 1))

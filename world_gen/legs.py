@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
-import numpy as np
-
-from contracts.arrays import Array
 from world_gen.cross_section import CrossSection
 from world_gen.road_graph import DirectedEdge, RoadEdge
 
@@ -20,27 +18,34 @@ def is_ring_edge(edge: RoadEdge) -> bool:
     return edge.tags.get("junction") in RING_KINDS
 
 
-def heading_out(leg: DirectedEdge, look_m: float = 8.0) -> Array:
-    """Return the unit direction (2,) in which a leg leaves, averaged over `look_m`."""
-    xy = leg.xy_m
-    x0, y0 = x, y = xy[0].tolist()
-    ahead, gone_m = None, 0.0
+Heads = Mapping[tuple[int, bool], tuple[float, float]]
+"""Unit directions in which legs leave, by (edge index, reverse)."""
+
+
+def heading_out(leg: DirectedEdge, look_m: float = 8.0) -> tuple[float, float]:
+    """Return the unit direction in which a leg leaves, averaged over `look_m`."""
     # Most legs need one or two points: plain floats are faster here than arrays.
-    for i in range(1, len(xy)):
-        nx, ny = xy[i].tolist()
+    points = iter(leg.xy_m.tolist())
+    x0, y0 = x, y = next(points)
+    ahead, gone_m = (1.0, 0.0), 0.0
+    for nx, ny in points:
         step_m = math.hypot(nx - x, ny - y)
         if step_m <= 0.01:
             continue
-        ahead = ahead or ((nx - x) / step_m, (ny - y) / step_m)
+        if gone_m == 0.0:
+            ahead = (nx - x) / step_m, (ny - y) / step_m
         share = min((look_m - gone_m) / step_m, 1.0)
         x, y = x + share * (nx - x), y + share * (ny - y)
         gone_m += step_m
         if gone_m >= look_m:
             break
     span_m = math.hypot(x - x0, y - y0)
-    if span_m > 0.1:
-        ahead = ((x - x0) / span_m, (y - y0) / span_m)
-    return np.array(ahead or (1.0, 0.0))
+    return ((x - x0) / span_m, (y - y0) / span_m) if span_m > 0.1 else ahead
+
+
+def dot(a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Return the cosine between two unit directions."""
+    return a[0] * b[0] + a[1] * b[1]
 
 
 def opposed(leg: DirectedEdge, other: DirectedEdge) -> bool:
@@ -50,7 +55,7 @@ def opposed(leg: DirectedEdge, other: DirectedEdge) -> bool:
     ):
         return False
     return any(
-        float(heading_out(leg, look_m) @ heading_out(other, look_m)) > _BESIDE_COS
+        dot(heading_out(leg, look_m), heading_out(other, look_m)) > _BESIDE_COS
         for look_m in (8.0, _PARTED_M)
     )
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -29,8 +29,7 @@ MOST_NAMED = 3
 NO_WAYS = "the map holds none of its ways; left out"
 
 
-@dataclass(slots=True, kw_only=True)
-class MapObjects:
+class MapObjects(msgspec.Struct, kw_only=True):
     """What a map file or an index holds for a map; ways in any order, nodes with their ways."""
 
     way_ids: Sequence[int]
@@ -40,8 +39,8 @@ class MapObjects:
     """Ids ascending, each once."""
     node_tags: Mapping[int, Mapping[str, str]]
     relations: Mapping[int, OsmRelation]
-    notes: list[str] = field(default_factory=list)
-    note_places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    notes: list[str] = msgspec.field(default_factory=list)
+    note_places: Mapping[str, tuple[float, float]] = msgspec.field(default_factory=dict)
 
 
 def assemble_map(

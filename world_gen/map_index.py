@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import shapely
@@ -20,8 +20,7 @@ from world_gen.road_tags import OTHER_CLASSES
 from world_gen.turn_restrictions import TurnRestrictions, read_turn_restrictions
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MapIndex:
+class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
     """A map prepared for building Worlds; make it once per map with `index_map`."""
 
     osm: OsmMap

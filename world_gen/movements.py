@@ -9,16 +9,14 @@ import msgspec
 import numpy as np
 
 from contracts.world import DrivingSide, Turn
-from world_gen.clusters import Cluster, Surroundings, heading_out, is_ring_edge
-from world_gen.legs import opposed
+from world_gen.clusters import Cluster, Surroundings
+from world_gen.legs import Heads, dot, heading_out, is_ring_edge, opposed
 from world_gen.road_graph import DirectedEdge
 from world_gen.turn_restrictions import TurnRestrictions
 
 STRAIGHT_RAD = math.radians(45.0)
 FORK_RAD = math.radians(18.0)
 U_TURN_RAD = math.radians(150.0)
-Heads = dict[tuple[int, bool], tuple[float, ...]]
-"""Where legs head, by (edge index, reverse)."""
 _NOSE_COS = math.cos(math.radians(60.0))
 
 
@@ -48,9 +46,6 @@ def movements(
         for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
             if directed.allowed:
                 inner.setdefault(directed.start_node, []).append(directed)
-    heads: Heads = {
-        (leg.edge.index, leg.reverse): tuple(heading_out(leg).tolist()) for leg in cluster.legs
-    }
     found: list[Movement] = []
     for leg in cluster.legs:
         toward = DirectedEdge(leg.edge, not leg.reverse)
@@ -66,7 +61,7 @@ def movements(
             if not _around_a_nose(cluster, toward, away)
             and (marked or not _back_along(toward, away))
         ] or ways
-        found.extend(_with_turns(toward, ways, heads, around.driving_side))
+        found.extend(_with_turns(toward, ways, around.heads, around.driving_side))
     return tuple(found)
 
 
@@ -117,22 +112,20 @@ def _around_a_nose(cluster: Cluster, toward: DirectedEdge, away: DirectedEdge) -
     if {leg.edge.index for leg in one_way} != {toward.edge.index, away.edge.index}:
         return False
     outward = DirectedEdge(toward.edge, not toward.reverse)
-    return bool(heading_out(outward) @ heading_out(away) > _NOSE_COS)
+    return dot(heading_out(outward), heading_out(away)) > _NOSE_COS
 
 
 def _back_along(toward: DirectedEdge, away: DirectedEdge) -> bool:
     """Return whether a way leads back along the other carriageway of the same street."""
     a, b = toward.edge, away.edge
-    if is_ring_edge(a) or is_ring_edge(b):
-        return False
     same = a.name == b.name if a.name or b.name else a.road_class == b.road_class
-    return same and _parting(toward, away)
+    return same and _parting(toward, away) and not (is_ring_edge(a) or is_ring_edge(b))
 
 
 def _parting(toward: DirectedEdge, away: DirectedEdge) -> bool:
     """Return whether two one-way roads part where one ends and the other begins."""
     a, b = toward.edge, away.edge
-    if toward.end_node != away.start_node or a.forward == a.backward or b.forward == b.backward:
+    if a.forward == a.backward or b.forward == b.backward or toward.end_node != away.start_node:
         return False
     return opposed(DirectedEdge(a, not toward.reverse), away)
 
@@ -149,10 +142,11 @@ def _with_turns(
         u, v = heads[leg.edge.index, leg.reverse]
         angles.append(math.atan2(y * u - x * v, -x * u - y * v))
     straightest = min((abs(a) for a in angles), default=0.0)
+    off_ring = not is_ring_edge(toward.edge)
     found = []
     for (leg, path), angle in zip(ways, angles, strict=True):
         turn = _turn(angle, straightest, angles)
-        if is_ring_edge(toward.edge) or is_ring_edge(leg.edge):
+        if not off_ring or is_ring_edge(leg.edge):
             turn = _ring_turn(toward, leg, driving_side)
         elif (
             toward.edge.index == leg.edge.index

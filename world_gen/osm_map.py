@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -31,8 +31,7 @@ class OsmWay(NamedTuple):
     tags: Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True)
-class OsmMember:
+class OsmMember(msgspec.Struct, frozen=True):
     """One member of a relation; `kind` is n, w or r."""
 
     kind: str
@@ -40,8 +39,7 @@ class OsmMember:
     role: str
 
 
-@dataclass(frozen=True, slots=True)
-class OsmRelation:
+class OsmRelation(msgspec.Struct, frozen=True):
     """One relation: its members in order and its tags."""
 
     id: int
@@ -58,8 +56,7 @@ class LatLonBounds(NamedTuple):
     east: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OsmMap:
+class OsmMap(msgspec.Struct, frozen=True, kw_only=True):
     """A map file in memory.
 
     `locations` holds (lat, lon) of every node of a kept way; `node_tags` the tags of tagged nodes;
@@ -79,7 +76,7 @@ class OsmMap:
     ways: Mapping[int, OsmWay]
     relations: Mapping[int, OsmRelation]
     notes: tuple[str, ...] = ()
-    note_places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    note_places: Mapping[str, tuple[float, float]] = msgspec.field(default_factory=dict)
     """(lat, lon) of those notes that are about a place."""
 
     def notes_within(self, bounds: LatLonBounds) -> tuple[str, ...]:

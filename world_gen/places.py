@@ -25,7 +25,7 @@ def places_led_through(
     into: dict[str, list[DirectedEdge]] = {}
     out_of: dict[str, list[DirectedEdge]] = {}
     for found, keys in ((out_of, set(begins)), (into, {(i, not r) for i, r in ends})):
-        for key in sorted(keys & legs.keys()):
+        for key in keys & legs.keys():
             place, leg = legs[key]
             found.setdefault(place, []).append(leg)
     return frozenset(

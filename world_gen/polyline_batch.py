@@ -7,11 +7,11 @@ times the arithmetic.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
@@ -21,8 +21,7 @@ _MITRE_LIMIT = 2.0
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 
 
-@dataclass(frozen=True)
-class Polylines:
+class Polylines(msgspec.Struct, frozen=True, dict=True):
     """L polylines: line i owns the points `xy_m[first[i]:first[i + 1]]`; `first` is (L + 1,)."""
 
     xy_m: Array
@@ -149,17 +148,6 @@ def directions(lines: Polylines) -> tuple[Array, Array]:
     return before, after
 
 
-def headings(lines: Polylines, *, look_m: float = 8.0) -> Array:
-    """Return the unit direction (L, 2) from each line's start to the point `look_m` along it."""
-    every = np.arange(len(lines))
-    start = lines.xy_m[lines.first[:-1]]
-    gap = points_at(lines, every, np.minimum(look_m, lines.length_m)) - start
-    norm = np.hypot(gap[:, 0], gap[:, 1])
-    first = directions(lines)[1][lines.first[:-1]]
-    found: Array = np.where((norm > 0.1)[:, None], gap / np.maximum(norm, 1e-9)[:, None], first)
-    return found
-
-
 def offset(
     lines: Polylines, left_m: Array, *, before: Array | None = None, after: Array | None = None
 ) -> Polylines:
@@ -169,14 +157,14 @@ def offset(
     """
     into, out = directions(lines)
     first, last = lines.first[:-1], lines.first[1:] - 1
+    at_start = left_of(out[first])
     if before is not None:
         into[first] = np.where(np.isnan(before), into[first], before)
     if after is not None:
         out[last] = np.where(np.isnan(after), out[last], after)
-    normal = left_of(into) + left_of(out)
-    norm = np.hypot(normal[:, 0], normal[:, 1])
-    at_start = left_of(directions(lines)[1][first])[lines.line]
-    normal = np.where(norm[:, None] > 0.2, normal / np.maximum(norm, 0.2)[:, None], at_start)
+    normal = left_of(into + out)
+    norm = np.hypot(normal[:, 0], normal[:, 1])[:, None]
+    normal = np.where(norm > 0.2, normal / np.maximum(norm, 0.2), at_start[lines.line])
     stretch = 1.0 / np.maximum((normal * left_of(out)).sum(axis=1), 1.0 / _MITRE_LIMIT)
     shift = left_m[lines.line]
     shifted = np.where(

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
-from contracts.arrays import Array
 from contracts.provenance import Provenance
 from contracts.world import DrivingSide, YieldRule
 from world_gen.legs import heading_out
@@ -69,9 +68,9 @@ def opposites(
     place among the roads.
     """
     # A junction has few roads: plain floats are faster here than arrays.
-    out: list[list[float]] = [outward(road).tolist() for road in roads]
+    out = [outward(road) for road in roads]
     out_only = [leg for leg in legs if not DirectedEdge(leg.edge, not leg.reverse).allowed]
-    ways_out: list[list[float]] = [heading_out(leg, LOOK_M).tolist() for leg in out_only]
+    ways_out = [heading_out(leg, LOOK_M) for leg in out_only]
     found: list[tuple[int | None, bool]] = []
     for x, y in out:
         cos = [x * u + y * v for u, v in out]
@@ -82,8 +81,8 @@ def opposites(
     return found
 
 
-def outward(toward: DirectedEdge) -> Array:
-    """Return the unit direction (2,) in which a road in leaves the junction."""
+def outward(toward: DirectedEdge) -> tuple[float, float]:
+    """Return the unit direction in which a road in leaves the junction."""
     return heading_out(DirectedEdge(toward.edge, not toward.reverse), LOOK_M)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import msgspec
 
@@ -47,8 +46,7 @@ class SubjectReport(msgspec.Struct, frozen=True, kw_only=True):
     """One sentence for each road and value that the map does not say outright."""
 
 
-@dataclass(frozen=True, slots=True)
-class Value:
+class Value(msgspec.Struct, frozen=True):
     """One value of a subject: of which road, what it is, where it came from."""
 
     of: str

@@ -20,7 +20,6 @@ from contracts.world import Area
 from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.intersections import Junction
-from world_gen.islands import RING_ISLAND as RING_ISLAND
 from world_gen.islands import island_areas
 from world_gen.kerbs import kerb_lines
 from world_gen.lanes import LaneSet

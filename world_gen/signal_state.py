@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
+from contracts.arrays import Array
 from contracts.drive import SignalColour, SignalState
 from contracts.signals import SignalPlan
 from contracts.world import World
@@ -34,6 +38,15 @@ def live_colours(states: Iterable[SignalState], *, start_stamp_ns: int) -> dict[
 def cycle_s(plan: SignalPlan) -> float:
     """Return how long a plan's cycle takes."""
     return sum(phase.green_s + plan.amber_s + plan.all_red_s for phase in plan.phases)
+
+
+def parts_of_cycle(plan: SignalPlan, time_s: Array) -> npt.NDArray[np.intp]:
+    """Return (K,) which parts of a plan's cycle times (K,) fall into; none changes colours."""
+    parts = [(phase.green_s, plan.amber_s, plan.all_red_s) for phase in plan.phases]
+    if not parts:
+        return np.zeros(len(time_s), dtype=np.intp)
+    ends = np.cumsum(parts)
+    return np.asarray(np.searchsorted(ends, time_s % ends[-1], side="right"))
 
 
 def colours_at(

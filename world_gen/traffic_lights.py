@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
+
+import msgspec
 
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
@@ -18,8 +19,7 @@ holds but one arm.
 """
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrafficLight:
+class TrafficLight(msgspec.Struct, frozen=True, kw_only=True):
     """A node tagged `highway=traffic_signals` on a car road, and the junctions that it governs."""
 
     osm_node: int

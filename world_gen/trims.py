@@ -11,7 +11,7 @@ import shapely
 
 from contracts.arrays import Array
 from world_gen.cross_section import CrossSection
-from world_gen.legs import heading_out, is_ring_edge, lateral_positions
+from world_gen.legs import Heads, heading_out, is_ring_edge, lateral_positions
 from world_gen.polyline_batch import Polylines, cut, without_repeats
 from world_gen.road_graph import RoadEdge
 from world_gen.turn_curves import LEAD_M, WANTED_RADIUS_M
@@ -54,6 +54,7 @@ def trims(
     edges: Mapping[int, RoadEdge],
     sections: Mapping[int, CrossSection],
     shifts_m: Mapping[int, tuple[float, float]],
+    heads: Heads,
 ) -> dict[tuple[int, bool], float]:
     """Return metres cut off an edge's lanes by (edge index, at its end node)."""
     found: dict[tuple[int, bool], float] = {}
@@ -63,7 +64,7 @@ def trims(
     wide = [cluster for cluster in clusters if len(cluster.nodes) > 1]
     areas = dict(zip([c.key for c in wide], _area_trims(wide, edges, sections), strict=True))
     for alike in by_size.values():
-        legs = _legs_of(alike, sections)
+        legs = _legs_of(alike, sections, heads)
         turning, at_node = _turning_trims(legs), _node_trims(legs)
         for k, cluster in enumerate(alike):
             if cluster.plain:
@@ -84,14 +85,14 @@ def trims(
     return found
 
 
-def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection]) -> _Legs:
+def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection], heads: Heads) -> _Legs:
     legs = [leg for cluster in clusters for leg in cluster.legs]
     mine = [sections[leg.edge.index] for leg in legs]
     shape = (len(clusters), len(clusters[0].legs))
     into = [s.reach_m(not leg.reverse) for s, leg in zip(mine, legs, strict=True)]
     out = [s.reach_m(leg.reverse) for s, leg in zip(mine, legs, strict=True)]
     return _Legs(
-        heads=np.array([heading_out(leg) for leg in legs]).reshape(*shape, 2),
+        heads=np.array([heads[leg.edge.index, leg.reverse] for leg in legs]).reshape(*shape, 2),
         starts_m=np.array([leg.edge.xy_m[-1 if leg.reverse else 0] for leg in legs]).reshape(
             *shape, 2
         ),

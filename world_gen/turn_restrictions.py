@@ -43,8 +43,11 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
 
     def step_allowed(self, before: DirectedEdge, after: DirectedEdge) -> bool:
         """Return whether a car may go from one edge onto the next at their common node."""
+        rules = self.at_node.get(before.end_node)
+        if rules is None:
+            return True
         turns_back = before.edge.index == after.edge.index and before.reverse != after.reverse
-        for rule in self.at_node.get(before.end_node, ()):
+        for rule in rules:
             if rule.from_way != before.edge.way_id:
                 continue
             meant = after.edge.way_id in rule.to_ways
@@ -57,6 +60,8 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
 
     def path_allowed(self, path: Sequence[DirectedEdge]) -> bool:
         """Return whether no restriction over via ways forbids this sequence of edges."""
+        if len(path) < 3:
+            return True
         ways = [path[0].edge.way_id]
         for part in path[1:]:
             if part.edge.way_id != ways[-1]:

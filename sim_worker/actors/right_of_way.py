@@ -174,7 +174,8 @@ def _stretches(world: World) -> dict[tuple[str, str], _Stretch]:
         outlines.append(conflict.area)
     if not outlines:
         return {}
-    areas = np.array([shapely.Polygon(outline) for outline in outlines], dtype=object)
+    # Outlines of ground that is long and bent may cross themselves.
+    areas = shapely.make_valid(np.array([shapely.Polygon(one) for one in outlines], dtype=object))
     spans = np.hstack([_spans(waits, areas), _spans(goes, areas)])
     return {
         (wait.id, go.id): _Stretch(*span)

@@ -10,7 +10,7 @@ from contracts.drive import SignalColour
 from sim_worker.metrics.rollout import Flags, Measure
 from sim_worker.metrics.route_rules import PriorityConflict, RouteRules
 from sim_worker.metrics.scene import Scene
-from world_gen.signal_state import world_colours_at
+from world_gen.signal_state import colours_at, parts_of_cycle
 
 HARD_BRAKING_MPS2 = 2.0
 """Who has priority and must brake harder was not given way to."""
@@ -37,8 +37,8 @@ def red_light_violations(scene: Scene) -> Measure:
         if line.group_id is None or line.control != "signal":
             continue
         future, time_s = _line_crossings(front, line.ends_m, scene.time_s)
-        for row, at_s in zip(future.tolist(), time_s.tolist(), strict=True):
-            count[row] += _colour(scene, line.group_id, at_s) in _STOPS
+        colours = _colours(scene, line.group_id, time_s)
+        np.add.at(count, future, [colour in _STOPS for colour in colours])
     return scene.measure(count)
 
 
@@ -59,7 +59,7 @@ def right_of_way_violations(scene: Scene) -> Measure:
         rows = np.flatnonzero(np.isfinite(enters) & scene.valid)
         group = conflict.other_group_id
         if group is not None:
-            colours = [_colour(scene, group, enters[row]) for row in rows]
+            colours = _colours(scene, group, enters[rows])
             rows = rows[[colour in ("green", "unknown", "dark") for colour in colours]]
         if len(rows) and users:
             wronged[rows] |= _forced(scene, conflict, rows, enters[rows], leaves[rows])
@@ -72,11 +72,23 @@ def _rules(scene: Scene) -> RouteRules:
     return scene.context.rules
 
 
-def _colour(scene: Scene, group_id: str, at_s: float) -> SignalColour:
-    context = scene.context
-    world = _rules(scene).world
-    colours = world_colours_at(world, context.start_s + at_s, context.live)
-    return colours.get(group_id, "unknown")
+def _colours(scene: Scene, group_id: str, at_s: Array) -> list[SignalColour]:
+    """Return the colours of a group at times (K,)."""
+    context, world = scene.context, _rules(scene).world
+    plans = (*(junction.plan for junction in world.junctions), *world.crossing_plans)
+    mine = [p for p in plans if p is not None and group_id in {group.id for group in p.groups}]
+    plan = mine[-1] if mine else None
+    if plan is None:
+        return ["unknown"] * len(at_s)
+    drive_s = context.start_s + at_s
+    if context.live:
+        return [colours_at(plan, time_s, context.live)[group_id] for time_s in drive_s.tolist()]
+    # Colours change a few times a cycle: they are looked up once for all who come in between.
+    _, first, part = np.unique(
+        parts_of_cycle(plan, drive_s), return_index=True, return_inverse=True
+    )
+    found = [colours_at(plan, float(drive_s[k]))[group_id] for k in first]
+    return [found[k] for k in part]
 
 
 def _line_crossings(front: Array, ends_m: Array, time_s: Array) -> tuple[Indices, Array]:

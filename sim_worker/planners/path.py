@@ -7,6 +7,7 @@ index arithmetic and a vehicle never runs out of path.
 from __future__ import annotations
 
 import functools
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,9 +16,10 @@ import numpy.typing as npt
 from contracts.arrays import Array
 
 SPACING_M = 1.0
+"""Between nodes. As it is one metre, an arc length less that of the first node is a place."""
 _AFTER_M = 200.0
-_WINDOW = 12
-"""Nodes searched on either side of the last known place."""
+NEAR_M = 12.0
+"""How far on either side of the last known place is searched."""
 _MANY = 32
 """Points, from which on a tree of the nodes is searched faster than all of them."""
 _SMOOTH_NODES = 2
@@ -29,6 +31,17 @@ class FrenetPoint(NamedTuple):
 
     arc_m: Array
     offset_m: Array
+
+
+class NodePlace(NamedTuple):
+    """Places between a path's nodes: which is before (…), what share (…) of the way to the next."""
+
+    node: npt.NDArray[np.intp]
+    share: Array
+
+    def row(self, index: int) -> NodePlace:
+        """Return one of several rows of places."""
+        return NodePlace(self.node[index], self.share[index])
 
 
 class PathPose(NamedTuple):
@@ -68,15 +81,19 @@ class FrenetPath:
         self._y = _prolonged(self.arc_m, arc, points[:, 1])
         heading = np.unwrap(np.arctan2(np.gradient(self._y), np.gradient(self._x)))
         self._heading = heading
-        self._cos, self._sin = np.cos(heading), np.sin(heading)
-        self._nodes = np.stack([self._x, self._y, self._cos, self._sin], axis=-1)
-        self._steps = np.diff(self._nodes, axis=0)
+        # Tables have a row for each quantity: a look-up gives columns that lie in order.
+        self._nodes = np.stack([self._x, self._y, -np.sin(heading), np.cos(heading)])
+        """(4, M) x, y and the unit vector to the left."""
+        self._pieces = _with_steps(self._nodes)
         self._last = len(self.arc_m) - 1
-        length = np.hypot(self._steps[:, 0], self._steps[:, 1])
-        self._segments = np.column_stack(
-            [self._x[:-1], self._y[:-1], self._steps[:, :2] / length[:, None], 1.0 / length]
+        step = np.diff(self._nodes[:2])
+        length = np.hypot(*step)
+        cos, sin = step / length
+        self._segments = np.stack(
+            [*self._nodes[:2, :-1], cos / length, -sin, sin / length, cos, self.arc_m[:-1]]
         )
-        """(M - 1, 5) start, direction, one over the length."""
+        """(7, M - 1) start; what turns a way from it into a share of the length and an offset; arc
+        length."""
         if speed_limit_mps is None:
             self.speed_limit_mps = np.full(len(self.arc_m), np.inf)
         else:
@@ -96,12 +113,16 @@ class FrenetPath:
         return np.column_stack([self._x, self._y, self._heading])
 
     @functools.cached_property
-    def _windows(self) -> tuple[Array, Array]:
-        """(M - 2 W, 2 W + 1) x and y of the nodes around each, for the search near a place."""
-        views = np.lib.stride_tricks.sliding_window_view
-        # Copies, whose rows are taken together faster than those of views.
-        x, y = (views(values, 2 * _WINDOW + 1).copy() for values in (self._x, self._y))
-        return x, y
+    def _windows(self) -> dict[int, Array]:
+        return {}
+
+    def _windows_of(self, width: int) -> Array:
+        """(M - width + 1, 2, width) x and y of the nodes from each on, for the search near one."""
+        if width not in self._windows:
+            views = np.lib.stride_tricks.sliding_window_view(self._nodes[:2], width, axis=1)
+            # A copy, whose rows are taken together faster than those of a view.
+            self._windows[width] = views.transpose(1, 0, 2).copy()
+        return self._windows[width]
 
     @functools.cached_property
     def curvature_pm(self) -> Array:
@@ -110,47 +131,59 @@ class FrenetPath:
         padded = np.pad(self._heading, k, mode="edge")
         return np.asarray((padded[2 * k :] - padded[: -2 * k]) / (2 * k * SPACING_M))
 
-    @functools.cached_property
-    def _profiles(self) -> dict[tuple[float, float], Array]:
-        return {}
-
     def speed_profile(self, *, lateral_accel_mps2: float, decel_mps2: float) -> Array:
         """Return (M,) the speed at each node that curves ahead allow.
 
         √(a_lat / |κ|) at every node, lowered so that a deceleration of `decel_mps2` suffices to
         reach what lies ahead.
         """
+        return np.asarray(self._curve_speeds(lateral_accel_mps2, decel_mps2)[0])
+
+    @functools.cached_property
+    def _profiles(self) -> dict[tuple[float, float], Array]:
+        return {}
+
+    def _curve_speeds(self, lateral_accel_mps2: float, decel_mps2: float) -> Array:
         key = (lateral_accel_mps2, decel_mps2)
         if key not in self._profiles:
             square = lateral_accel_mps2 / np.maximum(np.abs(self.curvature_pm), 1e-6)
             slope = 2.0 * decel_mps2 * self.arc_m
             ahead = np.minimum.accumulate((square + slope)[::-1])[::-1]
-            self._profiles[key] = np.sqrt(np.minimum(ahead - slope, square))
+            self._profiles[key] = _with_steps(np.sqrt(np.minimum(ahead - slope, square))[None])
         return self._profiles[key]
 
-    def _place(self, arc_m: Array) -> tuple[npt.NDArray[np.intp], Array]:
-        """Return node index and fraction towards the next, clipped to the path."""
-        place = (arc_m - self._first_arc) / SPACING_M
-        place = np.minimum(np.maximum(place, 0.0), self._last - 1e-9)
-        index = place.astype(np.intp)
-        return index, place - index
+    def place(self, arc_m: Array) -> NodePlace:
+        """Return where arc lengths of any shape lie among the nodes, clipped to the path."""
+        place = arc_m - self._first_arc
+        np.maximum(place, 0.0, out=place)
+        np.minimum(place, self._last - 1e-9, out=place)
+        node = place.astype(np.intp)
+        place -= node
+        return NodePlace(node, place)
 
     def at_nodes(self, values: Array, arc_m: Array) -> Array:
         """Interpolate `values` (M,), given at the nodes, at arc lengths of any shape."""
-        index, share = self._place(arc_m)
-        low = values[index]
-        return np.asarray(low + share * (values[index + 1] - low))
+        node, share = self.place(arc_m)
+        low = values[node]
+        return np.asarray(low + share * (values[node + 1] - low))
+
+    def curve_speed(
+        self, place: NodePlace, *, lateral_accel_mps2: float, decel_mps2: float
+    ) -> Array:
+        """Return (…) the `speed_profile` at places."""
+        found = _between(self._curve_speeds(lateral_accel_mps2, decel_mps2), place)
+        return np.asarray(found[0])
+
+    def point_of(self, place: NodePlace, offset_m: Array | float = 0.0) -> Array:
+        """Return positions (2, …), x and y, at places and offsets to the left."""
+        found = _between(self._pieces, place)
+        found[2:] *= offset_m
+        found[:2] += found[2:]
+        return found[:2]
 
     def point_at(self, arc_m: Array, offset_m: Array | float = 0.0) -> Array:
         """Return positions (…, 2) at arc lengths (…) and offsets to the left."""
-        index, share = self._place(arc_m)
-        rows = self._steps.take(index, axis=0)
-        rows *= share[..., None]
-        rows += self._nodes.take(index, axis=0)
-        point = rows[..., :2]
-        point[..., 0] -= rows[..., 3] * offset_m
-        point[..., 1] += rows[..., 2] * offset_m
-        return np.asarray(point)
+        return np.moveaxis(self.point_of(self.place(np.asarray(arc_m)), offset_m), 0, -1)
 
     def pose_at(self, arc_m: Array, offset_m: Array | float = 0.0) -> PathPose:
         """Return positions and headings at arc lengths (…) and offsets to the left."""
@@ -162,7 +195,7 @@ class FrenetPath:
             # Slower to import than all else that the process of a hosted planner needs.
             from scipy.spatial import cKDTree
 
-            return np.asarray(cKDTree(self._nodes[:end, :2]).query(xy_m)[1], dtype=np.intp)
+            return np.asarray(cKDTree(self._nodes[:2, :end].T).query(xy_m)[1], dtype=np.intp)
         dx, dy = self._x[:end] - xy_m[:, 0, None], self._y[:end] - xy_m[:, 1, None]
         dx *= dx
         dy *= dy
@@ -170,38 +203,60 @@ class FrenetPath:
         return np.asarray(dx.argmin(axis=1))
 
     def locate(
-        self, xy_m: Array, *, near_arc_m: Array | None = None, upto_arc_m: float = np.inf
+        self,
+        xy_m: Array,
+        *,
+        near_arc_m: Array | None = None,
+        within_m: float = NEAR_M,
+        upto_arc_m: float = np.inf,
     ) -> FrenetPoint:
         """Project positions (S, 2) onto the path, as far as `upto_arc_m`.
 
-        With `near_arc_m` (S,) only its surroundings (±12 m) are searched, so that a path that
-        crosses itself is followed rather than jumped along.
+        With `near_arc_m` (S,) only its surroundings are searched, `within_m` on either side, so
+        that a path that crosses itself is followed rather than jumped along.
         """
-        x, y = xy_m[:, 0], xy_m[:, 1]
+        xy = np.asarray(xy_m).T
         if near_arc_m is None:
             end = max(2, int(np.searchsorted(self.arc_m, upto_arc_m, side="right")))
-            index = self._nearest(xy_m, end)
+            node = self._nearest(xy_m, end)
         else:
-            centre = (near_arc_m - (self._first_arc + _WINDOW * SPACING_M)) / SPACING_M
-            centre = np.minimum(np.maximum(centre, 0.0), self._last - 2 * _WINDOW)
-            start = centre.astype(np.intp)
-            dx, dy = (window.take(start, axis=0) for window in self._windows)
-            dx -= x[:, None]
-            dy -= y[:, None]
-            dx *= dx
-            dy *= dy
-            dx += dy
-            index = start + dx.argmin(axis=1)
+            either = min(math.ceil(within_m / SPACING_M), self._last // 2)
+            first = near_arc_m - (self._first_arc + either)
+            np.maximum(first, 0.0, out=first)
+            np.minimum(first, self._last - 2 * either, out=first)
+            node = first.astype(np.intp)
+            away = self._windows_of(2 * either + 1).take(node, axis=0)
+            away -= xy.T[:, :, None]
+            away *= away
+            node += np.add(away[:, 0], away[:, 1]).argmin(axis=1)
         # The node's own tangent decides between the segment before and the one after.
-        x0, y0, cos, sin = self._nodes.take(index, axis=0).T
-        index = index - ((x - x0) * cos + (y - y0) * sin < 0.0)
-        index = np.minimum(np.maximum(index, 0), self._last - 1)
-        x0, y0, cos, sin, per_length = self._segments.take(index, axis=0).T
-        x, y = x - x0, y - y0
-        share = (x * cos + y * sin) * per_length
-        share = np.minimum(np.maximum(share, 0.0), 1.0)
-        arc = (index + share) * SPACING_M + self._first_arc
-        return FrenetPoint(arc, cos * y - sin * x)
+        nodes = self._nodes.take(node, axis=1)
+        turned = (xy - nodes[:2]) * nodes[:1:-1]
+        node -= turned[0] < turned[1]
+        segments = self._segments.take(node, axis=1, mode="clip")
+        turned = segments[2:6].reshape(2, 2, -1)
+        turned *= (xy - segments[:2])[:, None]
+        share, offset = turned[0, 0], turned[0, 1]
+        turned[0] += turned[1]
+        np.maximum(share, 0.0, out=share)
+        np.minimum(share, 1.0, out=share)
+        share += segments[6]
+        return FrenetPoint(share, offset)
+
+
+def _with_steps(values: Array) -> Array:
+    """Return (2 K, M): values (K, M) at nodes, and their steps to the next."""
+    return np.concatenate([values, np.diff(values, append=values[:, -1:])])
+
+
+def _between(table: Array, place: NodePlace) -> Array:
+    """Return values (K, …) at places, from a table (2 K, M) of them with their steps."""
+    found = table.take(place.node, axis=1)
+    half = len(table) // 2
+    steps = found[half:]
+    steps *= place.share
+    steps += found[:half]
+    return np.asarray(steps)
 
 
 def _path_of(xy_m: Array, speed_limit_mps: Array | None, before_m: float) -> FrenetPath:

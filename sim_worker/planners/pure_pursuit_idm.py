@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+import numpy.typing as npt
 
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import front_from_base_m, pure_pursuit, turning_speed
+from sim_worker.planners.path import NodePlace
+from sim_worker.planners.tracking import (
+    aside_m,
+    front_from_base_m,
+    lookahead_m,
+    steer_towards,
+    turning_speed,
+)
 from sim_worker.vehicle.resistance import resistance_mps2
 
 MAX_ACCEL_MPS2 = 1.5
@@ -27,20 +37,46 @@ _HOLD_SPEED_MPS = 0.3
 _HOLD_MPS2 = -2.0
 
 
+class _Wishes(NamedTuple):
+    """What drivers want on a free road, each (S,), of `target_speed_mps` and `speed_factor`.
+
+    To go at `speed_mps`, beginning with `accel_mps2`; `exponent` is of how they slow down to it.
+    """
+
+    target_speed_mps: Array
+    speed_factor: Array
+    speed_mps: Array
+    accel_mps2: Array
+    exponent: Array
+    stand: npt.NDArray[np.bool_] | None
+
+
 class PurePursuitIdm:
     """Keeps its lane, slows for curves, follows what is ahead, stops at lights, and holds there."""
+
+    def __init__(self) -> None:
+        self._wished: _Wishes | None = None
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
         speed = np.maximum(view.states[:, 3], 0.0)
-        angle = pure_pursuit(view)
-        turning = turning_speed(view, angle, lateral_accel_mps2=TURNING_ACCEL_MPS2)
-        accel = np.minimum(self._free(view, speed), self._curves(view, speed, turning))
-        accel = accel - self._interaction(view, speed)
-        accel = np.maximum(accel, -MAX_DECEL_MPS2)
+        # Where to steer for, and where the speed is looked up.
+        arcs = np.empty((2, len(speed)))
+        np.add(view.arc_m, lookahead_m(speed, aside_m(view)), out=arcs[0])
+        np.add(view.arc_m, _CURVE_TIME_S * speed, out=arcs[1])
+        ahead = view.path.place(arcs)
+        goal = view.path.point_of(ahead.row(0), view.desired_offset_m)
+        angle = steer_towards(view, goal.T)
+        accel = self._curves(view, speed, angle, ahead.row(1))
+        np.minimum(accel, self._free(view, speed), out=accel)
+        if view.stop_arc_m is not None or np.count_nonzero(view.lead_gap_m < np.inf):
+            accel -= self._interaction(view, speed)
+        np.maximum(accel, -MAX_DECEL_MPS2, out=accel)
         command = accel + resistance_mps2(view.vehicle, speed)
-        hold = (speed < _HOLD_SPEED_MPS) & (accel <= 0.0)
-        return PlannerOutput(np.where(hold, _HOLD_MPS2, command), angle)
+        slow = speed < _HOLD_SPEED_MPS
+        if np.count_nonzero(slow):
+            command = np.where(slow & (accel <= 0.0), _HOLD_MPS2, command)
+        return PlannerOutput(command, angle)
 
     def _free(self, view: PlannerView, speed: Array) -> Array:
         """Free-road acceleration; above the target speed it approaches the comfortable one.
@@ -48,30 +84,55 @@ class PurePursuitIdm:
         Treiber, Hennecke, Helbing (2000), Phys. Rev. E 62, eq. 2; above the target speed the
         improved form of Treiber and Kesting (2013), Traffic Flow Dynamics, eq. 11.22.
         """
-        start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(view.speed_factor, 0.3), 2.0)
-        target = np.maximum(view.target_speed_mps, 0.0)
-        allowed = np.maximum(target, 0.1)
-        ratio = speed / allowed
-        fourth = np.square(np.square(ratio))
-        below = start * (1.0 - fourth)
-        above = -COMFORT_DECEL_MPS2 * (
-            1.0 - np.maximum(ratio, 1.0) ** (-start * EXPONENT / COMFORT_DECEL_MPS2)
-        )
-        return np.where(target < 0.05, -COMFORT_DECEL_MPS2, np.where(ratio <= 1.0, below, above))
+        wishes = self._wishes(view)
+        ratio = speed / wishes.speed_mps
+        below = np.minimum(ratio, 1.0)
+        below *= below
+        below *= below
+        np.subtract(1.0, below, out=below)
+        below *= wishes.accel_mps2
+        # At the target speed either is zero, and so they add up.
+        above = np.maximum(ratio, 1.0, out=ratio)
+        np.power(above, wishes.exponent, out=above)
+        above -= 1.0
+        above *= COMFORT_DECEL_MPS2
+        above += below
+        return above if wishes.stand is None else np.where(wishes.stand, -COMFORT_DECEL_MPS2, above)
 
-    def _curves(self, view: PlannerView, speed: Array, turning_mps: Array) -> Array:
+    def _wishes(self, view: PlannerView) -> _Wishes:
+        """Return what drivers want; mostly, that stays the same from tick to tick."""
+        known, target, factor = self._wished, view.target_speed_mps, view.speed_factor
+        if (
+            known is None
+            or known.target_speed_mps is not target
+            or known.speed_factor is not factor
+        ):
+            start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(factor, 0.3), 2.0)
+            stand = target < 0.05
+            known = self._wished = _Wishes(
+                target,
+                factor,
+                speed_mps=np.maximum(target, 0.1),
+                accel_mps2=start,
+                exponent=-start * EXPONENT / COMFORT_DECEL_MPS2,
+                stand=stand if stand.any() else None,
+            )
+        return known
+
+    def _curves(self, view: PlannerView, speed: Array, angle: Array, ahead: NodePlace) -> Array:
         """Acceleration that follows the speed profile of the curves ahead and of the wheels."""
-        profile = view.path.speed_profile(
-            lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
+        allowed = view.path.curve_speed(
+            ahead, lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
         )
-        ahead = view.arc_m + _CURVE_TIME_S * speed
-        allowed = view.speed_factor * view.path.at_nodes(profile, ahead)
-        return np.asarray((np.minimum(allowed, turning_mps) - speed) / _CURVE_TIME_S)
+        allowed *= view.speed_factor
+        turning = turning_speed(view, angle, lateral_accel_mps2=TURNING_ACCEL_MPS2)
+        np.minimum(allowed, turning, out=allowed)
+        allowed -= speed
+        allowed /= _CURVE_TIME_S
+        return allowed
 
     def _interaction(self, view: PlannerView, speed: Array) -> Array:
         """IDM deceleration for what is ahead: a (s* / s)², s* = s0 + v T + v Δv / (2 √(a b))."""
-        if view.stop_arc_m is None and view.lead_gap_m.min() == np.inf:
-            return np.zeros(len(speed))
         gap = np.maximum(view.lead_gap_m, 0.1)
         approach = speed * (speed - view.lead_speed_mps)
         wanted = STANDSTILL_GAP_M + np.maximum(

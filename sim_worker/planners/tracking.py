@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from contracts.arrays import Array
@@ -25,15 +27,25 @@ def pure_pursuit(view: PlannerView) -> Array:
     δ = atan(2 L y / d²) with the goal at (x, y) in body axes and distance d
     (Coulter 1992, Implementation of the Pure Pursuit Path Tracking Algorithm).
     """
-    aside = np.abs(view.offset_m - view.desired_offset_m)
-    lookahead = lookahead_m(view.states[:, 3], aside)
-    return steer_towards(view, view.path.point_at(view.arc_m + lookahead, view.desired_offset_m))
+    ahead = view.arc_m + lookahead_m(view.states[:, 3], aside_m(view))
+    return steer_towards(view, view.path.point_at(ahead, view.desired_offset_m))
+
+
+def aside_m(view: PlannerView) -> Array:
+    """Return how far (S,) the cars are from their lines."""
+    aside = view.offset_m - view.desired_offset_m
+    return np.abs(aside, out=aside)
 
 
 def lookahead_m(speed_mps: Array, aside_m: Array) -> Array:
     """Return how far ahead goals lie for cars so far beside their lines, each (S,)."""
-    lookahead = np.maximum(MIN_LOOKAHEAD_M, LOOKAHEAD_TIME_S * speed_mps)
-    return np.asarray(lookahead + _LOOKAHEAD_ASIDE * np.maximum(aside_m - _KEPT_M, 0.0))
+    more = aside_m - _KEPT_M
+    np.maximum(more, 0.0, out=more)
+    more *= _LOOKAHEAD_ASIDE
+    lookahead = LOOKAHEAD_TIME_S * speed_mps
+    np.maximum(lookahead, MIN_LOOKAHEAD_M, out=lookahead)
+    lookahead += more
+    return lookahead
 
 
 def steer_towards(view: PlannerView, goal: Array) -> Array:
@@ -41,15 +53,26 @@ def steer_towards(view: PlannerView, goal: Array) -> Array:
 
     Goals behind the car are those of one that drives backwards.
     """
-    states = view.states
-    dx, dy = goal[:, 0] - states[:, 0], goal[:, 1] - states[:, 1]
-    cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
-    left = cos * dy - sin * dx
-    wheelbase = view.vehicle.wheelbase_m.value
-    slope = 2.0 * wheelbase * left / (dx * dx + dy * dy + 1e-9)
-    most = wheelbase * MAX_LATERAL_ACCEL_MPS2 / np.square(np.maximum(states[:, 3], 1.0))
-    most = np.minimum(most, np.tan(view.vehicle.max_tire_angle_rad.value))
-    return np.arctan(np.minimum(np.maximum(slope, -most), most))
+    states, wheelbase = view.states.T, view.vehicle.wheelbase_m.value
+    way = goal.T - states[:2]
+    ahead = np.empty_like(way)
+    np.cos(states[2], out=ahead[0])
+    np.sin(states[2], out=ahead[1])
+    ahead *= way[::-1]
+    slope = ahead[0] - ahead[1]
+    slope *= 2.0 * wheelbase
+    way *= way
+    distance_square = way[0] + way[1]
+    distance_square += 1e-9
+    slope /= distance_square
+    most = np.maximum(states[3], 1.0)
+    most *= most
+    np.divide(wheelbase * MAX_LATERAL_ACCEL_MPS2, most, out=most)
+    np.minimum(most, math.tan(view.vehicle.max_tire_angle_rad.value), out=most)
+    np.minimum(slope, most, out=slope)
+    np.negative(most, out=most)
+    np.maximum(slope, most, out=slope)
+    return np.asarray(np.arctan(slope, out=slope))
 
 
 def front_from_base_m(vehicle: VehicleParameters) -> float:
@@ -64,9 +87,18 @@ def turning_speed(view: PlannerView, tire_angle_rad: Array, *, lateral_accel_mps
     have to turn: a car that starts with wheels turned would drive a loop before they are straight.
     """
     vehicle, present = view.vehicle, view.states[:, 6]
-    wider = np.maximum(np.abs(present), np.abs(tire_angle_rad))
-    curvature = np.tan(wider) / vehicle.wheelbase_m.value + 1e-6
-    on_the_way_s = np.abs(present - tire_angle_rad) / vehicle.max_tire_rate_radps.value + 1e-6
-    return np.minimum(
-        np.sqrt(lateral_accel_mps2 / curvature), _MAX_TURN_RAD / (curvature * on_the_way_s)
-    )
+    curvature, turned = np.abs(present), np.abs(tire_angle_rad)
+    np.maximum(curvature, turned, out=curvature)
+    np.tan(curvature, out=curvature)
+    curvature /= vehicle.wheelbase_m.value
+    curvature += 1e-6
+    np.subtract(present, tire_angle_rad, out=turned)
+    np.abs(turned, out=turned)
+    turned /= vehicle.max_tire_rate_radps.value
+    turned += 1e-6
+    # What the car turns by at 1 m/s until the wheels are where they should be.
+    turned *= curvature
+    np.divide(_MAX_TURN_RAD, turned, out=turned)
+    np.divide(lateral_accel_mps2, curvature, out=curvature)
+    np.sqrt(curvature, out=curvature)
+    return np.minimum(curvature, turned, out=curvature)

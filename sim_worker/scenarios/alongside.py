@@ -6,15 +6,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from contracts.arrays import Array
 from contracts.scenario import ActorPart
 from sim_worker.actors.kinds import KINDS
+from sim_worker.overlap import corners
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.impact import (
     TOLERANCE_M,
     Moving,
     Touch,
+    ego_rectangles,
     first_touch,
     front_point,
     gap_m,
@@ -24,6 +27,7 @@ from sim_worker.scenarios.ways import Way
 
 _CLEAR_M, _LANE_HALF_M = 0.3, 1.5
 """What is parked leaves the lane free, and a car's side by so much."""
+_BAY_CLEAR_M = 0.3
 
 
 class Touched(NamedTuple):
@@ -118,8 +122,45 @@ def _played(actor: CastActor, staging: Staging) -> _OnPath:
 
 
 def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
-    """Return whether the ego touches somebody beside its path, with whatever side."""
-    return bool(np.isfinite(_played(actor, staging).touch.time_s[0]))
+    """Return whether the ego touches somebody beside its path, with whatever side.
+
+    One that backs into a bay goes no farther than its way, and needs room for being off it.
+    """
+    if not staging.place.reverse:
+        return bool(np.isfinite(_played(actor, staging).touch.time_s[0]))
+    way, traits = staging.place.way_named(actor.way), actor.traits
+    wider = traits._replace(
+        length_m=traits.length_m + 2 * _BAY_CLEAR_M, width_m=traits.width_m + 2 * _BAY_CLEAR_M
+    )
+    touch = first_touch(
+        staging.ego, staging.box, Moving(way.path, 0.0, actor.lateral_m), wider,
+        ego_arc_m=np.array([staging.start_m]), actor_arc_m=np.array([actor.start_on(way)]),
+        until_s=(staging.place.ego.path.length_m - staging.start_m) / staging.ego.speed_mps,
+    )  # fmt: skip
+    return bool(np.isfinite(touch.time_s[0]))
+
+
+def backs_into_a_house(staging: Staging) -> bool:
+    """Return whether an ego that keeps to its line into a bay touches a building, or nearly so."""
+    walls, path, box = staging.place.walls, staging.place.ego.path, staging.box
+    if walls is None or not staging.place.reverse:
+        return False
+    arcs = np.arange(staging.start_m, path.length_m, 0.5)
+    at = ego_rectangles(staging.ego, box, arcs)
+    wider = at._replace(
+        length_m=box.length_m + 2 * _BAY_CLEAR_M, width_m=box.width_m + 2 * _BAY_CLEAR_M
+    )
+    return any(walls.meet(shapely.Polygon(outline)) for outline in corners(wider))
+
+
+def stands_in_a_house(actor: CastActor, staging: Staging) -> bool:
+    """Return whether somebody parked would stand in a building."""
+    walls, way = staging.place.walls, staging.place.way_named(actor.way)
+    arc, half = actor.start_on(way), actor.traits.length_m / 2.0
+    return walls is not None and walls.block(
+        way.path, from_m=arc - half, to_m=arc + half, width_m=actor.traits.width_m,
+        left_m=actor.lateral_m,
+    )  # fmt: skip
 
 
 def run_into(actor: CastActor, staging: Staging) -> Touched | None:

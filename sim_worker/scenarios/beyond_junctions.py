@@ -17,7 +17,7 @@ from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.places import Place
 from sim_worker.scenarios.relations import ways_over
 from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
+from sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way, own_way
 from world_gen.polyline import arc_lengths, points_at
 
 _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
@@ -109,6 +109,7 @@ def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> Place:
         driving_side=network.driving_side,
         ego=way,
         actor_ways=tuple(() for _ in scenario.actors),
+        walls=network.walls,
     )
 
 
@@ -167,17 +168,7 @@ def _live(path: FrenetPath, arc_m: float, lanes: list[Lane]) -> Way | None:
     lines = [shapely.LineString(lane.centerline) for lane in lanes if len(lane.centerline) > 1]
     if not lines or min(line.distance(here) for line in lines) > _ON_LANE_M:
         return None
-    arcs = np.linspace(0.0, path.length_m, max(2, math.ceil(path.length_m) + 1))
-    return Way(
-        name="the car's own path",
-        xy_m=path.point_at(arcs),
-        speed_limit_mps=path.speed_limit_mps[np.searchsorted(path.arc_m, arcs - 0.5)],
-        path=path,
-        entry_m=path.length_m,
-        exit_m=path.length_m,
-        first_m=0.0,
-        last_m=path.length_m,
-    )
+    return own_way("the car's own path", path, path.length_m, path.length_m)
 
 
 def _bays(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], str]:
@@ -188,9 +179,8 @@ def _bays(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], st
     why = counted.most_common(1)[0][0] if counted else "there is none"
     if fitting:
         why = "buildings stand beside those that are long enough"
-    walls = shapely.STRtree([shapely.Polygon(b.outline) for b in network.world.buildings])
     bays = (_Bay(lane, network) for lane in fitting)
-    clear = (bay for bay in bays if not len(walls.query(bay.box, "intersects")))
+    clear = (bay for bay in bays if not network.walls.meet(bay.box))
     places = (bay.place(scenario, network) for bay in clear)
     return places, f"no lane has room for a bay beside it: {why}"
 
@@ -260,7 +250,7 @@ class _Bay:
         bay = _way("in the bays beside it", line, self._limit_mps, 20.0, 20.0)
         across = self._at(self._middle_m, self._to_near * np.array([-1.0, self.shift_m + 2.0]))
         ways = tuple(
-            tuple(ways_over(across, "straight", ego, network.near_sign))
+            tuple(ways_over(across, "straight", ego, network.near_sign, where="behind the bay"))
             if part.relation == "crosses_exit"
             else (bay,)
             for part in scenario.actors

@@ -12,9 +12,11 @@ from contracts.vehicle import VehicleParameters
 from sim_worker.scenarios.alongside import (
     Touched,
     along,
+    backs_into_a_house,
     beside_bay,
     closing_time_s,
     run_into,
+    stands_in_a_house,
     stands_in_the_way,
 )
 from sim_worker.scenarios.drawing import Values
@@ -32,8 +34,9 @@ _LATERAL_ACCEL_MPS2 = 4.0
 _VERGE_M = 4.0
 """Beside the road, where one may still stand or park."""
 
-_Met = dict[tuple[str, float, float, float, float], Meeting | None]
-"""Meetings by actor, its speed and share, and the ego's speed and shift: all they depend on."""
+_Met = dict[tuple[str | float, ...], Meeting | str]
+"""Meetings by actor, its numbers named here, and the ego's speed and shift: all they depend on."""
+_MEETS_BY = ("speed_mps", "impact_share", "arrives_after_s")
 
 
 def cast(
@@ -88,14 +91,13 @@ def _cast(
     for part, ways in zip(scenario.actors, place.actor_ways, strict=True):
         if part.relation in ALONG:
             continue
-        numbers = staging.number(part, "speed_mps"), staging.number(part, "impact_share")
-        key = (part.name, *numbers, ego.speed_mps, ego.offset_m)
+        numbers = [staging.number(part, name) for name in _MEETS_BY]
+        key: tuple[str | float, ...] = (part.name, *numbers, ego.speed_mps, ego.offset_m)
         if key not in met:
             met[key] = meet(part, ways, staging, ego_arc_m)
         found = met[key]
-        if found is None:
-            why = f"no way of {part.name} touches the ego's front before anything else"
-            return Unplaced(place.junction_id, why, True)
+        if isinstance(found, str):
+            return Unplaced(place.junction_id, found, True)
         meetings[part.name] = found
     start = _start_arc(staging, meetings) if ego_arc_m is None else ego_arc_m
     staging = staging._replace(start_m=start)
@@ -173,11 +175,16 @@ def _first_touched(
 
 
 def _in_the_way(staging: Staging, actors: tuple[CastActor, ...], met: str) -> str:
-    """Return who parks where the ego must pass on its way to somebody else, or nothing."""
+    """Return who parks where the ego must pass, or in a building, or nothing."""
     for actor in actors:
         stands = actor.relation == "parked" and actor.name != met
+        stands |= staging.place.reverse and actor.conduct == "parked"
         if stands and stands_in_the_way(actor, staging):
             return f"{actor.name} would stand in the ego's way"
+        if actor.conduct == "parked" and stands_in_a_house(actor, staging):
+            return f"{actor.name} would stand in a building"
+    if backs_into_a_house(staging):
+        return "the ego would touch a building on its way into the bay"
     return ""
 
 

@@ -18,8 +18,11 @@ _AROUND_M, _MOUTH_M = 40.0, 15.0
 
 def meet(
     part: ActorPart, ways: tuple[Way, ...], staging: Staging, ego_arc_m: float | None
-) -> Meeting | None:
-    """Return where and by which way an actor meets the ego, as near the wished share as can be."""
+) -> Meeting | str:
+    """Return where and by which way an actor meets the ego, as near the wished share as can be.
+
+    Nobody on foot comes through a building. Says why, where there is no such way.
+    """
     place, ego = staging.place, staging.ego
     low, high = place.ego.entry_m - _AROUND_M, place.ego.exit_m + _AROUND_M
     if place.reverse:
@@ -35,6 +38,7 @@ def meet(
     wished = staging.number(part, "impact_share")
     walks = part.relation in ("crosses_exit", "crosses_entry")
     before, after = (2.0, 2.0) if walks else (10.0, 30.0)
+    walled = False
     for share in sorted({wished, *_SHARES}, key=lambda other: abs(other - wished)):
         for way in ways:
             impact = find_impact(
@@ -43,9 +47,25 @@ def meet(
                 actor_span=Span(way.entry_m - before, way.exit_m + after),
                 share=share, near_sign=place.near_sign, lead_time_s=lead,
             )  # fmt: skip
-            if impact is not None:
+            if impact is None:
+                continue
+            if not (walks and _through_walls(part, staging, Meeting(impact, way))):
                 return Meeting(impact, way)
-    return None
+            walled = True
+    if walled:
+        return f"{part.name} would have to come through a building"
+    return f"no way of {part.name} touches the ego's front before anything else"
+
+
+def _through_walls(part: ActorPart, staging: Staging, meeting: Meeting) -> bool:
+    """Return whether a building stands on what an actor covers before it meets the ego."""
+    if staging.place.walls is None:
+        return False
+    (_, met_m, *_), way = meeting
+    on_the_way_s = staging.scenario.lead_time_s + staging.number(part, "arrives_after_s")
+    traits = KINDS[part.kind]
+    from_m = met_m - staging.number(part, "speed_mps") * on_the_way_s - traits.length_m / 2.0
+    return staging.place.walls.block(way.path, from_m=from_m, to_m=met_m, width_m=traits.width_m)
 
 
 def incoming(part: ActorPart, staging: Staging, meeting: Meeting) -> CastActor:

@@ -20,7 +20,7 @@ from sim_worker.scenarios.drawing import Values, draw_cases
 from sim_worker.scenarios.places import Place, Placement, Unplaced
 from sim_worker.scenarios.relations import ways_of
 from sim_worker.scenarios.roads import Passage, RoadNetwork
-from sim_worker.scenarios.ways import Way, unlike_its_turn
+from sim_worker.scenarios.ways import Way, own_way, unlike_its_turn
 from sim_worker.vehicle.parameters import load_vehicle
 
 _ON_CONNECTION_M = 3.0
@@ -167,6 +167,7 @@ def _places_of(
             driving_side=network.driving_side,
             ego=ego,
             actor_ways=chosen,
+            walls=network.walls,
             edges_m=network.edges_beside(passage.connections[0].from_lane_id),
         )
 
@@ -251,7 +252,7 @@ def passage_on_path(
         off, entry, exit_, passage = min(matches, key=lambda match: (match[0], match[3].name))
         if best is not None and best[1] <= entry:
             continue
-        best = (off, entry, passage, _live_way(passage.name, ego_path, entry, exit_))
+        best = (off, entry, passage, own_way(passage.name, ego_path, entry, exit_))
     return None if best is None else (best[2], best[3])
 
 
@@ -281,20 +282,3 @@ def _match(
         return None
     score = off + 5.0 * float(turned.mean()) + 2.0 * float(turned[-1])
     return score, entry, exit_, passage
-
-
-def _live_way(name: str, path: FrenetPath, entry_m: float, exit_m: float) -> Way:
-    """Return the car's own path as a way; it is taken as it comes, on lanes or not."""
-    arcs = np.arange(0.0, path.length_m + 1e-6, 1.0)
-    if path.length_m - arcs[-1] > 1e-3:
-        arcs = np.append(arcs, path.length_m)
-    return Way(
-        name=name,
-        xy_m=path.point_at(arcs),
-        speed_limit_mps=path.speed_limit_mps[np.searchsorted(path.arc_m, arcs - 0.5)],
-        path=path,
-        entry_m=entry_m,
-        exit_m=exit_m,
-        first_m=0.0,
-        last_m=path.length_m,
-    )

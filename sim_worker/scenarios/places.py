@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from contracts.world import DrivingSide
+from sim_worker.scenarios.walls import Walls
 from sim_worker.scenarios.ways import Way
 
 
@@ -25,6 +26,8 @@ class Place(NamedTuple):
     actor_ways: tuple[tuple[Way, ...], ...]
     reverse: bool = False
     """The ego drives its way backwards."""
+    walls: Walls | None = None
+    """Where those who come on foot or by bicycle cannot come from."""
     edges_m: tuple[float, float] = (10.0, -10.0)
     """How far left and, negative, right of the ego's way the road reaches where it comes from."""
 

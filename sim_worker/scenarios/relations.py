@@ -15,6 +15,7 @@ from contracts.world import Crossing
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.roads import Passage, RoadNetwork
 from sim_worker.scenarios.ways import Way
+from world_gen.polyline import length
 
 SIDE_RAD = (math.radians(30.0), math.radians(150.0))
 """Arms at these angles to the ego's own count as side arms."""
@@ -23,6 +24,8 @@ WALKS_M = 60.0
 """How far a crossing's line is led on at either end."""
 _CROSSING_AROUND_M = (12.0, 25.0)
 """How far inside the junction, and outside it, a mapped crossing counts as on that arm."""
+_KERB_M, _CORNER_M = 1.2, 2.0
+"""Who comes along the road does so at this distance from the kerb, and cuts the corner by this."""
 _BEYOND_MOUTH_M = 4.0
 """Where nobody mapped a crossing, people cross so far from the junction."""
 
@@ -108,17 +111,24 @@ def _walking(
         mouth, farther_m = ego_way.entry_m - _BEYOND_MOUTH_M, -_BEYOND_MOUTH_M
     mapped = _mapped(network.world.crossings, ego_way, low, high)
     nearest = sorted(mapped, key=lambda item: abs(item[0] - mouth))
-    lines = [line for _, line in nearest]
+    lines = {f"over {crossing.id}": crossing.line for _, crossing in nearest}
     # Where the mapped crossing does not do, people cross beside it.
-    lines += [_line_across(ego_way.path, mouth + beyond) for beyond in (0.0, farther_m)]
-    for line in lines:
-        yield from ways_over(line, actor.turn, ego_way, network.near_sign)
+    lines["beside the junction"] = _line_across(ego_way.path, mouth)
+    lines["farther from the junction"] = _line_across(ego_way.path, mouth + farther_m)
+    straight = [
+        way
+        for where, line in lines.items()
+        for way in ways_over(line, actor.turn, ego_way, network.near_sign, where=where)
+    ]
+    yield from straight
+    away = 1.0 if at_exit else -1.0
+    yield from (_along_the_road(way, ego_way, away) for way in straight)
 
 
 def _mapped(
     crossings: tuple[Crossing, ...], ego_way: Way, low: float, high: float
-) -> list[tuple[float, Array]]:
-    """Return (arc length, line) of the crossings that the ego's path runs over between two arcs."""
+) -> list[tuple[float, Crossing]]:
+    """Return the crossings that the ego's path runs over between two arcs, and where."""
     arcs = np.arange(low, high + 0.5, 1.0)
     path = shapely.LineString(ego_way.path.point_at(arcs))
     found = []
@@ -126,7 +136,7 @@ def _mapped(
         line = shapely.LineString(crossing.line)
         if line.length > 1.0 and path.intersects(line):
             point = shapely.get_coordinates(path.intersection(line))[:1]
-            found.append((low + float(path.project(shapely.Point(point[0]))), crossing.line))
+            found.append((low + float(path.project(shapely.Point(point[0]))), crossing))
     return found
 
 
@@ -137,30 +147,48 @@ def _line_across(path: FrenetPath, at_m: float) -> Array:
     return np.asarray(pose.xy_m + np.array([[-3.0], [3.0]]) * direction)
 
 
-def ways_over(line: Array, turn: TrafficTurn, ego_way: Way, near_sign: float) -> Iterator[Way]:
+def ways_over(
+    line: Array, turn: TrafficTurn, ego_way: Way, near_sign: float, *, where: str
+) -> Iterator[Way]:
     """Yield the way along a line (2, 2) over the ego's: to the across side, the near side, or both.
 
-    `turn` names the side; `straight` stands for either.
+    `turn` names the side; `straight` stands for either. Names tell `where` it crosses.
     """
     middle = line.mean(axis=0)
     arc = float(ego_way.path.locate(middle[None]).arc_m[0])
     heading = float(ego_way.path.pose_at(np.array([arc])).yaw_rad[0])
     step = line[1] - line[0]
-    length = float(np.hypot(*step))
-    direction = step / length
+    across_m = float(np.hypot(*step))
+    direction = step / across_m
     left = float(direction @ np.array([-math.sin(heading), math.cos(heading)]))
     to_across = direction if left * near_sign > 0.0 else -direction
     directions = {"across": (to_across,), "near": (-to_across,)}
     for towards in directions.get(turn, (to_across, -to_across)):
-        ends = middle + np.array([[-1.0], [1.0]]) * (length / 2 + WALKS_M) * towards
+        ends = middle + np.array([[-1.0], [1.0]]) * (across_m / 2 + WALKS_M) * towards
         side = "across" if towards is to_across else "near"
-        yield Way(
-            name=f"on foot to the {side} side",
-            xy_m=ends,
-            speed_limit_mps=np.full(2, np.inf),
-            path=FrenetPath(ends),
-            entry_m=WALKS_M,
-            exit_m=WALKS_M + length,
-            first_m=0.0,
-            last_m=2 * WALKS_M + length,
-        )
+        yield _walk(f"on foot to the {side} side {where}", ends, WALKS_M, WALKS_M + across_m)
+
+
+def _walk(name: str, xy_m: Array, entry_m: float, exit_m: float) -> Way:
+    path = FrenetPath(xy_m)
+    return Way(
+        name=name,
+        xy_m=xy_m,
+        speed_limit_mps=np.full(len(xy_m), np.inf),
+        path=path,
+        entry_m=entry_m,
+        exit_m=exit_m,
+        first_m=0.0,
+        last_m=path.length_m,
+    )
+
+
+def _along_the_road(way: Way, ego_way: Way, away: float) -> Way:
+    """Return a walk that comes along the ego's road, from where `away` leads along the ego's way,
+    and turns to cross: where walls stand at the crossing's end."""
+    ends = way.path.point_at(np.array([way.entry_m - _KERB_M, way.exit_m]))
+    kerb = ego_way.path.locate(ends[:1])
+    arcs = kerb.arc_m + away * np.arange(WALKS_M, _CORNER_M, -_CORNER_M)
+    xy = np.concatenate([ego_way.path.point_at(arcs, kerb.offset_m), ends, way.xy_m[-1:]])
+    entry = length(xy[:-2]) + _KERB_M
+    return _walk(f"{way.name}, along the road", xy, entry, entry + way.exit_m - way.entry_m)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from contracts.arrays import Array
 from contracts.frames import wrap_angle
 from contracts.scenario import TrafficTurn
 from contracts.world import Connection, DrivingSide, Lane, World
+from sim_worker.scenarios.walls import Walls
 from sim_worker.scenarios.ways import (
     APPROACH_M,
     DEPARTURE_M,
@@ -21,7 +23,7 @@ from sim_worker.scenarios.ways import (
     traffic_turn,
     turn_by_heading,
 )
-from world_gen.polyline import arc_lengths
+from world_gen.polyline import arc_lengths, length
 
 _LONGEST_CHAIN = 16
 """Connections through one ring: more are a drive in circles."""
@@ -71,6 +73,11 @@ class RoadNetwork:
         if after not in known:
             known.append(after)
             self._into.setdefault(after, []).append(before)
+
+    @functools.cached_property
+    def walls(self) -> Walls:
+        """Return the World's buildings."""
+        return Walls(self.world)
 
     @property
     def near_sign(self) -> float:
@@ -141,13 +148,13 @@ class RoadNetwork:
     def _heading_at_end(self, lane_id: str, connection: Connection) -> float:
         """Return where a lane heads at its end; that of the connection if it is short."""
         line = self.lanes[lane_id].centerline
-        if len(line) < 2 or arc_lengths(line)[-1] < 1.0:
+        if len(line) < 2 or length(line) < 1.0:
             line = connection.centerline[:2]
         return heading_of(line[::-1], backwards=True)
 
     def _heading_at_start(self, lane_id: str, connection: Connection) -> float:
         line = self.lanes[lane_id].centerline
-        if len(line) < 2 or arc_lengths(line)[-1] < 1.0:
+        if len(line) < 2 or length(line) < 1.0:
             line = connection.centerline[-2:]
         return heading_of(line, backwards=False)
 
@@ -182,9 +189,9 @@ class RoadNetwork:
                 ids.extend(self._between(before, after))
             self._ways[passage.name] = self.way_along(
                 passage.name,
-                before=self._upstream(passage.connections[0].from_lane_id),
+                before=self._led(passage.connections[0].from_lane_id, back=True),
                 middle=ids,
-                after=self._downstream(passage.connections[-1].to_lane_id),
+                after=self._led(passage.connections[-1].to_lane_id, back=False),
             )
         return self._ways[passage.name]
 
@@ -217,7 +224,7 @@ class RoadNetwork:
                 break
             last = onward[0]
             chain.append(last)
-            walked += max(0.5, float(arc_lengths(self._line(last))[-1]))
+            walked += max(0.5, length(self._line(last)))
         return chain
 
     def _on_ring(self, id_: str, entering: Connection) -> bool:
@@ -260,30 +267,22 @@ class RoadNetwork:
             lane = self.lanes[self.connections[id_].from_lane_id]
         return float(lane.speed_limit_mps.value)
 
-    def _upstream(self, lane_id: str) -> list[str]:
-        """Return a lane and what leads to it, the straightest way back, first things first."""
-        chain, walked = [lane_id], float(arc_lengths(self._line(lane_id))[-1])
-        while walked < APPROACH_M:
-            back = [i for i in self._into.get(chain[0], ()) if i not in chain and self._drivable(i)]
-            if not back:
-                break
-            best = min(back, key=lambda i: bend_between(self._line(i), self._line(chain[0])))
-            chain.insert(0, best)
-            walked += float(arc_lengths(self._line(best))[-1])
-        return chain
+    def _led(self, lane_id: str, *, back: bool) -> list[str]:
+        """Return a lane and what leads to it, or on from it, the straightest way, in its order."""
+        links, far_m = (self._into, APPROACH_M) if back else (self._out_of, DEPARTURE_M)
+        chain, walked = [lane_id], length(self._line(lane_id))
 
-    def _downstream(self, lane_id: str) -> list[str]:
-        chain, walked = [lane_id], float(arc_lengths(self._line(lane_id))[-1])
-        while walked < DEPARTURE_M:
-            on = [
-                i for i in self._out_of.get(chain[-1], ()) if i not in chain and self._drivable(i)
-            ]
-            if not on:
+        def bend(id_: str) -> float:
+            lines = self._line(chain[-1]), self._line(id_)
+            return bend_between(*(lines[::-1] if back else lines))
+
+        while walked < far_m:
+            more = [i for i in links.get(chain[-1], ()) if i not in chain and self._drivable(i)]
+            if not more:
                 break
-            best = min(on, key=lambda i: bend_between(self._line(chain[-1]), self._line(i)))
-            chain.append(best)
-            walked += float(arc_lengths(self._line(best))[-1])
-        return chain
+            chain.append(min(more, key=bend))
+            walked += length(self._line(chain[-1]))
+        return chain[::-1] if back else chain
 
     def after(self, id_: str) -> tuple[str, ...]:
         """Return the lanes and connections that begin where a lane or connection ends."""
@@ -296,5 +295,5 @@ class RoadNetwork:
 
     def lane_way(self, lane: Lane) -> Way:
         """Return the way along a lane of an open road; it counts as within no junction."""
-        back, on = self._upstream(lane.id), self._downstream(lane.id)[1:]
+        back, on = self._led(lane.id, back=True), self._led(lane.id, back=False)[1:]
         return self.way_along(lane.id, before=back[:-1], middle=[lane.id], after=on)

@@ -22,7 +22,7 @@ _MIN_SPEED_MPS = 1.0
 """Below it tyres act as dampers: slip angles lose their meaning towards standstill."""
 _MIN_LATERAL_SHARE = 0.2
 """Of the friction limit, left to lateral force under full braking: a real ABS leaves that much."""
-_TINY_N = 1e-9
+_TINY_N, _TINY_KG = 1e-9, 1e-9
 """A force range of exactly 0 would mean unlimited."""
 
 
@@ -44,12 +44,12 @@ def actuator_ids(model: mujoco.MjModel, prefix: str) -> ActuatorIds:
 class Actuation:
     """Writes tyre stiffness, force limits and drive force of S vehicles at each control tick.
 
-    `ctrl` (S, nu), `biasprm` (S, nu, k) and `forcerange` (S, nu, 2) are written in place;
-    `friction` (S,) stays. The actuator along the road is a brake, a strong damper within ± its
-    force, shifted by the drive force: at speed drive minus brake, at standstill a hold. With
-    `tick_s`, the time between two calls of `apply`, forces lag as the vehicle's parameters say,
-    from `accel_mps2` (S,) on; without, they are immediate. Where `backwards` (S,) is true, the
-    gear is in reverse: commands count in that direction.
+    `ctrl` (S, nu) or for every step (S, steps, nu), `biasprm` (S, nu, k) and `forcerange`
+    (S, nu, 2) are written in place; `friction` (S,) stays. The actuator along the road is a brake,
+    a strong damper within ± its force, shifted by the drive force: at speed drive minus brake, at
+    standstill a hold. With `tick_s`, the time between two calls of `apply`, forces lag as the
+    vehicle's parameters say, from `accel_mps2` (S,) on; without, they are immediate. Where
+    `backwards` (S,) is true, the gear is in reverse: commands count in that direction.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Actuation:
         tyres = slice(ids.tyre_front, ids.tyre_rear + 1)
         if ids.tyre_rear != ids.tyre_front + 1:
             raise ValueError(f"the tyres' actuators must follow each other: {ids}")
-        self._drive_n = ctrl[:, ids.drive]
+        self._drive_n = ctrl[..., ids.drive].T
         self._damping = biasprm[:, tyres, 2].T
         self._lateral_low = forcerange[:, tyres, 0].T
         self._lateral_high = forcerange[:, tyres, 1].T
@@ -76,17 +76,19 @@ class Actuation:
         mass = self._mass = vehicle.mass_kg.value
         wheelbase = vehicle.wheelbase_m.value
         rear = vehicle.cog_from_rear_axle_m.value
-        loads = mass * GRAVITY_MPS2 / wheelbase * np.array([[rear], [wheelbase - rear]])
-        transfer = mass * vehicle.cog_height_m.value / wheelbase
+        axles = mass / wheelbase * np.array([[rear], [wheelbase - rear]])
+        transfer = mass * vehicle.cog_height_m.value / (wheelbase * GRAVITY_MPS2)
         stiffness = np.array(
             [
                 [vehicle.front_cornering_stiffness_npr.value],
                 [vehicle.rear_cornering_stiffness_npr.value],
             ]
         )
-        self._loads_n = loads + _TINY_N
-        self._transfer_kg = np.array([[-transfer], [transfer]])
-        self._stiffness_prad = -stiffness / loads
+        # All as wide as what they meet: numpy takes twice as long to spread a column.
+        count = len(friction)
+        self._axles_kg = np.repeat(axles, count, axis=1)
+        self._transfer_kgpmps2 = np.repeat([[-transfer], [transfer]], count, axis=1)
+        self._stiffness_prkg = np.repeat(-stiffness / axles, count, axis=1)
         effective = vehicle.wheel_inertia_mass_factor.value
         self._drive_gain = vehicle.drive_gain.value / effective
         self._brake_gain = vehicle.brake_gain.value / effective
@@ -95,21 +97,32 @@ class Actuation:
         self._drag = vehicle.drag_npv2.value / effective
         self._rolling = vehicle.rolling_resistance_n.value / effective + _TINY_N
         self._friction = np.array(friction, dtype=np.float64)
-        self._grip = self._friction * GRAVITY_MPS2
-        self._grip_square = self._grip**2
         self._gear: Array | None = None
         if backwards is not None and backwards.any():
             self._gear = np.where(backwards, -1.0, 1.0)
         self._lag: ForceLag | None = None
         if tick_s is not None and lags_of_force(vehicle):
-            start = np.zeros(len(self._friction)) if accel_mps2 is None else accel_mps2
+            start = np.zeros(count) if accel_mps2 is None else accel_mps2
             self._lag = ForceLag(vehicle, tick_s=tick_s, accel_mps2=start)
+        self._limit()
+
+    def _limit(self) -> None:
+        """Bound what tyres bear along the road, and what they keep across it."""
+        grip = self._friction * GRAVITY_MPS2
+        self._most, self._least = grip, -grip
+        if self._lag is None:
+            # What drive and brakes can do goes together with it.
+            self._most = np.minimum(grip, self._max_drive * self._drive_gain)
+            self._least = np.maximum(-grip, -self._max_brake * self._brake_gain)
+        self._grip_square = np.square(grip)
+        self._least_square = self._grip_square * _MIN_LATERAL_SHARE**2
+        lightest = self._axles_kg - np.abs(self._transfer_kgpmps2) * grip
+        self._may_lift = bool(lightest.min() < _TINY_KG)
 
     def restart(self, rows: npt.NDArray[np.intp], *, friction: Array, accel_mps2: Array) -> None:
         """Let the vehicles of `rows` (K,) begin anew with `accel_mps2` (K,) on `friction` (K,)."""
         self._friction[rows] = friction
-        self._grip = self._friction * GRAVITY_MPS2
-        self._grip_square = self._grip**2
+        self._limit()
         if self._lag is not None:
             self._lag.restart(rows, accel_mps2)
 
@@ -119,30 +132,45 @@ class Actuation:
         Forces along the road are divided by the effective mass factor instead of adding wheel
         inertia to the chassis, which would add it sideways too.
         """
-        command = np.minimum(np.maximum(accel_mps2, -self._max_brake), self._max_drive)
-        if self._lag is None:
-            accel = command * np.where(command > 0.0, self._drive_gain, self._brake_gain)
-        else:
-            drive, brake = self._lag.follow(command)
-            accel = drive * self._drive_gain + brake * self._brake_gain
-        accel = np.minimum(np.maximum(accel, -self._grip), self._grip)
-        share = np.maximum(1.0 - accel * accel / self._grip_square, _MIN_LATERAL_SHARE**2)
-        forward = accel if self._gear is None else accel * self._gear
-        loads = self._transfer_kg * forward
-        loads += self._loads_n
-        np.maximum(loads, _TINY_N, out=loads)
+        accel = self._carried_out(accel_mps2)
+        # The friction circle: what is left across the road.
+        across = np.square(accel)
+        np.subtract(self._grip_square, across, out=across)
+        np.maximum(across, self._least_square, out=across)
+        np.sqrt(across, out=across)
+        axles = self._transfer_kgpmps2 * (accel if self._gear is None else accel * self._gear)
+        axles += self._axles_kg
+        if self._may_lift:
+            np.maximum(axles, _TINY_KG, out=axles)
         speed = np.abs(speed_mps)
         slow = np.maximum(speed, _MIN_SPEED_MPS)
-        np.divide(self._stiffness_prad * loads, slow, out=self._damping)
-        loads *= self._friction * np.sqrt(share)
-        np.copyto(self._lateral_high, loads)
-        np.negative(loads, out=self._lateral_low)
-        drive = self._mass * np.maximum(accel, 0.0)
-        brake = drive - self._mass * accel
+        np.divide(self._stiffness_prkg * axles, slow, out=self._damping)
+        axles *= across
+        np.copyto(self._lateral_high, axles)
+        np.negative(axles, out=self._lateral_low)
+        force = self._mass * accel
+        drive = np.maximum(force, 0.0)
+        brake = drive - force
         brake += self._rolling
         if self._gear is not None:
             drive *= self._gear
-        drive -= self._drag * speed_mps * speed
+        speed *= speed_mps
+        speed *= self._drag
+        drive -= speed
         np.copyto(self._drive_n, drive)
         np.subtract(drive, brake, out=self._along_low)
         np.add(drive, brake, out=self._along_high)
+
+    def _carried_out(self, command_mps2: Array) -> Array:
+        """Return the acceleration (S,) by the tyres that a command leads to now."""
+        if self._lag is not None:
+            command = np.minimum(np.maximum(command_mps2, -self._max_brake), self._max_drive)
+            drive, brake = self._lag.follow(command)
+            accel = drive * self._drive_gain + brake * self._brake_gain
+        elif self._drive_gain == self._brake_gain:
+            accel = command_mps2 * self._drive_gain
+        else:
+            gain = np.where(command_mps2 > 0.0, self._drive_gain, self._brake_gain)
+            accel = command_mps2 * gain
+        np.maximum(accel, self._least, out=accel)
+        return np.minimum(accel, self._most, out=accel)

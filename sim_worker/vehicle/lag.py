@@ -45,7 +45,9 @@ class ForceLag:
         self._commands = [command_mps2.copy(), *self._commands[:-1]]
         newer, older = self._commands[self._whole : self._whole + 2]
         due = newer if self._part == 0.0 else newer + self._part * (older - newer)
-        wanted = np.stack([np.maximum(due, 0.0), np.minimum(due, 0.0)])
+        wanted = np.empty_like(self._acting)
+        np.maximum(due, 0.0, out=wanted[0])
+        np.minimum(due, 0.0, out=wanted[1])
         behind = self._acting - wanted
         self._acting = wanted + self._decay * behind
         drive, brake = wanted + self._mean * behind

@@ -174,15 +174,16 @@ def base_from_cog(
 ) -> Array:
     """Fill columns 0 to 6 of base_link states `out` (S, 8) from joints (S, 4); returns `out`."""
     rear = vehicle.cog_from_rear_axle_m.value
-    x, y, yaw, steer = positions.T
-    vx, vy, rate, _ = velocities.T
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    columns = out.T
-    np.subtract(x, rear * cos, out=columns[0])
-    np.subtract(y, rear * sin, out=columns[1])
-    columns[2] = yaw
-    np.add(cos * vx, sin * vy, out=columns[3])
-    np.subtract(cos * vy - sin * vx, rear * rate, out=columns[4])
-    columns[5] = rate
-    columns[6] = steer
+    columns, place, motion = out.T, positions.T, velocities.T
+    ahead = np.empty((2, len(positions)))
+    np.cos(place[2], out=ahead[0])
+    np.sin(place[2], out=ahead[1])
+    np.subtract(place[:2], rear * ahead, out=columns[:2])
+    columns[2:7:4] = place[2:]
+    along = ahead * motion[:2]
+    np.add(along[0], along[1], out=columns[3])
+    across = ahead[::-1] * motion[:2]
+    np.subtract(across[1], across[0], out=columns[4])
+    columns[4] -= rear * motion[2]
+    columns[5] = motion[2]
     return out

@@ -10,7 +10,10 @@ from contracts.vehicle import VehicleParameters
 
 def resistance_mps2(vehicle: VehicleParameters, speed_mps: Array) -> Array:
     """Return the deceleration by drag and rolling at `speed_mps`, for a command to undo."""
+    mass, rolling = vehicle.mass_kg.value, vehicle.rolling_resistance_n.value
     speed = np.abs(speed_mps)
-    force = vehicle.drag_npv2.value * speed * speed_mps
-    force += (speed > 0.1) * np.sign(speed_mps) * vehicle.rolling_resistance_n.value
-    return np.asarray(force / vehicle.mass_kg.value)
+    decel = vehicle.drag_npv2.value / mass * speed
+    decel *= speed_mps
+    if rolling > 0.0:
+        decel += (speed > 0.1) * np.sign(speed_mps) * (rolling / mass)
+    return decel

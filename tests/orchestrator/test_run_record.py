@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from orchestrator.drive import summary_text
 from orchestrator.run_record import run_record, versions, write_record
+from orchestrator.summary import summary_text
 from orchestrator.supervisor import FreshInterpreter, Supervisor
 from tests.orchestrator.house import House
 

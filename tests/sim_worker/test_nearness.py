@@ -43,7 +43,7 @@ NEAR = NearStatics(STAGE.model, reach_m=REACH_M)
 def test_whatever_is_in_reach_is_near_and_what_is_far_is_not(x: float, y: float) -> None:
     point = shapely.Point(x, y)
     distance = min(shapely.Polygon(house.outline).distance(point) for house in HOUSES)
-    near = bool(NEAR.at(np.array([x]), np.array([y]))[0])
+    near = bool(NEAR.at(np.array([[x], [y]]))[0])
     if distance <= REACH_M:
         assert near
     # A point off a corner is nearer to both lines than to the corner.
@@ -53,8 +53,12 @@ def test_whatever_is_in_reach_is_near_and_what_is_far_is_not(x: float, y: float)
 
 def test_places_outside_the_grid_and_no_places_at_all_are_far() -> None:
     places = np.array([-1e9, 1e9, np.nan, np.inf, 0.0])
-    assert not NEAR.at(places, places[::-1]).any()
-    assert not NearStatics(Stage(None, CAR, nsim=1).model, reach_m=5.0).at(places, places).any()
+    assert not NEAR.at(np.stack([places, places[::-1]])).any()
+    assert (
+        not NearStatics(Stage(None, CAR, nsim=1).model, reach_m=5.0)
+        .at(np.stack([places, places]))
+        .any()
+    )
 
 
 def _always(states: Array) -> Any:

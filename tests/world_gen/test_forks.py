@@ -115,14 +115,14 @@ def test_a_lane_too_short_to_be_drawn_does_not_shift_its_neighbours():
     around = _street()
     lanes = build_lanes(around)
     (plain,) = (c for c in around.clusters if c.plain)
-    (second,) = {key.edge for key, name in lanes.begins.items() if name.startswith("w2.")}
-    begins = {key: name for key, name in lanes.begins.items() if key != LaneKey(second, False, 0)}
+    (second,) = {lane.key.edge for lane in lanes.begins.values() if lane.id.startswith("w2.")}
+    begins = {key: lane for key, lane in lanes.begins.items() if key != LaneKey(second, False, 0)}
     assert join_straight_on(plain, around, msgspec.structs.replace(lanes, begins=begins))
     (first,) = {lane.key.edge for lane in lanes.lanes.values()
                 if lane.id.startswith("w1.") and LaneKey(lane.key.edge, False, 0) in lanes.ends
                 and any(leg.edge.index == lane.key.edge for leg in plain.legs)}  # fmt: skip
-    onto = [lanes.lanes[lanes.ends[LaneKey(first, False, n)]].successors for n in range(3)]
-    assert onto == [[], *([lanes.begins[LaneKey(second, False, n)]] for n in (1, 2))]
+    onto = [lanes.ends[LaneKey(first, False, n)].successors for n in range(3)]
+    assert onto == [[], *([lanes.begins[LaneKey(second, False, n)].id] for n in (1, 2))]
 
 
 def test_a_place_beyond_the_worlds_edge_is_none():

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from world_gen import polyline
 from world_gen import polyline_batch as batch
-from world_gen.clusters import heading_out
 from world_gen.polyline_batch import Polylines
 
 coordinate = st.integers(-400, 400).map(lambda tenths: tenths / 10)
@@ -76,16 +75,6 @@ def test_offsets_of_roads_that_go_on(some):
 def test_repeats_are_dropped(some):
     doubled = [np.repeat(xy, 2, axis=0) for xy in some]
     same(batch.without_repeats(Polylines.of(doubled)), some)
-
-
-@given(lines)
-def test_headings(some):
-    class Leg:
-        def __init__(self, xy_m):
-            self.xy_m = xy_m
-
-    found = batch.headings(Polylines.of(some))
-    np.testing.assert_allclose(found, [heading_out(Leg(xy)) for xy in some], atol=1e-6)
 
 
 @given(lines, st.data())

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-
+import msgspec
 import numpy as np
 import pytest
 
@@ -230,7 +229,7 @@ def test_a_circular_place_with_signs_at_its_entries_is_driven_like_a_roundabout(
     osm = roundabout()
     ring = osm.ways[10]
     nodes = {**osm.locations, 9: local_to_geo(osm, 25.0, 0.0)}
-    osm = dataclasses.replace(
+    osm = msgspec.structs.replace(
         osm,
         locations=nodes,
         ways={

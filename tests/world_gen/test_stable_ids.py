@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import random
 import tempfile
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -119,7 +119,7 @@ def _without(osm: OsmMap, lat_deg: float, lon_deg: float, radius_m: float) -> Os
     near = set(nodes[np.hypot(*(xy_m - place).T) < radius_m].tolist())
     ways = {key: way for key, way in osm.ways.items() if near.isdisjoint(way.nodes)}
     assert len(ways) < len(osm.ways)
-    return dataclasses.replace(osm, ways=ways)
+    return msgspec.structs.replace(osm, ways=ways)
 
 
 @pytest.mark.real_data

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -52,6 +53,18 @@ def test_only_red_and_amber_stop(tmp_path: Path, colour: str) -> None:
     rules = JunctionRules(world)
     found = rules.between([rules.taken(straight_on(world, EAST))])
     assert np.isinf(found.red(dict.fromkeys(found.groups, colour))).all()  # type: ignore[arg-type]
+
+
+def test_ground_whose_outline_crosses_itself_is_shared_as_well(tmp_path: Path) -> None:
+    world = crossroads(tmp_path)
+    bow = np.array([[-3.0, -3.0], [3.0, 3.0], [3.0, -3.0], [-3.0, 3.0]])
+    crossed = tuple(
+        msgspec.structs.replace(one, area=one.area.mean(axis=0) + bow) for one in world.conflicts
+    )
+    rules = JunctionRules(msgspec.structs.replace(world, conflicts=crossed))
+    east, north = straight_on(world, EAST), straight_on(world, NORTH)
+    found = rules.between([rules.taken(east), rules.taken(north)]).meetings
+    assert np.isfinite(found[0, 1]).all()
 
 
 def test_open_ground_has_no_rules() -> None:

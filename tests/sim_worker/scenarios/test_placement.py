@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
+import shapely
 
 from contracts.frames import wrap_angle
 from contracts.scenario import ActorPart, EgoPart, Scenario, Where
@@ -19,6 +21,7 @@ from sim_worker.scenarios.reading import catalogue
 from sim_worker.scenarios.roads import RoadNetwork
 from sim_worker.scenarios.ways import unlike_its_turn
 from sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.places import box
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
 from tests.world_gen.drawn_maps import drawn_map
 from world_gen.build import build_region
@@ -147,6 +150,43 @@ def test_bays_lie_at_the_near_side_of_the_road() -> None:
             aside = float((end - start) @ left)
             assert (aside > 0.0) == (not left_hand)
             assert 2.0 < abs(aside) < 3.5
+
+
+def test_nobody_parks_where_one_who_backs_into_a_bay_would_touch_it() -> None:
+    scenario = catalogue()["reversing_parking"]
+    tight = tuple(
+        msgspec.structs.replace(part, gap_m=1.5) if part.name == "car_ahead" else part
+        for part in scenario.actors
+    )
+    result = places(msgspec.structs.replace(scenario, actors=tight), cross(), vehicle=VEHICLE)
+    assert result.unplaced[0].reason == "car_ahead would stand in the ego's way"
+
+
+def test_who_cannot_come_through_a_house_comes_along_the_road() -> None:
+    scenario = catalogue()["cbta"]
+    open_ground = places(scenario, cross(), vehicle=VEHICLE, most=1).places[0]
+    (way,) = open_ground.actor_ways[0]
+    x, y = way.path.point_at(np.array([way.entry_m - 12.0]))[0]
+    built = msgspec.structs.replace(cross(), buildings=(box(x, y, 6.0, 6.0),))
+    found = places(scenario, built, vehicle=VEHICLE).places
+    names = [place.name for place in found]
+    assert open_ground.name not in names
+    assert f"{open_ground.name}, along the road" in names
+    house = shapely.box(x - 6.0, y - 6.0, x + 6.0, y + 6.0)
+    for place in found:
+        for values in draw_cases(scenario)[::3]:
+            case = cast(scenario, values, place, vehicle=VEHICLE)
+            assert isinstance(case, Cast)
+            (bicycle,) = case.actors
+            walked = bicycle.speed_mps * np.linspace(0.0, case.impact_time_s, 40)
+            line = FrenetPath(bicycle.xy_m).point_at(bicycle.start_arc_m + walked)
+            assert not house.intersects(shapely.LineString(line))
+
+
+def test_places_of_a_scenario_have_names_of_their_own() -> None:
+    for id_ in ("cpta", "occluded_pedestrian"):
+        names = [place.name for place in placed(id_, cross(signals=True))]
+        assert len(set(names)) == len(names)
 
 
 def live_path(world: World, turn: str) -> tuple[RoadNetwork, FrenetPath, float]:

@@ -1,0 +1,30 @@
+"""The buildings of a World: nobody comes out of their walls, and nobody parks in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from contracts.arrays import Array
+from contracts.world import World
+from sim_worker.planners.path import FrenetPath
+
+
+class Walls:
+    """Where a World's buildings stand, ready to be asked."""
+
+    def __init__(self, world: World) -> None:
+        self._tree = shapely.STRtree([shapely.Polygon(b.outline) for b in world.buildings])
+
+    def meet(self, shape: shapely.Geometry) -> bool:
+        """Return whether a shape touches a building."""
+        return len(self._tree.query(shape, "intersects")) > 0
+
+    def block(
+        self, path: FrenetPath, *, from_m: float, to_m: float, width_m: float, left_m: float = 0.0
+    ) -> bool:
+        """Return whether what is so wide touches one on its way between two arc lengths, `left_m`
+        to the left of the path."""
+        arcs = np.linspace(from_m, to_m, max(2, int(to_m - from_m) + 1))
+        line: Array = path.point_at(arcs, left_m)
+        return self.meet(shapely.LineString(line).buffer(width_m / 2.0, cap_style="flat"))
