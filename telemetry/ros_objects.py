@@ -10,7 +10,6 @@ left out.
 from __future__ import annotations
 
 import math
-import uuid
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,28 +35,20 @@ from telemetry.ros_parts import (
     turn_from,
     twist_from,
     vector_from,
-    within_float32,
     yaw_of,
 )
+from telemetry.ros_shapes import (
+    classes_from,
+    height_m,
+    is_passable,
+    kind_of,
+    shape_from,
+    size_m,
+    uuid_from,
+)
 
-_KIND_BY_LABEL: dict[int, drive.RoadUserKind] = {
-    1: "car", 2: "lorry", 3: "bus", 4: "lorry", 5: "motorcycle", 6: "bicycle", 7: "pedestrian",
-}  # fmt: skip
-"""ObjectClassification.label; the rest is unknown."""
-_PASSABLE = (10, 11)
-"""OVER_DRIVABLE, UNDER_DRIVABLE."""
-_LABEL_BY_KIND = {
-    # Autoware knows no vans and no trams: what plans around a tram must leave a bus's room.
-    "car": 1, "van": 1, "lorry": 2, "bus": 3, "tram": 3, "motorcycle": 5, "bicycle": 6,
-    "pedestrian": 7, "unknown": 0,
-}  # fmt: skip
-_HEIGHT_M = {"van": 2.5, "lorry": 3.5, "bus": 3.2, "tram": 3.6, "pedestrian": 1.8, "bicycle": 1.8}
-_OTHER_HEIGHT_M = 1.6
-_BOX, _CYLINDER, _POLYGON = 0, 1, 2
 _HEADING_KNOWN = 2
 """DetectedObjectKinematics.orientation_availability: AVAILABLE."""
-_IDS = uuid.UUID("6f2d1c1e-2f0a-5c39-9d5b-1f5f0c7a3b11")
-"""Namespace of the UUIDs of ids that are none."""
 
 
 class PlanarPose(NamedTuple):
@@ -129,7 +120,7 @@ def detected_from_users(message: drive.RoadUsers, frame: LocalFrame) -> Any:
     objects = [
         detected(
             existence_probability=1.0,
-            classification=_classes(user),
+            classification=classes_from(user),
             kinematics=kinematics(
                 pose_with_covariance=_pose(user, _planar(user, frame), frame),
                 has_position_covariance=False,
@@ -138,7 +129,7 @@ def detected_from_users(message: drive.RoadUsers, frame: LocalFrame) -> Any:
                 has_twist=True,
                 has_twist_covariance=False,
             ),
-            shape=_shape(user),
+            shape=shape_from(user),
         )
         for user in message.users
     ]
@@ -164,16 +155,16 @@ def predicted_from_users(
         now = _planar(user, frame)
         objects.append(
             predicted(
-                object_id=_uuid(user.user_id),
+                object_id=uuid_from(user.user_id),
                 existence_probability=1.0,
-                classification=_classes(user),
+                classification=classes_from(user),
                 kinematics=kinematics(
                     initial_pose_with_covariance=_pose(user, now, frame),
                     initial_twist_with_covariance=_twist(user),
                     initial_acceleration_with_covariance=still,
                     predicted_paths=[_straight_on(user, now, frame, horizon_s, step_s)],
                 ),
-                shape=_shape(user),
+                shape=shape_from(user),
             )
         )
     return ros_type(PREDICTED_OBJECTS)(
@@ -192,9 +183,7 @@ def _users(
         if header.frame_id.lstrip("/") != MAP_FRAME:
             raise ValueError(f"objects in frame {header.frame_id!r}, whose pose is not known")
         header_frame = PlanarPose(0.0, 0.0, 0.0)
-    users = tuple(
-        _user(box, frame, header_frame) for box in boxes if _label(box.classes) not in _PASSABLE
-    )
+    users = tuple(_user(box, frame, header_frame) for box in boxes if not is_passable(box.classes))
     return drive.RoadUsers(
         stamp_ns=stamp_ns_of(header.stamp) if stamp_ns is None else stamp_ns, users=users
     )
@@ -207,11 +196,11 @@ def _user(box: _Box, frame: LocalFrame, at: PlanarPose) -> drive.RoadUser:
         [[at.x_m + cos * place.x - sin * place.y, at.y_m + sin * place.x + cos * place.y]]
     )
     yaw = geo_from_local_yaw(frame, np.array([at.yaw_rad + yaw_of(box.pose.orientation)]), xy_m)
-    length_m, width_m = _size_m(shape)
+    length_m, width_m = size_m(shape)
     geo = geo_from_local(frame, xy_m)[0]
     return drive.RoadUser(
         user_id=box.user_id,
-        kind=_KIND_BY_LABEL.get(_label(box.classes), "unknown"),
+        kind=kind_of(box.classes),
         position=GeoPoint(
             float(geo[0]), float(geo[1]), frame.origin.alt_m + place.z - 0.5 * shape.dimensions.z
         ),
@@ -222,27 +211,10 @@ def _user(box: _Box, frame: LocalFrame, at: PlanarPose) -> drive.RoadUser:
     )
 
 
-def _label(classes: Any) -> int:
-    return int(max(classes, key=lambda one: one.probability).label) if len(classes) else 0
-
-
-def _size_m(shape: Any) -> tuple[float, float]:
-    if shape.type == _POLYGON and len(shape.footprint.points):
-        corners = np.array([(p.x, p.y) for p in shape.footprint.points], dtype=np.float64)
-        extent = np.ptp(corners, axis=0)
-        return float(extent[0]), float(extent[1])
-    width = shape.dimensions.x if shape.type == _CYLINDER else shape.dimensions.y
-    return float(shape.dimensions.x), float(width)
-
-
 def _planar(user: drive.RoadUser, frame: LocalFrame) -> PlanarPose:
     lat, lon = user.position.lat_deg, user.position.lon_deg
     x_m, y_m = local_from_geo(frame, lat, lon).tolist()
     return PlanarPose(x_m, y_m, float(local_from_geo_yaw(frame, user.yaw_rad, lat, lon)))
-
-
-def _height_m(user: drive.RoadUser) -> float:
-    return _HEIGHT_M.get(user.kind, _OTHER_HEIGHT_M)
 
 
 def _ros_pose(at: PlanarPose, z_m: float) -> Any:
@@ -252,7 +224,7 @@ def _ros_pose(at: PlanarPose, z_m: float) -> Any:
 
 
 def _z_m(user: drive.RoadUser, frame: LocalFrame) -> float:
-    return user.position.alt_m - frame.origin.alt_m + 0.5 * _height_m(user)
+    return user.position.alt_m - frame.origin.alt_m + 0.5 * height_m(user)
 
 
 def _pose(user: drive.RoadUser, at: PlanarPose, frame: LocalFrame) -> Any:
@@ -283,30 +255,4 @@ def _straight_on(
             sec=step_ns // 10**9, nanosec=step_ns % 10**9
         ),
         confidence=1.0,
-    )
-
-
-def _classes(user: drive.RoadUser) -> list[Any]:
-    classified = ros_type("autoware_perception_msgs/msg/ObjectClassification")
-    return [classified(label=_LABEL_BY_KIND[user.kind], probability=1.0)]
-
-
-def _shape(user: drive.RoadUser) -> Any:
-    return ros_type("autoware_perception_msgs/msg/Shape")(
-        type=_BOX,
-        footprint=ros_type("geometry_msgs/msg/Polygon")(points=[]),
-        dimensions=vector_from(
-            within_float32(user.length_m), within_float32(user.width_m), _height_m(user)
-        ),
-    )
-
-
-def _uuid(user_id: str) -> Any:
-    """Return the UUID that `user_id` spells in 32 hexadecimal digits, else one derived from it."""
-    try:
-        found = uuid.UUID(hex=user_id)
-    except ValueError:
-        found = uuid.uuid5(_IDS, user_id)
-    return ros_type("unique_identifier_msgs/msg/UUID")(
-        uuid=np.frombuffer(found.bytes, dtype=np.uint8).copy()
     )

@@ -191,6 +191,20 @@ def test_a_bag_that_was_cut_off_is_refused_in_one_line(tmp_path: Path) -> None:
             open_log(bag)
 
 
+def test_bytes_that_are_no_message_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "bag"
+    with Writer2(path, version=9) as writer:
+        fixes = writer.add_connection("/fix", NAV_SAT_FIX, typestore=typestore())
+        speeds = writer.add_connection("/speed", VELOCITY_REPORT, typestore=typestore())
+        cdr = bytes(typestore().serialize_cdr(fix(START_NS, 52.5), NAV_SAT_FIX))
+        for place, data in enumerate((cdr[:20], b"", bytes([9] * 40), cdr)):
+            writer.write(fixes, START_NS + place, data)
+        writer.write(speeds, START_NS, cdr)
+    log = open_log(path)
+    assert [channel for channel, _ in log.samples()] == ["gnss"]
+    assert log.skipped == {"unreadable row": 4}
+
+
 def test_objects_without_a_known_frame_are_counted(tmp_path: Path) -> None:
     user = drive.RoadUser(
         user_id="u", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=1.0,
