@@ -206,7 +206,8 @@ def convert(
         str | None, typer.Option("--to", help="mcap, ros2, ros1, csv; else the name tells")
     ] = None,
     declaration: Annotated[
-        Path | None, typer.Option("--declaration", help="TOML that declares a CSV at SOURCE")
+        Path | None,
+        typer.Option("--declaration", help="TOML that declares SOURCE; else SOURCE.toml"),
     ] = None,
 ) -> None:
     """Convert a recorded drive to MCAP, a ROS bag, or CSV."""

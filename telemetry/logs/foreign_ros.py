@@ -2,9 +2,9 @@
 
 Topics are chosen by message type, one topic per stream of telemetry.ros_foreign: the first type
 that occurs, and among its topics the one with the most messages. The stamp is that of the header,
-and the log time where that is 0. Plans and objects are read only where metadata `foretwin.frame`
-tells the origin of their frame. Where static transforms lead from base_link to the frame of the
-fixes, the antenna's place is theirs.
+and the log time where that is 0. Plans and objects are read only where metadata `foretwin.frame` or
+a declaration tells the origin of their frame. Where static transforms lead from base_link to the
+frame of the fixes, the antenna's place is theirs.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 from contracts import drive
 from contracts.frames import LocalFrame
 from telemetry.logs.log import FILE_CUT_SHORT, UNREADABLE_ROW, Declared, Log, LogError, Sample
+from telemetry.logs.map_origin import RecordingDeclaration
 from telemetry.logs.mcap_records import Contents, Record
 from telemetry.logs.merge import reordered
 from telemetry.logs.ros_recording import Recording, decoder
@@ -32,11 +33,15 @@ _UTC_FROM_NS = 946_684_800_000_000_000
 Decode = Callable[[Record], Any]
 
 
-def open_foreign(recording: Recording, frame: LocalFrame | None) -> Log:
-    """Open a file of another program; `frame` is the frame of its plans, None where unknown.
+def open_foreign(
+    recording: Recording, declared: RecordingDeclaration, *, frame: LocalFrame | None = None
+) -> Log:
+    """Open a file of another program; `frame` is that of its plans and objects.
 
-    Raises LogError where it holds no positions, or definitions that cannot be read.
+    Without it that of `declared` counts. Raises LogError where the file holds no positions, or
+    definitions that cannot be read.
     """
+    frame = declared.frame() if frame is None else frame
     path, contents = recording.path, recording.contents
     topics = _choose_topics(contents)
     if "gnss" not in topics:
@@ -56,7 +61,10 @@ def open_foreign(recording: Recording, frame: LocalFrame | None) -> Log:
     # Header stamps differ from log times by the transport's delay, and at times by a whole epoch.
     lag_ns, antenna_frame = _first_fix(recording, topics["gnss"], decode)
     start_ns = contents.first_ns - lag_ns
-    antenna_m = _antenna_m(recording, antenna_frame)
+    antenna_m, placed = declared.body_from_antenna_m, "antenna, placed by declaration"
+    if antenna_m is None:
+        antenna_m = _antenna_m(recording, antenna_frame)
+        placed = f"antenna, {'place unknown' if antenna_m is None else 'placed by transforms'}"
     channels = dict.fromkeys(_channel_of(contents, topic) for topic in topics.values())
     return Log(
         info=drive.VehicleInfo(
@@ -74,9 +82,7 @@ def open_foreign(recording: Recording, frame: LocalFrame | None) -> Log:
             + ", ".join(f"{stream} from {topic}" for stream, topic in topics.items()),
             frame="WGS84, body axes forward, left, up",
             time_base="stamp of the header, log time where it is 0",
-            reference_point="antenna, place unknown"
-            if antenna_m is None
-            else "antenna, placed by static transforms",
+            reference_point=placed,
         ),
         read=read,
     )

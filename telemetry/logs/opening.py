@@ -26,8 +26,9 @@ KINDS = (
 def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     """Open a recorded drive, choosing the reader by content, then by name.
 
-    `declaration` is the TOML that declares a CSV's columns; without it `NAME.csv.toml` beside the
-    file. Raises FileNotFoundError for a missing file and LogError for one that is no log.
+    `declaration` is the TOML that declares a CSV's columns, or what a recording with ROS messages
+    does not say of itself; without it `NAME.toml` beside the file. Raises FileNotFoundError for a
+    missing file and LogError for one that is no log.
     """
     path = Path(path)
     if not path.exists():
@@ -38,7 +39,7 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
         if (path / "metadata.yaml").is_file():
             from telemetry.logs.ros_log import open_bag
 
-            return open_bag(path)
+            return open_bag(path, declaration=declaration)
         raise LogError(
             f"{path}: a folder that is no comma2k19 segment and no ROS 2 bag (it has no"
             f" metadata.yaml); known logs: {KINDS}"
@@ -50,11 +51,11 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if head.startswith(b"\x89MCAP0") or suffix == ".mcap":
         from telemetry.logs.ros_log import open_mcap
 
-        return open_mcap(path)
+        return open_mcap(path, declaration=declaration)
     if head.startswith((BAG_MAGIC, SQLITE_MAGIC)) or suffix in (".bag", ".db3"):
         from telemetry.logs.ros_log import open_bag
 
-        return open_bag(path)
+        return open_bag(path, declaration=declaration)
     text = head.decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
     if suffix != ".csv" and declaration is None and is_nmea(text):
         return open_nmea(path)

@@ -17,6 +17,7 @@ from contracts import drive
 from contracts.frames import LocalFrame
 from telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
 from telemetry.logs.log import FILE_CUT_SHORT, VALUE_NOT_FINITE, Declared, Log, LogError, Sample
+from telemetry.logs.map_origin import declared_of
 from telemetry.logs.merge import reordered
 from telemetry.logs.ros_bag import bag_recording
 from telemetry.logs.ros_recording import Recording, decoder, mcap_recording
@@ -31,23 +32,29 @@ from telemetry.ros_messages import (
 )
 
 
-def open_mcap(path: Path) -> Log:
-    """Open an MCAP file; raises LogError where it is none or holds no positions."""
+def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
+    """Open an MCAP file; raises LogError where it is none or holds no positions.
+
+    `declaration` is that of telemetry.logs.map_origin, for files of other programs.
+    """
     recording = mcap_recording(path)
     metadata = recording.contents.metadata
     frame, info = metadata.get(FRAME_METADATA), metadata.get(INFO_METADATA)
     told = _Told(None if frame is None else frame["json"], None if info is None else info["json"])
     if FORMAT_METADATA in metadata:
         return _open_own(recording, told)
-    return open_foreign(recording, told.frame())
+    return open_foreign(recording, declared_of(path, declaration), frame=told.frame())
 
 
-def open_bag(path: Path) -> Log:
-    """Open a ROS 1 or ROS 2 bag; raises LogError where it is none or holds no positions."""
+def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
+    """Open a ROS 1 or ROS 2 bag; raises LogError where it is none or holds no positions.
+
+    `declaration` is as in open_mcap.
+    """
     recording = bag_recording(path)
     known = {INFO_TOPIC, FRAME_TOPIC} & set(recording.contents.schemas)
     if not known:
-        return open_foreign(recording, None)
+        return open_foreign(recording, declared_of(path, declaration))
     texts: dict[str, str] = {}
     decode = decoder(recording, known)
     for record in recording.chosen(known, Counter()):

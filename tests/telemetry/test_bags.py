@@ -219,6 +219,20 @@ def test_objects_without_a_known_frame_are_counted(tmp_path: Path) -> None:
     log = open_log(write_bag(tmp_path / "bag", StoragePlugin.SQLITE3, messages))
     assert [channel for channel, _ in log.samples()] == ["gnss"]
     assert log.skipped == {"objects in a frame whose origin is not known": 1}
+    (tmp_path / "bag.toml").write_text(
+        "body_from_antenna_m = [1, 0, 2]\n[map]\nlatitude = 52.5\nlongitude = 13.4\n"
+    )
+    placed = open_log(tmp_path / "bag")
+    found: dict[str, Any] = dict(placed.samples())
+    assert not placed.skipped
+    assert placed.info.body_from_antenna_m == (1.0, 0.0, 2.0)
+    assert found["objects"].users[0].position.lat_deg == pytest.approx(52.5)
+    (tmp_path / "bag.toml").write_text("[map]\nlatitude = 152.5\nlongitude = 13.4\n")
+    with pytest.raises(LogError, match=r"bag\.toml: \[map\] position \(152\.5, 13\.4\) is outside"):
+        open_log(tmp_path / "bag")
+    (tmp_path / "bag.toml").write_text("[map]\nlatitude = 52.5\n")
+    with pytest.raises(LogError, match=r"bag\.toml: .*longitude"):
+        open_log(tmp_path / "bag")
 
 
 def test_files_that_are_no_bag(tmp_path: Path) -> None:
