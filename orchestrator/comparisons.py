@@ -42,6 +42,11 @@ class ComparisonDesk:
 
     def take_state(self, state: VehicleState) -> list[Comparison]:
         """Add where the car is; return the comparisons that this completes."""
+        if self._stamps_ns and state.stamp_ns < self._stamps_ns[-1] - LEAD_NS:
+            # The vehicle's clock has stepped back: nothing of before can be compared any more.
+            self._stamps_ns.clear()
+            self._poses.clear()
+            self._waiting.clear()
         if not state.yaw_valid or (self._stamps_ns and state.stamp_ns <= self._stamps_ns[-1]):
             return []
         lat, lon = state.position.lat_deg, state.position.lon_deg

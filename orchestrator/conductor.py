@@ -43,7 +43,7 @@ class Conductor:
         self.mailbox = Mailbox(
             MAILBOX_DEPTH, when_full="block" if plan.config.lock_step else "drop_oldest"
         )
-        self.intake = Intake(plan.vehicle)
+        self.intake = Intake(plan.vehicle, pace=plan.config.speed)
         self.worlds = WorldDesk(
             plan,
             bus,
@@ -139,9 +139,15 @@ class Conductor:
             return
         if state is None:
             return
+        self.watch_telemetry(item.received_mono_ns)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.rounds.take_state(state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
+
+    def watch_telemetry(self, mono_ns: int) -> None:
+        """Tell what newly went wrong with the telemetry; also when none comes any more."""
+        for text in self.intake.warnings(mono_ns):
+            self.tell(Tell("warning", text))
 
     def start_round(self) -> bool:
         """Start a round where the mission wants one; returns whether it did."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from contracts.bus import Received
 from contracts.codec import SchemaMismatch
@@ -17,6 +17,7 @@ from contracts.drive import (
 )
 from contracts.vehicle import VehicleParameters
 from orchestrator.bookkeeping import TelemetryCount
+from orchestrator.telemetry_watch import TelemetryWatch, record
 from telemetry.estimator import StateEstimator
 
 
@@ -38,7 +39,11 @@ class Surroundings(NamedTuple):
 class Intake:
     """Takes samples one by one; the estimator behind it is pure."""
 
-    def __init__(self, vehicle: VehicleParameters) -> None:
+    def __init__(self, vehicle: VehicleParameters, *, pace: float | None = None) -> None:
+        """`pace` is how many seconds of the vehicle pass in one of ours.
+
+        None is lock step: samples are taken in their order and times of receipt mean nothing.
+        """
         self.counts = TelemetryCount()
         self.info: VehicleInfo | None = None
         self.end: DriveEnd | None = None
@@ -50,6 +55,8 @@ class Intake:
         self.states = 0
         self.first_stamp_ns: int | None = None
         self.refused = 0
+        self.watch = TelemetryWatch()
+        self._pace = pace
         self._vehicle = vehicle
         self._estimator: StateEstimator | None = None
 
@@ -89,11 +96,38 @@ class Intake:
             self.signals[message.group_id] = message
         if self._estimator is None:
             return None
-        state = self._estimator.handle(item.channel, message)
+        received_ns = self._drive_ns(item.received_mono_ns)
+        state = self._estimator.handle(item.channel, message, received_ns=received_ns)
         if state is not None:
             self.latest = LatestState(state, item.received_mono_ns)
             self.states += 1
         return state
+
+    def _drive_ns(self, mono_ns: int) -> int | None:
+        """Return our monotonic clock at the vehicle's pace, None in lock step."""
+        return None if self._pace is None else round(mono_ns * self._pace)
+
+    def warnings(self, mono_ns: int) -> list[str]:
+        """Return what newly went wrong with the telemetry, each thing once.
+
+        Without a clock of ours (lock step) the newest state says what is overdue.
+        """
+        if self._estimator is None or self.end is not None:
+            return []
+        warnings = self.watch.estimator(self._estimator)
+        now_ns = self._drive_ns(mono_ns)
+        if now_ns is not None:
+            warnings += self.watch.overdue(self._estimator.overdue(now_ns), now_ns)
+        elif self.latest is not None:
+            state = self.latest.state
+            warnings += self.watch.overdue(state.stale, state.stamp_ns)
+        return warnings
+
+    def record(self) -> dict[str, Any]:
+        """Return the `telemetry` part of run.json."""
+        receiver_utc_ns = time.time_ns() - time.monotonic_ns()
+        found = record(self._estimator, self.watch, receiver_utc_ns=receiver_utc_ns)
+        return {**self.counts.record(self.skipped_invalid), **found}
 
     @property
     def surroundings(self) -> Surroundings:

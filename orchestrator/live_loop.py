@@ -10,6 +10,8 @@ from contracts.keys import TELEMETRY_CHANNELS
 from orchestrator.conductor import Conductor
 
 HOUSEKEEPING_S = 0.1
+SILENCE_S = 0.05
+"""So long may nothing come before it is asked whether something should have."""
 LAST_ROUND_GRACE_S = 1.0
 GIVE_UP_ROUND_S = 10.0
 STALE_AFTER_S = 1.0
@@ -51,12 +53,14 @@ class LiveLoop:
                 self._housekeeping(now_s)
                 next_housekeeping_s = now_s + HOUSEKEEPING_S
             seen = conductor.intake.states
-            item = conductor.mailbox.take(
-                max(0.0, min(next_housekeeping_s, next_due_s + 0.5 * self._period_s) - now_s)
-            )
+            wake_s = min(next_housekeeping_s, next_due_s + 0.5 * self._period_s, now_s + SILENCE_S)
+            item = conductor.mailbox.take(max(0.0, wake_s - now_s))
+            now_s = time.monotonic()
             if item is not None:
                 conductor.handle(item)
-            now_s = time.monotonic()
+                now_s = time.monotonic()
+            else:
+                conductor.watch_telemetry(round(now_s * 1e9))
             fresh = conductor.intake.states > seen
             if now_s >= next_due_s and (fresh or now_s >= next_due_s + 0.5 * self._period_s):
                 # A machine that was asleep does not catch up on rounds; the grid stays.

@@ -47,7 +47,7 @@ def run_record(
         "route_source": plan.route_source,
         "config": msgspec.to_builtins(plan.config),
         "intersections": mission.records(mono_s=mono_s),
-        "telemetry": conductor.intake.counts.record(conductor.intake.skipped_invalid),
+        "telemetry": conductor.intake.record(),
         "futures": futures.record(
             wanted=plan.config.futures,
             missed=conductor.missed_rounds,

@@ -1,47 +1,61 @@
 """The vehicle's state from whatever it has sent so far: pure and causal.
 
-The same messages in the same order give the same states, and no state depends on what came later.
+The same messages with the same times of receipt in the same order give the same states, and no
+state depends on what came later.
 """
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
+import msgspec
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
-from contracts.frames import (
-    GeoPoint,
-    LocalFrame,
-    base_from_sensor,
-    geo_from_local,
-    grid_convergence,
-    local_from_geo,
+from contracts.drive import (
+    GnssFix,
+    HeadingSample,
+    ImuSample,
+    SpeedSample,
+    SteeringSample,
+    VehicleInfo,
+    VehicleState,
 )
-from telemetry.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
-from telemetry.measured import Measured
-from telemetry.motion_corrections import STANDING_MPS, MotionCorrections
-from telemetry.position_gate import PositionGate
-from telemetry.reported_state import moving_state, unmoved_state
+from telemetry.clock import ClockEstimator
+from telemetry.clock_steps import ClockStep, ClockSteps
+from telemetry.motion_track import MotionTrack
+from telemetry.reordering import Reordering
+from telemetry.staleness import Staleness
 
 _STATE_PERIOD_NS = 20_000_000
-_UNKNOWN_STD_M = 0.01
-"""Of positions that state none, until they turn out worse."""
-_ROUGH_M = 0.3
-_CREEPING_MPS = 1.0
-_FRAME_REACH_M = 20_000.0
-_FAR_M = 1e8
+_KINDS: dict[str, type] = {
+    "gnss": GnssFix,
+    "imu": ImuSample,
+    "speed": SpeedSample,
+    "heading": HeadingSample,
+    "steering": SteeringSample,
+}
+
+
+class ClockReport(NamedTuple):
+    """What is known of the vehicle's clock; None where samples had no time of receipt.
+
+    `offset_ns` is receipt minus stamp, the least transport delay included; `drift_ppm` how much
+    faster the vehicle's clock runs; `spread_s` the 95th percentile of delays beyond the least.
+    """
+
+    offset_ns: int | None
+    drift_ppm: float | None
+    spread_s: float | None
+    steps: tuple[ClockStep, ...]
 
 
 class StateEstimator:
-    """Turns samples into VehicleStates of base_link.
+    """Turns samples into VehicleStates of base_link, as MotionTrack sees the motion.
 
-    Positions whose source states no standard deviation, or only positions of at most 5 cm, are
-    passed through unchanged at their own stamp; rougher ones, and those with other sensors beside
-    them, are fused. `skipped` counts refused input by reason.
+    Samples with a time of receipt may come late, out of order, doubled or not at all, with a
+    foreign clock; those without are taken in the order in which they come (recordings, lock
+    step). `skipped` counts refused input by reason, `late` and `doubled` what came too late or
+    twice, by channel.
     """
 
     def __init__(
@@ -53,225 +67,151 @@ class StateEstimator:
         steering_offset_rad: float = 0.0,
     ) -> None:
         """`steering_ratio` is steering wheel over tyre; the offset is added at the tyre."""
-        self._info = info
-        self._wheelbase_m = wheelbase_m
-        self._lever = info.body_from_antenna_m or (0.0, 0.0, 0.0)
-        self._gate = PositionGate()
-        self._measured = Measured(
+        self._track = MotionTrack(
+            info,
+            wheelbase_m=wheelbase_m,
             steering_ratio=steering_ratio,
             steering_offset_rad=steering_offset_rad,
-            skipped=self._gate.skipped,
         )
-        self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
-        self._frame: LocalFrame | None = None
-        self._start_ns = 0
-        self._filter: KinematicFilter | None = None
-        self._filter_stamp_ns = 0
-        self._state_stamp_ns: int | None = None
-        self._convergence_rad = 0.0
-        self._altitude_m = 0.0
-        self._shifts = 0
-        self._standing = False
+        self._reordering: Reordering | None = None
+        self._clock = ClockEstimator()
+        self._steps = ClockSteps(self._clock)
+        self._staleness = Staleness(info.sends)
+        self._refused: Counter[str] = Counter()
+        self._state_ns: int | None = None
+        self._newest_ns: int | None = None
 
     @property
     def skipped(self) -> Counter[str]:
         """How many samples were refused, by reason."""
-        return self._gate.skipped
+        return self._track.skipped + self._refused
 
-    def handle(self, channel: str, message: Any) -> VehicleState | None:
-        """Take one message; return the new state where one is due, None otherwise.
+    @property
+    def refused(self) -> Counter[str]:
+        """Those of `skipped` that never came as far as the motion."""
+        return self._refused
 
-        Channels that say nothing of the motion are ignored.
-        """
-        if channel == "gnss":
-            return self._position(message)
-        if not self._measured.take(channel, message):
-            return None
-        self._take(message)
-        return self._due(message.stamp_ns)
+    @property
+    def clock_steps(self) -> int:
+        """How often the vehicle's clock has stepped."""
+        return len(self._steps.steps)
 
-    # Samples beside positions.
+    @property
+    def late(self) -> Counter[str]:
+        """How many samples came too late to count, by channel."""
+        return Counter() if self._reordering is None else self._reordering.late
 
-    def _take(self, message: Any) -> None:
-        filter_ = self._advance(message.stamp_ns)
-        if isinstance(message, SpeedSample):
-            self._standing = abs(message.speed_mps) < STANDING_MPS
-        if filter_ is not None:
-            self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
-        elif isinstance(message, HeadingSample):
-            local_yaw = message.yaw_rad + self._convergence_rad
-            self._start(message.stamp_ns, local_yaw, yaw_std_rad=0.02)
+    @property
+    def doubled(self) -> Counter[str]:
+        """How many samples came once more, by channel."""
+        return Counter() if self._reordering is None else self._reordering.doubled
 
-    # Positions.
-
-    def _position(self, fix: GnssFix) -> VehicleState | None:
-        if not self._gate.plausible(fix):
-            return None
-        if self._frame is None:
-            self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
-            self._start_ns = fix.stamp_ns
-        # Beyond the frame's reach the projection says infinity: just somewhere far away.
-        xy = np.nan_to_num(
-            local_from_geo(self._frame, fix.position.lat_deg, fix.position.lon_deg),
-            nan=_FAR_M, posinf=_FAR_M, neginf=-_FAR_M,
-        )  # fmt: skip
-        time_s = (fix.stamp_ns - self._start_ns) * 1e-9
-        recent = self._gate.recent
-        held = bool(recent) and bool(np.array_equal(recent[-1].xy_m, xy))
-        if (
-            held
-            and self._measured.fresh("speed_mps", fix.stamp_ns)
-            and abs(self._measured.speed_mps) > 0.5
-        ):
-            self.skipped["gnss_repeated"] += 1  # a slow receiver's last answer, sent once more
-            return None
-        lever = self._lever[:2]
-        filter_ = self._advance(fix.stamp_ns)
-        expected = recent[-1].xy_m if recent else None
-        if filter_ is not None:
-            expected = filter_.sensor_xy(lever)
-            late_s = max(0.0, (self._filter_stamp_ns - fix.stamp_ns) * 1e-9)
-            course = filter_.mean[YAW]
-            xy = xy + filter_.mean[SPEED] * late_s * np.array([math.cos(course), math.sin(course)])
-        verdict = self._gate.judge(time_s, xy, expected)
-        if verdict == "skip":
-            return None
-        if verdict == "relocate" and math.hypot(xy[0], xy[1]) > _FRAME_REACH_M:
-            # What went before was wrong, or another place: begin anew, with a frame of this one.
-            self._frame = LocalFrame(GeoPoint(fix.position.lat_deg, fix.position.lon_deg))
-            self._gate.restart(time_s, np.zeros(2))
-            filter_ = self._filter = None
-        self._altitude_m = fix.position.alt_m - self._lever[2]
-        self._convergence_rad = float(
-            grid_convergence(self._frame, fix.position.lat_deg, fix.position.lon_deg)
-        )
-        std = self._std_m(fix)
-        if filter_ is None:
-            self._start_from_course(fix.stamp_ns, std)
-        else:
-            self._correct(filter_, xy, std, relocate=verdict == "relocate")
-        return self._state(max(fix.stamp_ns, self._state_stamp_ns or 0), fix)
-
-    def _std_m(self, fix: GnssFix) -> float:
-        if fix.std_m is not None and math.isfinite(fix.std_m):
-            return min(max(fix.std_m, 1e-3), 1e4)
-        rough = self._gate.roughness_m
-        return rough if rough > _ROUGH_M else _UNKNOWN_STD_M
-
-    def _correct(self, filter_: KinematicFilter, xy: Array, std: float, *, relocate: bool) -> None:
-        lever = self._lever[:2]
-        innovation = math.hypot(*(xy - filter_.sensor_xy(lever)))
-        if relocate:
-            filter_.move_position(xy, std, lever)
-            return
-        if innovation > max(1.0, 8.0 * filter_.position_spread_m(std)):
-            self._shifts += 1
-            filter_.move_position(xy, std, lever)
-            if self._shifts >= 3:
-                self._turn_to_course(filter_)
-            return
-        self._shifts = 0
-        yaw_before = filter_.mean[YAW]
-        if abs(filter_.mean[SPEED]) < _CREEPING_MPS:
-            filter_.drift_sideways(xy, std, lever)
-        filter_.correct_position(xy, std, lever)
-        filter_.limit_turn(yaw_before, moved_m=self._gate.last_step_m)
-        if not self._measured.fresh("speed_mps", self._filter_stamp_ns):
-            self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
-            if self._standing:
-                filter_.stand()
-        if self._standing:
-            filter_.mean[YAW] = yaw_before
-        elif not filter_.may_reverse and not self._measured.fresh("yaw_rad", self._filter_stamp_ns):
-            course = self._gate.course(1.0 + 5.0 * std, within_s=3.0)
-            if course is not None and abs(math.remainder(course - yaw_before, math.tau)) > 1.75:
-                self._turn_to_course(filter_)
-
-    def _turn_to_course(self, filter_: KinematicFilter) -> None:
-        course = self._gate.course(1.0, within_s=3.0)
-        if course is not None:
-            self._start(self._filter_stamp_ns, course, yaw_std_rad=0.3)
-        self._shifts = 0
-
-    def _start_from_course(self, stamp_ns: int, std: float) -> None:
-        course = self._gate.course(max(1.0, 5.0 * std))
-        if course is None or (
-            self._measured.fresh("speed_mps", stamp_ns) and abs(self._measured.speed_mps) < 0.3
-        ):
-            return
-        if self._measured.fresh("speed_mps", stamp_ns) and self._measured.speed_mps < -0.1:
-            course += math.pi
-        self._start(stamp_ns, course, yaw_std_rad=0.15)
-
-    def _start(self, stamp_ns: int, yaw_rad: float, *, yaw_std_rad: float) -> None:
-        if not self._gate.recent:
-            return
-        measured = self._measured.fresh("speed_mps", stamp_ns)
-        xy = base_from_sensor(self._gate.recent[-1].xy_m, yaw_rad, self._lever)
-        self._filter = KinematicFilter(
-            xy_m=xy,
-            yaw_rad=yaw_rad,
-            speed_mps=self._measured.speed_mps if measured else self._gate.speed_mps(),
-            yaw_std_rad=yaw_std_rad,
-        )
-        self._filter_stamp_ns = stamp_ns
-
-    def _advance(self, stamp_ns: int) -> KinematicFilter | None:
-        if self._filter is not None and stamp_ns > self._filter_stamp_ns:
-            # After a long silence the motion is unknown: two seconds of it are enough.
-            self._filter.predict(min((stamp_ns - self._filter_stamp_ns) * 1e-9, 2.0))
-            self._filter_stamp_ns = stamp_ns
-        return self._filter
-
-    # What comes out.
-
-    def _due(self, stamp_ns: int) -> VehicleState | None:
-        if self._filter is None or self._state_stamp_ns is None:
-            return None
-        if stamp_ns - self._state_stamp_ns < _STATE_PERIOD_NS:
-            return None
-        return self._state(stamp_ns, None)
-
-    def _passes_through(self, fix: GnssFix) -> bool:
-        if fix.std_m is None:
-            return self._gate.roughness_m <= _ROUGH_M
-        return fix.std_m <= 0.05 and not self._measured.anything
-
-    def _place(self, fix: GnssFix | None) -> GeoPoint:
-        assert self._frame is not None
-        if fix is not None and (self._filter is None or self._passes_through(fix)):
-            if self._filter is None or not any(self._lever):
-                return fix.position
-            xy = base_from_sensor(self._gate.recent[-1].xy_m, self._filter.mean[YAW], self._lever)
-        else:
-            assert self._filter is not None
-            xy = self._filter.mean[:2]
-        lat_deg, lon_deg = geo_from_local(self._frame, xy)
-        return GeoPoint(float(lat_deg), float(lon_deg), self._altitude_m)
-
-    def _state(self, stamp_ns: int, fix: GnssFix | None) -> VehicleState:
-        self._state_stamp_ns = stamp_ns
-        position = self._place(fix)
-        if self._filter is None:
-            return unmoved_state(
-                self._measured,
-                vehicle_id=self._info.vehicle_id,
-                stamp_ns=stamp_ns,
-                position=position,
-                position_std_m=None if fix is None else fix.std_m,
-            )
-        return moving_state(
-            self._filter,
-            self._measured,
-            vehicle_id=self._info.vehicle_id,
-            stamp_ns=stamp_ns,
-            position=position,
-            convergence_rad=self._convergence_rad,
-            wheelbase_m=self._wheelbase_m,
-            standing=self._standing,
+    @property
+    def clock(self) -> ClockReport:
+        """What is known of the vehicle's clock."""
+        steps = tuple(self._steps.steps)
+        if not self._clock.known:
+            return ClockReport(None, None, None, steps)
+        return ClockReport(
+            self._clock.offset_ns, self._clock.drift_ppm, self._clock.spread_s(), steps
         )
 
     @property
     def gyro_bias_radps(self) -> float:
         """The gyro's bias as learnt so far; 0 before the heading is known."""
-        return 0.0 if self._filter is None else float(self._filter.mean[GYRO_BIAS])
+        return self._track.gyro_bias_radps
+
+    def handle(
+        self, channel: str, message: Any, *, received_ns: int | None = None
+    ) -> VehicleState | None:
+        """Take one message; return the new state where one is due, None otherwise.
+
+        `received_ns` is the receiver's monotonic clock, at the pace of the vehicle's. Channels
+        that say nothing of the motion are watched for staleness alone.
+        """
+        kind = _KINDS.get(channel)
+        if kind is not None and not isinstance(message, kind):
+            self._refused[f"{channel}_wrong_type"] += 1
+            return None
+        stamp_ns = getattr(message, "stamp_ns", None)
+        if stamp_ns is None:
+            return None
+        if kind is None:
+            self._watch(channel, stamp_ns + self._steps.shift_ns(channel), received_ns)
+            return None
+        placed_ns = self._steps.place(channel, stamp_ns, received_ns)
+        if placed_ns is None:
+            self._refused[f"{channel}_clock_doubtful"] += 1
+            return None
+        if received_ns is not None:
+            self._clock.handle(placed_ns, received_ns)
+        if placed_ns != stamp_ns:
+            message = msgspec.structs.replace(message, stamp_ns=placed_ns)
+        self._watch(channel, placed_ns, received_ns)
+        if received_ns is None:
+            state = self._in_order(channel, message)
+        else:
+            state = self._as_received(channel, message, received_ns)
+        if state is not None and placed_ns != stamp_ns:
+            # Inside time goes on; what leaves carries the vehicle's own clock.
+            own_ns = state.stamp_ns - (placed_ns - stamp_ns)
+            state = msgspec.structs.replace(state, stamp_ns=own_ns)
+        return state
+
+    def overdue(self, received_ns: int) -> tuple[str, ...]:
+        """Return the channels that are overdue now, for when nothing at all comes any more."""
+        if not self._clock.known:
+            return ()
+        return self._staleness.overdue(self._clock.stamp_at(received_ns))
+
+    def _watch(self, channel: str, placed_ns: int, received_ns: int | None) -> None:
+        if received_ns is not None:
+            now_ns = self._clock.stamp_at(received_ns) if self._clock.known else placed_ns
+        else:
+            now_ns = placed_ns if self._newest_ns is None else max(self._newest_ns, placed_ns)
+            if placed_ns - (self._newest_ns or placed_ns) > 0 or self._newest_ns is None:
+                self._newest_ns = placed_ns
+        self._staleness.take(channel, placed_ns, now_ns)
+
+    # Recordings and lock step: in the order of the stamps.
+
+    def _in_order(self, channel: str, message: Any) -> VehicleState | None:
+        if not self._track.take(channel, message):
+            return None
+        stamp_ns = message.stamp_ns
+        if channel == "gnss":
+            stamp_ns = max(stamp_ns, self._state_ns or 0)
+            return self._leave(self._track.state(stamp_ns, fix=message), stamp_ns)
+        if not self._track.started or self._state_ns is None:
+            return None
+        if stamp_ns - self._state_ns < _STATE_PERIOD_NS:
+            return None
+        return self._leave(self._track.state(stamp_ns), stamp_ns)
+
+    # A network: as they come.
+
+    def _as_received(self, channel: str, message: Any, received_ns: int) -> VehicleState | None:
+        if self._reordering is None:
+            self._reordering = Reordering(self._track)
+        reordering = self._reordering
+        if not reordering.add(channel, message):
+            return None
+        newest = reordering.newest
+        assert newest is not None
+        is_newest = newest.message is message
+        due = self._state_ns is None or newest.stamp_ns - self._state_ns >= _STATE_PERIOD_NS
+        if not due and not (is_newest and channel == "gnss"):
+            return None
+        self._track = reordering.track()
+        fix = newest.message if newest.channel == "gnss" else None
+        if fix is not None and self._track.fix is not fix:
+            return None  # refused: the next sample gives the state
+        if self._track.fix is None or (fix is None and not self._track.started):
+            return None
+        state = self._track.state(newest.stamp_ns, fix=fix)
+        return self._leave(state, self._clock.stamp_at(received_ns))
+
+    def _leave(self, state: VehicleState, now_ns: int) -> VehicleState:
+        self._state_ns = state.stamp_ns
+        stale = self._staleness.overdue(now_ns)
+        return msgspec.structs.replace(state, stale=stale) if stale else state

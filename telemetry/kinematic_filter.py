@@ -1,8 +1,10 @@
 """An extended Kalman filter of a car's planar motion in a local frame: arithmetic, no messages.
 
-State: x, y, yaw, speed, acceleration, curvature, gyro bias, accelerometer bias. Turning is a
-curvature times a speed, so that a car that stands cannot turn, whatever its positions jitter; and
-the gyro's bias is learnt for free while it stands.
+State: x, y, yaw, speed, acceleration, curvature, and what the sensors have of their own: the
+gyro's and the accelerometer's bias, a satellite receiver's wandering error (x, y), the speed
+sensor's scale, and the slip of the rear axle. Turning is a curvature times a speed, so that a car
+that stands cannot turn, whatever its positions jitter; and the gyro's bias is learnt for free
+while it stands.
 """
 
 from __future__ import annotations
@@ -14,9 +16,14 @@ import numpy as np
 from contracts.arrays import Array
 
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
+GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
+SIZE = 12
+_IDENTITY = np.eye(SIZE)
 
 MAX_CURVATURE_PM = 0.25
 """A turning circle of 8 m across: tighter than any passenger car's."""
+GNSS_CORRELATION_S = 30.0
+"""How long the error of a receiver without corrections stays alike: satellites, air, walls."""
 _MAX_STEP_S = 0.05
 _DRIFT_M = 0.03
 _STANDING_CURVATURE_PM = 0.1
@@ -30,22 +37,45 @@ _LATERAL_JERK_MPS3 = 5.0
 """Limits how fast the curvature changes at speed: v² dκ/dt."""
 _SLIP_DENSITY = 0.01**2
 """rad² / s: the body's direction differs from the path's by the rear tyres' slip."""
-_IDENTITY = np.eye(8)
+_GYRO_SLIP_DENSITY = 0.0005**2
+"""The same where a gyro tells the body's turning from the path's and the slip is estimated."""
+_GYRO_BIAS_DENSITY = (2e-5) ** 2
+"""(rad/s)² / s: an automotive gyro warms up by 0.01 °/s in a minute."""
+_ACCEL_BIAS_DENSITY = 0.02**2
+"""(m/s²)² / s: the grade of the road changes with the place."""
+_SLIP_RADPMPS2 = (0.004, 0.002)
+"""The rear axle's slip per lateral acceleration, mean and spread over passenger cars: load over
+cornering stiffness (Gillespie 1992, 6-2)."""
+_SCALE_STD = 0.01
+"""Of a wheel's radius against the one its speed was calibrated with."""
 
 
 class KinematicFilter:
     """Predicts with constant acceleration and curvature, and is corrected by each measurement.
 
-    `mean` (8,) and `covariance` (8, 8) are in SI units, in the order of the module's indices. The
-    point is base_link. Speed stays at or above zero unless `may_reverse`.
+    `mean` (12,) and `covariance` (12, 12) are in SI units, in the order of the module's indices.
+    The point is base_link. Speed stays at or above zero unless `may_reverse`. What no sensor has
+    spoken of yet (receiver's error, scale, slip) has no variance and so no effect.
     """
 
     def __init__(
         self, *, xy_m: Array, yaw_rad: float, speed_mps: float, yaw_std_rad: float
     ) -> None:
-        self.mean: Array = np.array([xy_m[0], xy_m[1], yaw_rad, speed_mps, 0.0, 0.0, 0.0, 0.0])
-        self.covariance: Array = np.diag([0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05, 0.01, 0.1]) ** 2
+        self.mean: Array = np.zeros(SIZE)
+        self.mean[: CURVATURE + 1] = xy_m[0], xy_m[1], yaw_rad, speed_mps, 0.0, 0.0
+        spread = np.zeros(SIZE)
+        spread[: ACCEL_BIAS + 1] = 0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05, 0.01, 0.1
+        self.covariance: Array = np.diag(spread * spread)
         self.may_reverse = speed_mps < 0.0
+        self._gnss_std_m = 0.0
+        self._slip_density = _SLIP_DENSITY
+
+    def copy(self) -> KinematicFilter:
+        """Return another filter that goes on from the same state."""
+        other = object.__new__(KinematicFilter)
+        other.__dict__.update(self.__dict__)
+        other.mean, other.covariance = self.mean.copy(), self.covariance.copy()
+        return other
 
     @property
     def yaw_rate_radps(self) -> float:
@@ -59,61 +89,64 @@ class KinematicFilter:
             self._step(duration_s / steps)
 
     def _step(self, dt: float) -> None:
-        x, y, yaw, speed, accel, curvature, gyro_bias, accel_bias = self.mean.tolist()
+        x, y, yaw, speed, accel, curvature, *_, slip = self.mean.tolist()
         if not self.may_reverse and speed + accel * dt < 0.0:
             accel = min(0.0, -speed / dt)  # it stops within the step
         distance = (speed + 0.5 * accel * dt) * dt
-        heading = yaw + 0.5 * curvature * distance
+        # The rear axle moves outwards of where the body points, the more the harder it turns.
+        heading = yaw + 0.5 * curvature * distance - slip * speed * speed * curvature
         cos, sin = math.cos(heading), math.sin(heading)
-        jacobian = _IDENTITY.copy()
         half = 0.5 * dt * dt
-        side = 0.5 * distance * curvature
-        jacobian[X, YAW] = -distance * sin
-        jacobian[Y, YAW] = distance * cos
-        jacobian[X, SPEED] = dt * (cos - side * sin)
-        jacobian[Y, SPEED] = dt * (sin + side * cos)
-        jacobian[X, ACCEL] = half * (cos - side * sin)
-        jacobian[Y, ACCEL] = half * (sin + side * cos)
-        jacobian[X, CURVATURE] = -0.5 * distance * distance * sin
-        jacobian[Y, CURVATURE] = 0.5 * distance * distance * cos
-        jacobian[YAW, SPEED] = curvature * dt
-        jacobian[YAW, ACCEL] = curvature * half
-        jacobian[YAW, CURVATURE] = distance
+        side = distance * (0.5 * curvature * dt - 2.0 * slip * speed * curvature)
+        by_accel = 0.5 * distance * curvature * half
+        by_curvature = distance * (0.5 * distance - slip * speed * speed)
+        by_slip = -distance * speed * speed * curvature
+        jacobian = _IDENTITY.copy()
+        jacobian[X, YAW : CURVATURE + 1] = (
+            -distance * sin, dt * cos - side * sin, half * cos - by_accel * sin,
+            -by_curvature * sin,
+        )  # fmt: skip
+        jacobian[Y, YAW : CURVATURE + 1] = (
+            distance * cos, dt * sin + side * cos, half * sin + by_accel * cos,
+            by_curvature * cos,
+        )  # fmt: skip
+        jacobian[X, SLIP], jacobian[Y, SLIP] = -by_slip * sin, by_slip * cos
+        jacobian[YAW, SPEED : CURVATURE + 1] = curvature * dt, curvature * half, distance
         jacobian[SPEED, ACCEL] = dt
-        self.mean = np.array(
-            [
-                x + distance * cos,
-                y + distance * sin,
-                yaw + curvature * distance,
-                speed + accel * dt,
-                accel,
-                curvature,
-                gyro_bias,
-                accel_bias,
-            ]
-        )
+        fading = math.exp(-dt / GNSS_CORRELATION_S)
+        jacobian[GNSS_X, GNSS_X] = jacobian[GNSS_Y, GNSS_Y] = fading
+        mean = self.mean.copy()
+        mean[:5] = (
+            x + distance * cos, y + distance * sin, yaw + curvature * distance,
+            speed + accel * dt, accel,
+        )  # fmt: skip
+        mean[GNSS_X : GNSS_Y + 1] *= fading
+        self.mean = mean
         turning = min(_CURVATURE_RATE_PMPS, _LATERAL_JERK_MPS3 / max(speed * speed, 1e-6))
         covariance = jacobian @ self.covariance @ jacobian.T
-        covariance[YAW, YAW] += _SLIP_DENSITY * min(1.0, abs(speed) / 10.0) * dt
-        covariance[ACCEL, ACCEL] += _JERK_DENSITY * dt
-        covariance[CURVATURE, CURVATURE] += turning * turning * dt
-        covariance[GYRO_BIAS, GYRO_BIAS] += 1e-4**2 * dt
-        covariance[ACCEL_BIAS, ACCEL_BIAS] += 0.02**2 * dt
+        noise = covariance.reshape(-1)[:: SIZE + 1]  # a view of the diagonal
+        noise[YAW : ACCEL_BIAS + 1] += (
+            self._slip_density * min(1.0, abs(speed) / 10.0) * dt, 0.0, _JERK_DENSITY * dt,
+            turning * turning * dt, _GYRO_BIAS_DENSITY * dt, _ACCEL_BIAS_DENSITY * dt,
+        )  # fmt: skip
+        if self._gnss_std_m:
+            noise[GNSS_X : GNSS_Y + 1] += self._gnss_std_m**2 * (1.0 - fading * fading)
         self.covariance = covariance
 
     def correct(self, row: Array, residual: float, std: float) -> None:
-        """Apply one scalar measurement: `row` (8,) is its derivative by the state."""
-        gain = self.covariance @ row
-        gain = gain / (float(row @ gain) + std * std)
-        self.mean = self.mean + gain * residual
-        covariance = self.covariance - gain[:, None] * (row @ self.covariance)
-        self.covariance = 0.5 * (covariance + covariance.T)
+        """Apply one scalar measurement: `row` (12,) is its derivative by the state."""
+        cross = self.covariance @ row
+        variance = float(row @ cross) + std * std
+        self.mean += cross * (residual / variance)
+        self.covariance -= cross[:, None] * (cross / variance)
         self._limit()
 
     def _limit(self) -> None:
-        if not self.may_reverse and self.mean[SPEED] < 0.0:
-            self.mean[SPEED] = 0.0
-        self.mean[CURVATURE] = min(max(self.mean[CURVATURE], -MAX_CURVATURE_PM), MAX_CURVATURE_PM)
+        mean = self.mean
+        if not self.may_reverse and mean[SPEED] < 0.0:
+            mean[SPEED] = 0.0
+        if abs(mean[CURVATURE]) > MAX_CURVATURE_PM:
+            mean[CURVATURE] = math.copysign(MAX_CURVATURE_PM, mean[CURVATURE])
 
     def sensor_xy(self, lever_m: tuple[float, float]) -> Array:
         """Return where a sensor at `lever_m` (forward, left) of base_link is, shape (2,)."""
@@ -122,20 +155,61 @@ class KinematicFilter:
         offset: Array = np.array([cos * forward - sin * left, sin * forward + cos * left])
         return self.mean[:2] + offset
 
-    def position_spread_m(self, std_m: float) -> float:
-        """Return one standard deviation of the distance between prediction and measurement."""
-        return math.sqrt(self.covariance[X, X] + self.covariance[Y, Y] + 2.0 * std_m * std_m)
+    def doubt_position(self, std_m: float) -> None:
+        """Make the place unknown within `std_m` and tell it apart from what else is known."""
+        self.covariance[:2, :] = 0.0
+        self.covariance[:, :2] = 0.0
+        self.covariance[X, X] = self.covariance[Y, Y] = std_m * std_m
 
-    def correct_position(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
-        """Apply a position (2,) of a sensor at `lever_m`."""
-        offset = self.sensor_xy(lever_m) - self.mean[:2]
-        rows = np.zeros((2, 8))
+    def expect_wander(self, std_m: float) -> None:
+        """Let positions have an error of `std_m` that stays alike over GNSS_CORRELATION_S."""
+        missing = std_m * std_m - self._gnss_std_m**2
+        if missing > 0.0:
+            self.covariance[GNSS_X, GNSS_X] += missing
+            self.covariance[GNSS_Y, GNSS_Y] += missing
+        self._gnss_std_m = std_m
+
+    def forget_wander(self) -> None:
+        """Begin the receiver's error anew: it has jumped."""
+        for index in (GNSS_X, GNSS_Y):
+            self.mean[index] = 0.0
+            self.covariance[index, :] = 0.0
+            self.covariance[:, index] = 0.0
+            self.covariance[index, index] = self._gnss_std_m**2
+
+    def _position_rows(self, lever_m: tuple[float, float], *, wander: bool) -> tuple[Array, Array]:
+        """Return where a receiver should say it is (2,), and that by the state (2, 12)."""
+        expected = self.sensor_xy(lever_m)
+        rows = np.zeros((2, SIZE))
         rows[0, X] = rows[1, Y] = 1.0
-        rows[0, YAW], rows[1, YAW] = -offset[1], offset[0]
+        rows[0, YAW], rows[1, YAW] = self.mean[Y] - expected[1], expected[0] - self.mean[X]
+        if wander:
+            rows[0, GNSS_X] = rows[1, GNSS_Y] = 1.0
+            expected = expected + self.mean[GNSS_X : GNSS_Y + 1]
+        return expected, rows
+
+    def position_surprise(
+        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool
+    ) -> tuple[float, float]:
+        """Return how far a position (2,) lies off the expected one, and that one's spread."""
+        expected, rows = self._position_rows(lever_m, wander=wander)
+        spread = float(np.trace(rows @ self.covariance @ rows.T)) + 2.0 * std_m * std_m
+        return float(np.hypot(*(xy_m - expected))), math.sqrt(spread)
+
+    def correct_position(
+        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool = False
+    ) -> None:
+        """Apply a position (2,) of a sensor at `lever_m` with white noise of `std_m`.
+
+        `wander` says that the receiver's own slow error lies on top, as `expect_wander` has it.
+        """
+        expected, rows = self._position_rows(lever_m, wander=wander)
         cross = self.covariance @ rows.T
-        spread = rows @ cross + std_m * std_m * np.eye(2)
-        gain = np.linalg.solve(spread, cross.T).T
-        self.mean = self.mean + gain @ (xy_m - self.mean[:2] - offset)
+        (a, b), (_, d) = (rows @ cross).tolist()
+        a, d = a + std_m * std_m, d + std_m * std_m
+        inverse = np.array([[d, -b], [-b, a]]) / (a * d - b * b)
+        gain = cross @ inverse
+        self.mean = self.mean + gain @ (xy_m - expected)
         covariance = self.covariance - gain @ cross.T
         self.covariance = 0.5 * (covariance + covariance.T)
         self._limit()
@@ -143,9 +217,7 @@ class KinematicFilter:
     def move_position(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
         """Put the sensor at `xy_m` and leave yaw and motion as they are: the source jumped."""
         self.mean[:2] += xy_m - self.sensor_xy(lever_m)
-        self.covariance[:2, :] = 0.0
-        self.covariance[:, :2] = 0.0
-        self.covariance[X, X] = self.covariance[Y, Y] = std_m * std_m
+        self.doubt_position(std_m)
 
     def drift_sideways(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
         """Take a step across the car as the receiver's own: a car that creeps cannot go there."""
@@ -168,30 +240,40 @@ class KinematicFilter:
         self.mean[YAW] = yaw_before_rad + min(max(change, -reach), reach)
 
     def correct_speed(self, speed_mps: float, std_mps: float) -> None:
-        """Apply a measured speed."""
-        row = np.zeros(8)
-        row[SPEED] = 1.0
-        self.correct(row, speed_mps - self.mean[SPEED], std_mps)
+        """Apply a measured speed, whose scale is estimated."""
+        if self.covariance[SPEED_SCALE, SPEED_SCALE] == 0.0:
+            self.covariance[SPEED_SCALE, SPEED_SCALE] = _SCALE_STD**2
+        row = np.zeros(SIZE)
+        row[SPEED], row[SPEED_SCALE] = 1.0 + self.mean[SPEED_SCALE], self.mean[SPEED]
+        self.correct(row, speed_mps - self.mean[SPEED] * row[SPEED], std_mps)
 
     def correct_yaw(self, yaw_rad: float, std_rad: float) -> None:
         """Apply a measured yaw in the local frame."""
-        row = np.zeros(8)
+        row = np.zeros(SIZE)
         row[YAW] = 1.0
         self.correct(row, math.remainder(yaw_rad - self.mean[YAW], math.tau), std_rad)
 
     def correct_yaw_rate(self, rate_radps: float, std_radps: float, *, biased: bool) -> None:
         """Apply a measured yaw rate; `biased` for a gyro, whose bias is estimated."""
-        row = np.zeros(8)
+        row = np.zeros(SIZE)
         row[SPEED], row[CURVATURE] = self.mean[CURVATURE], self.mean[SPEED]
         expected = self.yaw_rate_radps
         if biased:
+            self._know_slip()
             row[GYRO_BIAS] = 1.0
             expected += self.mean[GYRO_BIAS]
         self.correct(row, rate_radps - expected, std_radps)
 
+    def _know_slip(self) -> None:
+        """Tell the body's heading from the path's: a gyro shows how they part."""
+        self._slip_density = _GYRO_SLIP_DENSITY
+        if self.covariance[SLIP, SLIP] == 0.0:
+            self.mean[SLIP], std = _SLIP_RADPMPS2
+            self.covariance[SLIP, SLIP] = std * std
+
     def correct_accel(self, accel_mps2: float, std_mps2: float) -> None:
         """Apply a forward specific force: acceleration plus a slow bias, such as the grade's."""
-        row = np.zeros(8)
+        row = np.zeros(SIZE)
         row[ACCEL] = row[ACCEL_BIAS] = 1.0
         self.correct(
             row, accel_mps2 - self.mean[ACCEL] - self.mean[ACCEL_BIAS], std_mps2
@@ -199,13 +281,13 @@ class KinematicFilter:
 
     def correct_curvature(self, curvature_pm: float, std_pm: float) -> None:
         """Apply the curvature that the measured steering implies."""
-        row = np.zeros(8)
+        row = np.zeros(SIZE)
         row[CURVATURE] = 1.0
         self.correct(row, curvature_pm - self.mean[CURVATURE], std_pm)
 
     def stand(self) -> None:
         """Apply that the car stands: no speed and no acceleration; yaw stays as it is."""
-        row = np.zeros(8)
+        row = np.zeros(SIZE)
         row[SPEED] = 1.0
         self.correct(row, -self.mean[SPEED], 0.01)
         row[SPEED], row[ACCEL] = 0.0, 1.0

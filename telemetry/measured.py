@@ -10,6 +10,8 @@ from contracts.drive import SpeedSample, SteeringSample
 
 FRESH_NS = 1_000_000_000
 """A quantity counts as measured while its last sample is younger than this."""
+CLOCK_LEAP_NS = 10_000_000_000
+"""One stamp that is this far ahead must not make all later ones look late."""
 MOTION_FIELDS = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
 """Fields of VehicleState that are either measured or estimated."""
 _CHANNEL_FIELDS = {
@@ -41,9 +43,18 @@ class Measured:
         self._skipped = skipped
         self._sample_ns: dict[str, int] = {}
         self._field_ns: dict[str, int] = {}
+        self._leap_ns: dict[str, int] = {}
         self._steering: SteeringSample | None = None
         self.speed_mps = 0.0
         """The last measured speed; 0 before there is one."""
+
+    def copy(self, *, skipped: Counter[str]) -> Measured:
+        """Return another memory of the same samples that counts into `skipped`."""
+        other = object.__new__(Measured)
+        other.__dict__.update(self.__dict__)
+        other._skipped = skipped
+        other._sample_ns, other._field_ns = self._sample_ns.copy(), self._field_ns.copy()
+        return other
 
     def take(self, channel: str, message: Any) -> bool:
         """Remember a sample; return False for one that is refused or says nothing of the motion."""
@@ -53,6 +64,9 @@ class Measured:
         stamp_ns = message.stamp_ns
         if stamp_ns < self._sample_ns.get(channel, stamp_ns):
             self._skipped[f"{channel}_time_backwards"] += 1
+            return False
+        if self._leaps(channel, stamp_ns):
+            self._skipped[f"{channel}_time_leap"] += 1
             return False
         fault = _fault(message)
         if fault is not None:
@@ -68,6 +82,14 @@ class Measured:
         elif isinstance(message, SteeringSample):
             self._steering = message
         return True
+
+    def _leaps(self, channel: str, stamp_ns: int) -> bool:
+        """Return whether the stamp is far ahead without a second one to bear witness."""
+        if stamp_ns - self._sample_ns.get(channel, stamp_ns) <= CLOCK_LEAP_NS:
+            return False
+        before_ns = self._leap_ns.get(channel)
+        self._leap_ns = {**self._leap_ns, channel: stamp_ns}
+        return before_ns is None or not 0 <= stamp_ns - before_ns <= CLOCK_LEAP_NS
 
     @property
     def anything(self) -> bool:
@@ -110,6 +132,12 @@ class Doubt:
         self._least = least
         self._mean_square = 0.0
 
+    def copy(self) -> Doubt:
+        """Return another one that goes on from here by itself."""
+        other = Doubt(self._least)
+        other._mean_square = self._mean_square
+        return other
+
     def std(self, surprise: float) -> float:
         """Take the latest surprise and return the standard deviation to use for it."""
         self._mean_square += 0.02 * (surprise * surprise - self._mean_square)
@@ -120,9 +148,8 @@ def _fault(message: Any) -> str | None:
     """Return why a sample cannot be a road vehicle's, or None."""
     for name in message.__struct_fields__:
         value = getattr(message, name)
-        numbers = value if isinstance(value, tuple) else (value,)
-        for number in numbers:
-            if not isinstance(number, float):
+        for number in value if type(value) is tuple else (value,):
+            if type(number) is not float:
                 continue
             if not math.isfinite(number):
                 return "not_finite"

@@ -9,6 +9,7 @@ from contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSampl
 from telemetry.kinematic_filter import SPEED, YAW, KinematicFilter
 from telemetry.measured import Doubt, Measured
 
+_GYRO_STD_RADPS = 0.005
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
 
@@ -22,6 +23,15 @@ class MotionCorrections:
         self._speed_doubt = Doubt(0.05)
         self._yaw_doubt = Doubt(0.02)
 
+    def copy(self, measured: Measured) -> MotionCorrections:
+        """Return others with the same doubts, which read `measured`."""
+        other = object.__new__(MotionCorrections)
+        other.__dict__.update(self.__dict__)
+        other._measured = measured
+        other._speed_doubt = self._speed_doubt.copy()
+        other._yaw_doubt = self._yaw_doubt.copy()
+        return other
+
     def correct(self, filter_: KinematicFilter, message: Any, *, convergence_rad: float) -> None:
         """Correct a filter already predicted to the sample's stamp.
 
@@ -31,7 +41,7 @@ class MotionCorrections:
             case SpeedSample(speed_mps=speed):
                 self._correct_speed(filter_, speed)
             case ImuSample(accel_mps2=accel, rate_radps=rate):
-                filter_.correct_yaw_rate(rate[2], 0.01, biased=True)
+                filter_.correct_yaw_rate(rate[2], _GYRO_STD_RADPS, biased=True)
                 filter_.correct_accel(accel[0], 0.5)
             case HeadingSample(yaw_rad=yaw, yaw_rate_radps=yaw_rate):
                 local_yaw = yaw + convergence_rad

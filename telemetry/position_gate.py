@@ -13,6 +13,9 @@ from contracts.drive import GnssFix
 
 MAX_SPEED_MPS = 70.0
 """A position that asks for more than this is no motion of a road vehicle."""
+_UNKNOWN_STD_M = 0.01
+"""Of positions that state none, until they turn out worse."""
+_ROUGH_M = 0.3
 _JUMP_CONFIRM_S = 1.0
 _CLOCK_LEAP_S = 10.0
 _HISTORY_S = 6.0
@@ -44,6 +47,14 @@ class PositionGate:
         self._elsewhere: list[Placed] = []
         self.roughness_m = 0.0
         """How far fixes lie, on average, off any motion with up to 4 m/s² through the last two."""
+
+    def copy(self) -> PositionGate:
+        """Return another gate that goes on from here by itself."""
+        other = object.__new__(PositionGate)
+        other.__dict__.update(self.__dict__)
+        other.skipped, other.recent = self.skipped.copy(), self.recent.copy()
+        other._elsewhere = self._elsewhere.copy()
+        return other
 
     def plausible(self, fix: GnssFix) -> bool:
         """Return whether the fix is a position on Earth with a stamp after the last one's."""
@@ -121,6 +132,17 @@ class PositionGate:
         self.recent.append(fix)
         while fix.time_s - self.recent[0].time_s > _HISTORY_S:
             self.recent.popleft()
+
+    @property
+    def rough(self) -> bool:
+        """Whether fixes have turned out too rough to be taken at their word."""
+        return self.roughness_m > _ROUGH_M
+
+    def std_m(self, fix: GnssFix) -> float:
+        """Return the standard deviation that a fix states, or what its like turned out to have."""
+        if fix.std_m is not None and math.isfinite(fix.std_m):
+            return min(max(fix.std_m, 1e-3), 1e4)
+        return self.roughness_m if self.rough else _UNKNOWN_STD_M
 
     def standing(self, std_m: float) -> bool:
         """Return whether the last fixes show nothing but jitter of `std_m` about one point."""

@@ -34,6 +34,7 @@ BENCHMARKS = (
     "world_liechtenstein_vs_netconvert",
     "state_to_result",
     "metrics_64x80x10",
+    "estimator_bad_network",
     "help_startup",
 )
 """Each is a module of this package with a function `measure() -> Measurement`."""

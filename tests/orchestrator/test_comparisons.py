@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -121,3 +122,17 @@ def test_the_track_is_forgotten_when_nobody_needs_it() -> None:
         desk.take_state(state)
 
     assert len(desk._stamps_ns) < 10 * 15
+
+
+def test_after_the_clock_has_stepped_back_comparisons_go_on() -> None:
+    desk = ComparisonDesk(DRIVE, 8.0)
+    hour_ns = 3600 * 10**9
+    for state in car(DRIVE)[:10]:
+        later = msgspec.structs.replace(state, stamp_ns=state.stamp_ns + hour_ns)
+        assert desk.take_state(later) == []
+    found = []
+    for state in car(DRIVE):
+        found += desk.take_state(state)
+        if state.stamp_ns == START_NS:
+            desk.take_round(round_done(straight()), DRIVE, state)
+    assert {comparison.horizon_s for comparison in found} == {1.0, 2.0, 4.0, 8.0}

@@ -98,3 +98,51 @@ def test_an_age_is_never_negative() -> None:
 
     assert min(telemetry.intake.counts.ages_ms) >= 0.0
     assert max(telemetry.intake.counts.ages_ms) < 60_000.0
+
+
+def heard(intake: Intake, sample: GnssFix, mono_ns: int) -> list[str]:
+    """Return what is warned of after `sample` came at `mono_ns`."""
+    item = Received("gnss", "…/gnss", encode(sample), GnssFix)
+    item.received_mono_ns = mono_ns
+    intake.take(item)
+    return intake.warnings(mono_ns)
+
+
+def test_a_live_vehicles_clock_is_recorded_and_its_silence_told_once() -> None:
+    intake = Intake(town().vehicle, pace=1.0)
+    intake.take_info(INFO)
+    mono_ns = [1_000_000_000 + fix.stamp_ns - START_NS for fix in FIXES]
+    for fix, at_ns in zip(FIXES, mono_ns, strict=True):
+        assert heard(intake, fix, at_ns) == []
+    heard(intake, FIXES[-1], mono_ns[-1])
+    record = intake.record()
+    assert record["doubled"] == 1
+    assert record["late"] == 0
+    assert record["clock_drift_ppm"] == 0.0
+    assert record["clock_steps_s"] == []
+
+    told = [t for k in range(40) for t in intake.warnings(mono_ns[-1] + k * 50_000_000)]
+    assert told == ["telemetry: gnss is overdue; states go on without"]
+    assert intake.record()["stale"] == {"gnss": 1}
+
+
+def test_a_clock_that_steps_back_is_told_once() -> None:
+    intake = Intake(town().vehicle, pace=1.0)
+    intake.take_info(INFO)
+    said = []
+    for k, fix in enumerate(FIXES):
+        back_ns = 3600 * 10**9 if k >= len(FIXES) // 2 else 0
+        moved = GnssFix(stamp_ns=fix.stamp_ns - back_ns, position=fix.position)
+        said += heard(intake, moved, 1_000_000_000 + fix.stamp_ns - START_NS)
+    assert len([text for text in said if "clock stepped by -3600.000 s" in text]) == 1
+    assert intake.latest is not None
+    assert intake.latest.state.stamp_ns == FIXES[-1].stamp_ns - 3600 * 10**9
+    assert intake.record()["clock_steps_s"] == [-3600.0]
+
+
+def test_in_lock_step_times_of_receipt_mean_nothing() -> None:
+    telemetry = Telemetry()
+    telemetry.send(*FIXES)
+    record = telemetry.intake.record()
+    assert record["clock_offset_ms"] is None
+    assert record["late"] == record["doubled"] == 0

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from orchestrator import live_loop
@@ -70,6 +71,7 @@ class Conductor:
         self.missed_rounds = self.spared_rounds = 0
         self.started_s: list[float] = []
         self.dropped_s: list[float] = []
+        self.watched_s: list[float] = []
 
     @property
     def open_rounds(self) -> tuple[int, ...]:
@@ -87,6 +89,9 @@ class Conductor:
             self.intake.latest = SimpleNamespace(receipt_mono_ns=self._clock.now_s * 1e9)
         else:
             self.intake.end = True
+
+    def watch_telemetry(self, mono_ns: int) -> None:
+        self.watched_s.append(mono_ns * 1e-9 - 100)
 
     def start_round(self) -> bool:
         self.started_s.append(self._clock.now_s - 100)
@@ -185,6 +190,12 @@ def test_a_loop_that_is_stopped_says_so(monkeypatch: pytest.MonkeyPatch) -> None
     assert not loop.run()
     assert clock.now_s < 102.2
     assert len(kept) == pytest.approx(20, abs=2)
+
+
+def test_silence_is_looked_into_every_50_ms(driven: Any) -> None:
+    conductor = driven(states_s=[0.0, 0.01, 0.02], end_s=1.0)
+    gaps_s = np.diff([0.02, *conductor.watched_s, 1.0])
+    assert gaps_s.max() < 0.051
 
 
 def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(driven: Any) -> None:

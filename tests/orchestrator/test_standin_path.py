@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -126,7 +126,7 @@ def test_the_way_a_sign_faces_is_that_of_its_way(
 ) -> None:
     inputs = town()
     edge = max(inputs.graph.edges, key=lambda e: len(e.node_ids))
-    osm = replace(inputs.osm, node_tags={edge.node_ids[1]: tags})
+    osm = msgspec.structs.replace(inputs.osm, node_tags={edge.node_ids[1]: tags})
 
     assert len(stop_signs(osm, Route((DirectedEdge(edge, False),), 0.0))) == there
     assert len(stop_signs(osm, Route((DirectedEdge(edge, True),), 0.0))) == back

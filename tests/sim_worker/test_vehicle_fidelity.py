@@ -30,7 +30,8 @@ def test_cars_drive_as_the_multi_body_model(name: str) -> None:
     got = fidelity(name, "multi-body")
     assert np.abs(got.radius).mean() < 0.009
     assert got.step_steer.max() < 0.015
-    # At 8 m/s², the van's rear wheels lock in the multi-body model, which knows no ABS: see vw_vanagon.toml.
+    # At 8 m/s², the van's rear wheels lock in the multi-body model, which knows no ABS: see
+    # vw_vanagon.toml.
     comparable = [decel < 8.0 or name != "vw_vanagon" for _, decel in STOPS]
     assert np.abs(got.braking[comparable]).max() < 0.015
 

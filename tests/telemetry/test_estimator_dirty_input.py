@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -126,3 +127,97 @@ def test_whatever_arrives_no_state_is_broken(samples: list[Sample]) -> None:
         state.position.validate()
         stamps.append(state.stamp_ns)
     assert stamps == sorted(stamps)
+
+
+def stepped(samples: list[Sample], *, from_s: float, by_s: float) -> list[Sample]:
+    """Return the samples with the clock of all after `from_s` set by `by_s`."""
+    return [
+        (channel, msgspec.structs.replace(message, stamp_ns=message.stamp_ns + round(by_s * 1e9)))
+        if message.stamp_ns >= from_s * 1e9 else (channel, message)
+        for channel, message in samples
+    ]  # fmt: skip
+
+
+def received(estimator: StateEstimator, samples: list[Sample], times: list[Sample]) -> list:
+    """Return the states of `samples` when they come at the stamps of `times`."""
+    return [
+        estimator.handle(*sample, received_ns=time[1].stamp_ns)
+        for sample, time in zip(samples, times, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("with_receipt", [False, True])
+def test_a_clock_that_jumps_back_is_believed_after_a_second(with_receipt: bool) -> None:
+    true = along(circle, 20.0)
+    samples = stepped(true, from_s=10.0, by_s=-7200.0)
+    estimator = StateEstimator(info())
+    if with_receipt:
+        states = received(estimator, samples, true)
+    else:
+        states = [estimator.handle(*sample) for sample in samples]
+    assert [k for k, state in enumerate(states) if state is None] == [50, 51, 52, 53, 54]
+    assert estimator.skipped.total() == 5
+    (step,) = estimator.clock.steps
+    assert step.step_ns == pytest.approx(-7200e9, abs=1e6)
+    for state, (_, message) in list(zip(states, samples, strict=True))[56:]:
+        assert state is not None
+        assert state.stamp_ns == message.stamp_ns
+        assert xy(state) == pytest.approx(circle(state.stamp_ns * 1e-9 + 7200.0), abs=1e-3)
+        assert state.speed_mps == pytest.approx(6.0, abs=0.1)
+
+
+def test_a_channel_that_changes_its_type_is_counted_and_survived() -> None:
+    clean = along(circle, 6.0)
+    estimator = StateEstimator(info())
+    wrong = [
+        ("speed", clean[12][1]),
+        ("gnss", SpeedSample(stamp_ns=2_300_000_000, speed_mps=6.0)),
+        ("imu", "a text"),
+        ("steering", HeadingSample(stamp_ns=2_300_000_000, yaw_rad=3.0)),
+    ]
+    states = [estimator.handle(*sample) for sample in clean[:12] + wrong + clean[12:]]
+    assert estimator.skipped == {
+        "speed_wrong_type": 1, "gnss_wrong_type": 1, "imu_wrong_type": 1, "steering_wrong_type": 1,
+    }  # fmt: skip
+    assert [state for state in states if state] == states_of(clean)
+
+
+def test_one_wild_stamp_of_a_sensor_beside_positions_does_not_silence_the_rest() -> None:
+    samples: list[Sample] = []
+    for k in range(120):
+        samples.append(("speed", SpeedSample(stamp_ns=k * 50_000_000, speed_mps=6.0)))
+        if k % 4 == 0:
+            samples.append(fix(k / 20, 0.3 * k, 0.0))
+    wild = ("speed", SpeedSample(stamp_ns=10**15, speed_mps=6.0))
+    estimator = StateEstimator(info())
+    states = [estimator.handle(*sample) for sample in [*samples[:60], wild, *samples[60:]]]
+    assert estimator.skipped == {"speed_time_leap": 1}
+    assert [state for state in states if state] == states_of(samples)
+
+
+def test_jumps_and_broken_numbers_through_a_network_are_counted_and_survived() -> None:
+    true = along(circle, 10.0)
+    nowhere = GnssFix(stamp_ns=2_410_000_000, position=GeoPoint(math.nan, 13.0))
+    samples = [*true[:13], ("gnss", nowhere), fix(2.6, 500.0, 0.0), *true[14:]]
+    estimator = StateEstimator(info())
+    states = received(estimator, samples, [*true[:13], ("gnss", nowhere), *true[13:]])
+    assert estimator.skipped == {"gnss_not_finite": 1, "gnss_jump": 1}
+    for state in states:
+        if state is not None:
+            assert xy(state) == pytest.approx(circle(state.stamp_ns * 1e-9), abs=1e-3)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(messages, st.integers(0, 2 * 10**9)), max_size=40))
+def test_whatever_arrives_whenever_no_state_is_broken(
+    arrivals: list[tuple[Sample, int]],
+) -> None:
+    estimator = StateEstimator(info())
+    now_ns = 0
+    for (channel, message), pause_ns in arrivals:
+        now_ns += pause_ns
+        state = estimator.handle(channel, message, received_ns=now_ns)
+        if state is not None:
+            numbers = (state.yaw_rad, state.speed_mps, state.yaw_rate_radps, state.accel_mps2)
+            assert all(math.isfinite(number) for number in numbers)
+            state.position.validate()

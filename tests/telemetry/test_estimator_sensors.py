@@ -14,6 +14,7 @@ from contracts.frames import LocalFrame, local_from_geo, wrap_angle
 from telemetry.estimator import StateEstimator
 from telemetry.logs import Log, open_log
 from telemetry.smoothing import SmoothedTrack, smooth_positions
+from tests.telemetry.estimator_figures import boreas
 
 pytestmark = pytest.mark.real_data
 DECLARATIONS = Path(__file__).parents[1] / "data" / "declarations"
@@ -104,3 +105,15 @@ def test_measured_heading_and_speed_agree_with_the_positions(data_dir: Path) -> 
     assert drive.rms("yaw_rate_radps") < 0.06
     assert not drive.skipped
     assert "yaw_rad" not in drive.states[-1].estimated
+
+
+def test_positions_alone_give_the_course_and_the_yaw_rate(data_dir: Path) -> None:
+    """In bends the lidar's own course differs from the car's by its place on the car, fitted."""
+    found = boreas(data_dir, until_s=150.0)
+    course = np.degrees(np.abs(found.course_rad))
+    mounted = np.degrees(np.abs(found.course_rad - found.mounting_rad))
+    assert np.median(course) < 0.4
+    assert np.percentile(mounted, 95) < 2.0
+    assert 0.0 < found.lever_m < 2.0
+    assert np.sqrt(np.mean(found.yaw_rate_radps**2)) < 0.07
+    assert found.yaw_rate_lag_s < 0.11  # one period of the positions

@@ -9,7 +9,8 @@ import pytest
 
 from sim_worker.planners.base import SharedGround
 from sim_worker.planners.constant_speed import ConstantSpeed
-from sim_worker.planners.frenet_lattice import FrenetLattice, choose
+from sim_worker.planners.frenet_lattice import FrenetLattice
+from sim_worker.planners.lattice_choice import choose
 from sim_worker.planners.path import FrenetPath
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from sim_worker.vehicle.parameters import load_vehicle

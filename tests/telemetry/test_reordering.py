@@ -1,0 +1,69 @@
+"""Samples out of order give what they would have given in order."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contracts.drive import GnssFix, SpeedSample
+from telemetry.motion_track import MotionTrack
+from telemetry.reordering import WINDOW_NS, Reordering
+from tests.telemetry.position_track import Sample, circle, fix, info
+
+
+def samples() -> list[Sample]:
+    """Return 4 s of speeds at 20 Hz and positions at 5 Hz on a circle."""
+    result: list[Sample] = []
+    for k in range(80):
+        result.append(("speed", SpeedSample(stamp_ns=k * 50_000_000, speed_mps=6.0)))
+        if k % 4 == 0:
+            result.append(fix(k / 20, *circle(k / 20), std_m=0.1))
+    return result
+
+
+def in_order() -> MotionTrack:
+    track = MotionTrack(info())
+    for channel, message in samples():
+        track.take(channel, message)
+    return track
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.booleans())
+def test_the_order_of_arrival_does_not_matter(seed: int, doubled: bool) -> None:
+    random = np.random.default_rng(seed)
+    given_samples = samples() * (2 if doubled else 1)
+    # Out of order by less than the window, with a sample that follows the last of them.
+    delays_ns = random.uniform(0, 0.9 * WINDOW_NS, len(given_samples))
+    stamps_ns = np.array([message.stamp_ns for _, message in given_samples])
+    reordering = Reordering(MotionTrack(info()))
+    for k in np.argsort(stamps_ns + delays_ns, kind="stable"):
+        reordering.add(*given_samples[k])
+        if random.random() < 0.5:
+            reordering.track()
+    end_ns = 3_950_000_000
+    assert reordering.track().state(end_ns) == in_order().state(end_ns)
+    assert not reordering.late
+    assert reordering.doubled.total() == (len(samples()) if doubled else 0)
+
+
+def test_what_is_too_late_is_counted_and_left_out() -> None:
+    reordering = Reordering(MotionTrack(info()))
+    for channel, message in samples():
+        reordering.add(channel, message)
+        reordering.track()
+    late = GnssFix(stamp_ns=2_000_000_001, position=samples()[1][1].position)
+    assert not reordering.add("gnss", late)
+    assert reordering.late == {"gnss": 1}
+    assert reordering.track().state(3_950_000_000) == in_order().state(3_950_000_000)
+
+
+def test_a_flood_between_two_states_stays_bounded() -> None:
+    reordering = Reordering(MotionTrack(info()))
+    reordering.add(*fix(0.0, 0.0, 0.0))
+    flood = 5000
+    for k in range(flood):
+        reordering.add("speed", SpeedSample(stamp_ns=1 + k, speed_mps=1.0))
+    assert reordering.waiting < flood / 2
+    assert reordering.track().state(flood).stamp_ns == flood
