@@ -4,14 +4,15 @@ Topics are chosen by message type, one topic per stream of telemetry.ros_foreign
 that occurs, and among its topics the one with the most messages. The stamp is that of the header,
 and the log time where that is 0. Plans and objects are read only where metadata `foretwin.frame` or
 a declaration tells the origin of their frame. Where static transforms lead from base_link to the
-frame of the fixes, the antenna's place is theirs.
+frame of the fixes, the antenna's place is theirs. Without any fixes an Odometry in `map` gives
+positions and headings, where that frame is placed.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 from contracts import drive
 from contracts.frames import LocalFrame
@@ -20,8 +21,8 @@ from telemetry.logs.map_origin import RecordingDeclaration
 from telemetry.logs.mcap_records import Contents, Record
 from telemetry.logs.merge import reordered
 from telemetry.logs.ros_recording import Recording, decoder
-from telemetry.ros_foreign import FOREIGN, UnusableError, stamp_of
-from telemetry.ros_parts import BASE_FRAME, TF
+from telemetry.ros_foreign import FOREIGN, POSE, Foreign, UnusableError, channel_of, stamp_of
+from telemetry.ros_parts import BASE_FRAME, ODOMETRY, TF
 from telemetry.ros_status import StatusJoiner
 from telemetry.ros_transforms import TransformTree
 
@@ -43,29 +44,33 @@ def open_foreign(
     """
     frame = declared.frame() if frame is None else frame
     path, contents = recording.path, recording.contents
-    topics = _choose_topics(contents)
-    if "gnss" not in topics:
+    chosen = _choose(contents, placed=frame is not None)
+    positions = next((one for one in chosen if "gnss" in one.how.channels), None)
+    if positions is None:
         kinds = sorted({schema.name for schema in contents.schemas.values()})
+        hint = f"; with [map] declared in {path.name}.toml {ODOMETRY} would do"
         raise LogError(
             f"{path}: no topic of type sensor_msgs/msg/NavSatFix, so no positions;"
             f" types: {', '.join(kinds) or 'none'}"
+            + (hint if ODOMETRY in kinds and frame is None else "")
         )
-    decode = decoder(recording, set(topics.values()))
+    decode = decoder(recording, {one.topic for one in chosen})
 
     def read(skipped: Counter[str]) -> Iterator[Sample]:
         if contents.cut_short:
             skipped[FILE_CUT_SHORT] += 1
-        samples = _foreign_samples(recording, set(topics.values()), decode, frame, skipped)
+        samples = _foreign_samples(recording, chosen, decode, frame, skipped)
         return _joined(reordered(samples, window_ns=WINDOW_NS))
 
     # Header stamps differ from log times by the transport's delay, and at times by a whole epoch.
-    lag_ns, antenna_frame = _first_fix(recording, topics["gnss"], decode)
+    lag_ns, antenna_frame = _first_fix(recording, positions.topic, decode)
     start_ns = contents.first_ns - lag_ns
-    antenna_m, placed = declared.body_from_antenna_m, "antenna, placed by declaration"
-    if antenna_m is None:
+    antenna_m, reference = declared.body_from_antenna_m, "antenna, placed by declaration"
+    if positions.how is POSE:
+        antenna_m, reference = (0.0, 0.0, 0.0), BASE_FRAME
+    elif antenna_m is None:
         antenna_m = _antenna_m(recording, antenna_frame)
-        placed = f"antenna, {'place unknown' if antenna_m is None else 'placed by transforms'}"
-    channels = dict.fromkeys(_channel_of(contents, topic) for topic in topics.values())
+        reference = f"antenna, {'place unknown' if antenna_m is None else 'placed by transforms'}"
     return Log(
         info=drive.VehicleInfo(
             vehicle_id="car",
@@ -73,16 +78,16 @@ def open_foreign(
             start_stamp_ns=start_ns,
             end_stamp_ns=contents.last_ns - lag_ns,
             source=path.name,
-            reference_point="antenna",
+            reference_point=BASE_FRAME if positions.how is POSE else "antenna",
             body_from_antenna_m=antenna_m,
-            sends=tuple(channels),
+            sends=tuple(dict.fromkeys(channel for one in chosen for channel in one.how.channels)),
         ),
         declared=Declared(
             units="degrees, m/s, rad, m/s²; "
-            + ", ".join(f"{stream} from {topic}" for stream, topic in topics.items()),
+            + ", ".join(f"{one.how.stream} from {one.topic}" for one in chosen),
             frame="WGS84, body axes forward, left, up",
             time_base="stamp of the header, log time where it is 0",
-            reference_point=placed,
+            reference_point=reference,
         ),
         read=read,
     )
@@ -93,21 +98,33 @@ def time_base_of(stamp_ns: int) -> drive.TimeBase:
     return "utc" if stamp_ns > _UTC_FROM_NS else "log"
 
 
-def _choose_topics(contents: Contents) -> dict[str, str]:
-    chosen: dict[str, str] = {}
-    for kind, how in FOREIGN.items():
+class _Chosen(NamedTuple):
+    """A topic and how its messages are read."""
+
+    topic: str
+    how: Foreign
+
+
+def _choose(contents: Contents, *, placed: bool) -> list[_Chosen]:
+    """Return one topic for each stream; `placed` tells whether `map` has a place on Earth."""
+
+    def topic_of(kind: str) -> str | None:
         topics = [
             topic
             for topic, schema in contents.schemas.items()
             if schema.name == kind and contents.counts.get(topic, 0) > 0
         ]
-        if topics and how.stream not in chosen:
-            chosen[how.stream] = max(topics, key=lambda topic: (contents.counts[topic], topic))
-    return chosen
+        return max(topics, key=lambda topic: (contents.counts[topic], topic), default=None)
 
-
-def _channel_of(contents: Contents, topic: str) -> str:
-    return FOREIGN[contents.schemas[topic].name].channel
+    chosen: dict[str, _Chosen] = {}
+    for kind, how in FOREIGN.items():
+        topic = topic_of(kind)
+        if topic is not None and how.stream not in chosen:
+            chosen[how.stream] = _Chosen(topic, how)
+    pose = topic_of(ODOMETRY)
+    if POSE.stream not in chosen and placed and pose is not None:
+        chosen[POSE.stream] = _Chosen(pose, POSE)
+    return list(chosen.values())
 
 
 def _first_fix(recording: Recording, topic: str, decode: Decode) -> tuple[int, str]:
@@ -143,23 +160,31 @@ def _antenna_m(recording: Recording, antenna_frame: str) -> drive.Vector3 | None
 
 def _foreign_samples(
     recording: Recording,
-    topics: set[str],
+    chosen: Sequence[_Chosen],
     decode: Decode,
     frame: LocalFrame | None,
     skipped: Counter[str],
 ) -> Iterator[Sample]:
-    for record in recording.chosen(topics, skipped):
-        how = FOREIGN[record.kind]
+    readers: dict[str, list[Foreign]] = {}
+    for one in chosen:
+        readers.setdefault(one.topic, []).append(one.how)
+    for record in recording.chosen(set(readers), skipped):
         try:
             ros = decode(record)
-            messages = how.read(ros, stamp_of(ros) or record.log_time_ns, frame)
-        except UnusableError as reason:
-            skipped[str(reason)] += 1
+            stamp_ns = stamp_of(ros) or record.log_time_ns
         except Exception:  # whatever rosbags raises over broken bytes
             skipped[UNREADABLE_ROW] += 1
-        else:
-            for message in messages:
-                yield how.channel, message
+            continue
+        for how in readers[record.topic]:
+            try:
+                messages = how.read(ros, stamp_ns, frame)
+            except UnusableError as reason:
+                skipped[str(reason)] += 1
+            except Exception:  # values that cannot be what they stand for
+                skipped[UNREADABLE_ROW] += 1
+            else:
+                for message in messages:
+                    yield channel_of(message), message
 
 
 def _joined(samples: Iterator[Sample]) -> Iterator[Sample]:

@@ -15,11 +15,13 @@ from rosbags.typesys import Stores, get_typestore
 from contracts import drive
 from contracts.frames import GeoPoint, LocalFrame
 from telemetry.logs import LogError, open_log
+from telemetry.ros_motion import ros_from_state
 from telemetry.ros_objects import predicted_from_users
 from telemetry.ros_parts import (
     CONTROL_MODE_REPORT,
     GEAR_REPORT,
     NAV_SAT_FIX,
+    ODOMETRY,
     PREDICTED_OBJECTS,
     TF,
     TRAFFIC_LIGHTS,
@@ -33,6 +35,7 @@ from telemetry.ros_parts import (
 )
 from telemetry.ros_status import ros_from_signals
 from telemetry.ros_transforms import transform_message
+from tests.telemetry import drive_messages
 from tests.telemetry.test_foreign_mcap import START_NS, ForeignFile, fix, velocity
 
 MS = 10**6
@@ -233,6 +236,31 @@ def test_objects_without_a_known_frame_are_counted(tmp_path: Path) -> None:
     (tmp_path / "bag.toml").write_text("[map]\nlatitude = 52.5\n")
     with pytest.raises(LogError, match=r"bag\.toml: .*longitude"):
         open_log(tmp_path / "bag")
+
+
+def test_a_recording_without_a_receiver_is_placed_by_its_odometry(tmp_path: Path) -> None:
+    frame = LocalFrame(GeoPoint(52.5, 13.4))
+    state = drive_messages.state(START_NS)
+    odometry = ros_from_state(state, frame)[0][2]
+    bag = write_bag(
+        tmp_path / "bag", StoragePlugin.SQLITE3, [("/odometry", ODOMETRY, odometry, START_NS)]
+    )
+    with pytest.raises(LogError, match=r"no positions; .*with \[map\] declared in bag\.toml"):
+        open_log(bag)
+    (tmp_path / "bag.toml").write_text("[map]\nlatitude = 52.5\nlongitude = 13.4\n")
+    log = open_log(bag)
+    found: dict[str, Any] = dict(log.samples())
+    assert set(found) == set(log.info.sends) == {"gnss", "heading", "speed"}
+    assert (log.info.reference_point, log.info.body_from_antenna_m) == ("base_link", (0, 0, 0))
+    assert found["gnss"].position.lat_deg == pytest.approx(state.position.lat_deg, abs=1e-9)
+    assert found["heading"].yaw_rad == pytest.approx(state.yaw_rad)
+    assert found["speed"].speed_mps == state.speed_mps
+    odometry.header.frame_id = "odom"
+    messages = [("/odometry", ODOMETRY, odometry, START_NS)]
+    (tmp_path / "other.toml").write_text("[map]\nlatitude = 52.5\nlongitude = 13.4\n")
+    other = open_log(write_bag(tmp_path / "other", StoragePlugin.SQLITE3, messages))
+    assert [channel for channel, _ in other.samples()] == ["speed"]
+    assert other.skipped == {"odometry in another frame than map": 1}
 
 
 def test_files_that_are_no_bag(tmp_path: Path) -> None:
