@@ -70,7 +70,8 @@ class Scene:
         whole = np.isfinite(states).all(axis=(1, 2))
         self.valid: Flags = np.asarray(rollout.valid, dtype=bool) & whole
         """(S,) whether a future was simulated to its end."""
-        self.states = states if self.valid.all() else np.where(
+        self.all_valid = bool(self.valid.all())
+        self.states = states if self.all_valid else np.where(
             self.valid[:, None, None], states, 0.0
         )  # fmt: skip
         self.time_s = np.asarray(rollout.time_s, dtype=np.float64)
@@ -90,9 +91,13 @@ class Scene:
 
     def measure(self, values: Array, valid: Flags | None = None) -> Measure:
         """Return `values` (S, …) as a Measure, NaN where a future, or `valid` (S, …), is not."""
-        good = self.valid.reshape((-1,) + (1,) * (values.ndim - 1))
-        good = np.broadcast_to(good, values.shape) if valid is None else good & valid
-        return Measure(np.where(good, values, np.nan), np.asarray(good))
+        if valid is None:
+            valid = np.ones(values.shape, dtype=bool)
+            if self.all_valid:
+                return Measure(np.array(values, dtype=np.float64), valid)
+        if not self.all_valid:
+            valid = valid & self.valid.reshape((-1,) + (1,) * (values.ndim - 1))
+        return Measure(np.where(valid, values, np.nan), valid)
 
     @functools.cached_property
     def blocks(self) -> tuple[slice, ...]:
