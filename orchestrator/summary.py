@@ -8,8 +8,13 @@ BEGINNING_S = 0.5
 """Where a junction is near so soon, the drive began near it."""
 
 
-def _readiness(junction: dict[str, Any]) -> str:
-    """Say how long before the car came near a World was ready; a drive may begin near one."""
+def _readiness(junction: dict[str, Any], *, lock_step: bool) -> str:
+    """Say how long before the car came near a World was ready; a drive may begin near one.
+
+    In lock step the drive waits for Worlds, and how long that takes says nothing of the drive.
+    """
+    if lock_step:
+        return "world never came" if junction["built_at_s"] is None else "world ready"
     before_s = junction["world_ready_before_s"]
     if before_s < 0.0:
         return f"world {-before_s:.1f} s late"
@@ -36,9 +41,10 @@ def summary_text(record: dict[str, object]) -> str:
             f"  machine too slow for {futures['wanted_per_round']} futures in every round: "
             f"{sizes} futures, {futures['spared_rounds']} rounds spared"
         )
+    lock_step = record["config"]["speed"] is None  # type: ignore[index]
     lines += [
         f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "
-        f"{junction['name'] or junction['id']}  {_readiness(junction)}"
+        f"{junction['name'] or junction['id']}  {_readiness(junction, lock_step=lock_step)}"
         for junction in junctions
     ]
     attribution = record["map"]["attribution"]  # type: ignore[index]

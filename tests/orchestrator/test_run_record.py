@@ -131,6 +131,17 @@ def test_the_summary_says_when_a_world_was_ready(
     assert said in summary_text(record)
 
 
+def test_a_drive_in_lock_step_waits_for_its_worlds_and_is_never_late(house: House) -> None:
+    house.drive(200, round_every=5)
+    house.end()
+    record = record_of(house)
+    record["config"]["speed"] = None
+    record["intersections"][0]["world_ready_before_s"] = -2.34
+    assert "Mill Lane  world ready\n" in summary_text(record)
+    record["intersections"][0]["built_at_s"] = None
+    assert "Mill Lane  world never came\n" in summary_text(record)
+
+
 def test_the_summary_owns_up_to_what_a_slow_machine_left_out(house: House) -> None:
     house.drive(200, round_every=5)
     house.end()
