@@ -1,0 +1,204 @@
+"""Reader of MCAP files and bags with ROS messages that other programs wrote.
+
+Topics are chosen by message type, one topic per stream of telemetry.ros_foreign: the first type
+that occurs, and among its topics the one with the most messages. The stamp is that of the header,
+and the log time where that is 0. Plans and objects are read only where metadata `foretwin.frame` or
+a declaration tells the origin of their frame. Where static transforms lead from base_link to the
+frame of the fixes, the antenna's place is theirs. Without any fixes an Odometry in `map` gives
+positions and headings, where that frame is placed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from contracts import drive
+from contracts.frames import LocalFrame
+from telemetry.logs.log import FILE_CUT_SHORT, UNREADABLE_ROW, Declared, Log, LogError, Sample
+from telemetry.logs.map_origin import RecordingDeclaration
+from telemetry.logs.mcap_records import Contents, Record
+from telemetry.logs.merge import reordered
+from telemetry.logs.ros_recording import Recording, decoder
+from telemetry.ros_foreign import FOREIGN, POSE, Foreign, UnusableError, channel_of, stamp_of
+from telemetry.ros_parts import BASE_FRAME, ODOMETRY, TF
+from telemetry.ros_status import StatusJoiner
+from telemetry.ros_transforms import TransformTree
+
+WINDOW_NS = 2_000_000_000
+"""How late a message may lie in its file and still be put in order."""
+_UTC_FROM_NS = 946_684_800_000_000_000
+"""2000-01-01: clocks beyond it count from 1970, others from boot or start."""
+
+Decode = Callable[[Record], Any]
+
+
+def open_foreign(
+    recording: Recording, declared: RecordingDeclaration, *, frame: LocalFrame | None = None
+) -> Log:
+    """Open a file of another program; `frame` is that of its plans and objects.
+
+    Without it that of `declared` counts. Raises LogError where the file holds no positions, or
+    definitions that cannot be read.
+    """
+    frame = declared.frame() if frame is None else frame
+    path, contents = recording.path, recording.contents
+    chosen = _choose(contents, placed=frame is not None)
+    positions = next((one for one in chosen if "gnss" in one.how.channels), None)
+    if positions is None:
+        kinds = sorted({schema.name for schema in contents.schemas.values()})
+        hint = f"; with [map] declared in {path.name}.toml {ODOMETRY} would do"
+        raise LogError(
+            f"{path}: no topic of type sensor_msgs/msg/NavSatFix, so no positions;"
+            f" types: {', '.join(kinds) or 'none'}"
+            + (hint if ODOMETRY in kinds and frame is None else "")
+        )
+    decode = decoder(recording, {one.topic for one in chosen})
+
+    def read(skipped: Counter[str]) -> Iterator[Sample]:
+        if contents.cut_short:
+            skipped[FILE_CUT_SHORT] += 1
+        samples = _foreign_samples(recording, chosen, decode, frame, skipped)
+        return _joined(reordered(samples, window_ns=WINDOW_NS))
+
+    # Header stamps differ from log times by the transport's delay, and at times by a whole epoch.
+    lag_ns, antenna_frame = _first_fix(recording, positions.topic, decode)
+    start_ns = contents.first_ns - lag_ns
+    antenna_m, reference = declared.body_from_antenna_m, "antenna, placed by declaration"
+    if positions.how is POSE:
+        antenna_m, reference = (0.0, 0.0, 0.0), BASE_FRAME
+    elif antenna_m is None:
+        antenna_m = _antenna_m(recording, antenna_frame)
+        reference = f"antenna, {'place unknown' if antenna_m is None else 'placed by transforms'}"
+    return Log(
+        info=drive.VehicleInfo(
+            vehicle_id="car",
+            time_base=time_base_of(start_ns),
+            start_stamp_ns=start_ns,
+            end_stamp_ns=contents.last_ns - lag_ns,
+            source=path.name,
+            reference_point=BASE_FRAME if positions.how is POSE else "antenna",
+            body_from_antenna_m=antenna_m,
+            sends=tuple(dict.fromkeys(channel for one in chosen for channel in one.how.channels)),
+        ),
+        declared=Declared(
+            units="degrees, m/s, rad, m/s²; "
+            + ", ".join(f"{one.how.stream} from {one.topic}" for one in chosen),
+            frame="WGS84, body axes forward, left, up",
+            time_base="stamp of the header, log time where it is 0",
+            reference_point=reference,
+        ),
+        read=read,
+    )
+
+
+def time_base_of(stamp_ns: int) -> drive.TimeBase:
+    """Guess the time base from one stamp."""
+    return "utc" if stamp_ns > _UTC_FROM_NS else "log"
+
+
+class _Chosen(NamedTuple):
+    """A topic and how its messages are read."""
+
+    topic: str
+    how: Foreign
+
+
+def _choose(contents: Contents, *, placed: bool) -> list[_Chosen]:
+    """Return one topic for each stream; `placed` tells whether `map` has a place on Earth."""
+
+    def topic_of(kind: str) -> str | None:
+        topics = [
+            topic
+            for topic, schema in contents.schemas.items()
+            if schema.name == kind and contents.counts.get(topic, 0) > 0
+        ]
+        return max(topics, key=lambda topic: (contents.counts[topic], topic), default=None)
+
+    chosen: dict[str, _Chosen] = {}
+    for kind, how in FOREIGN.items():
+        topic = topic_of(kind)
+        if topic is not None and how.stream not in chosen:
+            chosen[how.stream] = _Chosen(topic, how)
+    pose = topic_of(ODOMETRY)
+    if POSE.stream not in chosen and placed and pose is not None:
+        chosen[POSE.stream] = _Chosen(pose, POSE)
+    return list(chosen.values())
+
+
+def _first_fix(recording: Recording, topic: str, decode: Decode) -> tuple[int, str]:
+    """Return how far the log time is ahead of the first readable fix's stamp, and its frame."""
+    for record in recording.chosen({topic}, Counter()):
+        try:
+            ros = decode(record)
+            lag_ns = record.log_time_ns - (stamp_of(ros) or record.log_time_ns)
+            return lag_ns, str(ros.header.frame_id)
+        except Exception:  # an unreadable message, counted when it is read
+            continue
+    return 0, ""
+
+
+def _antenna_m(recording: Recording, antenna_frame: str) -> drive.Vector3 | None:
+    schemas = recording.contents.schemas
+    topics = {
+        topic
+        for topic, schema in schemas.items()
+        if schema.name == TF and topic.endswith("tf_static")
+    }
+    if not topics or not antenna_frame:
+        return None
+    tree = TransformTree()
+    try:
+        decode = decoder(recording, topics)
+        for record in recording.chosen(topics, Counter()):
+            tree.add(decode(record))
+    except Exception:  # a place that cannot be read is one that is not known
+        return None
+    return tree.place_of(antenna_frame, within=BASE_FRAME)
+
+
+def _foreign_samples(
+    recording: Recording,
+    chosen: Sequence[_Chosen],
+    decode: Decode,
+    frame: LocalFrame | None,
+    skipped: Counter[str],
+) -> Iterator[Sample]:
+    readers: dict[str, list[Foreign]] = {}
+    for one in chosen:
+        readers.setdefault(one.topic, []).append(one.how)
+    for record in recording.chosen(set(readers), skipped):
+        try:
+            ros = decode(record)
+            stamp_ns = stamp_of(ros) or record.log_time_ns
+        except Exception:  # whatever rosbags raises over broken bytes
+            skipped[UNREADABLE_ROW] += 1
+            continue
+        for how in readers[record.topic]:
+            try:
+                messages = how.read(ros, stamp_ns, frame)
+            except UnusableError as reason:
+                skipped[str(reason)] += 1
+            except Exception:  # values that cannot be what they stand for
+                skipped[UNREADABLE_ROW] += 1
+            else:
+                for message in messages:
+                    yield channel_of(message), message
+
+
+def _joined(samples: Iterator[Sample]) -> Iterator[Sample]:
+    """Join the reports of a status; those of one stamp become one sample."""
+    joiner = StatusJoiner()
+    waiting: drive.VehicleStatus | None = None
+    for channel, message in samples:
+        stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
+        if waiting is not None and stamp_ns != waiting.stamp_ns:
+            yield "status", waiting
+            waiting = None
+        if isinstance(message, drive.VehicleStatus):
+            waiting = joiner.join(message)
+        else:
+            yield channel, message
+    if waiting is not None:
+        yield "status", waiting

@@ -1,0 +1,65 @@
+"""What a recording of another program does not say of itself, declared in TOML beside it.
+
+`NAME.toml`, after the whole name of the file or folder:
+
+```toml
+body_from_antenna_m = [1.4, 0.0, 1.6]  # where the recording has no static transforms
+[map]                                  # origin of the frame `map`: a plane around it, x east
+latitude = 52.5121
+longitude = 13.3925
+altitude = 34.0                        # of z = 0, above the ellipsoid
+```
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+
+from contracts.drive import Vector3
+from contracts.frames import GeoPoint, LocalFrame
+from telemetry.logs.log import LogError
+
+
+class MapSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The origin of the frame `map`, degrees and metres on WGS84."""
+
+    latitude: float
+    longitude: float
+    altitude: float = 0.0
+
+
+class RecordingDeclaration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is declared of a recording."""
+
+    body_from_antenna_m: Vector3 | None = None
+    map: MapSection | None = None
+
+    def frame(self) -> LocalFrame | None:
+        """Return the plane of the frame `map`, None where it is not declared."""
+        if self.map is None:
+            return None
+        return LocalFrame(GeoPoint(self.map.latitude, self.map.longitude, self.map.altitude))
+
+
+def declared_of(path: Path, declaration: Path | None = None) -> RecordingDeclaration:
+    """Return what `declaration`, else `NAME.toml` beside a recording, says; all is optional.
+
+    Raises FileNotFoundError for a declaration that was named and is not there, and LogError naming
+    the field that is wrong.
+    """
+    beside = path.with_name(path.name + ".toml")
+    if declaration is None and not beside.is_file():
+        return RecordingDeclaration()
+    file = beside if declaration is None else declaration
+    try:
+        found = msgspec.toml.decode(file.read_bytes(), type=RecordingDeclaration)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise LogError(f"{file}: {error}") from None
+    if (frame := found.frame()) is not None:
+        try:
+            frame.origin.validate()
+        except ValueError as error:
+            raise LogError(f"{file}: [map] {error}") from None
+    return found
