@@ -199,12 +199,20 @@ def sweep(
 @app.command()
 def convert(
     source: Annotated[Path, typer.Argument(help="recorded drive")],
-    target: Annotated[Path, typer.Argument(help="MCAP file to write")],
+    target: Annotated[
+        Path, typer.Argument(help=".mcap, .bag (ROS 1), .csv, or a folder for a ROS 2 bag")
+    ],
+    to: Annotated[
+        str | None, typer.Option("--to", help="mcap, ros2, ros1, csv; else the name tells")
+    ] = None,
+    declaration: Annotated[
+        Path | None, typer.Option("--declaration", help="TOML that declares a CSV at SOURCE")
+    ] = None,
 ) -> None:
-    """Convert a recorded drive to MCAP with ROS 2 messages."""
+    """Convert a recorded drive to MCAP, a ROS bag, or CSV."""
     from orchestrator.log_commands import convert_log
 
-    convert_log(source, target)
+    convert_log(source, target, to=to, declaration=declaration)
 
 
 @app.command()

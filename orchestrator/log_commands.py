@@ -9,15 +9,23 @@ from pathlib import Path
 from contracts.errors import UserError
 
 
-def convert_log(source: Path, target: Path) -> None:
-    """Convert a recorded drive to MCAP and say what was kept and what was not."""
-    from telemetry.convert import convert
+def convert_log(
+    source: Path, target: Path, *, to: str | None = None, declaration: Path | None = None
+) -> None:
+    """Convert a recorded drive and say what was kept and what was not.
 
+    `to` is one of telemetry.convert.TARGETS, else the target's suffix tells.
+    """
+    from telemetry.convert import TARGETS, convert
+
+    kind = next((one for one in TARGETS if one == to), None)
+    if to is not None and kind is None:
+        raise UserError(f"--to {to}: no kind of target; known: {', '.join(TARGETS)}")
     if not source.exists():
         raise FileNotFoundError(f"recorded drive {source}: no such file or folder")
     if not target.parent.is_dir():
         raise UserError(f"{target}: folder {target.parent} does not exist")
-    report = convert(source, target)
+    report = convert(source, target, declaration=declaration, to=kind)
     kept = ", ".join(f"{count} {name}" for name, count in sorted(report.counts.items()))
     print(f"{target}: {kept}")
     if report.skipped:

@@ -180,7 +180,7 @@ class DriveWriter:
 
     def _frame_for(self, message: msgspec.Struct) -> LocalFrame | None:
         """Return the local frame, whose origin is the first position that comes along."""
-        if self._frame is None and (origin := _position_of(message)) is not None:
+        if self._frame is None and (origin := position_of(message)) is not None:
             self._frame = LocalFrame(origin)
             with self._guarded():
                 self._writer.add_metadata(
@@ -200,7 +200,8 @@ class DriveWriter:
         return self._ids[topic]
 
 
-def _position_of(message: msgspec.Struct) -> GeoPoint | None:
+def position_of(message: msgspec.Struct) -> GeoPoint | None:
+    """Return the first position in a message that lies on Earth, None where there is none."""
     if isinstance(message, drive.PlannedTrajectory) and len(message.lat_deg):
         candidate = GeoPoint(float(message.lat_deg[0]), float(message.lon_deg[0]))
     elif isinstance(message, drive.GnssFix | drive.VehicleState):

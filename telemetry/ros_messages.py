@@ -56,6 +56,8 @@ from telemetry.ros_sensors import (
 )
 
 TOPIC_PREFIX = "/foretwin/"
+INFO_TOPIC, FRAME_TOPIC = f"{TOPIC_PREFIX}vehicle_info", f"{TOPIC_PREFIX}frame"
+"""Of bags: std_msgs/String with the JSON of VehicleInfo and of the LocalFrame named "map"."""
 _JSON_ALONE = ("status", "objects", "signals", "end")
 _JSON_BESIDE_A_VIEW = ("control", "state")
 
@@ -104,17 +106,30 @@ def message_from(
     topic: str, data: bytes, frame: LocalFrame | None
 ) -> tuple[str, msgspec.Struct] | None:
     """Return channel and message of one of our own topics, None for views and other topics."""
+    kind = kind_of(topic)
+    if kind is None:
+        return None
+    return message_of(topic, typestore().deserialize_cdr(data, kind), frame)
+
+
+def kind_of(topic: str) -> str | None:
+    """Return the type of one of our own topics that is read back, None for any other."""
     name = topic.removeprefix(TOPIC_PREFIX)
     if topic == name:
         return None
     channel = name.removesuffix("_json")
     if channel in _JSON_ALONE or (channel in _JSON_BESIDE_A_VIEW and channel != name):
-        text = typestore().deserialize_cdr(data, STRING).data
-        return channel, msgspec.json.decode(text, type=CHANNELS[channel].kind)
-    if name not in _READERS:
-        return None
-    kind, read = _READERS[name]
-    return name, read(typestore().deserialize_cdr(data, kind), frame)
+        return STRING
+    return _READERS[name][0] if name in _READERS else None
+
+
+def message_of(topic: str, ros: Any, frame: LocalFrame | None) -> tuple[str, msgspec.Struct]:
+    """Return channel and message of a decoded message of a topic that has a `kind_of`."""
+    name = topic.removeprefix(TOPIC_PREFIX)
+    if kind_of(topic) == STRING:
+        channel = name.removesuffix("_json")
+        return channel, msgspec.json.decode(ros.data, type=CHANNELS[channel].kind)
+    return name, _READERS[name][1](ros, frame)
 
 
 _WRITERS: dict[str, Callable[[Any, LocalFrame | None], Parts]] = {

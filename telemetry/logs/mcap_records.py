@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import struct
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,6 +33,8 @@ class Record(NamedTuple):
 class Contents(NamedTuple):
     """What a file holds: schemas and message counts by topic, its metadata by name.
 
+    A topic of several types has the schema of the type that most of its messages have, and their
+    number.
     A file without an index, as after a crash, was read through once to learn this.
     """
 
@@ -56,14 +59,17 @@ def read_contents(path: Path) -> Contents:
             summary = reader.get_summary()
             if summary is not None and summary.statistics is not None and summary.chunk_indexes:
                 told = summary.statistics
-                channels = summary.channels.values()
+                schemas, counts = _by_topic(
+                    (
+                        channel.topic,
+                        summary.schemas.get(channel.schema_id),
+                        told.channel_message_counts.get(channel.id, 0),
+                    )
+                    for channel in summary.channels.values()
+                )
                 return Contents(
-                    schemas={
-                        channel.topic: summary.schemas[channel.schema_id]
-                        for channel in channels
-                        if channel.schema_id
-                    },
-                    counts={c.topic: told.channel_message_counts.get(c.id, 0) for c in channels},
+                    schemas=schemas,
+                    counts=counts,
                     first_ns=told.message_start_time,
                     last_ns=told.message_end_time,
                     metadata={item.name: dict(item.metadata) for item in reader.iter_metadata()},
@@ -96,17 +102,20 @@ def records(path: Path, contents: Contents, topics: set[str]) -> Iterator[Record
 
 def _read_through(path: Path) -> Contents:
     linear = _Linear(path)
-    counts: dict[str, int] = {}
+    seen: Counter[tuple[str, str]] = Counter()
     metadata: dict[str, dict[str, str]] = {}
     first_ns, last_ns = 2**63, 0
     for item in linear:
         if isinstance(item, Metadata):
             metadata[item.name] = dict(item.metadata)
             continue
-        counts[item.topic] = counts.get(item.topic, 0) + 1
+        seen[item.topic, item.kind] += 1
         first_ns, last_ns = min(first_ns, item.log_time_ns), max(last_ns, item.log_time_ns)
+    schemas, counts = _by_topic(
+        (topic, linear.schemas[topic, kind], count) for (topic, kind), count in seen.items()
+    )
     return Contents(
-        schemas=linear.schemas,
+        schemas=schemas,
         counts=counts,
         first_ns=first_ns if counts else 0,
         last_ns=last_ns,
@@ -116,11 +125,29 @@ def _read_through(path: Path) -> Contents:
     )
 
 
+def _by_topic(
+    channels: Iterable[tuple[str, Schema | None, int]],
+) -> tuple[dict[str, Schema], dict[str, int]]:
+    """Return schema and count by topic, of the schema with the most messages."""
+    totals: Counter[tuple[str, str]] = Counter()
+    schemas: dict[tuple[str, str], Schema] = {}
+    for topic, schema, count in channels:
+        name = "" if schema is None else schema.name
+        totals[topic, name] += count
+        if schema is not None:
+            schemas[topic, name] = schema
+    best = {topic: name for (topic, name), _ in sorted(totals.items(), key=lambda item: item[1])}
+    return (
+        {topic: schemas[topic, name] for topic, name in best.items() if (topic, name) in schemas},
+        {topic: totals[topic, name] for topic, name in best.items()},
+    )
+
+
 class _Linear:
     """Reads a file from its beginning to its end or to where it is torn."""
 
     def __init__(self, path: Path) -> None:
-        self.schemas: dict[str, Schema] = {}
+        self.schemas: dict[tuple[str, str], Schema] = {}
         self.cut_short = False
         self._path = path
 
@@ -135,13 +162,14 @@ class _Linear:
                     elif isinstance(item, Channel):
                         channels[item.id] = item
                         if item.schema_id in by_id:
-                            self.schemas[item.topic] = by_id[item.schema_id]
+                            schema = by_id[item.schema_id]
+                            self.schemas[item.topic, schema.name] = schema
                     elif isinstance(item, Metadata):
                         yield item
                     elif isinstance(item, Message):
-                        topic = channels[item.channel_id].topic
-                        if topic in self.schemas:
-                            kind = self.schemas[topic].name
-                            yield Record(topic, kind, item.log_time, item.data)
+                        channel = channels[item.channel_id]
+                        if channel.schema_id in by_id:
+                            kind = by_id[channel.schema_id].name
+                            yield Record(channel.topic, kind, item.log_time, item.data)
             except _BROKEN:
                 self.cut_short = True

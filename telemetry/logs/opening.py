@@ -10,11 +10,15 @@ from telemetry.logs.geojson import open_geojson
 from telemetry.logs.gpx import open_gpx
 from telemetry.logs.log import Log, LogError
 from telemetry.logs.mcity import DECLARED, is_mcity, read_mcity
+from telemetry.logs.nmea import is_nmea, open_nmea
 from telemetry.logs.road_users import LONGEST_GAP_S, RoadUserLog, detections_of, log_of_detections
 from telemetry.logs.smartloc import is_smartloc, open_smartloc
 
+BAG_MAGIC, SQLITE_MAGIC = b"#ROSBAG V", b"SQLite format 3\0"
+
 KINDS = (
-    "MCAP with ROS 2 messages (.mcap), CSV with a declaration (.csv), GPX (.gpx), "
+    "MCAP with ROS messages (.mcap), ROS 1 bag (.bag), ROS 2 bag (folder or .db3), "
+    "NMEA-0183 (.nmea), CSV with a declaration (.csv), GPX (.gpx), "
     "GeoJSON lines (.geojson, .json), smartLoc ground truth (point3 text), comma2k19 segment folder"
 )
 
@@ -31,16 +35,29 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if path.is_dir():
         if is_comma2k19(path):
             return open_comma2k19(path)
-        raise LogError(f"{path}: a folder that is no comma2k19 segment; known logs: {KINDS}")
+        if (path / "metadata.yaml").is_file():
+            from telemetry.logs.ros_log import open_bag
+
+            return open_bag(path)
+        raise LogError(
+            f"{path}: a folder that is no comma2k19 segment and no ROS 2 bag (it has no"
+            f" metadata.yaml); known logs: {KINDS}"
+        )
     head = _head(path)
     if not head:
         raise LogError(f"{path}: the file is empty")
     suffix = path.suffix.lower()
     if head.startswith(b"\x89MCAP0") or suffix == ".mcap":
-        from telemetry.logs.ros2_mcap import open_mcap
+        from telemetry.logs.ros_log import open_mcap
 
         return open_mcap(path)
+    if head.startswith((BAG_MAGIC, SQLITE_MAGIC)) or suffix in (".bag", ".db3"):
+        from telemetry.logs.ros_log import open_bag
+
+        return open_bag(path)
     text = head.decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
+    if suffix != ".csv" and declaration is None and is_nmea(text):
+        return open_nmea(path)
     if is_smartloc(text):
         return open_smartloc(path)
     if suffix == ".gpx" or (text.startswith("<") and "<gpx" in text):

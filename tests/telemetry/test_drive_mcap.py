@@ -18,7 +18,7 @@ from contracts import drive
 from contracts.frames import GeoPoint, LocalFrame
 from contracts.keys import TELEMETRY_CHANNELS
 from telemetry.logs import LogError, open_log
-from telemetry.logs.ros2_mcap import read_drive
+from telemetry.logs.ros_log import read_drive
 from telemetry.mcap_file import create
 from telemetry.ros_messages import message_from, messages_from, written
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples

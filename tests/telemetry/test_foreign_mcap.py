@@ -36,14 +36,14 @@ class ForeignFile:
         self._bytes = io.BytesIO()
         self._writer = Writer(self._bytes)
         self._writer.start(profile="ros2", library="another program")
-        self._channels: dict[str, int] = {}
+        self._channels: dict[tuple[str, str], int] = {}
 
     def add(self, topic: str, kind: str, message: Any, log_time_ns: int) -> None:
-        if topic not in self._channels:
+        if (topic, kind) not in self._channels:
             schema = self._writer.register_schema(kind, "ros2msg", schema_text(kind).encode())
-            self._channels[topic] = self._writer.register_channel(topic, "cdr", schema)
+            self._channels[topic, kind] = self._writer.register_channel(topic, "cdr", schema)
         self._writer.add_message(
-            self._channels[topic],
+            self._channels[topic, kind],
             log_time=log_time_ns,
             publish_time=log_time_ns,
             data=bytes(typestore().serialize_cdr(message, kind)),

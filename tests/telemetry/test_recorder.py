@@ -21,7 +21,7 @@ from contracts.memory_bus import MemoryBus
 from contracts.setup import BusSetup, RecorderSetup, write_setup
 from contracts.simulation import RunEnd
 from telemetry.logs import open_log
-from telemetry.logs.ros2_mcap import read_drive
+from telemetry.logs.ros_log import read_drive
 from telemetry.mcap_file import DriveWriter, create
 from telemetry.recorder import RecorderProcess
 from telemetry.recording import Recording

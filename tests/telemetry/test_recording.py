@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from contracts.drive import ImuSample, SpeedSample
-from telemetry.logs.ros2_mcap import read_drive
+from telemetry.logs.ros_log import read_drive
 from telemetry.mcap_file import DriveWriter, create
 from telemetry.recording import Recording
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel

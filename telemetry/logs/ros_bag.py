@@ -1,0 +1,82 @@
+"""Bags of ROS 1 (.bag) and ROS 2 (a folder with metadata.yaml, or one .db3) as recordings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mcap.records import Schema
+from rosbags.interfaces import MessageDefinitionFormat
+from rosbags.rosbag1 import Reader as Reader1
+from rosbags.rosbag1 import ReaderError as Error1
+from rosbags.rosbag2 import Reader as Reader2
+from rosbags.rosbag2 import ReaderError as Error2
+
+from telemetry.logs.log import FILE_CUT_SHORT, LogError
+from telemetry.logs.mcap_records import Contents, Record
+from telemetry.logs.ros_recording import NO_DEFINITION, ROS1, Recording
+
+_ENCODINGS = {
+    MessageDefinitionFormat.NONE: NO_DEFINITION,
+    MessageDefinitionFormat.MSG: "ros2msg",
+    MessageDefinitionFormat.IDL: "ros2idl",
+}
+
+
+def bag_recording(path: Path) -> Recording:
+    """Open a bag; raises LogError where it cannot be read."""
+    ros1 = path.is_file() and path.suffix.lower() != ".db3"
+    kind: Any = Reader1 if ros1 else Reader2
+    try:
+        with kind(path) as reader:
+            contents = _contents(reader, ros1=ros1)
+    except (Error1, Error2) as error:
+        hint = ""
+        if "index" in str(error).lower():
+            hint = "; `rosbag reindex` may mend it"
+        elif path.is_dir() and any(path.glob("*.mcap")):
+            hint = "; its .mcap files can be read one by one"
+        raise LogError(f"{path}: unreadable bag: {error}{hint}") from None
+
+    def read(topics: set[str], skipped: Counter[str]) -> Iterator[Record]:
+        try:
+            with kind(path) as reader:
+                wanted = [one for one in reader.connections if one.topic in topics]
+                # No connections at all would mean all of them.
+                for one, log_time_ns, data in reader.messages(wanted) if wanted else ():
+                    yield Record(one.topic, one.msgtype, log_time_ns, bytes(data))
+        except GeneratorExit:
+            raise
+        except Exception:  # whatever rosbags, SQLite or zstd raise over bytes that are damaged
+            skipped[FILE_CUT_SHORT] += 1
+
+    return Recording(path=path, contents=contents, read=read)
+
+
+def _contents(reader: Any, *, ros1: bool) -> Contents:
+    schemas: dict[str, Schema] = {}
+    counts: dict[str, int] = {}
+    by_kind: Counter[tuple[str, str]] = Counter()
+    for one in reader.connections:
+        by_kind[one.topic, one.msgtype] += one.msgcount
+    for one in reader.connections:
+        count = by_kind[one.topic, one.msgtype]
+        if count <= counts.get(one.topic, -1):
+            continue
+        counts[one.topic] = count
+        encoding = ROS1 if ros1 else _ENCODINGS[one.msgdef.format]
+        schemas[one.topic] = Schema(
+            id=one.id, name=one.msgtype, encoding=encoding, data=one.msgdef.data.encode()
+        )
+    empty = not reader.message_count
+    return Contents(
+        schemas=schemas,
+        counts=counts,
+        first_ns=0 if empty else reader.start_time,
+        last_ns=0 if empty else reader.end_time - 1,
+        metadata={},
+        indexed=False,
+        cut_short=False,
+    )

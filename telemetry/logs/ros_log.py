@@ -1,0 +1,144 @@
+"""Reader of MCAP files and bags: our own, which say all of themselves, and other programs'.
+
+An MCAP file of ours tells vehicle and frame in metadata, a bag of ours in the String topics
+INFO_TOPIC and FRAME_TOPIC, since bags of ROS 1 have no metadata.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from contracts import drive
+from contracts.frames import LocalFrame
+from telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
+from telemetry.logs.log import FILE_CUT_SHORT, VALUE_NOT_FINITE, Declared, Log, LogError, Sample
+from telemetry.logs.merge import reordered
+from telemetry.logs.ros_bag import bag_recording
+from telemetry.logs.ros_recording import Recording, decoder, mcap_recording
+from telemetry.mcap_file import FORMAT_METADATA, FRAME_METADATA, INFO_METADATA
+from telemetry.ros_messages import (
+    FRAME_TOPIC,
+    INFO_TOPIC,
+    TOPIC_PREFIX,
+    kind_of,
+    message_from,
+    message_of,
+)
+
+
+def open_mcap(path: Path) -> Log:
+    """Open an MCAP file; raises LogError where it is none or holds no positions."""
+    recording = mcap_recording(path)
+    metadata = recording.contents.metadata
+    frame, info = metadata.get(FRAME_METADATA), metadata.get(INFO_METADATA)
+    told = _Told(None if frame is None else frame["json"], None if info is None else info["json"])
+    if FORMAT_METADATA in metadata:
+        return _open_own(recording, told)
+    return open_foreign(recording, told.frame())
+
+
+def open_bag(path: Path) -> Log:
+    """Open a ROS 1 or ROS 2 bag; raises LogError where it is none or holds no positions."""
+    recording = bag_recording(path)
+    known = {INFO_TOPIC, FRAME_TOPIC} & set(recording.contents.schemas)
+    if not known:
+        return open_foreign(recording, None)
+    texts: dict[str, str] = {}
+    decode = decoder(recording, known)
+    for record in recording.chosen(known, Counter()):
+        texts[record.topic] = decode(record).data
+    return _open_own(recording, _Told(texts.get(FRAME_TOPIC), texts.get(INFO_TOPIC)))
+
+
+def read_drive(path: Path) -> Iterator[Sample]:
+    """Yield every message of our own MCAP by log time, the vehicle's states and `end` included.
+
+    Unlike `open_mcap(path).samples()` nothing is refused. Raises LogError for another's file.
+    """
+    recording = mcap_recording(path)
+    contents = recording.contents
+    if FORMAT_METADATA not in contents.metadata:
+        raise LogError(f"{path}: not written by foretwin: no metadata {FORMAT_METADATA!r}")
+    told = contents.metadata.get(FRAME_METADATA)
+    frame = _Told(None if told is None else told["json"], None).frame()
+    for record in recording.read(set(contents.counts), Counter()):
+        sample = message_from(record.topic, record.data, frame)
+        if sample is not None:
+            yield sample
+
+
+class _Told(NamedTuple):
+    """What a file of ours says of itself, as JSON."""
+
+    frame_json: str | None
+    info_json: str | None
+
+    def frame(self) -> LocalFrame | None:
+        if self.frame_json is None:
+            return None
+        return msgspec.json.decode(self.frame_json, type=LocalFrame)
+
+
+def _open_own(recording: Recording, told: _Told) -> Log:
+    path, contents = recording.path, recording.contents
+    frame = told.frame()
+    topics = {
+        topic
+        for topic in contents.counts
+        if kind_of(topic) is not None
+        and topic not in (f"{TOPIC_PREFIX}end", f"{TOPIC_PREFIX}state_json")
+    }
+    channels = sorted({topic.removeprefix(TOPIC_PREFIX).removesuffix("_json") for topic in topics})
+    if not channels:
+        raise LogError(f"{path}: holds no telemetry")
+    if told.info_json is not None:
+        info = msgspec.json.decode(told.info_json, type=drive.VehicleInfo)
+        info = msgspec.structs.replace(info, end_stamp_ns=contents.last_ns)
+    else:
+        info = drive.VehicleInfo(
+            vehicle_id="car",
+            time_base=time_base_of(contents.first_ns),
+            start_stamp_ns=contents.first_ns,
+            end_stamp_ns=contents.last_ns,
+            source=path.name,
+            sends=tuple(channels),
+        )
+
+    decode = decoder(recording, topics)
+
+    def read(skipped: Counter[str]) -> Iterator[Sample]:
+        if contents.cut_short:
+            skipped[FILE_CUT_SHORT] += 1
+        samples = _own_samples(recording, topics, decode, frame, skipped)
+        return samples if contents.indexed else reordered(samples, window_ns=WINDOW_NS)
+
+    return Log(
+        info=info,
+        declared=Declared(
+            units="degrees, m/s, rad, m/s²",
+            frame="WGS84",
+            time_base=info.time_base,
+            reference_point=info.reference_point,
+        ),
+        read=read,
+    )
+
+
+def _own_samples(
+    recording: Recording,
+    topics: set[str],
+    decode: Decode,
+    frame: LocalFrame | None,
+    skipped: Counter[str],
+) -> Iterator[Sample]:
+    for record in recording.chosen(topics, skipped):
+        try:
+            yield message_of(record.topic, decode(record), frame)
+        except msgspec.ValidationError:
+            # JSON has no NaN: it stands as null where a number belongs.
+            skipped[VALUE_NOT_FINITE] += 1

@@ -1,0 +1,155 @@
+"""NMEA-0183: knots, degrees and minutes, true north, midnight, checksums."""
+
+from __future__ import annotations
+
+import functools
+import math
+import operator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from telemetry.logs import Log, LogError, open_log
+from telemetry.logs.nmea import CHECKSUM_WRONG, Sentence, sentence_of
+
+NOON_NS = 1_772_366_400 * 10**9
+"""2026-03-01T12:00:00Z."""
+
+
+def line(body: str) -> str:
+    return f"${body}*{functools.reduce(operator.xor, body.encode(), 0):02X}\r\n"
+
+
+def rmc(time: str, date: str, *, knots: str = "10.0", course: str = "90.0") -> str:
+    return line(f"GNRMC,{time},A,5230.6000,N,01323.4000,E,{knots},{course},{date},,,A")
+
+
+def gga(time: str, *, quality: int = 4) -> str:
+    return line(f"GPGGA,{time},5230.6000,S,01323.4000,W,{quality},12,0.6,34.5,M,44.5,M,,")
+
+
+def opened(tmp_path: Path, *lines: str) -> tuple[Log, dict[str, list[Any]]]:
+    path = tmp_path / "drive.nmea"
+    path.write_text("".join(lines))
+    log = open_log(path)
+    found: dict[str, list[Any]] = {}
+    for channel, message in log.samples():
+        found.setdefault(channel, []).append(message)
+    return log, found
+
+
+def test_the_example_of_the_standard_has_its_checksum() -> None:
+    told = "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47"
+    sentence = sentence_of(told)
+    assert isinstance(sentence, Sentence)
+    assert sentence.fields[1] == "4807.038"
+    assert sentence_of(told.replace("545.4", "545.5")) == CHECKSUM_WRONG
+    assert sentence_of("$GPGSV,3,1,11*7F") is None
+
+
+def test_a_sentence_cut_off_by_the_next_does_not_take_it_along() -> None:
+    sentence = sentence_of("$GPRMC,1200" + line("HEHDT,1.0,T"))
+    assert sentence == Sentence("HDT", ["1.0", "T"])
+
+
+def test_minutes_knots_and_course(tmp_path: Path) -> None:
+    log, found = opened(tmp_path, rmc("120000.00", "010326"), rmc("120000.25", "010326"))
+    assert [fix.stamp_ns for fix in found["gnss"]] == [NOON_NS, NOON_NS + 250_000_000]
+    assert found["gnss"][0].position.lat_deg == pytest.approx(52.51)
+    assert found["gnss"][0].position.lon_deg == pytest.approx(13.39)
+    assert found["speed"][0].speed_mps == pytest.approx(5.144444, abs=1e-6)
+    assert found["heading"][0].yaw_rad == pytest.approx(0.0)
+    assert (log.info.time_base, log.info.reference_point) == ("utc", "antenna")
+    assert set(log.info.sends) == {"gnss", "speed", "heading"}
+
+
+@given(st.floats(0.0, 359.999))
+def test_degrees_clockwise_from_north_become_yaw_from_east(course_deg: float) -> None:
+    from telemetry.logs.nmea import _yaw_rad
+
+    yaw = _yaw_rad(repr(course_deg))
+    assert -math.pi <= yaw <= math.pi
+    # East and north of a unit vector, both ways.
+    assert math.cos(yaw) == pytest.approx(math.sin(math.radians(course_deg)), abs=1e-9)
+    assert math.sin(yaw) == pytest.approx(math.cos(math.radians(course_deg)), abs=1e-9)
+
+
+def test_gga_is_preferred_and_ellipsoidal_and_south_and_west_are_negative(tmp_path: Path) -> None:
+    _, found = opened(tmp_path, gga("120000.00"), rmc("120000.00", "010326"), gga("120001.00"))
+    assert [fix.stamp_ns for fix in found["gnss"]] == [NOON_NS, NOON_NS + 10**9]
+    position = found["gnss"][0].position
+    assert (position.lat_deg, position.lon_deg) == (pytest.approx(-52.51), pytest.approx(-13.39))
+    assert position.alt_m == pytest.approx(79.0)
+
+
+def test_a_compass_is_preferred_to_a_course(tmp_path: Path) -> None:
+    _, found = opened(tmp_path, rmc("120000", "010326"), line("HEHDT,0.0,T"))
+    assert [one.yaw_rad for one in found["heading"]] == [pytest.approx(0.5 * math.pi)]
+    assert found["heading"][0].stamp_ns == NOON_NS
+
+
+def test_a_course_at_a_standstill_is_none(tmp_path: Path) -> None:
+    _, found = opened(tmp_path, rmc("120000", "010326", knots="0.1"))
+    assert "heading" not in found
+    assert found["speed"][0].speed_mps == pytest.approx(0.0514, abs=1e-3)
+
+
+def test_vtg_gives_the_speed_where_there_is_no_rmc(tmp_path: Path) -> None:
+    _, found = opened(
+        tmp_path,
+        line("GPZDA,120000.00,01,03,2026,00,00"),
+        gga("120000.00"),
+        line("GPVTG,180.0,T,,M,,N,36.0,K,A"),
+    )
+    assert found["speed"][0].speed_mps == pytest.approx(10.0)
+    assert found["heading"][0].yaw_rad == pytest.approx(-0.5 * math.pi)
+
+
+@pytest.mark.parametrize("dated", [True, False])
+def test_midnight_begins_the_next_day(tmp_path: Path, dated: bool) -> None:
+    day = rmc("235959.50", "280226")
+    after = rmc("000000.50", "010326") if dated else gga("000000.50")
+    _, found = opened(tmp_path, day, gga("235959.50"), after, gga("000000.50"))
+    first, second = (fix.stamp_ns for fix in found["gnss"])
+    assert first == NOON_NS - 12 * 3600 * 10**9 - 500_000_000
+    assert second - first == 10**9
+
+
+def test_times_before_the_first_date_are_of_the_day_before_where_midnight_lies_between(
+    tmp_path: Path,
+) -> None:
+    _, found = opened(tmp_path, gga("235959.50"), gga("000000.50"), rmc("000000.75", "010326"))
+    assert found["gnss"][1].stamp_ns - found["gnss"][0].stamp_ns == 10**9
+    assert found["speed"][0].stamp_ns - found["gnss"][1].stamp_ns == 250_000_000
+
+
+def test_what_is_refused_is_counted(tmp_path: Path) -> None:
+    broken = rmc("120001", "010326").replace("5230", "5231")
+    log, found = opened(
+        tmp_path,
+        line("HEHDT,12.0,T"),
+        rmc("120000", "010326"),
+        broken,
+        line("GPRMC,120002,V,,,,,,,010326,,,N"),
+        line("GPRMC,120003,A,5270.0000,N,01323.4,E,1.0,1.0,010326,,,A"),
+        gga("126000"),
+        gga("120004", quality=0),
+        gga("120005", quality=8),
+        "something else\n$GPXXX,1,2\n",
+        gga("120006"),
+    )
+    assert log.skipped == {
+        "sentence before any time": 1, "checksum wrong": 1, "receiver without fix": 3,
+        "unreadable row": 1,
+    }  # fmt: skip
+    assert [fix.stamp_ns for fix in found["gnss"]] == [NOON_NS + 6 * 10**9]
+
+
+def test_a_log_without_a_date_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"drive\.nmea: no RMC or ZDA sentence with a date"):
+        opened(tmp_path, gga("120000"))
+    with pytest.raises(LogError, match=r"drive\.nmea: no RMC or GGA sentence with a fix"):
+        opened(tmp_path, gga("120000", quality=0), line("GPZDA,120000,01,03,2026,00,00"))
