@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import msgspec
 
@@ -164,7 +164,15 @@ class Mapping(
         return None if at is None else LocalFrame(GeoPoint(at.lat_deg, at.lon_deg, at.alt_m))
 
 
-def read_mapping(path: Path) -> Mapping:
+class MappingFile(NamedTuple):
+    """A mapping that was read: checked, and as it stands in its file."""
+
+    name: str
+    text: str
+    mapping: Mapping
+
+
+def read_mapping(path: Path) -> MappingFile:
     """Read and check a mapping; the name `autoware` is ours for Autoware.
 
     Raises MappingError or FileNotFoundError, one line.
@@ -173,7 +181,8 @@ def read_mapping(path: Path) -> Mapping:
         path = AUTOWARE
     if not path.is_file():
         raise FileNotFoundError(f"ROS 2 mapping {path}: no such file")
-    return parse_mapping(path.read_text(encoding="utf-8"), name=str(path))
+    text = path.read_text(encoding="utf-8")
+    return MappingFile(str(path), text, parse_mapping(text, name=str(path)))
 
 
 def parse_mapping(text: str, *, name: str) -> Mapping:

@@ -22,7 +22,7 @@ source = "twin"
 
 
 def test_the_mapping_for_autoware() -> None:
-    mapping = read_mapping(Path("autoware"))
+    mapping = read_mapping(Path("autoware")).mapping
     assert {row.channel for row in mapping.inwards} >= {
         "gnss", "imu", "speed", "steering", "control", "plan", "status", "objects", "signals"
     }  # fmt: skip
