@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts import drive, futures, gap, planner_link, simulation, tuning
+from contracts import drive, futures, gap, planner_link, simulation, towards_vehicle, tuning
 
 PREFIX = "foretwin/v1"
 
@@ -116,6 +116,13 @@ CHANNELS: dict[str, Channel] = {
         _row("progress", f"{_RUN}/progress", simulation.Progress, 5, WATCH, "one line"),
         _row("event", f"{_RUN}/event", simulation.Event, None, RESULT, "worth telling"),
         _row("run_end", f"{_RUN}/run_end", simulation.RunEnd, None, RESULT, "write and leave"),
+        # Towards a real vehicle, through a gateway that bounds it; off unless switched on twice.
+        _row("authority", f"{_RUN}/authority", towards_vehicle.Authority, 20, LIVE,
+             "the orchestrator is in charge"),
+        _row("vehicle_command", f"{_RUN}/vehicle_command", towards_vehicle.VehicleCommand, 50,
+             LIVE, "what the vehicle shall do"),
+        _row("virtual_objects", f"{_RUN}/virtual_objects", drive.RoadUsers, 10, LIVE,
+             "road users that are simulated"),
         # A driving stack in another process as planner under test.
         _row("planner_scene", f"{_RUN}/worker/{{process}}/planner_scene",
              planner_link.PlannerScene, None, LIVE, "futures at one instant: what to do?"),

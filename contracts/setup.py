@@ -58,6 +58,18 @@ class RecorderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fiel
     file: str
 
 
+class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The gateway to ROS 2; `mapping` is the text of its TOML, as it was when it was checked.
+
+    `towards_vehicle` is the command line's switch; the mapping holds the other.
+    """
+
+    mapping: str
+    mapping_name: str
+    drive_frame: LocalFrame
+    towards_vehicle: bool = False
+
+
 class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A worker of one role; `drive_frame` is the frame of MirrorSample."""
 

@@ -66,6 +66,15 @@ def drive(
         str | None, typer.Option(help="auto, native, web or none [default: auto]")
     ] = None,
     out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,
+    ros2: Annotated[
+        str | None, typer.Option(help="mapping of the live car's ROS 2 topics, TOML, or autoware")
+    ] = None,
+    towards_vehicle: Annotated[
+        bool,
+        typer.Option(
+            "--towards-vehicle", help="second switch for what goes to the car; see docs/ros2.md"
+        ),
+    ] = False,
 ) -> None:
     """Drive ahead of a car: worlds for the coming junctions, futures, live comparison."""
     from orchestrator.config import load_config
@@ -78,6 +87,7 @@ def drive(
             "end_s": end, "speed": speed, "workers": workers, "futures": futures,
             "least_futures": least_futures, "rate_hz": rate, "horizon_s": horizon,
             "planner": planner, "seed": seed, "vehicle": vehicle, "view": view, "out": out,
+            "ros2": ros2, "towards_vehicle": towards_vehicle or None,
         },
     )  # fmt: skip
     raise typer.Exit(run_drive(settings))

@@ -62,6 +62,10 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     endpoint: str | None = None
     """Where the router listens, such as tcp/127.0.0.1:7447; None takes a free loopback port."""
     standin_plan_shift_m: float = 0.0
+    ros2: str | None = None
+    """A mapping in TOML, or `autoware`: the live car speaks ROS 2; see docs/ros2.md."""
+    towards_vehicle: bool = False
+    """One of two switches, and of the command line alone; the mapping holds the other."""
 
     def validate(self) -> DriveConfig:
         """Return self, or raise ConfigError naming the first setting that cannot be used."""
@@ -93,6 +97,18 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             (
                 self.route != "from-log" or self.log is not None,
                 "--route from-log needs --log FILE",
+            ),
+            (
+                self.ros2 is None or self.source == "live",
+                "--ros2 MAPPING needs --source live: its topics are the car's telemetry",
+            ),
+            (
+                self.ros2 is None or self.speed is not None,
+                "--ros2 MAPPING: a live car knows no --speed max",
+            ),
+            (
+                not self.towards_vehicle or self.ros2 is not None,
+                "--towards-vehicle needs --ros2 MAPPING",
             ),
             (
                 self.log is None or self.map is not None,
@@ -153,6 +169,9 @@ def load_config(path: Path | None, overrides: dict[str, Any]) -> DriveConfig:
             values = msgspec.toml.decode(path.read_bytes())
         except msgspec.DecodeError as error:
             raise ConfigError(f"{path}: not TOML: {error}") from error
+        if "towards_vehicle" in values:
+            # Else one file could hold both switches.
+            raise ConfigError(f"{path}: towards_vehicle: on the command line alone")
     values |= {name: value for name, value in overrides.items() if value is not None}
     if "speed" in values:
         values["speed"] = parse_speed(values["speed"])

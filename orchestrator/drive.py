@@ -17,6 +17,7 @@ from contracts.setup import ProcessSetup
 from contracts.simulation import RunEnd
 from orchestrator.conductor import Conductor
 from orchestrator.config import DriveConfig
+from orchestrator.in_charge import InCharge
 from orchestrator.instructions import Tell
 from orchestrator.live_loop import LiveLoop
 from orchestrator.lock_step import LockStepLoop
@@ -139,8 +140,15 @@ class _Drive:
             self._look_after(conductor, now_s)
             line.update(now_s)
 
-        loop = LockStepLoop if self._plan.config.lock_step else LiveLoop
-        ended = loop(conductor, housekeeping=housekeeping, stop=self._stop).run()
+        loop: LockStepLoop | LiveLoop
+        if self._plan.config.lock_step:
+            loop = LockStepLoop(conductor, housekeeping=housekeeping, stop=self._stop)
+        else:
+            in_charge = InCharge(bus, self._plan).say if self._plan.towards_vehicle else _nothing
+            loop = LiveLoop(
+                conductor, housekeeping=housekeeping, stop=self._stop, each_turn=in_charge
+            )
+        ended = loop.run()
         if self._vehicle_lost and not self._interrupt.asked:
             raise DriveError("the vehicle's process died; see log.jsonl")
         if not ended:
@@ -197,7 +205,8 @@ class _Drive:
                     conductor.handle(item)
                 self._look_after(conductor, time.monotonic())
                 first_ns = conductor.intake.first_stamp_ns
-                if first_ns is not None:
+                # A gateway knows our question, and the antenna's place.
+                if first_ns is not None and self._plan.ros2 is None:
                     conductor.take_info(unannounced(self._plan.config.vehicle_id, first_ns))
                     return True
             elif time.monotonic() > deadline:
@@ -267,6 +276,10 @@ class _Drive:
         with contextlib.suppress(OSError):  # a full disk has been told of
             fold_stderr(plan.processes_dir, plan.folder / "log.jsonl")
         line.say(summary_text(record))
+
+
+def _nothing() -> None:
+    """Say nothing towards a vehicle."""
 
 
 def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:

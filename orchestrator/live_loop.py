@@ -34,10 +34,13 @@ class LiveLoop:
         *,
         housekeeping: Callable[[float], None],
         stop: Callable[[], bool],
+        each_turn: Callable[[], None] = lambda: None,
     ) -> None:
+        """`each_turn` is called at least every 50 ms, unless the loop itself is held up."""
         self._conductor = conductor
         self._housekeeping = housekeeping
         self._stop = stop
+        self._each_turn = each_turn
         self._period_s = 1.0 / conductor.plan.config.rate_hz
         self._speed = conductor.plan.config.speed or 1.0
         self._started_s = 0.0
@@ -48,6 +51,7 @@ class LiveLoop:
         next_due_s = time.monotonic()
         next_housekeeping_s = next_due_s
         while not self._stop():
+            self._each_turn()
             now_s = time.monotonic()
             if now_s >= next_housekeeping_s:
                 self._housekeeping(now_s)

@@ -28,6 +28,7 @@ from orchestrator.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import check_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line
+from telemetry.ros2.mapping import MappingFile, read_mapping
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
@@ -65,6 +66,14 @@ class DriveInputs:
     log_file: Path | None
     info: VehicleInfo | None
     standin: StandinPath | None
+    ros2: MappingFile | None = None
+    """How the live car's ROS 2 topics are read, and what goes back."""
+
+    @property
+    def towards_vehicle(self) -> bool:
+        """Whether both switches are on: anything may go out towards the vehicle."""
+        enabled = self.ros2 is not None and self.ros2.mapping.towards_vehicle.enabled
+        return enabled and self.config.towards_vehicle
 
     @property
     def commands_recorded(self) -> bool:
@@ -110,6 +119,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         raise ConfigError(str(error)) from error
     scenarios_of(config)  # an unknown one is told before anything long begins
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
+    ros2 = read_mapping(Path(config.ros2)) if config.ros2 else None
     map_file = Path(config.map) if config.map else EMBEDDED_MAP
     source = config.resolved_source
     info, positions, log_file = None, None, None
@@ -158,6 +168,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         log_file=log_file,
         info=info,
         standin=standin,
+        ros2=ros2,
     )
 
 

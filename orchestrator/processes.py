@@ -10,6 +10,7 @@ from contracts.setup import (
     ProcessSetup,
     RecorderSetup,
     ReplaySetup,
+    Ros2Setup,
     StandinSetup,
     ViewerSetup,
     WorkerSetup,
@@ -123,6 +124,21 @@ def _standin(plan: DrivePlan, process_id: str) -> ProcessSetup:
     )
 
 
+def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    assert plan.ros2 is not None
+    return Ros2Setup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        mapping=plan.ros2.text,
+        mapping_name=plan.ros2.name,
+        drive_frame=plan.drive_frame,
+        towards_vehicle=plan.config.towards_vehicle,
+    )
+
+
+def _speaks_ros2(plan: DrivePlan) -> bool:
+    return plan.ros2 is not None
+
+
 def _source_is(source: str) -> Callable[[DrivePlan], bool]:
     return lambda plan: plan.config.resolved_source == source
 
@@ -135,6 +151,8 @@ PROCESSES: tuple[ProcessRow, ...] = (
     ProcessRow("viewer", "viewer", _always, _one, "report", _viewer, 10),
     ProcessRow(VEHICLE, "telemetry.replay", _source_is("log"), _one, "end_drive", _replay),
     ProcessRow(VEHICLE, "telemetry.standin", _source_is("standin"), _one, "end_drive", _standin),
+    # Never started again: what has stopped towards a vehicle must not resume by itself.
+    ProcessRow("ros2", "telemetry.ros2", _speaks_ros2, _one, "end_drive", _ros2),
 )
 """In the order in which they are started; the vehicle waits for the orchestrator's token."""
 

@@ -37,6 +37,9 @@ def test_no_file_and_no_flags_is_the_embedded_drive() -> None:
         ({"log": "a.gpx"}, "--map FILE"),
         ({"map": "a.osm"}, "--log FILE"),
         ({"view": "hologram"}, "view"),
+        ({"ros2": "autoware"}, "--source live"),
+        ({"ros2": "autoware", "source": "live", "speed": "max"}, "--speed max"),
+        ({"towards_vehicle": True, "source": "live"}, "--towards-vehicle needs --ros2"),
     ],
 )
 def test_what_cannot_be_used_is_named_in_one_line(flags: dict[str, object], named: str) -> None:
@@ -76,3 +79,10 @@ def test_speed_is_a_number_or_max() -> None:
 )
 def test_how_few_futures_a_slow_machine_may_run(settings: dict[str, object], fewest: int) -> None:
     assert load_config(None, settings).fewest_futures == fewest
+
+
+def test_no_file_can_hold_the_command_lines_switch_towards_the_vehicle(tmp_path: Path) -> None:
+    file = tmp_path / "drive.toml"
+    file.write_text('source = "live"\nros2 = "autoware"\ntowards_vehicle = true\n')
+    with pytest.raises(ConfigError, match="towards_vehicle: on the command line alone"):
+        load_config(file, {"towards_vehicle": True})

@@ -204,3 +204,17 @@ def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(dri
     assert conductor.started_s == pytest.approx([*range(10)], abs=0.03)
     assert conductor.missed_rounds == 0
     assert conductor.spared_rounds == 10
+
+
+def test_something_is_done_each_turn_at_least_every_50_ms(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(live_loop, "time", clock)
+    conductor = Conductor(clock, states_s=[0.0, 0.3], end_s=1.0)
+    turns_s: list[float] = []
+    LiveLoop(
+        conductor,  # type: ignore[arg-type]
+        housekeeping=lambda _: None,
+        stop=lambda: False,
+        each_turn=lambda: turns_s.append(clock.now_s),
+    ).run()
+    assert np.diff([*turns_s, 101.0]).max() < 0.051

@@ -1,0 +1,39 @@
+"""The gateway to ROS 2 as a process: `python -m telemetry.ros2 --setup FILE`."""
+
+from __future__ import annotations
+
+import logging
+
+from contracts.bus import Bus
+from contracts.foreign_bus import ZenohForeignBus
+from contracts.process import ProcessLife, run_process
+from contracts.setup import Ros2Setup
+from telemetry.ros2.gateway import Gateway
+from telemetry.ros2.mapping import parse_mapping
+from telemetry.ros_parts import typestore
+
+log = logging.getLogger("telemetry.ros2")
+
+
+def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
+    """Pass messages on until the run is over."""
+    mapping = parse_mapping(setup.mapping, name=setup.mapping_name)
+    typestore()  # 0.15 s that no sample shall wait for
+    with ZenohForeignBus(mapping.endpoint or setup.bus.endpoint) as foreign:
+        gateway = Gateway(
+            mapping,
+            bus=bus,
+            foreign=foreign,
+            run_id=setup.run_id,
+            vehicle_id=setup.vehicle_id,
+            drive_frame=setup.drive_frame,
+            flag_on=setup.towards_vehicle,
+        )
+        life.ready()
+        while not life.over:
+            gateway.step()
+        log.info("%s", gateway.report())
+
+
+if __name__ == "__main__":
+    run_process(Ros2Setup, serve)

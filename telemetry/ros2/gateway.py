@@ -1,0 +1,281 @@
+"""Between the vehicle's ROS 2 and a run: its topics as telemetry, and back what we say.
+
+One thread; what arrives waits in bounded mailboxes that forget the oldest. Nothing is repeated:
+each message towards the vehicle answers one fresh word of the orchestrator, so silence there is
+silence here, and the dead man of `telemetry.ros2.safety` shuts the gate besides.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from contracts import drive, gap
+from contracts.bus import Bus, Mailbox, Received, Request
+from contracts.codec import SchemaMismatch
+from contracts.foreign_bus import ForeignBus
+from contracts.frames import LocalFrame
+from contracts.simulation import Event, MirrorSample
+from contracts.towards_vehicle import Authority, VehicleCommand
+from telemetry.logs.foreign_ros import time_base_of
+from telemetry.ros2.inwards import Inwards
+from telemetry.ros2.mapping import Mapping, OutRow, Source
+from telemetry.ros2.outwards import Level, Outwards, is_usable
+from telemetry.ros2.safety import VehicleGate
+from telemetry.ros2.sender import RosSender
+
+_PORTION = 16
+"""So many samples at most between two looks at the orchestrator's words."""
+_DIAGNOSTICS_NS = 1_000_000_000
+_MEASURED_WITHIN_NS = 500_000_000
+"""A measured steering angle that is older says nothing of now."""
+_INFO_WAITS_NS = 1_500_000_000
+_STATE_EVERY_NS = 20_000_000
+
+log = logging.getLogger("telemetry.ros2")
+
+
+class Gateway:
+    """Does what is due with each `step`; owns neither bus."""
+
+    def __init__(
+        self,
+        mapping: Mapping,
+        *,
+        bus: Bus,
+        foreign: ForeignBus,
+        run_id: str,
+        vehicle_id: str,
+        drive_frame: LocalFrame,
+        flag_on: bool,
+        mono_ns: Callable[[], int] = time.monotonic_ns,
+        wall_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
+        """Subscribe to what the mapping names; `flag_on` is the command line's switch."""
+        self._mapping, self._bus, self._foreign = mapping, bus, foreign
+        self._vehicle_id, self._mono_ns, self._wall_ns = vehicle_id, mono_ns, wall_ns
+        self.inwards = Inwards(mapping)
+        self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id)
+        self.gate = VehicleGate(
+            mapping.towards_vehicle.limits(),
+            config_on=mapping.towards_vehicle.enabled,
+            flag_on=flag_on,
+        )
+        self.held: Counter[str] = Counter()
+        """By topic, messages towards the vehicle that were not sent."""
+        self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
+        self._last_ns: dict[str, int] = {}
+        self._told: dict[str, Level] = {}
+        self._waiting: list[tuple[int, Request]] = []
+        self._inbox, self._words, self._views = Mailbox(2048), Mailbox(64), Mailbox(256)
+        self._gate_told = self.gate.state
+        for key in self.inwards.key_expressions():
+            foreign.subscribe(key, self._inbox)
+        bus.serve("info", self._views, vehicle=vehicle_id)
+        self._listen(run_id)
+        self._sender.announce(
+            [
+                *mapping.inwards,
+                *(
+                    row
+                    for row in mapping.outwards
+                    if not row.towards_vehicle or self.gate.state != "off"
+                ),
+            ]
+        )
+        log.info("towards the vehicle: %s", self.gate.why)
+
+    def step(self, wait_s: float = 0.005) -> None:
+        """Wait a moment for samples, then pass on what has come from either side."""
+        arrived: Any = self._inbox.take(wait_s)
+        for left in reversed(range(_PORTION)):
+            self._hear()
+            if arrived is None:
+                break
+            for channel, message in self.inwards.take(arrived):
+                self._bus.publish(channel, message, vehicle=self._vehicle_id)
+            arrived = self._inbox.take() if left else None
+        for _ in range(_PORTION):
+            item = self._views.take()
+            if item is None:
+                break
+            self._pass_on(item)
+        self._hear()
+        self._answer_info()
+        self._diagnose()
+
+    def info(self) -> drive.VehicleInfo | None:
+        """Return what is known of the vehicle, None before its first sample."""
+        first_ns = self.inwards.first_stamp_ns
+        if first_ns is None:
+            return None
+        return drive.VehicleInfo(
+            vehicle_id=self._vehicle_id,
+            time_base=time_base_of(first_ns),
+            start_stamp_ns=first_ns,
+            source=f"ROS 2 through {self._mapping.dialect}",
+            reference_point="antenna",
+            body_from_antenna_m=self.inwards.antenna_m,
+            sends=self.inwards.channels,
+        )
+
+    def report(self) -> dict[str, dict[str, int]]:
+        """Return all counts: what came in, what was left out, what was sent, bounded and held."""
+        return {
+            "in": dict(self.inwards.counts),
+            "unused": dict(self.inwards.unused),
+            "lost": dict(self.inwards.lost),
+            "sent": dict(self._sender.sent),
+            "held": dict(self.held),
+            "gate": dict(self.gate.counts),
+            "dropped": {
+                "samples": self._inbox.dropped,
+                "words": self._words.dropped,
+                "views": self._views.dropped,
+            },
+        }
+
+    def _listen(self, run_id: str) -> None:
+        sources = {row.source for row in self._mapping.outwards}
+        if self.gate.state != "off":
+            self._bus.subscribe("authority", self._words, run=run_id)
+            if "vehicle_command" in sources:
+                self._bus.subscribe("vehicle_command", self._words, run=run_id)
+        if sources & {"state", "clock"}:
+            self._bus.subscribe("state", self._views, vehicle=self._vehicle_id)
+        for source, channel in (("twin", "mirror"), ("virtual_objects", "virtual_objects")):
+            if source in sources:
+                self._bus.subscribe(channel, self._views, run=run_id)
+        if "diagnostics" in sources:
+            for channel in ("event", "gap_alarm", "verdict"):
+                self._bus.subscribe(channel, self._views, run=run_id)
+
+    def _hear(self) -> None:
+        """Take every word of the orchestrator, then look whether the gate may stay open."""
+        while (item := self._words.take()) is not None:
+            message = _decoded(item)
+            if isinstance(message, Authority):
+                self.gate.hear(message.sent_mono_ns, now_ns=self._mono_ns())
+            elif isinstance(message, VehicleCommand):
+                self._command(message)
+        if self.gate.state == "open":
+            self.gate.look(now_ns=self._mono_ns(), link_up=self._foreign.connected)
+        if self.gate.state != self._gate_told:
+            self._gate_told = self.gate.state
+            log.warning("towards the vehicle: %s: %s", self.gate.state, self.gate.why)
+
+    def _command(self, message: VehicleCommand) -> None:
+        now_ns = self._mono_ns()
+        measured_ago_ns = now_ns - self.inwards.tire_angle_mono_ns
+        known = measured_ago_ns <= _MEASURED_WITHIN_NS
+        admitted = self.gate.admit(
+            message,
+            now_ns=now_ns,
+            link_up=self._foreign.connected,
+            tire_angle_rad=self.inwards.tire_angle_rad if known else None,
+        )
+        for row in self._out.rows("vehicle_command"):
+            if admitted is None:
+                self.held[row.topic] += 1
+            else:
+                stamp_ns = self._wall_ns()
+                self._put(row, self._out.command(admitted, row.type, stamp_ns=stamp_ns))
+
+    def _pass_on(self, item: Any) -> None:
+        if isinstance(item, Request):
+            self._waiting.append((self._mono_ns(), item))
+            return
+        match _decoded(item):
+            case drive.VehicleState() as state:
+                self._send("state", lambda _: self._out.state(state), every_ns=_STATE_EVERY_NS)
+                self._send(
+                    "clock", lambda _: self._out.clock(state.stamp_ns), every_ns=_STATE_EVERY_NS
+                )
+            case MirrorSample() as mirror:
+                self._send("twin", lambda _: self._out.twin(mirror))
+            case drive.RoadUsers() as users:
+                if is_usable(users, at_most=self._mapping.towards_vehicle.max_objects):
+                    self._send("virtual_objects", lambda row: self._out.objects(users, row.type))
+                else:
+                    self.held["virtual objects that are too many or not finite"] += 1
+            case Event() as event if event.level != "info":
+                level = 2 if event.level == "error" else 1
+                self._told["event"] = Level("foretwin/event", level, event.text, {})
+            case gap.GapAlarm() as alarm:
+                name = f"foretwin/gap/{alarm.quantity}"
+                values = {"value": f"{alarm.value:.6g}", "limit": f"{alarm.limit:.6g}"}
+                text = "beyond its limit" if alarm.over else "within its limit"
+                self._told[name] = Level(name, int(alarm.over), text, values)
+            case gap.Verdict() as verdict:
+                values = {"cause": verdict.cause, "confidence": f"{verdict.confidence:.3f}"}
+                self._told["verdict"] = Level("foretwin/verdict", 1, verdict.text, values)
+
+    def _send(
+        self, source: Source, payload: Callable[[OutRow], bytes], *, every_ns: int = 0
+    ) -> None:
+        """Send on the rows of a source; towards the vehicle only through the gate, at its rate."""
+        for row in self._out.rows(source):
+            now_ns, least_ns = self._mono_ns(), every_ns
+            if row.towards_vehicle:
+                least_ns = max(every_ns, int(1e9 / self._mapping.towards_vehicle.max_rate_hz))
+                if self.gate.look(now_ns=now_ns, link_up=self._foreign.connected) != "open":
+                    self.held[row.topic] += 1
+                    continue
+            if now_ns - self._last_ns.get(row.topic, now_ns - least_ns) < least_ns:
+                continue
+            self._last_ns[row.topic] = now_ns
+            try:
+                self._put(row, payload(row))
+            except (ValueError, OverflowError, AssertionError) as error:
+                # A stamp that no ROS time holds, a number that 32 bits do not.
+                self.held[f"{row.topic}: {type(error).__name__}"] += 1
+
+    def _put(self, row: OutRow, payload: bytes) -> None:
+        """The only way out; refuses once more what must not leave."""
+        if row.towards_vehicle and self.gate.state != "open":
+            self.held[row.topic] += 1
+            return
+        self._sender.put(row, payload)
+
+    def _answer_info(self) -> None:
+        if not self._waiting:
+            return
+        info, now_ns = self.info(), self._mono_ns()
+        kept = []
+        for since_ns, request in self._waiting:
+            if info is not None:
+                request.reply(info)
+            elif now_ns - since_ns > _INFO_WAITS_NS:
+                request.refuse("no sample of the vehicle yet")
+            else:
+                kept.append((since_ns, request))
+        self._waiting = kept
+
+    def _diagnose(self) -> None:
+        now_ns = self._mono_ns()
+        if now_ns - self._last_ns.get("diagnostics", 0) < _DIAGNOSTICS_NS:
+            return
+        self._last_ns["diagnostics"] = now_ns
+        levels = list(self._told.values())
+        for part, counts in self.report().items():
+            well = part in ("in", "sent", "gate") or not any(counts.values())
+            levels.append(
+                Level(f"foretwin/ros2/{part}", 0 if well else 1, "",
+                      {key: str(value) for key, value in counts.items()})
+            )  # fmt: skip
+        shut = self.gate.state == "shut"
+        levels.append(Level("foretwin/ros2/towards_vehicle", 2 * shut, self.gate.why, {}))
+        stamp_ns = self._wall_ns()
+        self._send("diagnostics", lambda _: self._out.diagnostics(stamp_ns, levels))
+
+
+def _decoded(item: Any) -> Any:
+    if not isinstance(item, Received):
+        return None
+    try:
+        return item.message()
+    except SchemaMismatch:
+        return None

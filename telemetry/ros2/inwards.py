@@ -1,0 +1,182 @@
+"""ROS messages of a vehicle as samples of its telemetry; pure, counts what it cannot use."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from contracts import drive
+from contracts.foreign_bus import Arrived
+from telemetry.logs.units import ANGLE, SPEED
+from telemetry.ros2.attachment import unpack
+from telemetry.ros2.mapping import InRow, Mapping
+from telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
+from telemetry.ros_foreign import FOREIGN, UnusableError, stamp_of
+from telemetry.ros_parts import BASE_FRAME, CLOCK, LANELET_ROUTE, TF, typestore
+from telemetry.ros_status import StatusJoiner
+from telemetry.ros_transforms import TransformTree
+
+Samples = list[tuple[str, msgspec.Struct]]
+
+
+class Inwards:
+    """Turns what arrives into samples.
+
+    `counts` holds samples by channel, `unused` what was left out by topic and reason.
+    """
+
+    def __init__(self, mapping: Mapping) -> None:
+        self._mapping = mapping
+        self._rows = {row.topic: row for row in mapping.inwards}
+        self._by_bridge_key = {
+            bridge_key(row.topic, namespace=mapping.namespace): row for row in mapping.inwards
+        }
+        self._joiner = StatusJoiner()
+        self._transforms = TransformTree()
+        self._antenna_frame: str | None = None
+        self.counts: Counter[str] = Counter()
+        self.unused: Counter[str] = Counter()
+        self.lost: Counter[str] = Counter()
+        """By topic, samples that the sequence numbers of rmw_zenoh say went missing."""
+        self._next_seq: dict[tuple[str, bytes], int] = {}
+        self.first_stamp_ns: int | None = None
+        self.tire_angle_rad: float | None = None
+        """The newest measured angle at the tyres."""
+        self.tire_angle_mono_ns = 0
+        self.clock_ns: int | None = None
+        """The newest /clock of the vehicle's side."""
+
+    def key_expressions(self) -> list[str]:
+        """Return the key expressions to subscribe to; of rmw_zenoh with any type and hash."""
+        if self._mapping.dialect == "ros2dds":
+            return list(self._by_bridge_key)
+        return [rmw_any_type_key(topic, domain=self._mapping.domain) for topic in self._rows]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels of telemetry that the mapping feeds."""
+        return tuple(sorted({row.channel for row in self._rows.values() if row.type in FOREIGN}))
+
+    @property
+    def antenna_m(self) -> drive.Vector3 | None:
+        """The antenna's place in base_link, from the mapping or from the transforms."""
+        if self._mapping.antenna_m is not None or self._antenna_frame is None:
+            return self._mapping.antenna_m
+        return self._transforms.place_of(self._antenna_frame, within=BASE_FRAME)
+
+    def take(self, arrived: Arrived) -> Samples:
+        """Return the samples of one message, none where it cannot be used; never raises."""
+        row, why = self._row_of(arrived.key)
+        if row is None:
+            self.unused[why] += 1
+            return []
+        if arrived.attachment is not None:
+            self._follow(row.topic, arrived.attachment)
+        try:
+            ros = typestore().deserialize_cdr(arrived.payload, row.type)
+        except Exception:  # whatever rosbags raises over broken bytes, or those of another type
+            self.unused[f"{row.topic}: unreadable as {row.type}"] += 1
+            return []
+        try:
+            return self._samples(row, ros, arrived)
+        except UnusableError as reason:
+            self.unused[f"{row.topic}: {reason}"] += 1
+        except (ValueError, ArithmeticError) as error:
+            # Its text may differ each time, and this must stay small.
+            self.unused[f"{row.topic}: {type(error).__name__}"] += 1
+        return []
+
+    def _row_of(self, key: str) -> tuple[InRow | None, str]:
+        if self._mapping.dialect == "ros2dds":
+            return self._by_bridge_key.get(key), f"{key}: not mapped"
+        try:
+            found = parse_rmw_key(key)
+        except ValueError:
+            return None, f"{key}: no key of rmw_zenoh"
+        row = self._rows.get(found.topic)
+        if row is not None and row.type != found.kind:
+            return None, f"{found.topic}: type {found.kind} instead of {row.type}"
+        return row, f"{found.topic}: not mapped"
+
+    def _follow(self, topic: str, attached: bytes) -> None:
+        try:
+            attachment = unpack(attached)
+        except ValueError:
+            self.unused[f"{topic}: attachment not understood"] += 1
+            return
+        sender = (topic, attachment.gid)
+        expected = self._next_seq.get(sender)
+        if expected is not None and 0 < attachment.seq - expected < 2**31:
+            self.lost[topic] += attachment.seq - expected
+        self._next_seq[sender] = max(attachment.seq + 1, expected or 0)
+
+    def _samples(self, row: InRow, ros: Any, arrived: Arrived) -> Samples:
+        if row.type == TF:
+            self._transforms.add(ros)
+            return []
+        if row.type == CLOCK:
+            self.clock_ns = int(ros.clock.sec) * 10**9 + int(ros.clock.nanosec)
+            return []
+        if row.type == LANELET_ROUTE:
+            # Lanelet ids say nothing without the vehicle's own map: the route is predicted instead.
+            raise UnusableError("a route of lanelets, whose map is not known")
+        how = FOREIGN[row.type]
+        stamp_ns = arrived.received_wall_ns
+        if row.stamp == "header":
+            stamp_ns = stamp_of(ros) or stamp_ns
+        if how.channel == "gnss":
+            self._antenna_frame = str(ros.header.frame_id)
+        samples: Samples = []
+        for message in how.read(ros, stamp_ns, self._mapping.map_frame):
+            if isinstance(message, drive.VehicleStatus):
+                message = self._joiner.join(message)
+            message = _in_our_units(message, row)
+            if not _is_finite(message):
+                raise UnusableError("a number that is not finite")
+            self._note(message, arrived)
+            samples.append((how.channel, message))
+        self.counts[how.channel] += len(samples)
+        return samples
+
+    def _note(self, message: msgspec.Struct, arrived: Arrived) -> None:
+        if self.first_stamp_ns is None:
+            self.first_stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
+        if isinstance(message, drive.SteeringSample) and message.tire_angle_rad is not None:
+            self.tire_angle_rad = message.tire_angle_rad
+            self.tire_angle_mono_ns = arrived.received_mono_ns
+
+
+def _in_our_units(message: msgspec.Struct, row: InRow) -> msgspec.Struct:
+    match message:
+        case drive.SteeringSample() | drive.ControlCommand():
+            factor = ANGLE[row.angle_unit] * (1.0 if row.left_positive else -1.0)
+            angle = message.tire_angle_rad
+            if factor == 1.0 or angle is None:
+                return message
+            return msgspec.structs.replace(message, tire_angle_rad=factor * angle)
+        case drive.SpeedSample():
+            speed = message.speed_mps * SPEED[row.speed_unit]
+            return msgspec.structs.replace(message, speed_mps=speed)
+        case drive.ImuSample() if row.axes == "forward_right_down":
+            a, w = message.accel_mps2, message.rate_radps
+            return msgspec.structs.replace(
+                message, accel_mps2=(a[0], -a[1], -a[2]), rate_radps=(w[0], -w[1], -w[2])
+            )
+    return message
+
+
+def _is_finite(value: Any) -> bool:
+    match value:
+        case float():
+            return math.isfinite(value)
+        case np.ndarray():
+            return bool(np.isfinite(value).all())
+        case msgspec.Struct():
+            return all(_is_finite(getattr(value, name)) for name in value.__struct_fields__)
+        case tuple():
+            return all(map(_is_finite, value))
+    return True

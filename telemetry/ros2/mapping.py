@@ -1,0 +1,243 @@
+"""Which ROS topics become which channels, and back: one TOML file, checked into a frozen struct.
+
+`[[in]]` rows: topic, type, channel, units and axes that differ from ROS's. `[[out]]` rows: topic,
+type, source. Whatever a vehicle's software might obey, that is commands, and any topic outside
+/foretwin/, counts as towards the vehicle: see `OutRow.towards_vehicle`.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import msgspec
+
+from contracts.drive import Vector3
+from contracts.errors import UserError
+from contracts.frames import GeoPoint, LocalFrame
+from telemetry.logs.units import ANGLE, SPEED
+from telemetry.ros2.names import Dialect, check_topic, dds_type
+from telemetry.ros2.safety import Limits
+from telemetry.ros_foreign import FOREIGN
+from telemetry.ros_messages import TOPIC_PREFIX as OWN_PREFIX
+from telemetry.ros_parts import (
+    ACKERMANN,
+    CLOCK,
+    CONTROL,
+    DETECTED_OBJECTS,
+    LANELET_ROUTE,
+    ODOMETRY,
+    PREDICTED_OBJECTS,
+    TF,
+)
+
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+AUTOWARE = Path(__file__).with_name("autoware.toml")
+
+Source = Literal["state", "twin", "virtual_objects", "diagnostics", "clock", "vehicle_command"]
+_TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
+    "state": (ODOMETRY,),
+    "twin": (ODOMETRY,),
+    "virtual_objects": (PREDICTED_OBJECTS, DETECTED_OBJECTS),
+    "diagnostics": (DIAGNOSTICS,),
+    "clock": (CLOCK,),
+    "vehicle_command": (CONTROL, ACKERMANN),
+}
+CHANNEL_OF_OTHERS = {TF: "transforms", CLOCK: "clock", LANELET_ROUTE: "route"}
+"""Types that are taken in but are no samples of the vehicle's telemetry."""
+
+
+class MappingError(UserError):
+    """A mapping that cannot be used; the text names the file, the line and what would be right."""
+
+
+class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One topic that is listened to."""
+
+    topic: str
+    type: str
+    channel: str
+    stamp: Literal["header", "arrival"] = "header"
+    angle_unit: str = "rad"
+    """Of steering and commands."""
+    left_positive: bool = True
+    """Of steering and commands."""
+    speed_unit: str = "m/s"
+    axes: Literal["forward_left_up", "forward_right_down"] = "forward_left_up"
+    """Of an Imu."""
+
+    def validate(self) -> None:
+        """Raise ValueError naming the key at fault."""
+        check_topic(self.topic)
+        dds_type(self.type)
+        known = {kind: how.channel for kind, how in FOREIGN.items()} | CHANNEL_OF_OTHERS
+        if self.type not in known:
+            raise ValueError(f"type {self.type!r}: readable are {', '.join(sorted(known))}")
+        if self.channel != known[self.type]:
+            raise ValueError(f"channel {self.channel!r}: {self.type} gives {known[self.type]!r}")
+        for name, units in (("angle_unit", ANGLE), ("speed_unit", SPEED)):
+            if getattr(self, name) not in units:
+                raise ValueError(f"{name} {getattr(self, name)!r}: one of {', '.join(units)}")
+        angles = self.angle_unit != "rad" or not self.left_positive
+        if angles and self.channel not in ("steering", "control"):
+            raise ValueError(f"angle_unit, left_positive: not of channel {self.channel!r}")
+        if self.speed_unit != "m/s" and self.channel != "speed":
+            raise ValueError(f"speed_unit: not of channel {self.channel!r}")
+        if self.axes != "forward_left_up" and self.channel != "imu":
+            raise ValueError(f"axes: not of channel {self.channel!r}")
+
+    @property
+    def stream(self) -> str:
+        """What must come from one topic alone."""
+        return FOREIGN[self.type].stream if self.type in FOREIGN else self.type + self.topic
+
+
+class OutRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One topic that is published."""
+
+    topic: str
+    type: str
+    source: Source
+
+    def validate(self) -> None:
+        """Raise ValueError naming the key at fault."""
+        check_topic(self.topic)
+        if self.type not in _TYPES_OF_SOURCE[self.source]:
+            raise ValueError(
+                f"type {self.type!r}: {self.source} goes out as "
+                f"{' or '.join(_TYPES_OF_SOURCE[self.source])}"
+            )
+
+    @property
+    def towards_vehicle(self) -> bool:
+        """Whether software of the vehicle might obey it: a command, or a topic that is not ours."""
+        return self.source == "vehicle_command" or not self.topic.startswith(OWN_PREFIX)
+
+
+class MapPlace(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the frame `map` lies: a plane east and north at this point."""
+
+    lat_deg: float
+    lon_deg: float
+    alt_m: float = 0.0
+
+
+class TowardsVehicle(Limits, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The configuration's switch and the bounds; the other switch is on the command line."""
+
+    enabled: bool = False
+    max_objects: int = 64
+
+    def limits(self) -> Limits:
+        """Return the bounds alone."""
+        return Limits(**{name: getattr(self, name) for name in Limits.__struct_fields__})
+
+
+class Mapping(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    forbid_unknown_fields=True,
+    rename={"inwards": "in", "outwards": "out", "map_place": "map"},
+):
+    """The whole file."""
+
+    dialect: Dialect
+    endpoint: str | None = None
+    """The vehicle's Zenoh router; None is the run's own, to which the vehicle's side connects."""
+    domain: int = 0
+    """ROS_DOMAIN_ID, of rmw_zenoh."""
+    namespace: str = "/"
+    """Of zenoh-bridge-ros2dds."""
+    antenna_m: Vector3 | None = None
+    """Of the GNSS antenna from base_link: forward, left, up; else from /tf_static."""
+    map_place: MapPlace | None = None
+    inwards: tuple[InRow, ...] = ()
+    outwards: tuple[OutRow, ...] = ()
+    towards_vehicle: TowardsVehicle = TowardsVehicle()
+
+    @property
+    def map_frame(self) -> LocalFrame | None:
+        """The plane of `map`, None where the file does not place it."""
+        at = self.map_place
+        return None if at is None else LocalFrame(GeoPoint(at.lat_deg, at.lon_deg, at.alt_m))
+
+
+class MappingFile(NamedTuple):
+    """A mapping that was read: checked, and as it stands in its file."""
+
+    name: str
+    text: str
+    mapping: Mapping
+
+
+def read_mapping(path: Path) -> MappingFile:
+    """Read and check a mapping; the name `autoware` is ours for Autoware.
+
+    Raises MappingError or FileNotFoundError, one line.
+    """
+    if str(path) == "autoware":
+        path = AUTOWARE
+    if not path.is_file():
+        raise FileNotFoundError(f"ROS 2 mapping {path}: no such file")
+    text = path.read_text(encoding="utf-8")
+    return MappingFile(str(path), text, parse_mapping(text, name=str(path)))
+
+
+def parse_mapping(text: str, *, name: str) -> Mapping:
+    """Return the mapping of a TOML text; `name` is the file in errors. Raises MappingError."""
+    try:
+        mapping = msgspec.toml.decode(text, type=Mapping)
+    except msgspec.ValidationError as error:
+        raise MappingError(f"{name}: {error}") from error
+    except msgspec.DecodeError as error:
+        raise MappingError(f"{name}: not TOML: {error}") from error
+    try:
+        mapping.towards_vehicle.limits().validate()
+        _check_head(mapping)
+    except ValueError as error:
+        raise MappingError(f"{name}: {error}") from error
+    seen: dict[str, str] = {}
+    tables: tuple[tuple[str, tuple[InRow | OutRow, ...]], ...] = (
+        ("[[in]]", mapping.inwards),
+        ("[[out]]", mapping.outwards),
+    )
+    for header, rows in tables:
+        for index, row in enumerate(rows):
+            try:
+                row.validate()
+                _check_alone(row, seen, mapping)
+            except ValueError as error:
+                line = _line_of(text, header, index)
+                raise MappingError(f"{name}, line {line}, {header}: {error}") from error
+    return mapping
+
+
+def _check_head(mapping: Mapping) -> None:
+    if not 0 <= mapping.domain <= 232:
+        raise ValueError(f"domain {mapping.domain}: 0 to 232")
+    at = mapping.map_place
+    if at is not None and not (abs(at.lat_deg) < 90.0 and abs(at.lon_deg) <= 180.0):
+        raise ValueError(f"map at {at.lat_deg}, {at.lon_deg}: degrees of latitude and longitude")
+    if mapping.antenna_m is not None and not all(map(math.isfinite, mapping.antenna_m)):
+        raise ValueError(f"antenna_m {mapping.antenna_m}: three finite numbers")
+
+
+def _check_alone(row: InRow | OutRow, seen: dict[str, str], mapping: Mapping) -> None:
+    """Refuse two topics for one stream, one topic twice, and objects without a known `map`."""
+    if isinstance(row, InRow):
+        keys = {f"in {row.topic}": f"topic {row.topic}", row.stream: f"stream {row.stream}"}
+    else:
+        keys = {f"out {row.topic}": f"topic {row.topic}"}
+        if row.source == "virtual_objects" and row.towards_vehicle and mapping.map_place is None:
+            raise ValueError("virtual objects towards the vehicle need [map] lat_deg, lon_deg")
+    for key, what in keys.items():
+        if key in seen:
+            raise ValueError(f"{what} stands twice; first: {seen[key]}")
+        seen[key] = row.topic
+
+
+def _line_of(text: str, header: str, index: int) -> int:
+    found = [number for number, line in enumerate(text.splitlines(), 1) if line.strip() == header]
+    return found[index] if index < len(found) else 0

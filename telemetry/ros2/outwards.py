@@ -1,0 +1,133 @@
+"""What foretwin says as ROS messages: states, virtual objects, diagnostics, time, commands."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contracts import drive
+from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from contracts.simulation import MirrorSample
+from contracts.towards_vehicle import VehicleCommand
+from telemetry.ros2.mapping import DIAGNOSTICS, Mapping, OutRow, Source
+from telemetry.ros_commands import ackermann_from_command, control_from_command
+from telemetry.ros_motion import ros_from_state
+from telemetry.ros_objects import detected_from_users, predicted_from_users
+from telemetry.ros_parts import CLOCK, CONTROL, DETECTED_OBJECTS, header_from, ros_type, time_from
+from telemetry.ros_parts import typestore as ros_types
+
+DRIVE_FRAME = "foretwin_drive"
+"""The frame of what goes out where the mapping does not place `map`: the drive's own plane."""
+
+
+class Level(NamedTuple):
+    """One line of diagnostics: what it is of, whether all is well, and its numbers."""
+
+    name: str
+    level: int
+    """0 well, 1 warning, 2 error, as diagnostic_msgs has them."""
+    text: str
+    values: dict[str, str]
+
+
+class Outwards:
+    """Turns messages of a run into CDR bytes for the rows that carry them."""
+
+    def __init__(self, mapping: Mapping, *, drive_frame: LocalFrame, vehicle_id: str) -> None:
+        self._rows = mapping.outwards
+        self._map = mapping.map_frame
+        self._drive_frame = drive_frame
+        self._vehicle_id = vehicle_id
+
+    def rows(self, source: Source) -> list[OutRow]:
+        """Return the rows that carry a source."""
+        return [row for row in self._rows if row.source == source]
+
+    def state(self, message: drive.VehicleState) -> bytes:
+        """Return the Odometry of a state."""
+        frame = self._map or self._drive_frame
+        (_, kind, odometry), *_ = ros_from_state(message, frame)
+        return _cdr(self._framed(odometry), kind)
+
+    def twin(self, message: MirrorSample) -> bytes:
+        """Return the Odometry of the twin; its yaw rate is not known and stands as 0."""
+        twin, frame = message.twin, self._drive_frame
+        xy_m = np.array([[twin.x_m, twin.y_m]])
+        lat_deg, lon_deg = geo_from_local(frame, xy_m)[0].tolist()
+        yaw = float(geo_from_local_yaw(frame, np.array([twin.yaw_rad]), xy_m)[0])
+        return self.state(
+            drive.VehicleState(
+                vehicle_id=self._vehicle_id,
+                stamp_ns=message.stamp_ns,
+                position=GeoPoint(lat_deg, lon_deg, (self._map or frame).origin.alt_m),
+                yaw_rad=yaw,
+                speed_mps=twin.speed_mps,
+                yaw_rate_radps=0.0,
+                accel_mps2=0.0,
+                estimated=("yaw_rate_radps", "accel_mps2"),
+            )
+        )
+
+    def objects(self, message: drive.RoadUsers, kind: str) -> bytes:
+        """Return DetectedObjects or PredictedObjects."""
+        convert = detected_from_users if kind == DETECTED_OBJECTS else predicted_from_users
+        return _cdr(self._framed(convert(message, self._map or self._drive_frame)), kind)
+
+    def clock(self, stamp_ns: int) -> bytes:
+        """Return a Clock."""
+        return _cdr(ros_type(CLOCK)(clock=time_from(stamp_ns)), CLOCK)
+
+    def diagnostics(self, stamp_ns: int, levels: list[Level]) -> bytes:
+        """Return a DiagnosticArray."""
+        status = ros_type("diagnostic_msgs/msg/DiagnosticStatus")
+        pair = ros_type("diagnostic_msgs/msg/KeyValue")
+        array = ros_type(DIAGNOSTICS)(
+            header=header_from(stamp_ns, ""),
+            status=[
+                status(
+                    level=one.level,
+                    name=one.name,
+                    message=one.text,
+                    hardware_id=self._vehicle_id,
+                    values=[pair(key=key, value=value) for key, value in one.values.items()],
+                )
+                for one in levels
+            ],
+        )
+        return _cdr(array, DIAGNOSTICS)
+
+    def command(self, message: VehicleCommand, kind: str, *, stamp_ns: int) -> bytes:
+        """Return Control or AckermannDriveStamped; the stamp is when it goes out.
+
+        Raises ValueError for a number that is not finite.
+        """
+        command = drive.ControlCommand(
+            stamp_ns=stamp_ns,
+            accel_mps2=message.accel_mps2,
+            tire_angle_rad=message.tire_angle_rad,
+        )
+        convert = control_from_command if kind == CONTROL else ackermann_from_command
+        return _cdr(convert(command, speed_mps=message.speed_mps), kind)
+
+    def _framed(self, ros: Any) -> Any:
+        if self._map is None:
+            ros.header.frame_id = DRIVE_FRAME
+        return ros
+
+
+def is_usable(message: drive.RoadUsers, *, at_most: int) -> bool:
+    """Whether virtual objects may go towards a vehicle: not too many, every number finite."""
+    numbers = [
+        number
+        for user in message.users
+        for number in (
+            user.position.lat_deg, user.position.lon_deg, user.position.alt_m,
+            user.yaw_rad, user.speed_mps, user.length_m, user.width_m,
+        )
+    ]  # fmt: skip
+    return len(message.users) <= at_most and bool(np.isfinite(numbers).all())
+
+
+def _cdr(ros: Any, kind: str) -> bytes:
+    return bytes(ros_types().serialize_cdr(ros, kind))

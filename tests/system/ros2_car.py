@@ -1,0 +1,67 @@
+"""A car behind zenoh-bridge-ros2dds that drives the embedded route: plain CDR on plain keys."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from contracts import drive
+from contracts.foreign_bus import Arrived, ZenohForeignBus
+from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from contracts.mailbox import Mailbox
+from orchestrator.plan import EMBEDDED_ROUTE
+from telemetry.logs import read_line
+from telemetry.ros_commands import velocity_report
+from telemetry.ros_parts import STEERING_REPORT, VELOCITY_REPORT, ros_type, time_from, typestore
+from telemetry.ros_sensors import ros_from_gnss
+
+SPEED_MPS = 8.0
+REPORT_EVERY_S = 0.02
+
+
+class Ros2Car:
+    """Publishes GNSS at 10 Hz, speed and steering at 50 Hz, and keeps what comes back."""
+
+    def __init__(self, bus: ZenohForeignBus, *, listens_to: tuple[str, ...]) -> None:
+        self._bus = bus
+        self.heard = Mailbox(100_000)
+        for key in listens_to:
+            bus.subscribe(key, self.heard)
+        line_deg = read_line(EMBEDDED_ROUTE).lat_lon_deg
+        self._frame = LocalFrame(GeoPoint(float(line_deg[0, 0]), float(line_deg[0, 1])))
+        self._xy_m = local_from_geo(self._frame, line_deg[:, 0], line_deg[:, 1])
+        steps_m = np.hypot(*np.diff(self._xy_m, axis=0).T)
+        self._arc_m = np.concatenate(([0.0], np.cumsum(steps_m)))
+        self._started_s = time.monotonic()
+        self._turn = 0
+
+    def drive_until(self, *, deadline_s: float) -> Arrived | None:
+        """Drive on until something comes back; None where nothing does in so many seconds."""
+        until_s = time.monotonic() + deadline_s
+        while time.monotonic() < until_s:
+            if time.monotonic() - self._started_s >= REPORT_EVERY_S * self._turn:
+                self._report()
+            item = self.heard.take(0.005)
+            if item is not None:
+                assert isinstance(item, Arrived)
+                return item
+        return None
+
+    def _report(self) -> None:
+        stamp_ns = time.time_ns()
+        arc_m = (time.monotonic() - self._started_s) * SPEED_MPS
+        xy_m = np.array([[np.interp(arc_m, self._arc_m, axis) for axis in self._xy_m.T]])
+        lat_deg, lon_deg = geo_from_local(self._frame, xy_m)[0].tolist()
+        if self._turn % 5 == 0:
+            fix = drive.GnssFix(stamp_ns=stamp_ns, position=GeoPoint(lat_deg, lon_deg), std_m=0.1)
+            ((_, kind, ros),) = ros_from_gnss(fix, None)
+            self._put("sensing/gnss/ublox/nav_sat_fix", ros, kind)
+        speed = velocity_report(stamp_ns, speed_mps=SPEED_MPS, yaw_rate_radps=0.0)
+        self._put("vehicle/status/velocity_status", speed, VELOCITY_REPORT)
+        steering = ros_type(STEERING_REPORT)(stamp=time_from(stamp_ns), steering_tire_angle=0.0)
+        self._put("vehicle/status/steering_status", steering, STEERING_REPORT)
+        self._turn += 1
+
+    def _put(self, key: str, ros: object, kind: str) -> None:
+        self._bus.put(key, bytes(typestore().serialize_cdr(ros, kind)))

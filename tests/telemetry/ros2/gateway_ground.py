@@ -1,0 +1,174 @@
+"""A vehicle's side that speaks rmw_zenoh, spelled out by hand, and a gateway beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from contracts.foreign_bus import Arrived
+from contracts.frames import GeoPoint, LocalFrame
+from contracts.mailbox import Mailbox
+from contracts.setup import BusSetup, Ros2Setup, write_setup
+from telemetry.ros_parts import typestore
+
+ROOT = Path(__file__).resolve().parents[3]
+FRAME = LocalFrame(GeoPoint(52.5, 13.4))
+
+FIX_KEY = (
+    "0/sensing/gnss/sensor_msgs::msg::dds_::NavSatFix_/"
+    "RIHS01_62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"
+)
+STEERING_KEY = "0/vehicle/steering/autoware_vehicle_msgs::msg::dds_::SteeringReport_/"
+CONTROL_KEY = "0/control/cmd/autoware_control_msgs::msg::dds_::Control_/*"
+ODOMETRY_KEY = "0/foretwin/twin/nav_msgs::msg::dds_::Odometry_/*"
+
+MAPPING = """
+dialect = "rmw_zenoh"
+{head}
+[map]
+lat_deg = 52.5
+lon_deg = 13.4
+
+[[in]]
+topic = "/sensing/gnss"
+type = "sensor_msgs/msg/NavSatFix"
+channel = "gnss"
+
+[[in]]
+topic = "/vehicle/steering"
+type = "autoware_vehicle_msgs/msg/SteeringReport"
+channel = "steering"
+
+[[out]]
+topic = "/foretwin/twin"
+type = "nav_msgs/msg/Odometry"
+source = "twin"
+
+[[out]]
+topic = "/foretwin/diagnostics"
+type = "diagnostic_msgs/msg/DiagnosticArray"
+source = "diagnostics"
+
+[[out]]
+topic = "/control/cmd"
+type = "autoware_control_msgs/msg/Control"
+source = "vehicle_command"
+
+[[out]]
+topic = "/perception/objects"
+type = "autoware_perception_msgs/msg/PredictedObjects"
+source = "virtual_objects"
+
+[[out]]
+topic = "/clock"
+type = "rosgraph_msgs/msg/Clock"
+source = "clock"
+
+[towards_vehicle]
+enabled = {enabled}
+"""
+
+
+def mapping_text(*, enabled: bool, endpoint: str | None = None) -> str:
+    head = "" if endpoint is None else f'endpoint = "{endpoint}"'
+    return MAPPING.format(head=head, enabled="true" if enabled else "false")
+
+
+def attached(seq: int) -> bytes:
+    return struct.pack("<qqB16s", seq, 5, 16, b"0123456789abcdef")
+
+
+def cdr(kind: str, **fields: Any) -> bytes:
+    return bytes(typestore().serialize_cdr(typestore().types[kind](**fields), kind))
+
+
+def ros_time(stamp_ns: int) -> Any:
+    sec, nanosec = divmod(stamp_ns, 10**9)
+    return typestore().types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
+
+
+def steering(stamp_ns: int, angle_rad: float) -> bytes:
+    return cdr(
+        "autoware_vehicle_msgs/msg/SteeringReport",
+        stamp=ros_time(stamp_ns),
+        steering_tire_angle=angle_rad,
+    )
+
+
+def fix(stamp_ns: int, lat_deg: float, lon_deg: float) -> bytes:
+    import numpy as np
+
+    types = typestore().types
+    return cdr(
+        "sensor_msgs/msg/NavSatFix",
+        header=types["std_msgs/msg/Header"](stamp=ros_time(stamp_ns), frame_id="gnss"),
+        status=types["sensor_msgs/msg/NavSatStatus"](status=0, service=1),
+        latitude=lat_deg,
+        longitude=lon_deg,
+        altitude=40.0,
+        position_covariance=np.diag([0.04, 0.04, 0.1]).ravel(),
+        position_covariance_type=2,
+    )
+
+
+class RecordingForeign:
+    """The other side in one process: what was put, and what the gateway shall find."""
+
+    session_id = "ab12"
+
+    def __init__(self) -> None:
+        self.connected = True
+        self.put_keys: list[str] = []
+        self.payloads: list[bytes] = []
+        self.attachments: list[bytes | None] = []
+        self.tokens: list[str] = []
+        self.subscribed: list[str] = []
+        self.inbox: Mailbox | None = None
+
+    def subscribe(self, key: str, mailbox: Mailbox) -> None:
+        self.subscribed.append(key)
+        self.inbox = mailbox
+
+    def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
+        self.put_keys.append(key)
+        self.payloads.append(payload)
+        self.attachments.append(attachment)
+
+    def declare_alive(self, token: str) -> None:
+        self.tokens.append(token)
+
+    def watch_alive(self, tokens: str, mailbox: Mailbox) -> None:
+        raise AssertionError("the gateway watches no tokens")
+
+    def arrive(self, key: str, payload: bytes, *, mono_ns: int, seq: int = 1) -> None:
+        assert self.inbox is not None
+        self.inbox.put(Arrived(key, payload, attached(seq), mono_ns, 10**18))
+
+    def on(self, topic: str) -> list[bytes]:
+        """Return the payloads that were put on a topic."""
+        pairs = zip(self.put_keys, self.payloads, strict=True)
+        return [payload for key, payload in pairs if key.startswith(f"0{topic}/")]
+
+
+@contextlib.contextmanager
+def gateway_process(
+    folder: Path, *, run_endpoint: str, mapping: str, flag: bool
+) -> Iterator[subprocess.Popen[str]]:
+    file = folder / "ros2.json"
+    setup = Ros2Setup(
+        run_id="r", process_id="ros2", vehicle_id="ego", bus=BusSetup(endpoint=run_endpoint),
+        log_file=str(folder / "log.jsonl"), mapping=mapping, mapping_name="m.toml",
+        drive_frame=FRAME, towards_vehicle=flag,
+    )  # fmt: skip
+    write_setup(setup, file)
+    command = [sys.executable, "-m", "telemetry.ros2", "--setup", str(file)]
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()

@@ -1,0 +1,184 @@
+"""The gateway in one process: samples in, states out, and nothing towards the vehicle unasked."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from contracts.bus import Mailbox
+from contracts.drive import GnssFix, RoadUser, RoadUsers, SteeringSample, VehicleState
+from contracts.frames import GeoPoint
+from contracts.memory_bus import MemoryBus
+from contracts.simulation import MirrorSample, PlaneState
+from contracts.towards_vehicle import Authority, VehicleCommand
+from telemetry.ros2.gateway import Gateway
+from telemetry.ros2.mapping import parse_mapping
+from telemetry.ros_parts import ODOMETRY, typestore, yaw_of
+from tests.telemetry.ros2.gateway_ground import (
+    FIX_KEY,
+    FRAME,
+    STEERING_KEY,
+    RecordingForeign,
+    fix,
+    mapping_text,
+    steering,
+)
+
+S = 10**9
+TOWARDS = ("/control/cmd", "/perception/objects", "/clock")
+
+
+class Ground:
+    """A gateway with a clock in the test's hand."""
+
+    def __init__(self, *, enabled: bool, flag: bool) -> None:
+        self.now_ns = S
+        self.bus, self.foreign = MemoryBus(), RecordingForeign()
+        self.inbox = Mailbox(100)
+        for channel in ("gnss", "steering"):
+            self.bus.subscribe(channel, self.inbox, vehicle="ego")
+        self.gateway = Gateway(
+            parse_mapping(mapping_text(enabled=enabled), name="m.toml"),
+            bus=self.bus, foreign=self.foreign, run_id="r", vehicle_id="ego",
+            drive_frame=FRAME, flag_on=flag,
+            mono_ns=lambda: self.now_ns, wall_ns=lambda: 10**18 + self.now_ns,
+        )  # fmt: skip
+
+    def arrive(self, key: str, payload: bytes, seq: int = 1) -> None:
+        self.foreign.arrive(key, payload, mono_ns=self.now_ns, seq=seq)
+        self.step()
+
+    def step(self, passed_ms: float = 0.0) -> None:
+        self.now_ns += round(passed_ms * 1e6)
+        self.gateway.step(0.0)
+
+    def say_everything(self) -> None:
+        """The orchestrator is in charge and says all that could go towards a vehicle."""
+        self.arrive(STEERING_KEY + "RIHS01_x", steering(5 * S, 0.1))
+        self.bus.publish("authority", Authority(sent_mono_ns=self.now_ns), run="r")
+        self.step()
+        command = VehicleCommand(
+            stamp_ns=0, sent_mono_ns=self.now_ns, tire_angle_rad=0.2, accel_mps2=9.0, speed_mps=99.0
+        )
+        self.bus.publish("vehicle_command", command, run="r")
+        user = RoadUser(
+            user_id="u", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=1.0,
+            length_m=4.0, width_m=2.0, virtual=True,
+        )  # fmt: skip
+        users = RoadUsers(stamp_ns=5 * S, users=(user,))
+        self.bus.publish("virtual_objects", users, run="r")
+        state = VehicleState(
+            vehicle_id="ego", stamp_ns=5 * S, position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
+            speed_mps=1.0, yaw_rate_radps=0.0, accel_mps2=0.0,
+        )  # fmt: skip
+        self.bus.publish("state", state, vehicle="ego")
+        self.step()
+
+    def towards(self) -> dict[str, int]:
+        return {topic: len(self.foreign.on(topic)) for topic in TOWARDS}
+
+
+def test_ros_samples_become_telemetry() -> None:
+    ground = Ground(enabled=False, flag=False)
+    ground.arrive(FIX_KEY, fix(5 * S, 52.6, 13.5))
+    ground.arrive(STEERING_KEY + "TypeHashNotSupported", steering(5 * S + 1, 0.25))
+    first, second = ground.inbox.take(), ground.inbox.take()
+    assert first is not None
+    assert second is not None
+    assert first.message() == GnssFix(
+        stamp_ns=5 * S, position=GeoPoint(52.6, 13.5, 40.0), std_m=pytest.approx(0.2)
+    )
+    assert second.message() == SteeringSample(stamp_ns=5 * S + 1, tire_angle_rad=0.25)
+    info = ground.gateway.info()
+    assert info is not None
+    assert (info.start_stamp_ns, info.sends) == (5 * S, ("gnss", "steering"))
+
+
+def test_what_cannot_be_used_is_counted_and_survived() -> None:
+    ground = Ground(enabled=False, flag=False)
+    ground.arrive(FIX_KEY, b"\x00\x01\x00\x00short")
+    ground.arrive(FIX_KEY, fix(5 * S, math.nan, 13.5))
+    ground.arrive("0/sensing/gnss/sensor_msgs::msg::dds_::Imu_/RIHS01_x", fix(5 * S, 52.0, 13.0))
+    ground.arrive(STEERING_KEY + "x", fix(5 * S, 52.0, 13.0))
+    assert ground.inbox.take() is None
+    assert ground.gateway.report()["unused"] == {
+        "/sensing/gnss: unreadable as sensor_msgs/msg/NavSatFix": 1,
+        "/sensing/gnss: a number that is not finite": 1,
+        "/sensing/gnss: type sensor_msgs/msg/Imu instead of sensor_msgs/msg/NavSatFix": 1,
+        "/vehicle/steering: unreadable as autoware_vehicle_msgs/msg/SteeringReport": 1,
+    }
+    ground.arrive(FIX_KEY, fix(5 * S, 52.6, 13.5))
+    assert ground.inbox.take() is not None
+
+
+def test_lost_samples_are_counted_by_sequence_number() -> None:
+    ground = Ground(enabled=False, flag=False)
+    for seq in (1, 2, 6, 5, 7):
+        ground.arrive(FIX_KEY, fix(5 * S + seq, 52.6, 13.5), seq)
+    assert ground.gateway.report()["lost"] == {"/sensing/gnss": 3}
+
+
+def test_the_twin_goes_out_as_odometry() -> None:
+    ground = Ground(enabled=False, flag=False)
+    car = PlaneState(100.0, -50.0, 0.5, 7.0)
+    mirror = MirrorSample(
+        stamp_ns=5 * S, world_id=None, real=car, twin=car, shadow=car, ghost=car, gap_m=0.0,
+        gap_along_m=0.0, gap_across_m=0.0, gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=0.0,
+        independent=True,
+    )  # fmt: skip
+    ground.bus.publish("mirror", mirror, run="r")
+    ground.step()
+    (data,) = ground.foreign.on("/foretwin/twin")
+    odometry = typestore().deserialize_cdr(data, ODOMETRY)
+    place = odometry.pose.pose.position
+    assert (place.x, place.y) == (pytest.approx(100.0, abs=1e-6), pytest.approx(-50.0, abs=1e-6))
+    assert yaw_of(odometry.pose.pose.orientation) == pytest.approx(0.5, abs=1e-9)
+    assert odometry.twist.twist.linear.x == 7.0
+    assert odometry.header.frame_id == "map"
+
+
+@pytest.mark.parametrize(("enabled", "flag"), [(False, False), (True, False), (False, True)])
+def test_nothing_goes_towards_the_vehicle_without_both_switches(enabled: bool, flag: bool) -> None:
+    ground = Ground(enabled=enabled, flag=flag)
+    for _ in range(5):
+        ground.say_everything()
+        ground.step(30.0)
+    assert ground.towards() == dict.fromkeys(TOWARDS, 0)
+    assert not [token for token in ground.foreign.tokens if "%control%cmd" in token]
+    assert ground.foreign.on("/foretwin/diagnostics")
+
+
+def test_both_switches_let_it_out_within_its_bounds() -> None:
+    ground = Ground(enabled=True, flag=True)
+    ground.say_everything()
+    assert ground.towards() == dict.fromkeys(TOWARDS, 1)
+    data = ground.foreign.on("/control/cmd")[0]
+    control = typestore().deserialize_cdr(data, "autoware_control_msgs/msg/Control")
+    assert control.lateral.steering_tire_angle == pytest.approx(0.1 + 0.3 / 50.0)
+    assert control.longitudinal.acceleration == pytest.approx(4.0 / 50.0)
+    assert control.longitudinal.velocity == pytest.approx(8.0)
+    tokens = [token for token in ground.foreign.tokens if "%control%cmd" in token]
+    assert len(tokens) == 1
+    assert tokens[0].startswith("@ros2_lv/0/ab12/0/")
+    attachment = ground.foreign.attachments[ground.foreign.payloads.index(data)]
+    assert attachment is not None
+    assert len(attachment) == 33
+
+
+@pytest.mark.parametrize("end", ["silence", "link"])
+def test_what_has_stopped_does_not_resume(end: str) -> None:
+    ground = Ground(enabled=True, flag=True)
+    ground.say_everything()
+    if end == "link":
+        ground.foreign.connected = False
+        ground.step()
+        ground.foreign.connected = True
+    else:
+        ground.step(151.0)
+    before = ground.towards()
+    for _ in range(10):
+        ground.step(20.0)
+        ground.say_everything()
+    assert ground.towards() == before
+    assert ground.gateway.gate.state == "shut"

@@ -1,0 +1,194 @@
+"""The gateway as a process between two routers, with an emulated rmw_zenoh peer."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from contracts.bus import Mailbox, ZenohBus, ask
+from contracts.drive import GnssFix, InfoRequest
+from contracts.foreign_bus import Arrived, ZenohForeignBus
+from contracts.setup import BusSetup
+from contracts.simulation import MirrorSample, PlaneState
+from telemetry.ros_parts import CONTROL, ODOMETRY, typestore
+from tests.contracts.bus_sides import free_endpoint, python, take_until
+from tests.telemetry.ros2.gateway_ground import (
+    CONTROL_KEY,
+    FIX_KEY,
+    ODOMETRY_KEY,
+    STEERING_KEY,
+    attached,
+    fix,
+    gateway_process,
+    mapping_text,
+    steering,
+)
+
+ROOT = Path(__file__).resolve().parents[3]
+ODOMETRY_HASH = "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"
+
+PEER = """
+import json, struct, sys, time, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
+config.insert_json5("scouting/multicast/enabled", "false")
+fix_key, odometry_key, payload = sys.argv[2], sys.argv[3], bytes.fromhex(sys.argv[4])
+with zenoh.open(config) as session:
+    zid = session.info.zid()
+    heard = []
+    def hear(sample):
+        attachment = sample.attachment
+        heard.append({
+            "key": str(sample.key_expr), "payload": sample.payload.to_bytes().hex(),
+            "attachment": attachment.to_bytes().hex() if attachment else "",
+        })
+    ends = []
+    tokens = session.liveliness().declare_subscriber(
+        "@ros2_lv/0/*/*/*/*/*/*/foretwin/**", lambda s: ends.append(str(s.key_expr)), history=True)
+    own = session.liveliness().declare_token(f"@ros2_lv/0/{zid}/0/0/NN/%/%/gnss_driver")
+    subscriber = session.declare_subscriber(odometry_key, hear)
+    print("ready", flush=True)
+    seq = 0
+    until = time.monotonic() + 30.0
+    while not heard and time.monotonic() < until:
+        seq += 1
+        session.put(fix_key, payload, attachment=struct.pack(
+            "<qqB16s", seq, time.time_ns(), 16, bytes(range(16))))
+        time.sleep(0.02)
+    print(json.dumps({"heard": heard[:1], "ends": ends}), flush=True)
+"""
+
+ORCHESTRATOR = """
+import sys, time
+from contracts.bus import ZenohBus
+from contracts.keys import alive_key
+from contracts.setup import BusSetup
+from contracts.towards_vehicle import Authority, VehicleCommand
+with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True) as bus:
+    bus.declare_alive(alive_key(run="r", process="orchestrator"))
+    print("ready", flush=True)
+    while True:
+        now = time.monotonic_ns()
+        bus.publish("authority", Authority(sent_mono_ns=now), run="r")
+        bus.publish("vehicle_command", VehicleCommand(
+            stamp_ns=0, sent_mono_ns=now, tire_angle_rad=0.1, accel_mps2=0.5, speed_mps=3.0),
+            run="r")
+        time.sleep(0.01)
+"""
+
+
+def test_a_peer_of_rmw_zenoh_talks_to_it_both_ways(tmp_path: Path) -> None:
+    """Both sides on one router: how a car without a router of its own joins the run's."""
+    import json
+
+    endpoint = free_endpoint()
+    odometry_key = ODOMETRY_KEY.replace("*", ODOMETRY_HASH)
+    with ZenohBus(BusSetup(endpoint=endpoint), router=True) as bus:
+        inbox = Mailbox(1000)
+        bus.subscribe("gnss", inbox, vehicle="ego")
+        mapping = mapping_text(enabled=False)
+        payload = fix(10**18, 52.51, 13.41).hex()
+        with (
+            gateway_process(tmp_path, run_endpoint=endpoint, mapping=mapping, flag=False),
+            python("-c", PEER, endpoint, FIX_KEY, odometry_key, payload) as peer,
+        ):
+            sample = take_until(inbox, lambda item: item.channel == "gnss").message()
+            assert isinstance(sample, GnssFix)
+            assert (sample.position.lat_deg, sample.stamp_ns) == (52.51, 10**18)
+            info = ask(bus, "info", InfoRequest(), vehicle="ego")
+            assert info.sends == ("gnss", "steering")
+            car = PlaneState(1.0, 2.0, 0.0, 3.0)
+            mirror = MirrorSample(
+                stamp_ns=10**18, world_id=None, real=car, twin=car, shadow=car, ghost=car,
+                gap_m=0.0, gap_along_m=0.0, gap_across_m=0.0, gap_yaw_rad=0.0, gap_speed_mps=0.0,
+                since_reset_s=0.0, independent=True,
+            )  # fmt: skip
+            bus.publish("mirror", mirror, run="r")
+            assert peer.stdout is not None
+            said = json.loads(peer.stdout.readline())
+    (heard,) = said["heard"]
+    assert heard["key"] == odometry_key
+    odometry = typestore().deserialize_cdr(bytes.fromhex(heard["payload"]), ODOMETRY)
+    assert odometry.twist.twist.linear.x == 3.0
+    assert heard["attachment"].startswith("0100000000000000")
+    assert len(bytes.fromhex(heard["attachment"])) == 33
+    ends = {"/".join(token.split("/")[5:]) for token in said["ends"]}
+    assert "NN/%/%/foretwin" in ends
+    assert (
+        f"MP/%/%/foretwin/%foretwin%twin/nav_msgs::msg::dds_::Odometry_/{ODOMETRY_HASH}/::,10:,:,:,,"
+        in ends
+    )
+    assert not [end for end in ends if "%control" in end]
+
+
+class Vehicle(NamedTuple):
+    """The vehicle's own router, a peer on it, and a gateway to a run of another router."""
+
+    peer: ZenohForeignBus
+    commands: Mailbox
+    orchestrator: subprocess.Popen[str]
+    gateway: subprocess.Popen[str]
+
+    def until_commanded(self) -> Arrived:
+        """Report steering as a vehicle does until the first command is there."""
+        deadline = time.monotonic() + 20.0
+        while time.monotonic() < deadline:
+            self.peer.put(STEERING_KEY + "RIHS01_x", steering(time.time_ns(), 0.1), attached(1))
+            item = self.commands.take(0.02)
+            if item is not None:
+                return item
+        raise AssertionError("no command towards the vehicle")
+
+    def last_before_silence(self, silent_s: float) -> Arrived | None:
+        """Report steering on and return the last command before so long a silence."""
+        last, until = None, time.monotonic() + silent_s
+        while time.monotonic() < until:
+            self.peer.put(STEERING_KEY + "RIHS01_x", steering(time.time_ns(), 0.1), attached(1))
+            while (item := self.commands.take(0.01)) is not None:
+                last, until = item, time.monotonic() + silent_s
+        return last
+
+
+@pytest.fixture
+def vehicle(tmp_path: Path) -> Iterator[Vehicle]:
+    own, run = free_endpoint(), free_endpoint()
+    mapping = mapping_text(enabled=True, endpoint=own)
+    with (
+        ZenohBus(BusSetup(endpoint=own), router=True),
+        ZenohForeignBus(own) as peer,
+        python("-c", ORCHESTRATOR, run) as orchestrator,
+        gateway_process(tmp_path, run_endpoint=run, mapping=mapping, flag=True) as gateway,
+    ):
+        commands = Mailbox(10_000)
+        peer.subscribe(CONTROL_KEY, commands)
+        yield Vehicle(peer, commands, orchestrator, gateway)
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_dead_or_hung_orchestrator_stops_it_within_200_ms(
+    vehicle: Vehicle, how: signal.Signals
+) -> None:
+    first = vehicle.until_commanded()
+    control = typestore().deserialize_cdr(first.payload, CONTROL)
+    assert abs(control.lateral.steering_tire_angle) <= 0.5
+    for _ in range(30):
+        last = vehicle.until_commanded()
+    killed_ns = time.monotonic_ns()
+    assert killed_ns - last.received_mono_ns < 100e6, "it did not flow any more when it was killed"
+    vehicle.orchestrator.send_signal(how)
+    last = vehicle.last_before_silence(0.6) or last
+    after_ms = (last.received_mono_ns - killed_ns) / 1e6
+    print(f"last command {after_ms:.1f} ms after {how.name}", file=sys.stderr)
+    assert after_ms < 200.0
+    if how == signal.SIGSTOP:
+        vehicle.orchestrator.send_signal(signal.SIGCONT)
+        assert vehicle.last_before_silence(0.6) is None, "it resumed without a new switch-on"
+        assert vehicle.gateway.poll() is None

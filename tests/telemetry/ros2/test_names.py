@@ -1,0 +1,126 @@
+"""Keys, tokens and attachments of rmw_zenoh and of the bridge."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from telemetry.ros2.attachment import Attachment, pack, pack_labelled, unpack
+from telemetry.ros2.names import (
+    ANY_HASH,
+    Entity,
+    QosProfile,
+    bridge_key,
+    parse_rmw_key,
+    parse_token,
+    qos_text,
+    rmw_any_type_key,
+    rmw_key,
+    token,
+    topic_tokens_key,
+    type_hash,
+)
+from telemetry.ros_definitions import DEFINITIONS
+
+IMU = "sensor_msgs/msg/Imu"
+IMU_HASH = "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"
+STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+"""As ROS 2 Jazzy publishes them."""
+
+WORDS = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True)
+TOPICS = st.lists(WORDS, min_size=1, max_size=4).map(lambda words: "/" + "/".join(words))
+
+
+def test_hashes_are_those_that_ros_publishes() -> None:
+    assert type_hash(IMU) == IMU_HASH
+    assert type_hash("std_msgs/msg/String") == STRING_HASH
+
+
+@pytest.mark.parametrize("kind", sorted(DEFINITIONS))
+def test_every_type_of_ours_has_a_hash(kind: str) -> None:
+    assert type_hash(kind).startswith("RIHS01_")
+    assert len(type_hash(kind)) == len(IMU_HASH)
+
+
+def test_a_key_of_rmw_zenoh() -> None:
+    key = rmw_key("/sensing/imu", IMU, domain=0, type_hash=ANY_HASH)
+    assert key == "0/sensing/imu/sensor_msgs::msg::dds_::Imu_/*"
+    assert rmw_any_type_key("/sensing/imu", domain=7) == "7/sensing/imu/*/*"
+
+
+@given(TOPICS, st.integers(0, 232))
+def test_keys_are_read_back(topic: str, domain: int) -> None:
+    found = parse_rmw_key(rmw_key(topic, IMU, domain=domain, type_hash="TypeHashNotSupported"))
+    assert found == (domain, topic, IMU, "TypeHashNotSupported")
+
+
+def test_a_key_of_the_bridge() -> None:
+    assert bridge_key("/sensing/imu") == "sensing/imu"
+    assert bridge_key("/sensing/imu", namespace="/bot") == "bot/sensing/imu"
+
+
+def test_a_token_of_a_subscription() -> None:
+    entity = Entity(
+        domain=0, session="aac3178e", node_id=0, entity_id=8, entity="MS", namespace="/",
+        node="listener", topic="/chatter", kind="std_msgs/msg/String", type_hash=STRING_HASH,
+    )  # fmt: skip
+    text = token(entity)
+    assert text == (
+        "@ros2_lv/0/aac3178e/0/8/MS/%/%/listener/%chatter/"
+        f"std_msgs::msg::dds_::String_/{STRING_HASH}/::,10:,:,:,,"
+    )
+    assert topic_tokens_key("/chatter", domain=0) == "@ros2_lv/0/*/*/*/*/*/*/*/%chatter/*/*/*"
+
+
+@given(TOPICS, TOPICS, st.integers(0, 1000))
+def test_tokens_are_read_back(topic: str, namespace: str, number: int) -> None:
+    node = Entity(
+        domain=0, session="ab12", node_id=number, entity_id=number, entity="NN",
+        namespace=namespace, node="n",
+    )  # fmt: skip
+    assert parse_token(token(node)) == node
+    end = Entity(
+        domain=0, session="ab12", node_id=0, entity_id=number, entity="MP", namespace=namespace,
+        node="n", topic=topic, kind=IMU, type_hash=IMU_HASH, qos="2::,5:,:,:,,",
+    )  # fmt: skip
+    assert parse_token(token(end)) == end
+
+
+@pytest.mark.parametrize("key", ["foretwin/v1/x", "@ros2_lv/0/z/a/1/NN/%/%/n", "@ros2_lv/0", ""])
+def test_other_keys_are_no_tokens(key: str) -> None:
+    with pytest.raises(ValueError, match="token"):
+        parse_token(key)
+
+
+@pytest.mark.parametrize("key", ["a/b", "0/x/y", "0/x/noType/h", "foretwin/v1/run/r/x"])
+def test_other_keys_are_no_topics(key: str) -> None:
+    with pytest.raises(ValueError, match=r"key|type|topic"):
+        parse_rmw_key(key)
+
+
+def test_qos_leaves_defaults_empty() -> None:
+    assert qos_text(QosProfile()) == "::,10:,:,:,,"
+    assert qos_text(QosProfile(reliable=False, depth=5)) == "2::,5:,:,:,,"
+    assert qos_text(QosProfile(transient_local=True, depth=1)) == ":1:,1:,:,:,,"
+
+
+INT64 = st.integers(-(2**63), 2**63 - 1)
+
+
+@given(st.builds(Attachment, INT64, INT64, st.binary(min_size=16, max_size=16)))
+def test_attachments_are_read_in_both_forms(attachment: Attachment) -> None:
+    assert len(pack(attachment)) == 33
+    assert unpack(pack(attachment)) == attachment
+    assert unpack(pack_labelled(attachment)) == attachment
+
+
+def test_an_attachment_byte_by_byte() -> None:
+    data = pack(Attachment(1, 2, bytes(range(16))))
+    assert data.hex() == "0100000000000000" + "0200000000000000" + "10" + bytes(range(16)).hex()
+
+
+@given(st.binary(max_size=80).filter(lambda data: len(data) != 33))
+def test_other_bytes_are_no_attachment(data: bytes) -> None:
+    with pytest.raises(ValueError, match="no attachment"):
+        unpack(data)

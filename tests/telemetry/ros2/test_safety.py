@@ -1,0 +1,155 @@
+"""The gate towards a vehicle, whatever happens in whatever order."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contracts.towards_vehicle import VehicleCommand
+from telemetry.ros2.safety import DEAD_MAN_NS, Limits, VehicleGate
+
+LIMITS = Limits()
+MS = 1_000_000
+
+
+def command(
+    now_ns: int, tire: float = 0.0, accel: float = 0.0, speed: float = 1.0
+) -> VehicleCommand:
+    return VehicleCommand(
+        stamp_ns=0, sent_mono_ns=now_ns, tire_angle_rad=tire, accel_mps2=accel, speed_mps=speed
+    )
+
+
+def admit(gate: VehicleGate, wished: VehicleCommand, now_ns: int, link_up: bool = True):  # type: ignore[no-untyped-def]
+    return gate.admit(wished, now_ns=now_ns, link_up=link_up, tire_angle_rad=0.0)
+
+
+def open_gate(now_ns: int = 0) -> VehicleGate:
+    gate = VehicleGate(LIMITS, config_on=True, flag_on=True)
+    gate.hear(now_ns, now_ns=now_ns)
+    return gate
+
+
+@pytest.mark.parametrize(("config_on", "flag_on"), [(False, False), (True, False), (False, True)])
+def test_nothing_without_both_switches(config_on: bool, flag_on: bool) -> None:
+    gate = VehicleGate(LIMITS, config_on=config_on, flag_on=flag_on)
+    gate.hear(0, now_ns=0)
+    assert gate.state == "off"
+    assert admit(gate, command(0), 0) is None
+    assert "--towards-vehicle" in gate.why or "enabled" in gate.why
+
+
+def test_nothing_before_the_first_word() -> None:
+    gate = VehicleGate(LIMITS, config_on=True, flag_on=True)
+    assert admit(gate, command(0), 0) is None
+    gate.hear(0, now_ns=0)
+    assert admit(gate, command(0), 0) is not None
+
+
+def test_what_has_shut_stays_shut() -> None:
+    gate = open_gate()
+    late = DEAD_MAN_NS + 1
+    assert gate.look(now_ns=DEAD_MAN_NS, link_up=True) == "open"
+    assert gate.look(now_ns=late, link_up=True) == "shut"
+    gate.hear(late, now_ns=late)
+    assert admit(gate, command(late), late) is None
+    assert "150 ms" in gate.why
+
+
+def test_a_word_that_comes_late_does_not_bridge_the_gap() -> None:
+    """A gateway that was stopped finds words in its mailbox that were in time when sent."""
+    gate = open_gate()
+    gate.hear(100 * MS, now_ns=400 * MS)
+    assert gate.state == "shut"
+
+
+def test_a_lost_link_shuts() -> None:
+    gate = open_gate()
+    assert admit(gate, command(0), 0, link_up=False) is None
+    assert admit(gate, command(0), 0) is None
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("field", ["tire_angle_rad", "accel_mps2", "speed_mps"])
+def test_a_number_that_is_none_shuts(field: str, number: float) -> None:
+    gate = open_gate()
+    assert admit(gate, msgspec.structs.replace(command(0), **{field: number}), 0) is None
+    assert gate.state == "shut"
+
+
+def test_the_first_command_starts_from_the_measured_angle() -> None:
+    gate = open_gate()
+    wished = command(0, tire=-0.4)
+    assert gate.admit(wished, now_ns=0, link_up=True, tire_angle_rad=None) is None
+    first = gate.admit(wished, now_ns=0, link_up=True, tire_angle_rad=0.2)
+    assert first is not None
+    assert first.tire_angle_rad == pytest.approx(0.2 - LIMITS.max_tire_rate_radps / 50.0)
+
+
+@pytest.mark.parametrize("name", LIMITS.__struct_fields__)
+def test_limits_are_positive(name: str) -> None:
+    with pytest.raises(ValueError, match=name):
+        msgspec.structs.replace(LIMITS, **{name: 0.0}).validate()
+
+
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-2.0, 2.0)
+STEPS = st.tuples(
+    st.integers(0, 200 * MS),  # passes first
+    st.sampled_from(["word", "stale word", "command", "link down", "command", "word"]),
+    NUMBERS, NUMBERS, NUMBERS,
+)  # fmt: skip
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.booleans(), st.booleans(), st.floats(-0.5, 0.5),
+    st.lists(st.tuples(st.integers(0, 60 * MS), STEPS), max_size=40),
+)  # fmt: skip
+def test_never_outside_the_bounds_and_never_after_the_dead_mans_time(
+    config_on: bool,
+    flag_on: bool,
+    measured: float,
+    steps: list[tuple[int, tuple[int, str, float, float, float]]],
+) -> None:
+    gate = VehicleGate(LIMITS, config_on=config_on, flag_on=flag_on)
+    now, word, down = 1, None, False
+    sent: list[tuple[int, VehicleCommand]] = []
+    silent = False
+    for short, (long, what, tire, accel, speed) in steps:
+        now += long if tire > 1.0 else short
+        silent = silent or (word is not None and now - word > DEAD_MAN_NS)
+        if what == "word":
+            gate.hear(now, now_ns=now)
+            word = now
+        elif what == "stale word":
+            gate.hear(now - DEAD_MAN_NS - 1, now_ns=now)
+        elif what == "link down" and accel > 1.0:
+            gate.look(now_ns=now, link_up=False)
+            down = down or word is not None
+        elif what == "command":
+            wished = command(now, tire, accel, speed)
+            out = gate.admit(wished, now_ns=now, link_up=True, tire_angle_rad=measured)
+            if out is not None:
+                assert config_on
+                assert flag_on
+                assert word is not None
+                assert not silent
+                assert not down
+                sent.append((now, out))
+    for at, out in sent:
+        assert abs(out.tire_angle_rad) <= LIMITS.max_tire_angle_rad
+        assert -LIMITS.max_decel_mps2 <= out.accel_mps2 <= LIMITS.max_accel_mps2
+        assert 0.0 <= out.speed_mps <= LIMITS.max_speed_mps
+        assert at > 0
+    for (before, old), (after, new) in itertools.pairwise(sent):
+        passed_s = (after - before) / 1e9
+        assert passed_s * LIMITS.max_rate_hz >= 1.0 - 1e-9
+        tire_step = abs(new.tire_angle_rad - old.tire_angle_rad)
+        assert tire_step <= LIMITS.max_tire_rate_radps * passed_s + 1e-9
+        accel_step = abs(new.accel_mps2 - old.accel_mps2)
+        assert accel_step <= LIMITS.max_jerk_mps3 * passed_s + 1e-9
