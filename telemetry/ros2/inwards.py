@@ -15,7 +15,7 @@ from telemetry.logs.units import ANGLE, SPEED
 from telemetry.ros2.attachment import unpack
 from telemetry.ros2.mapping import InRow, Mapping
 from telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
-from telemetry.ros_foreign import FOREIGN, UnusableError, stamp_of
+from telemetry.ros_foreign import FOREIGN, UnusableError, channel_of, stamp_of
 from telemetry.ros_parts import BASE_FRAME, CLOCK, LANELET_ROUTE, TF, typestore
 from telemetry.ros_status import StatusJoiner
 from telemetry.ros_transforms import TransformTree
@@ -128,7 +128,7 @@ class Inwards:
         stamp_ns = arrived.received_wall_ns
         if row.stamp == "header":
             stamp_ns = stamp_of(ros) or stamp_ns
-        if how.channel == "gnss":
+        if "gnss" in how.channels:
             self._antenna_frame = str(ros.header.frame_id)
         samples: Samples = []
         for message in how.read(ros, stamp_ns, self._mapping.map_frame):
@@ -138,8 +138,9 @@ class Inwards:
             if not _is_finite(message):
                 raise UnusableError("a number that is not finite")
             self._note(message, arrived)
-            samples.append((how.channel, message))
-        self.counts[how.channel] += len(samples)
+            channel = channel_of(message)
+            samples.append((channel, message))
+            self.counts[channel] += 1
         return samples
 
     def _note(self, message: msgspec.Struct, arrived: Arrived) -> None:

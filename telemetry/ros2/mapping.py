@@ -71,7 +71,7 @@ class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         """Raise ValueError naming the key at fault."""
         check_topic(self.topic)
         dds_type(self.type)
-        known = {kind: how.channel for kind, how in FOREIGN.items()} | CHANNEL_OF_OTHERS
+        known = {kind: how.channels[0] for kind, how in FOREIGN.items()} | CHANNEL_OF_OTHERS
         if self.type not in known:
             raise ValueError(f"type {self.type!r}: readable are {', '.join(sorted(known))}")
         if self.channel != known[self.type]:
