@@ -7,6 +7,7 @@ near the greatest rate of the actuator are left out: there the rate says nothing
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ MAX_DELAY_S = 0.6
 _GRID_S = 0.02
 _RATE_SHARE = 0.8
 _SLOWEST_MPS = 0.5
+_MODEL_STD_S = 0.001
+"""What a first-order lag and an even grid leave unsaid of delay and lag."""
 
 
 class FollowingFit(NamedTuple):
@@ -106,9 +109,9 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
     gain_std = float(np.sqrt(slope @ fit.covariance @ slope))
     return FollowingFit(
         delay_s=delay_s,
-        delay_half_s=fit.half_width(3),
+        delay_half_s=math.hypot(fit.half_width(3), fit.quantile * _MODEL_STD_S),
         lag_s=lag_s,
-        lag_half_s=fit.half_width(2) * lag_s**2,
+        lag_half_s=math.hypot(fit.half_width(2) * lag_s**2, fit.quantile * _MODEL_STD_S),
         gain=gain,
         gain_half=fit.quantile * gain_std,
         moving_s=moving_s,

@@ -25,6 +25,10 @@ WIDTH_S = 0.1
 _SLOWEST_MPS = 2.0
 DRIVE, BRAKE, DRAG, ROLLING, DELAY = range(5)
 _DRIVES_MPS2 = 0.3
+_MODEL_STD_S = 0.003
+"""Tyres and wheels need some milliseconds to slip: a delay of motion that is not the actuator's."""
+_BRAKE_MODEL_STD = 0.002
+"""Braked wheels slip: measured speed falls a little more than the car's."""
 LEAST_DRIVING_S, LEAST_BRAKING_S, _LEAST_S = 4.0, 3.0, 1.0
 
 
@@ -145,4 +149,8 @@ def fit_longitudinal(
     assert fit is not None
     values = fit.values.copy()
     values[DELAY] = delay_s
-    return LongitudinalFit(fit._replace(values=values), driving_s, braking_s)
+    covariance = fit.covariance.copy()
+    covariance[DELAY, DELAY] += _MODEL_STD_S**2
+    covariance[BRAKE, BRAKE] += _BRAKE_MODEL_STD**2
+    fit = fit._replace(values=values, covariance=covariance)
+    return LongitudinalFit(fit, driving_s, braking_s)

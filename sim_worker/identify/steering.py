@@ -114,7 +114,7 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
          understeer_gradient(vehicle), turning_s2(vehicle), 0.0]
     )  # fmt: skip
     spread = np.array(
-        [_inverse_ratio_std(vehicle), _OFFSET_STD_RAD, understeer_std(vehicle),
+        [_inverse_ratio_std(vehicle), _OFFSET_STD_RAD, 1.5 * understeer_std(vehicle),
          turning_s2(vehicle), _GYRO_BIAS_STD_RADPS]
     )  # fmt: skip
     stretch = stretches(record.time_s[used])
