@@ -227,6 +227,23 @@ def convert(
 
 
 @app.command()
+def identify(
+    log: Annotated[Path, typer.Argument(help="recorded drive")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="parameters in force, TOML [default: the bundled BMW 320i]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON object")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="folder for plots and a vehicle file with what was taken")
+    ] = None,
+) -> None:
+    """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances."""
+    from orchestrator.identify_command import identify_log
+
+    raise typer.Exit(identify_log(log, vehicle_file=vehicle, as_json=as_json, out=out))
+
+
+@app.command()
 def view(
     run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
 ) -> None:

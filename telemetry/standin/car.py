@@ -24,6 +24,9 @@ _STEPS_BELOW_FAST, _FAST_MPS = 2, 8.0
 _SLOW_MPS = 0.8
 _ROLLING_MPS = 1.0
 _MAX_TIRE_RATE_RADPS = 0.4
+_GRAVITY_MPS2 = 9.81
+_COMPLIANCE_LAG_S = 0.02
+"""With which a column that gives springs back."""
 _MAX_TIRE_ANGLE_RAD = 0.6
 _X, _Y, _ANGLE, _VX, _YAW, _YAW_RATE, _VY = 0, 1, 2, 3, 4, 5, 10
 
@@ -41,6 +44,11 @@ class CarMotion(NamedTuple):
     accel_x_mps2: float
     """Forward acceleration of the centre of gravity, as an accelerometer on level ground reads."""
     accel_y_mps2: float
+    steered_rad: float
+    """The tyre angle that the steering wheel stands for: more than the true one if it gives."""
+    altitude_m: float = 0.0
+    grade: float = 0.0
+    """Rise over run of the road underneath."""
 
 
 class MultiBodyCar:
@@ -66,6 +74,8 @@ class MultiBodyCar:
         self.wheelbase_m: float = self._model.a + self._model.b
         self._state = [0.0] * 29
         self._accel = (0.0, 0.0)
+        self._gives = parameters.steering_compliance_rad_per_mps2 != 0.0
+        self._steered_rad = 0.0
         self._steering_queue = [0.0] * max(1, round(parameters.steering_delay_s / STEP_S))
         self._drive_queue = [0.0] * max(1, round(parameters.drive_delay_s / STEP_S))
         self._tick = 0
@@ -99,9 +109,10 @@ class MultiBodyCar:
             tire_angle_rad=state[_ANGLE],
             accel_x_mps2=self._accel[0],
             accel_y_mps2=self._accel[1],
+            steered_rad=self._steered_rad if self._gives else state[_ANGLE],
         )
 
-    def step(self, *, accel_mps2: float, steering_wheel_rad: float) -> None:
+    def step(self, *, accel_mps2: float, steering_wheel_rad: float, grade: float = 0.0) -> None:
         """Go on by STEP_S with the demanded acceleration and steering-wheel angle."""
         slot = self._tick % len(self._steering_queue)
         wheel, self._steering_queue[slot] = self._steering_queue[slot], steering_wheel_rad
@@ -111,13 +122,19 @@ class MultiBodyCar:
         given, state = self._parameters, self._state
         target = wheel / given.steering_ratio + given.steering_offset_rad
         target = min(max(target, -_MAX_TIRE_ANGLE_RAD), _MAX_TIRE_ANGLE_RAD)
-        rate = given.steering_gain_ps * (target - state[_ANGLE])
+        steered = self._steered_rad if self._gives else state[_ANGLE]
+        rate = given.steering_gain_ps * (target - steered)
         rate = min(max(rate, -_MAX_TIRE_RATE_RADPS), _MAX_TIRE_RATE_RADPS)
+        if self._gives:
+            self._steered_rad = steered + rate * STEP_S
+            wanted = self._steered_rad - given.steering_compliance_rad_per_mps2 * self._accel[1]
+            rate = (wanted - state[_ANGLE]) / _COMPLIANCE_LAG_S
         speed = state[_VX]
         accel = demanded * (given.drive_gain if demanded > 0.0 else given.brake_gain)
         if speed > 0.05:
             drag = given.drag_npv2 * speed * speed + given.rolling_resistance_n
             accel -= drag / self._model.m
+            accel -= _GRAVITY_MPS2 * math.sin(math.atan(grade))
         before = (state[_VX], state[_VY], state[_YAW_RATE])
         if self._multi_body and speed < _SLOW_MPS:
             self._multi_body = False

@@ -57,6 +57,11 @@ class Driver:
         self._waited_s = 0.0
         self.arrived = False
 
+    @property
+    def s_m(self) -> float:
+        """How far along the path the car was at the last command."""
+        return self._s_m
+
     def command(self, motion: CarMotion) -> DriverCommand:
         """Return what to ask of the car, and keep track of the stops."""
         self._s_m = self._path.locate(motion.x_m, motion.y_m, near_s_m=self._s_m)

@@ -23,6 +23,8 @@ class CarParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     brake_gain: float
     drag_npv2: float
     rolling_resistance_n: float
+    steering_compliance_rad_per_mps2: float = 0.0
+    """How far sideways acceleration turns the tyres back against the steering wheel: understeer."""
 
 
 class DriverParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -37,9 +37,17 @@ class DrivenPath:
     """
 
     def __init__(
-        self, lat_deg: Array, lon_deg: Array, speed_mps: Array, *, driver: DriverParameters
+        self,
+        lat_deg: Array,
+        lon_deg: Array,
+        speed_mps: Array,
+        *,
+        driver: DriverParameters,
+        altitude_m: Array | None = None,
     ) -> None:
         """Take positions (N,) in degrees with wished speeds (N,); 0 asks for a stop there.
+
+        Without `altitude_m` (N,) the road is flat.
 
         Raises UserError for arrays of other sizes, numbers that are not finite, or less than 5 m.
         """
@@ -71,6 +79,11 @@ class DrivenPath:
             if np.abs(self.curvature_pm).max() <= _MAX_CURVATURE_PM:
                 break
         self.length_m = float(self.s_m[-1])
+        self.altitude_m: Array | None = None
+        if altitude_m is not None:
+            if len(altitude_m) != len(lat_deg) or not np.isfinite(altitude_m).all():
+                raise UserError(f"path of {len(lat_deg)} points needs as many finite altitudes")
+            self.altitude_m = np.interp(even_s, given_s[fresh], altitude_m[fresh])
         moving = fresh & (speed_mps > 0.0)
         if not moving.any():
             raise UserError("path holds no speed above 0")
@@ -91,6 +104,16 @@ class DrivenPath:
         x, y = (float(np.interp(s_m, self.s_m, self.xy_m[:, k])) for k in (0, 1))
         yaw = float(np.interp(s_m, self.s_m, self.yaw_rad))
         return PathPoint(x, y, yaw, float(np.interp(s_m, self.s_m, self.curvature_pm)))
+
+    def altitude_at(self, s_m: float) -> float:
+        """Return the road's height at a distance along the path, 0 on a flat one."""
+        return 0.0 if self.altitude_m is None else float(np.interp(s_m, self.s_m, self.altitude_m))
+
+    def grade_at(self, s_m: float) -> float:
+        """Return the rise over run at a distance along the path."""
+        if self.altitude_m is None:
+            return 0.0
+        return (self.altitude_at(s_m + 1.0) - self.altitude_at(s_m - 1.0)) / 2.0
 
     def speed_at(self, s_m: float) -> float:
         """Return the wished speed at a distance along the path, without regard to stops."""

@@ -53,8 +53,8 @@ class Sensors:
         self._parameters = parameters
         self._car = car
         self._frame = frame
-        streams = np.random.SeedSequence(seed).spawn(4)
-        self._gnss, self._imu, self._speed, self._steering = map(np.random.default_rng, streams)
+        streams = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(5))
+        self._gnss, self._imu, self._speed, self._steering, self._height = streams
 
     def gnss(self, stamp_ns: int, motion: CarMotion) -> GnssFix:
         """Return the antenna's position with noise."""
@@ -68,7 +68,12 @@ class Sensors:
         )
         std = self._parameters.gnss_std_m
         lat, lon = geo_from_local(self._frame, xy + self._gnss.normal(0.0, std, 2))
-        return GnssFix(stamp_ns=stamp_ns, position=GeoPoint(float(lat), float(lon), up), std_m=std)
+        height = up
+        if motion.altitude_m:
+            # Receivers know their height about half as well as their place.
+            height += motion.altitude_m + float(self._height.normal(0.0, 2.0 * std))
+        place = GeoPoint(float(lat), float(lon), height)
+        return GnssFix(stamp_ns=stamp_ns, position=place, std_m=std)
 
     def imu(self, stamp_ns: int, motion: CarMotion) -> ImuSample:
         """Return specific force and rates at the centre of gravity, the gyro with its bias."""
@@ -78,7 +83,9 @@ class Sensors:
         return ImuSample(
             stamp_ns=stamp_ns,
             accel_mps2=(
-                motion.accel_x_mps2 + float(force[0]),
+                motion.accel_x_mps2
+                + _GRAVITY_MPS2 * math.sin(math.atan(motion.grade))
+                + float(force[0]),
                 motion.accel_y_mps2 + float(force[1]),
                 _GRAVITY_MPS2 + float(force[2]),
             ),
@@ -100,7 +107,7 @@ class Sensors:
     def steering(self, stamp_ns: int, motion: CarMotion) -> SteeringSample:
         """Return the angle at the steering wheel, as the car's bus would."""
         noise = float(self._steering.normal(0.0, self._parameters.steering_wheel_std_rad))
-        angle = motion.tire_angle_rad - self._car.steering_offset_rad
+        angle = motion.steered_rad - self._car.steering_offset_rad
         return SteeringSample(
             stamp_ns=stamp_ns, steering_wheel_rad=angle * self._car.steering_ratio + noise
         )

@@ -82,6 +82,11 @@ class StandinSource:
         while not self.ended and START_STAMP_NS + self._tick * _TICK_NS <= until_stamp_ns:
             stamp_ns = START_STAMP_NS + self._tick * _TICK_NS
             motion = self._car.motion()
+            if self._path.altitude_m is not None:
+                s_m = self._driver.s_m
+                motion = motion._replace(
+                    altitude_m=self._path.altitude_at(s_m), grade=self._path.grade_at(s_m)
+                )
             if self._tick % _CONTROL_TICKS == 0:
                 self._command = self._driver.command(motion)
             if self._tick % _TRUTH_TICKS == 0:
@@ -96,6 +101,7 @@ class StandinSource:
             self._car.step(
                 accel_mps2=self._command.accel_mps2,
                 steering_wheel_rad=self._command.steering_wheel_rad,
+                grade=motion.grade,
             )
             self.ended = self._driver.arrived or self._tick == self._last_tick
             self._tick += 1

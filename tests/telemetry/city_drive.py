@@ -6,6 +6,7 @@ import functools
 import math
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from contracts.arrays import Array
@@ -28,8 +29,13 @@ LONG_BEND_FROM_M = 262.5
 
 
 @functools.cache
-def city_drive() -> Drive:
-    """Return the drive from rest to rest, simulated once."""
+def city_drive(
+    *, ratio: float | None = None, compliance: float = 0.0, hill_m: float = 0.0, seed: int = 3
+) -> Drive:
+    """Return the drive from rest to rest, simulated once.
+
+    With another steering ratio, a steering column that gives, or hills `hill_m` high.
+    """
     x, y, yaw = 0.0, 0.0, 0.0
     points = [(x, y)]
     for length, curvature in LEGS:
@@ -44,8 +50,16 @@ def city_drive() -> Drive:
     wish = np.full(len(points), 12.0)
     wish[round(STOP_AT_M)] = 0.0
     parameters = read_parameters()
-    path = DrivenPath(geo[:, 0], geo[:, 1], wish, driver=parameters.driver)
-    source = StandinSource(path, parameters, vehicle_id="standin", seed=3)
+    car = msgspec.structs.replace(
+        parameters.car,
+        steering_ratio=ratio or parameters.car.steering_ratio,
+        steering_compliance_rad_per_mps2=compliance,
+    )
+    parameters = msgspec.structs.replace(parameters, car=car)
+    way_m = np.arange(len(points))
+    heights = hill_m * (1.0 - np.cos(2.0 * math.pi * way_m / 150.0)) / 2.0 if hill_m else None
+    path = DrivenPath(geo[:, 0], geo[:, 1], wish, driver=parameters.driver, altitude_m=heights)
+    source = StandinSource(path, parameters, vehicle_id="standin", seed=seed)
     return Drive(source, list(source.advance(START_STAMP_NS + 200_000_000_000)))
 
 

@@ -1,0 +1,1 @@
+"""Identification: what a stretch of driving says of the vehicle's parameters, and how surely."""

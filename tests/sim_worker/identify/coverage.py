@@ -1,0 +1,134 @@
+"""How often 95 % intervals hold the truth: many cars, each on a way of its own.
+
+    python -m tests.sim_worker.identify.coverage [CARS]
+
+prints, for each parameter, how many of the intervals held the truth, and their median half width;
+a car takes some seconds of CPU.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from contracts.frames import geo_from_local
+from sim_worker.identify.window import UNDERSTEER_NAME, identify
+from sim_worker.vehicle.parameters import load_vehicle
+from telemetry.standin.parameters import StandinParameters, read_parameters
+from telemetry.standin.path import DrivenPath
+from tests.sim_worker.standin_drives import MINUTE_S, driven, estimate, recorded
+from tests.telemetry.standin_drive import FRAME
+
+
+class Case(NamedTuple):
+    """One interval and the truth that it should hold."""
+
+    name: str
+    truth: float
+    value: float
+    low: float
+    high: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the truth lies in the interval."""
+        return self.low <= self.truth <= self.high
+
+
+def random_parameters(random: np.random.Generator) -> StandinParameters:
+    """Return a stand-in car that differs from the bundled one in what is identified."""
+    given = read_parameters()
+    car = msgspec.structs.replace(
+        given.car,
+        steering_ratio=random.uniform(13.0, 18.0),
+        steering_offset_rad=random.uniform(-0.008, 0.008),
+        steering_delay_s=0.005 * random.integers(10, 36),
+        drive_delay_s=0.005 * random.integers(6, 30),
+        drive_gain=random.uniform(0.85, 1.1),
+        brake_gain=random.uniform(0.9, 1.15),
+        drag_npv2=random.uniform(0.3, 0.6),
+        rolling_resistance_n=random.uniform(80.0, 200.0),
+        steering_compliance_rad_per_mps2=random.uniform(0.0, 0.003),
+    )
+    return msgspec.structs.replace(given, car=car)
+
+
+def random_path(random: np.random.Generator, parameters: StandinParameters) -> DrivenPath:
+    """Return 700 m of streets with bends of 12 to 40 m radius, and a stop or two."""
+    x, y, yaw = 0.0, 0.0, 0.0
+    points = [(x, y)]
+    while len(points) < 700:
+        radius = random.uniform(12.0, 40.0)
+        turn = random.choice([-1.0, 1.0]) * random.uniform(0.8, 1.6)
+        for length, curvature in (
+            (random.uniform(30.0, 90.0), 0.0),
+            (radius * abs(turn), math.copysign(1.0 / radius, turn)),
+        ):
+            for _ in range(round(length)):
+                x += math.cos(yaw + 0.5 * curvature)
+                y += math.sin(yaw + 0.5 * curvature)
+                yaw += curvature
+                points.append((x, y))
+    geo = geo_from_local(FRAME, np.array(points))
+    wish = np.full(len(points), random.uniform(10.0, 14.0))
+    wish[round(random.uniform(120.0, 300.0))] = 0.0
+    return DrivenPath(geo[:, 0], geo[:, 1], wish, driver=parameters.driver)
+
+
+def cases(seed: int) -> list[Case]:
+    """Return the intervals from a minute of one random car on a random way."""
+    random = np.random.default_rng(seed)
+    parameters = random_parameters(random)
+    path = random_path(random, parameters)
+    drive = driven(path, parameters, seed=seed, end_s=MINUTE_S)
+    told = identify(recorded(drive.samples), load_vehicle(), vehicle_id="standin")
+    car = parameters.car
+    # Stiffness goes with the load on both axles alike: the gradient is the column's alone.
+    truths = {
+        "steering_ratio": car.steering_ratio,
+        "steering_offset_rad": car.steering_offset_rad,
+        UNDERSTEER_NAME: car.steering_compliance_rad_per_mps2,
+        "steering_delay_s": car.steering_delay_s,
+        "drive_gain": car.drive_gain,
+        "brake_gain": car.brake_gain,
+        "drag_npv2": car.drag_npv2,
+        "accel_delay_s": car.drive_delay_s,
+    }
+    result = []
+    for name, truth in truths.items():
+        found = estimate(told, name)
+        if found.value is not None and found.low is not None and found.high is not None:
+            result.append(Case(name, truth, found.value, found.low, found.high))
+    return result
+
+
+def coverage(told: Iterable[Case]) -> dict[str, tuple[int, int]]:
+    """Return how many intervals held the truth, and of how many, by parameter."""
+    counts: dict[str, tuple[int, int]] = {}
+    for case in told:
+        held, of = counts.get(case.name, (0, 0))
+        counts[case.name] = (held + case.holds, of + 1)
+    return counts
+
+
+def main() -> None:
+    """Print the coverage."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    told = [case for seed in range(count) for case in cases(seed)]
+    for name, (held, of) in coverage(told).items():
+        mine = [case for case in told if case.name == name]
+        errors = np.array([case.value - case.truth for case in mine])
+        half = np.median([0.5 * (case.high - case.low) for case in mine])
+        print(
+            f"{name:34} {held:3} of {of:3} held; error {np.median(errors):+.5f} "
+            f"± {np.std(errors):.5f}, half interval {half:.5f}"
+        )
+
+
+if __name__ == "__main__":
+    main()

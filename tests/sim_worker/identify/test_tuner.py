@@ -1,0 +1,118 @@
+"""Identification while driving: what counts when, by hand, pinned, rolled back, after a step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import pytest
+
+from contracts.drive import SteeringSample
+from contracts.errors import UserError
+from contracts.tuning import Identification
+from sim_worker.identify.tuner import Tuner
+from sim_worker.vehicle.parameters import load_vehicle
+from telemetry.standin.source import START_STAMP_NS
+from tests.sim_worker.standin_drives import estimate
+from tests.telemetry.city_drive import city_drive
+
+Sample = tuple[str, Any]
+
+
+def tuner(**options: float) -> Tuner:
+    return Tuner(vehicle=load_vehicle(), vehicle_id="standin", **options)  # type: ignore[arg-type]
+
+
+def through(taken: Tuner, samples: list[Sample]) -> list[Identification]:
+    """Return every identification, each one taken as it comes."""
+    told = []
+    for channel, message in samples:
+        found = taken.handle(channel, message)
+        if found is not None:
+            told.append(found)
+            taken.take(found)
+    return told
+
+
+def test_parameters_count_as_soon_as_the_driving_tells_them() -> None:
+    taken = tuner()
+    told = through(taken, city_drive().samples)
+    assert [round((found.stamp_ns - START_STAMP_NS) * 1e-9) for found in told] == [
+        20, 30, 40, 50, 60, 70,
+    ]  # fmt: skip
+    assert taken.vehicle.steering_ratio.value == pytest.approx(15.3, rel=0.02)
+    assert taken.vehicle.brake_gain.value == pytest.approx(1.06, rel=0.03)
+    assert taken.vehicle.steering_delay_s.value == pytest.approx(0.1, abs=0.01)
+    assert taken.vehicle.wheelbase_m == load_vehicle().wheelbase_m
+    assert not any(found.step_noticed for found in told)
+
+
+def test_the_same_samples_give_the_same_parameters() -> None:
+    first, second = tuner(), tuner()
+    samples = city_drive().samples[:9000]
+    through(first, samples)
+    through(second, samples)
+    assert first.vehicle == second.vehicle
+
+
+def test_a_steering_ratio_that_changes_is_noticed_and_identified_anew() -> None:
+    """As after a repair: the same drive twice, the second time with another steering wheel."""
+    once = city_drive().samples
+    lasts_ns = once[-1][1].stamp_ns - START_STAMP_NS + 10_000_000
+    later: list[Sample] = []
+    for channel, message in once:
+        moved = msgspec.structs.replace(message, stamp_ns=message.stamp_ns + lasts_ns)
+        if isinstance(moved, SteeringSample):
+            assert moved.steering_wheel_rad is not None
+            wheel = moved.steering_wheel_rad * 18.0 / 15.3
+            moved = msgspec.structs.replace(moved, steering_wheel_rad=wheel)
+        later.append((channel, moved))
+    taken = tuner(window_s=40.0)
+    told = through(taken, once + later)
+    noticed = [found for found in told if "steering_ratio" in found.step_noticed]
+    assert noticed
+    assert noticed[0].stamp_ns > START_STAMP_NS + lasts_ns
+    assert "just changed" in estimate(noticed[0], "steering_ratio").reason
+    assert taken.vehicle.steering_ratio.value == pytest.approx(18.0, rel=0.02)
+
+
+def test_what_is_set_by_hand_stays_until_it_is_unpinned() -> None:
+    taken = tuner()
+    change = taken.set("steering_ratio", 17.0, stamp_ns=5)
+    assert (change.before, change.value, change.origin, change.pinned) == (16.0, 17.0, "set", True)
+    samples = city_drive().samples
+    through(taken, samples[:9000])
+    assert taken.vehicle.steering_ratio.value == 17.0
+    taken.unpin("steering_ratio")
+    through(taken, samples[9000:])
+    assert taken.vehicle.steering_ratio.value == pytest.approx(15.3, rel=0.02)
+    back = taken.rollback("steering_ratio", stamp_ns=9)
+    assert back.origin == "rolled_back"
+    assert taken.vehicle.steering_ratio.value != back.before
+    assert "steering_ratio" in taken.pinned
+
+
+def test_rolling_back_twice_reaches_the_file() -> None:
+    taken = tuner()
+    taken.set("mass_kg", 1200.0, stamp_ns=1)
+    taken.set("mass_kg", 1300.0, stamp_ns=2)
+    assert taken.rollback("mass_kg", stamp_ns=3).value == 1200.0
+    assert taken.rollback("mass_kg", stamp_ns=4).value == load_vehicle().mass_kg.value
+    with pytest.raises(UserError, match="nothing to roll back to"):
+        taken.rollback("mass_kg", stamp_ns=5)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("steering_wheel", 1.0, "no parameter of a vehicle"),
+        ("name", 1.0, "no parameter of a vehicle"),
+        ("mass_kg", -1.0, "must be more than zero"),
+        ("understeer_gradient_rad_per_mps2", 0.001, "follows from the stiffnesses"),
+    ],
+)
+def test_what_cannot_be_set_is_said(name: str, value: float, told: str) -> None:
+    taken = tuner()
+    with pytest.raises(UserError, match=told):
+        taken.set(name, value, stamp_ns=1)
+    assert taken.vehicle == load_vehicle()
