@@ -169,7 +169,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
                 name="model_delay_s", value=model.delay_s, expected=car.delay_s, std=0.02, text=said
             )
             return accuse("steering_delay", f"the model steers too late: {said}", more)
-    if line is None or (car is not None and not obeys):
+    if line is None or (car is not None and not obeys) or not _gyro_confirmed(seen.gyro_by_course):
         return None
     hard = seen.motion_by_measured_hard
     lag = 0.0 if math.isnan(seen.motion_lag_s) else seen.motion_lag_s
@@ -198,6 +198,13 @@ def _model_turns(seen: Consistency) -> Finding | None:
         text = f"{said}, though car and command agree: the model's steering offset is wrong"
         return accuse("steering_offset", text, _offset("curvature_offset", line, said))
     return None
+
+
+def _gyro_confirmed(gyro: Line | None) -> bool:
+    """Whether the course over ground turns as the gyro says; without positions nobody objects."""
+    if gyro is None:
+        return True
+    return abs(gyro.gain - 1.0) + gyro.gain_std < _GAIN + 0.05
 
 
 class _Single(NamedTuple):

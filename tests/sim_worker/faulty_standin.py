@@ -146,7 +146,7 @@ MODEL_FAULTS: dict[str, dict[str, float]] = {
     "inertia": {"yaw_inertia_kgm2": 14000.0},
     "friction": {"friction": 0.12},
     "cornering_stiffness": {"front_cornering_stiffness_npr": 18000.0},
-    "drag": {"drag_npv2": 9.0},
+    "drag": {"drag_npv2": 20.0},
     "drive_gain": {"drive_gain": 1.7},
     "brake_gain": {"brake_gain": 0.5},
     "steering_delay": {"steering_delay_s": 0.5},
