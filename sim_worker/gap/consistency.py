@@ -19,7 +19,8 @@ from sim_worker.motion_record import PERIOD_S, MotionRecord
 _Flags = np.ndarray[Any, np.dtype[np.bool_]]
 _Indices = np.ndarray[Any, np.dtype[np.intp]]
 _RUN, _HALF = round(1.0 / PERIOD_S), round(0.5 / PERIOD_S)
-_MOVES_MPS = 2.5
+_MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
+"""Above them turning, and acceleration alone, say something."""
 _BEND_RADPS = 0.08
 """Standard deviation of a rate that varies enough to show a gain."""
 _COURSE_HALF = round(0.3 / PERIOD_S)
@@ -71,7 +72,8 @@ def consistency_of(
     turn = np.nanmax(np.stack([np.abs(np.nan_to_num(x)) for x in signals]), axis=0)
     turn = np.maximum(turn, np.nan_to_num(2.5 * np.abs(rate) / np.maximum(speed, _MOVES_MPS)))
     excited = moves & (turn > _MIN_TURN_RAD)
-    pushed = moves & (np.abs(np.nan_to_num(record.command_accel_mps2)) > _MIN_ACCEL_MPS2)
+    rolls = np.isfinite(speed) & (speed > _ROLLS_MPS)
+    pushed = rolls & (np.abs(np.nan_to_num(record.command_accel_mps2)) > _MIN_ACCEL_MPS2)
     gyro, gnss_speed = _sensors(record, antenna_ahead_m)
     wheel = np.isfinite(record.command_wheel_rad).any() and np.isfinite(record.wheel_rad).any()
     # At the steering wheel where both are: no ratio comes in.
@@ -86,7 +88,7 @@ def consistency_of(
         arc = np.arctan(runner.vehicle.wheelbase_m.value * rate / np.maximum(speed, _MOVES_MPS))
         known = moves & np.isfinite(done) & np.isfinite(arc)
         angle = line_through(done[known], arc[known], independent=known.sum() * PERIOD_S / 0.3)
-    turned = _turning(record, runner, moves & np.isfinite(rate))
+    turned = _turning(record, runner, rolls & np.isfinite(rate))
     return Consistency(
         gyro_by_course=gyro,
         speed_by_gnss=gnss_speed,
@@ -176,24 +178,26 @@ def _turning(record: MotionRecord, runner: FreeRunner, usable: _Flags) -> dict[s
         "model_by_command": None, "motion_by_measured": None, "motion_by_measured_hard": None,
         "motion_lag_s": float("nan"), "motion_by_command": None, "push": None,
     }  # fmt: skip
-    starts = np.arange(0, len(usable) - _RUN, _HALF)
-    starts = np.array([s for s in starts if usable[s : s + _RUN + 1].all()], dtype=np.intp)
+    starts = _starts(usable)
     if not len(starts):
         return found
     speed, rate = record.speed_mps, record.yaw_rate_radps
     smooth = np.where(np.isfinite(_smooth(speed, 3)), _smooth(speed, 3), speed)
     accel = np.gradient(smooth) / PERIOD_S
     zero = np.zeros(len(starts))
+    turns = np.array([(speed[s : s + _RUN + 1] > _MOVES_MPS).all() for s in starts])
     begin = start_states(
         runner.vehicle, x_m=zero, y_m=zero, yaw_rad=zero, speed_mps=smooth[starts],
         yaw_rate_radps=rate[starts], accel_mps2=accel[starts],
         tire_rad=np.full(len(starts), np.nan),
     )  # fmt: skip
+    slow_too, begin_all = starts, begin
+    starts, begin = starts[turns], begin[turns]
     window = (starts[:, None] + np.arange(_RUN - _HALF + 1, _RUN + 1)[None, :]).ravel()
     real = rate[window] / speed[window]
     independent = len(window) * PERIOD_S / 0.3
     hard = np.abs(rate[window] * speed[window]) > 1.2
-    if np.isfinite(signals.measured_rad[window]).all():
+    if len(starts) and np.isfinite(signals.measured_rad[window]).all():
         runs = runner.run(
             states=begin, starts=starts, steps=_RUN, accel_mps2=record.command_accel_mps2,
             tire_rad=signals.measured_rad, hold_speed_mps=smooth, delayed=False,
@@ -205,30 +209,49 @@ def _turning(record: MotionRecord, runner: FreeRunner, usable: _Flags) -> dict[s
             if hard.sum() * PERIOD_S > 0.6:
                 found["motion_by_measured_hard"] = _mean_ratio(model[hard], real[hard], PERIOD_S)
         found["motion_lag_s"] = _lag(model.reshape(len(starts), -1), starts, record)
-    told = np.isfinite(signals.commanded_rad[window]).all()
-    if told and np.isfinite(record.command_accel_mps2[window]).all():
+    command = record.command_accel_mps2
+    span = slice(int(slow_too[0]), int(slow_too[-1]) + _RUN + 1)
+    if np.isfinite(signals.commanded_rad[span]).all() and np.isfinite(command[span]).all():
         runs = runner.run(
-            states=begin, starts=starts, steps=_RUN, accel_mps2=record.command_accel_mps2,
+            states=begin_all, starts=slow_too, steps=_RUN, accel_mps2=command,
             tire_rad=signals.commanded_rad,
         )  # fmt: skip
-        tail = runs[:, _HALF + 1 :]
+        tail = runs[turns, _HALF + 1 :]
         model = (tail[:, :, 5] / np.maximum(tail[:, :, 3], 1.0)).ravel()
-        if np.ptp(real) > 0.006 or np.ptp(model) > 0.006:
+        if len(starts) and (np.ptp(real) > 0.006 or np.ptp(model) > 0.006):
             found["motion_by_command"] = line_through(model, real, independent=independent)
         tyre = np.full(len(usable), np.nan)
         tyre[window] = tail[:, :, 6].ravel()
         if _varies(signals.commanded_rad):
             found["model_by_command"] = follower(signals.commanded_rad, tyre)
-        pace = _HALF * PERIOD_S
-        gained = (runs[:, -1, 3] - runs[:, _RUN - _HALF, 3]) / pace
-        went = (smooth[starts + _RUN] - smooth[starts + _RUN - _HALF]) / pace
-        command = record.command_accel_mps2
-        mean = np.array(
-            [np.mean(command[max(0, s + _HALF - _COMMAND_LAG) : s + _RUN - _COMMAND_LAG])
-             for s in starts]
-        )  # fmt: skip
-        found["push"] = Push(mean, went, gained, smooth[starts + _HALF])
+        found["push"] = _push(record, smooth, slow_too, runs)
     return found
+
+
+def _starts(usable: _Flags) -> _Indices:
+    """Return where runs begin, half a run apart at least, so that all of each is usable."""
+    chosen: list[int] = []
+    clear = np.concatenate([[0], np.cumsum(~usable)])
+    first = 0
+    while first + _RUN < len(usable):
+        if clear[first + _RUN + 1] > clear[first]:
+            first += 1
+            continue
+        chosen.append(first)
+        first += _HALF
+    return np.array(chosen, dtype=np.intp)
+
+
+def _push(record: MotionRecord, speed: Array, starts: _Indices, runs: Array) -> Push:
+    """Compare what car and model gain over the second half of each run."""
+    pace = _HALF * PERIOD_S
+    gained = (runs[:, -1, 3] - runs[:, _RUN - _HALF, 3]) / pace
+    went = (speed[starts + _RUN] - speed[starts + _RUN - _HALF]) / pace
+    asked = [
+        np.mean(record.command_accel_mps2[s + _HALF - _COMMAND_LAG : s + _RUN - _COMMAND_LAG])
+        for s in starts
+    ]
+    return Push(np.array(asked), went, gained, speed[starts + _HALF])
 
 
 def _lag(model: Array, starts: _Indices, record: MotionRecord) -> float:
