@@ -63,9 +63,16 @@ class Consistency(NamedTuple):
 
 
 def consistency_of(
-    record: MotionRecord, runner: FreeRunner, *, antenna_ahead_m: float = 0.0
+    record: MotionRecord,
+    runner: FreeRunner,
+    *,
+    antenna_ahead_m: float = 0.0,
+    precise_positions: bool = True,
 ) -> Consistency:
-    """Compare the signals of one stretch (some seconds) pair by pair."""
+    """Compare the signals of one stretch (some seconds) pair by pair.
+
+    Without precise positions no sensor is judged by them: a telephone's are smoothed and late.
+    """
     signals = steering_signals(record, runner.vehicle)
     speed, rate = record.speed_mps, record.yaw_rate_radps
     moves = np.isfinite(speed) & (speed > _MOVES_MPS)
@@ -74,7 +81,9 @@ def consistency_of(
     excited = moves & (turn > _MIN_TURN_RAD)
     rolls = np.isfinite(speed) & (speed > _ROLLS_MPS)
     pushed = rolls & (np.abs(np.nan_to_num(record.command_accel_mps2)) > _MIN_ACCEL_MPS2)
-    gyro, gnss_speed = _sensors(record, antenna_ahead_m)
+    gyro, gnss_speed = None, None
+    if precise_positions:
+        gyro, gnss_speed = _sensors(record, antenna_ahead_m)
     wheel = np.isfinite(record.command_wheel_rad).any() and np.isfinite(record.wheel_rad).any()
     # At the steering wheel where both are: no ratio comes in.
     ratio = runner.vehicle.steering_ratio.value

@@ -24,6 +24,10 @@ _PUSH_GAIN, _PUSH_REST_MPS2 = 0.3, 0.33
 _LEAST_EXCITED_S, _LEAST_PUSHED_S = 1.4, 1.4
 
 
+_BY_GYRO = {"steering_ratio", "cornering_stiffness", "friction", "inertia", "steering_offset"}
+"""What a wrong gyro could show as well."""
+
+
 class Finding(NamedTuple):
     """One departure: who, how, and the comparisons that say so."""
 
@@ -49,6 +53,9 @@ def findings_of(seen: Consistency) -> Finding | None:
             found = _degrees_without_commands(seen) or _model_without_commands(seen)
         else:
             found = _actuator(seen.measured_by_command, by_command) or _model_turns(seen)
+            if found is not None and found.cause in _BY_GYRO and seen.gyro_by_course is None:
+                text = "no precise positions confirm the gyro: " + found.text
+                found = found._replace(culprit="undecided", text=text)
         if found is not None:
             return found
     if seen.push is not None and seen.pushed_s >= _LEAST_PUSHED_S:
@@ -201,7 +208,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
 
 
 def _gyro_confirmed(gyro: Line | None) -> bool:
-    """Whether the course over ground turns as the gyro says; without positions nobody objects."""
+    """Whether the course over ground turns as the gyro says; without one nobody objects."""
     if gyro is None:
         return True
     return abs(gyro.gain - 1.0) + gyro.gain_std < _GAIN + 0.05

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Any
 
 import numpy as np
 
-from contracts.drive import VehicleInfo
+from contracts.drive import GnssFix, VehicleInfo
 from contracts.frames import LocalFrame
 from contracts.gap import Verdict
 from contracts.vehicle import VehicleParameters
@@ -20,6 +21,8 @@ WINDOW_S, EVERY_S = 6.0, 0.5
 _LATEST_S = 0.1
 """Samples of slower channels may still be on their way."""
 _IN_A_ROW = 2
+_DENSE_S, _PRECISE_M = 0.25, 0.15
+"""Positions this near to each other and this good may accuse another sensor."""
 _FORGOTTEN_S = 10.0
 """A finding that has not come back for so long is over, and a new one is told anew."""
 
@@ -40,6 +43,7 @@ class Judge:
         self._first_ns: int | None = None
         self._next_ns = 0
         self._pending: tuple[str, str, int, int] | None = None
+        self._fixes: deque[tuple[int, float]] = deque(maxlen=40)
         self._told: dict[tuple[str, str], int] = {}
         self.latest: Consistency | None = None
         """What the latest stretch said, for those who show it."""
@@ -58,6 +62,8 @@ class Judge:
         if newest is not None and stamp_ns < newest - 2_000_000_000:
             return None  # the clock ran back: what is kept would no longer be one motion
         self._recorder.handle(channel, message)
+        if isinstance(message, GnssFix):
+            self._fixes.append((stamp_ns, np.inf if message.std_m is None else message.std_m))
         newest = self._recorder.newest_stamp_ns
         if newest is None:
             return None
@@ -71,8 +77,18 @@ class Judge:
         if to_ns - from_ns < 1.5e9:
             return None
         record = without_manual_commands(self._recorder.record(from_ns, to_ns))
-        self.latest = consistency_of(record, self._runner, antenna_ahead_m=self._ahead_m)
+        self.latest = consistency_of(
+            record, self._runner, antenna_ahead_m=self._ahead_m, precise_positions=self._precise()
+        )
         return self._weigh(findings_of(self.latest), from_ns, to_ns)
+
+    def _precise(self) -> bool:
+        """Whether positions are dense and good enough to judge other sensors by."""
+        if len(self._fixes) < 4:
+            return False
+        table = np.array(self._fixes, dtype=np.float64)
+        apart_s = float(np.median(np.diff(table[:, 0]))) * 1e-9
+        return apart_s <= _DENSE_S and float(np.median(table[:, 1])) <= _PRECISE_M
 
     def _weigh(self, found: Finding | None, from_ns: int, to_ns: int) -> Verdict | None:
         for key, seen_ns in list(self._told.items()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -10,14 +11,24 @@ import numpy as np
 import pytest
 
 from contracts.drive import GnssFix, ImuSample, SpeedSample
-from contracts.frames import GeoPoint
+from contracts.frames import GeoPoint, LocalFrame
 from sim_worker.gap.verdict import Judge
+from sim_worker.vehicle.parameters import load_vehicle
+from telemetry.logs.opening import open_log
 from tests.sim_worker.faulty_standin import CAR_FAULTS, MODEL_FAULTS, drive_of, model_with
 from tests.sim_worker.gap.judging_faults import culprit_of, drive_with, excited_s, verdicts_of
 from tests.telemetry.standin_drive import FRAME
 
 SEED, END_S = 2, 12.0
 """Of the fast tests: one drive simulated once."""
+REAL_DRIVES = {
+    "drive-comma2k19-sf/segment40": None,
+    "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt": None,
+    "drive-dresden-imu/2014-02-14-002-Data.csv": "dresden.csv.toml",
+    "drive-dresden-imu/2014-03-26-000-Data.csv": "dresden.csv.toml",
+    "drive-boreas-toronto/boreas-2021-08-05-13-34_lidar_poses.csv": "boreas.csv.toml",
+}
+"""Of cars of which nobody knows a fault, with the declarations of the tables among them."""
 CAUSES = {
     "steering_read_in_degrees": {"steering_in_degrees"},
     "steering_sign": {"steering_sign"},
@@ -54,6 +65,18 @@ def test_without_commands_a_wrong_ratio_is_nobodys_but_degrees_are_the_cars() ->
 
     assert told("steering_ratio")[:1] == ["undecided steering_ratio"]
     assert told("steering_read_in_degrees")[:1] == ["vehicle steering_in_degrees"]
+
+
+def test_a_telephones_positions_accuse_no_sensor_and_confirm_none() -> None:
+    drive = drive_of(SEED, end_s=END_S)
+    told = []
+    for fault in (None, "steering_ratio"):
+        judge = Judge(drive.info, model_with(fault), frame=FRAME)
+        for channel, message in drive.samples:
+            if isinstance(message, GnssFix):
+                message = msgspec.structs.replace(message, std_m=3.0)
+            told.append(judge.handle(channel, message))
+    assert [verdict.culprit for verdict in told if verdict] == ["undecided"]
 
 
 def test_no_verdict_without_excitation() -> None:
@@ -111,3 +134,21 @@ def test_an_hour_without_faults_raises_one_false_alarm_at_most() -> None:
     """112 drives of 32 s; each seed has another way."""
     told = [one for seed in range(100, 212) for one in verdicts_of(None, seed=seed)]
     assert len(told) <= 1, told
+
+
+@pytest.mark.judge
+@pytest.mark.real_data
+@pytest.mark.timeout(3600)
+def test_real_drives_raise_one_false_alarm_at_most(data_dir: Path) -> None:
+    """ "Undecided" is none: it says that nobody can be accused."""
+    declared = Path(__file__).parents[2] / "data" / "declarations"
+    vehicle = load_vehicle()
+    accused = []
+    for name, declaration in REAL_DRIVES.items():
+        file = None if declaration is None else declared / declaration
+        log = open_log(data_dir / name, declaration=file)
+        frame = next(m for _, m in log.samples() if isinstance(m, GnssFix)).position
+        judge = Judge(log.info, vehicle, frame=LocalFrame(frame))
+        verdicts = [judge.handle(*sample) for sample in log.samples()]
+        accused += [(name, v.cause) for v in verdicts if v and v.culprit != "undecided"]
+    assert len(accused) <= 1, accused
