@@ -227,7 +227,7 @@ def _push(push: Push) -> Finding | None:
     Achieved over commanded is 1 for a car that does as told: who is farther from it is wrong.
     """
     fine = np.isfinite(np.stack(push)).all(axis=0)
-    if fine.sum() < 3:
+    if fine.sum() < 2:
         return None
     asked, car, model, speed = (values[fine] for values in push)
     causes = (
@@ -240,7 +240,7 @@ def _push(push: Push) -> Finding | None:
     for single in causes:
         square = float(np.sum(single.column**2))
         used = np.abs(single.column) > 1e-9
-        if square < 0.5 or used.sum() < 3:
+        if square < 0.5 or used.sum() < 2:
             continue
         value = float(np.sum(single.column * gap)) / square
         left = float(np.sum((gap - value * single.column) ** 2))

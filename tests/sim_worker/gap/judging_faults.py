@@ -53,7 +53,8 @@ def excited_s(fault: str, verdict: Verdict, *, seed: int, end_s: float = DURATIO
     """Return how long the car had been doing what the fault shows in, when the verdict fell.
 
     Steering and turning sensors: the wheel is turned by 0.15 rad, as the fault-free sensor has
-    it; drive and brake: commands beyond 0.5 m/s² while it rolls; drag: above 6 m/s;
+    it; drive and brake: commands beyond 0.5 m/s² while it rolls (0.9 where 0.7 is the most);
+    drag: above 6 m/s;
     friction: a lateral acceleration beyond what the slippery model carries.
     """
     clean = drive_of(seed, fault if culprit_of(fault) == "vehicle" else None, end_s=end_s)
@@ -74,7 +75,9 @@ def excited_s(fault: str, verdict: Verdict, *, seed: int, end_s: float = DURATIO
             seconds += 0.01 * slides
         elif fault in _PUSHES | _BRAKES:
             sign = -1.0 if fault in _BRAKES else 1.0
-            if isinstance(message, ControlCommand) and sign * message.accel_mps2 > 0.5:
+            # A brake that does at most 0.7 m/s² is one like others below.
+            least = 0.9 if fault == "saturated_brake" else 0.5
+            if isinstance(message, ControlCommand) and sign * message.accel_mps2 > least:
                 seconds += 0.02
         elif isinstance(message, SteeringSample):
             wheel = message.steering_wheel_rad or 0.0
