@@ -54,7 +54,7 @@ def gap_of(log: Log, vehicle: VehicleParameters) -> GapReport:
         steering_offset_rad=vehicle.steering_offset_rad.value,
     )
     judge = Judge(log.info, vehicle, frame=frame)
-    recorder = MotionRecorder(frame=frame, keep_s=float("1e6"), depth=len(messages) + 1)
+    recorder = MotionRecorder(frame=frame, keep_s=1e6, depth=len(messages) + 1)
     states: list[VehicleState] = []
     verdicts: list[Verdict] = []
     for channel, message in messages:
