@@ -244,6 +244,21 @@ def identify(
 
 
 @app.command()
+def gap(
+    recording: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="vehicle parameters, TOML, or a bundled name")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="table and verdicts as JSON")] = False,
+    out: Annotated[Path | None, typer.Option(help="folder for plots")] = None,
+) -> None:
+    """Measure how far the model leaves a recorded drive, and say which of the two is wrong."""
+    from orchestrator.gap_command import report_gap
+
+    report_gap(recording, vehicle=vehicle, as_json=as_json, out=out)
+
+
+@app.command()
 def view(
     run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
 ) -> None:

@@ -1,0 +1,108 @@
+"""Straight lines through pairs of signals, with honest deviations, delays and saturation."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array
+from sim_worker.motion_record import PERIOD_S
+
+
+class Line(NamedTuple):
+    """y = gain x + offset; deviations count one independent sample per `together_s`."""
+
+    gain: float
+    gain_std: float
+    offset: float
+    offset_std: float
+    residual: float
+    explained: float
+    """Share of the variance of y, 0 to 1."""
+
+
+class Follower(NamedTuple):
+    """How y follows x: the line after the best delay, and the plateau of y where there is one."""
+
+    line: Line
+    delay_s: float
+    saturated_at: float
+    """|y| is held there although x asks for more; NaN where it is not."""
+
+
+def line_through(x: Array, y: Array, *, independent: float) -> Line | None:
+    """Fit by least squares; `independent` says how many of the samples (N,) are.
+
+    None for fewer than three independent samples or an x that does not vary.
+    """
+    count = len(x)
+    if count < 3 or independent < 3.0 or float(np.std(x)) < 1e-9:
+        return None
+    mean_x, mean_y = float(np.mean(x)), float(np.mean(y))
+    spread = float(np.mean((x - mean_x) ** 2))
+    gain = float(np.mean((x - mean_x) * (y - mean_y))) / spread
+    offset = mean_y - gain * mean_x
+    left = y - gain * x - offset
+    variance = float(np.sum(left * left)) / count * independent / (independent - 2.0)
+    total = float(np.mean((y - mean_y) ** 2))
+    return Line(
+        gain=gain,
+        gain_std=float(np.sqrt(variance / (independent * spread))),
+        offset=offset,
+        offset_std=float(np.sqrt(variance / independent * (1.0 + mean_x**2 / spread))),
+        residual=float(np.sqrt(variance)),
+        explained=0.0 if total < 1e-18 else 1.0 - float(np.mean(left * left)) / total,
+    )
+
+
+def follower(
+    x: Array, y: Array, *, longest_s: float = 0.8, together_s: float = 0.3
+) -> Follower | None:
+    """Fit how y follows x, both (N,) on the grid, with delays from 0 to `longest_s`.
+
+    None where too little is known of both.
+    """
+    best: tuple[float, Line, int] | None = None
+    most = min(round(longest_s / PERIOD_S), len(x) // 2)
+    for shift in range(0, most + 1):
+        late = x[: len(x) - shift]
+        # The same instants for each delay, else the longest would win by having fewest.
+        at = slice(most - shift, None)
+        asked, done = late[at], y[most:]
+        known = np.isfinite(asked) & np.isfinite(done)
+        seconds = float(known.sum()) * PERIOD_S
+        line = line_through(asked[known], done[known], independent=seconds / together_s)
+        if line is not None and (best is None or line.residual < best[0]):
+            best = line.residual, line, shift
+    if best is None:
+        return None
+    _, line, shift = best
+    asked, done = x[most - shift : len(x) - shift], y[most:]
+    known = np.isfinite(asked) & np.isfinite(done)
+    return Follower(line, shift * PERIOD_S, _plateau(asked[known], done[known], line))
+
+
+def _plateau(x: Array, y: Array, line: Line) -> float:
+    """Return the |y| beyond which nothing goes although x does, NaN where there is none."""
+    sign = 1.0 if line.gain >= 0.0 else -1.0
+    x = x * sign
+    top = float(np.percentile(np.abs(y), 98))
+    small = np.abs(y) < 0.7 * top
+    flat = (np.abs(np.abs(y) - top) < 0.07 * top) & (np.sign(x) == np.sign(y))
+    if small.sum() < 10 or flat.sum() * PERIOD_S < 0.3:
+        return float("nan")
+    inner = float(np.sum(x[small] * x[small]))
+    if inner < 1e-12:
+        return float("nan")
+    slope = float(np.sum(x[small] * y[small])) / inner
+    if slope <= 0.0:
+        return float("nan")
+    asked = slope * np.abs(x)
+    beyond = flat & (asked > 1.25 * top)
+    clipped = np.clip(slope * x, -top, top)
+    left = float(np.mean((y - clipped) ** 2))
+    straight = float(np.mean((y - line.gain * sign * x - line.offset) ** 2))
+    if beyond.sum() * PERIOD_S >= 0.3 and left < 0.6 * straight:
+        return top
+    return float("nan")

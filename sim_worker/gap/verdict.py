@@ -1,0 +1,141 @@
+"""Which of the two is wrong: the pairs of signals judged stretch by stretch, until one is sure."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from contracts.drive import GnssFix, VehicleInfo
+from contracts.frames import LocalFrame
+from contracts.gap import Verdict
+from contracts.vehicle import VehicleParameters
+from sim_worker.gap.consistency import Consistency, consistency_of
+from sim_worker.gap.findings import Finding, findings_of
+from sim_worker.gap.free_run import FreeRunner
+from sim_worker.motion_record import MotionRecord, MotionRecorder
+
+WINDOW_S, EVERY_S = 6.0, 0.5
+_LATEST_S = 0.1
+"""Samples of slower channels may still be on their way."""
+_IN_A_ROW = 2
+_DENSE_S, _PRECISE_M = 0.25, 0.15
+"""Positions this near to each other and this good may accuse another sensor."""
+_FORGOTTEN_S = 10.0
+"""A finding that has not come back for so long is over, and a new one is told anew."""
+
+
+class Judge:
+    """Takes a vehicle's samples and says, where it is sure, who departs from the commands.
+
+    Pure: time is that of the samples. A verdict takes two findings of the same kind half a
+    second apart, and is given once as long as it holds.
+    """
+
+    def __init__(self, info: VehicleInfo, vehicle: VehicleParameters, *, frame: LocalFrame) -> None:
+        lever = info.body_from_antenna_m
+        self._vehicle_id = info.vehicle_id
+        self._ahead_m = 0.0 if lever is None else lever[0]
+        self._recorder = MotionRecorder(frame=frame, keep_s=WINDOW_S + 4.0, depth=4000)
+        self._runner = FreeRunner(vehicle)
+        self._first_ns: int | None = None
+        self._next_ns = 0
+        self._pending: tuple[str, str, int, int] | None = None
+        self._fixes: deque[tuple[int, float]] = deque(maxlen=40)
+        self._told: dict[tuple[str, str], int] = {}
+        self.latest: Consistency | None = None
+        """What the latest stretch said, for those who show it."""
+
+    @property
+    def recorder(self) -> MotionRecorder:
+        """The samples that are kept."""
+        return self._recorder
+
+    def handle(self, channel: str, message: Any) -> Verdict | None:
+        """Take one sample; return a verdict where one is due."""
+        stamp_ns = getattr(message, "stamp_ns", None)
+        if stamp_ns is None:
+            return None
+        newest = self._recorder.newest_stamp_ns
+        if newest is not None and stamp_ns < newest - 2_000_000_000:
+            return None  # the clock ran back: what is kept would no longer be one motion
+        self._recorder.handle(channel, message)
+        if isinstance(message, GnssFix):
+            self._fixes.append((stamp_ns, np.inf if message.std_m is None else message.std_m))
+        newest = self._recorder.newest_stamp_ns
+        if newest is None:
+            return None
+        if self._first_ns is None:
+            self._first_ns = newest
+        if newest < self._next_ns:
+            return None
+        self._next_ns = newest + round(EVERY_S * 1e9)
+        to_ns = newest - round(_LATEST_S * 1e9)
+        from_ns = max(self._first_ns, to_ns - round(WINDOW_S * 1e9))
+        if to_ns - from_ns < 1.5e9:
+            return None
+        record = without_manual_commands(self._recorder.record(from_ns, to_ns))
+        self.latest = consistency_of(
+            record, self._runner, antenna_ahead_m=self._ahead_m, precise_positions=self._precise()
+        )
+        return self._weigh(findings_of(self.latest), from_ns, to_ns)
+
+    def _precise(self) -> bool:
+        """Whether positions are dense and good enough to judge other sensors by."""
+        if len(self._fixes) < 4:
+            return False
+        table = np.array(self._fixes, dtype=np.float64)
+        apart_s = float(np.median(np.diff(table[:, 0]))) * 1e-9
+        return apart_s <= _DENSE_S and float(np.median(table[:, 1])) <= _PRECISE_M
+
+    def _weigh(self, found: Finding | None, from_ns: int, to_ns: int) -> Verdict | None:
+        for key, seen_ns in list(self._told.items()):
+            if to_ns - seen_ns > _FORGOTTEN_S * 1e9:
+                del self._told[key]
+        if found is None:
+            self._pending = None
+            return None
+        key = (found.culprit, found.cause)
+        if key in self._told:
+            self._told[key] = to_ns
+            return None
+        before = self._pending
+        if before is None or before[0] != found.culprit:
+            self._pending = (*key, 1, from_ns)
+        else:
+            self._pending = (*key, before[2] + 1, before[3])
+        if self._pending[2] < _IN_A_ROW:
+            return None
+        since_ns = self._pending[3]
+        self._told[key] = to_ns
+        return Verdict(
+            vehicle_id=self._vehicle_id,
+            stamp_ns=to_ns,
+            since_stamp_ns=since_ns,
+            culprit=found.culprit,
+            cause=found.cause,
+            text=found.text,
+            evidence=found.evidence,
+            confidence=_confidence(found),
+        )
+
+
+def _confidence(found: Finding) -> float:
+    """Return how sure it is that the first comparison departs: its normal deviations, to 0.99."""
+    first = found.evidence[0]
+    away = abs(first.value - first.expected) / max(first.std, 1e-6)
+    if found.culprit == "undecided":
+        return 0.0
+    return float(np.clip(math.erf(away / math.sqrt(8.0)), 0.5, 0.99))
+
+
+def without_manual_commands(record: MotionRecord) -> MotionRecord:
+    """Return the record without commands where a human drives: nobody carries them out then."""
+    if not record.manual.any():
+        return record
+    names = ("command_accel_mps2", "command_wheel_rad", "command_tire_rad")
+    return record._replace(
+        **{name: np.where(record.manual, np.nan, getattr(record, name)) for name in names}
+    )

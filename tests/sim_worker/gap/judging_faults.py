@@ -1,0 +1,91 @@
+"""Judges the stand-in's drives: what the tests of the verdict have in common."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample
+from contracts.gap import Verdict
+from sim_worker.gap.verdict import Judge
+from telemetry.standin.source import START_STAMP_NS
+from tests.sim_worker.faulty_standin import (
+    CAR_FAULTS,
+    DURATION_S,
+    MODEL_FAULTS,
+    FaultyDrive,
+    drive_of,
+    model_with,
+)
+from tests.telemetry.standin_drive import FRAME
+
+
+def drive_with(fault: str | None, *, seed: int, end_s: float = DURATION_S) -> FaultyDrive:
+    return drive_of(seed, fault if fault in CAR_FAULTS else None, end_s=end_s)
+
+
+def verdicts_of(
+    fault: str | None, *, seed: int, end_s: float = DURATION_S, until_first: bool = True
+) -> list[Verdict]:
+    """Return what is said of a drive; with `until_first` the first verdict alone."""
+    drive = drive_with(fault, seed=seed, end_s=end_s)
+    model = model_with(fault if fault in MODEL_FAULTS else None)
+    judge = Judge(drive.info, model, frame=FRAME)
+    told = []
+    for channel, message in drive.samples:
+        verdict = judge.handle(channel, message)
+        if verdict is not None:
+            told.append(verdict)
+            if until_first:
+                break
+    return told
+
+
+def culprit_of(fault: str) -> str:
+    return "vehicle" if fault in CAR_FAULTS else "model"
+
+
+_FAST_MPS, _SLIDES_MPS2 = 6.0, 1.2
+_PUSHES = {"drive_gain", "low_drive"}
+_BRAKES = {"brake_gain", "brake_fade", "saturated_brake"}
+
+
+def excited_s(fault: str, verdict: Verdict, *, seed: int, end_s: float = DURATION_S) -> float:
+    """Return how long the car had been doing what the fault shows in, when the verdict fell.
+
+    Steering and turning sensors: the wheel is turned by 0.15 rad, as the fault-free sensor has
+    it; drive and brake: commands beyond 0.5 m/s² while it rolls (0.9 where 0.7 is the most);
+    drag: above 6 m/s;
+    friction: a lateral acceleration beyond what the slippery model carries.
+    """
+    clean = drive_of(seed, fault if culprit_of(fault) == "vehicle" else None, end_s=end_s)
+    seconds, speed_mps = 0.0, 0.0
+    for _, message in clean.samples:
+        if getattr(message, "stamp_ns", 0) > verdict.stamp_ns:
+            break
+        if isinstance(message, SpeedSample):
+            speed_mps = message.speed_mps
+        if speed_mps < 0.5:
+            continue
+        if fault == "drag":
+            seconds += 0.02 * (isinstance(message, SpeedSample) and speed_mps > _FAST_MPS)
+        elif fault == "friction":
+            slides = isinstance(message, ImuSample) and (
+                abs(message.rate_radps[2]) * speed_mps > _SLIDES_MPS2
+            )
+            seconds += 0.01 * slides
+        elif fault in _PUSHES | _BRAKES:
+            sign = -1.0 if fault in _BRAKES else 1.0
+            # A brake that does at most 0.7 m/s² is one like others below.
+            least = 0.9 if fault == "saturated_brake" else 0.5
+            if isinstance(message, ControlCommand) and sign * message.accel_mps2 > least:
+                seconds += 0.02
+        elif isinstance(message, SteeringSample):
+            wheel = message.steering_wheel_rad or 0.0
+            wheel = np.radians(wheel) if fault == "steering_read_in_degrees" else wheel
+            wheel -= 0.5 if fault == "offset_steering_sensor" else 0.0
+            seconds += 0.02 * (abs(wheel) > 0.15)
+    return seconds
+
+
+def drive_s(verdict: Verdict) -> float:
+    return (verdict.stamp_ns - START_STAMP_NS) * 1e-9
