@@ -1,0 +1,57 @@
+"""The command line of recorded drives: what each command takes. The work is imported when run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(help="recorded drive")],
+    target: Annotated[
+        Path, typer.Argument(help=".mcap, .bag (ROS 1), .csv, or a folder for a ROS 2 bag")
+    ],
+    to: Annotated[
+        str | None, typer.Option("--to", help="mcap, ros2, ros1, csv; else the name tells")
+    ] = None,
+    declaration: Annotated[
+        Path | None,
+        typer.Option("--declaration", help="TOML that declares SOURCE; else SOURCE.toml"),
+    ] = None,
+) -> None:
+    """Convert a recorded drive to MCAP, a ROS bag, or CSV."""
+    from orchestrator.log_commands import convert_log
+
+    convert_log(source, target, to=to, declaration=declaration)
+
+
+def identify(
+    log: Annotated[Path, typer.Argument(help="recorded drive")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="parameters in force, TOML [default: the bundled BMW 320i]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON object")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="folder for plots and a vehicle file with what was taken")
+    ] = None,
+) -> None:
+    """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances."""
+    from orchestrator.identify_command import identify_log
+
+    raise typer.Exit(identify_log(log, vehicle_file=vehicle, as_json=as_json, out=out))
+
+
+def gap(
+    recording: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="vehicle parameters, TOML, or a bundled name")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="table and verdicts as JSON")] = False,
+    out: Annotated[Path | None, typer.Option(help="folder for plots")] = None,
+) -> None:
+    """Measure how far the model leaves a recorded drive, and say which of the two is wrong."""
+    from orchestrator.gap_command import report_gap
+
+    report_gap(recording, vehicle=vehicle, as_json=as_json, out=out)
