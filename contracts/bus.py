@@ -31,6 +31,7 @@ __all__ = [
     "Reply",
     "Request",
     "ZenohBus",
+    "ZenohSession",
     "ask",
     "zenoh_config",
 ]
@@ -129,25 +130,18 @@ def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
     return config
 
 
-class ZenohBus:
-    """The bus over one Zenoh session; use it as a context manager: unclosed, it hangs at exit."""
+class ZenohSession:
+    """One Zenoh session, and what every bus does with it; use it as a context manager.
+
+    Unclosed, it hangs at exit. Raises BusUnreachable where a client finds no router.
+    """
 
     def __init__(self, setup: BusSetup, *, router: bool = False) -> None:
         import zenoh
 
         self._zenoh = zenoh
-        self._lossless = setup.lossless
-        self._sequence = _Sequence()
         self._publishers: dict[str, Any] = {}
         self._declared: list[Any] = []
-        self._lock = threading.Lock()
-        self._priorities = {
-            "real_time": zenoh.Priority.REAL_TIME,
-            "interactive_high": zenoh.Priority.INTERACTIVE_HIGH,
-            "data_high": zenoh.Priority.DATA_HIGH,
-            "data": zenoh.Priority.DATA,
-            "background": zenoh.Priority.BACKGROUND,
-        }
         try:
             self._session: Any = zenoh.open(zenoh_config(setup, router=router))
         except zenoh.ZError as error:
@@ -163,6 +157,46 @@ class ZenohBus:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+    def declare_alive(self, alive_key: str) -> None:
+        """Hold a liveliness token; see Bus."""
+        self._declared.append(self._session.liveliness().declare_token(alive_key))
+
+    def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
+        """Watch liveliness tokens; see Bus."""
+        put = self._zenoh.SampleKind.PUT
+
+        def land(sample: Any) -> None:
+            mailbox.put(Alive(str(sample.key_expr), sample.kind == put, time.monotonic_ns()))
+
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(alive_key, land, history=True)
+        )
+
+    def close(self) -> None:
+        """Close the session; idempotent."""
+        self._publishers.clear()
+        self._declared.clear()
+        if not self._session.is_closed():
+            self._session.close()
+
+
+class ZenohBus(ZenohSession):
+    """The bus over one Zenoh session; see ZenohSession."""
+
+    def __init__(self, setup: BusSetup, *, router: bool = False) -> None:
+        super().__init__(setup, router=router)
+        self._lossless = setup.lossless
+        self._sequence = _Sequence()
+        self._lock = threading.Lock()
+        priority = self._zenoh.Priority
+        self._priorities = {
+            "real_time": priority.REAL_TIME,
+            "interactive_high": priority.INTERACTIVE_HIGH,
+            "data_high": priority.DATA_HIGH,
+            "data": priority.DATA,
+            "background": priority.BACKGROUND,
+        }
 
     def _qos(self, qos: Qos) -> dict[str, Any]:
         control = self._zenoh.CongestionControl
@@ -242,25 +276,3 @@ class ZenohBus:
             mailbox.put(Request(channel, full_key, payload, answer))
 
         self._declared.append(self._session.declare_queryable(full_key, land, complete=True))
-
-    def declare_alive(self, alive_key: str) -> None:
-        """Hold a liveliness token; see Bus."""
-        self._declared.append(self._session.liveliness().declare_token(alive_key))
-
-    def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
-        """Watch liveliness tokens; see Bus."""
-        put = self._zenoh.SampleKind.PUT
-
-        def land(sample: Any) -> None:
-            mailbox.put(Alive(str(sample.key_expr), sample.kind == put, time.monotonic_ns()))
-
-        self._declared.append(
-            self._session.liveliness().declare_subscriber(alive_key, land, history=True)
-        )
-
-    def close(self) -> None:
-        """Close the session; idempotent."""
-        self._publishers.clear()
-        self._declared.clear()
-        if not self._session.is_closed():
-            self._session.close()

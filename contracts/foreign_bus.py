@@ -7,11 +7,10 @@ threads, use it as a context manager.
 from __future__ import annotations
 
 import time
-from types import TracebackType
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Protocol
 
-from contracts.bus import BusUnreachable, zenoh_config
-from contracts.mailbox import Alive, Mailbox
+from contracts.bus import ZenohSession
+from contracts.mailbox import Mailbox
 from contracts.setup import BusSetup
 
 
@@ -42,37 +41,18 @@ class ForeignBus(Protocol):
     def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send one sample; never raises for a lost link, drops rather than waits."""
 
-    def declare_alive(self, token: str) -> None:
+    def declare_alive(self, alive_key: str) -> None:
         """Hold a liveliness token until `close` or the process's end."""
 
-    def watch_alive(self, tokens: str, mailbox: Mailbox) -> None:
+    def watch_alive(self, alive_key: str, mailbox: Mailbox) -> None:
         """Let every appearance, past ones included, and every loss land in `mailbox` as Alive."""
 
 
-class ZenohForeignBus:
+class ZenohForeignBus(ZenohSession):
     """A client session to the router at `endpoint`; raises BusUnreachable where there is none."""
 
     def __init__(self, endpoint: str) -> None:
-        import zenoh
-
-        self._zenoh = zenoh
-        self._publishers: dict[str, Any] = {}
-        self._declared: list[Any] = []
-        try:
-            self._session: Any = zenoh.open(zenoh_config(BusSetup(endpoint=endpoint), router=False))
-        except zenoh.ZError as error:
-            raise BusUnreachable(f"no Zenoh router at {endpoint}: {error}") from error
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
+        super().__init__(BusSetup(endpoint=endpoint))
 
     @property
     def session_id(self) -> str:
@@ -114,25 +94,3 @@ class ZenohForeignBus:
             )
             self._publishers[key] = publisher
         publisher.put(payload, attachment=attachment)
-
-    def declare_alive(self, token: str) -> None:
-        """Hold a liveliness token; see ForeignBus."""
-        self._declared.append(self._session.liveliness().declare_token(token))
-
-    def watch_alive(self, tokens: str, mailbox: Mailbox) -> None:
-        """Watch liveliness tokens; see ForeignBus."""
-        put = self._zenoh.SampleKind.PUT
-
-        def land(sample: Any) -> None:
-            mailbox.put(Alive(str(sample.key_expr), sample.kind == put, time.monotonic_ns()))
-
-        self._declared.append(
-            self._session.liveliness().declare_subscriber(tokens, land, history=True)
-        )
-
-    def close(self) -> None:
-        """Close the session; idempotent."""
-        self._publishers.clear()
-        self._declared.clear()
-        if not self._session.is_closed():
-            self._session.close()
