@@ -165,7 +165,7 @@ class MotionRecorder:
                 known = table[np.isfinite(table[:, index])]
                 if name == "yaw_rad":
                     known[:, index] = np.unwrap(known[:, index])
-                read = _held if channel in _HELD else _between
+                read = _held if channel in _HELD else between_samples
                 columns[name] = read(known[:, 0], known[:, index], at, gap_s=_GAP_S[channel])
         told = self._table("status", 2)
         manual = _held(told[:, 0], told[:, 1], at, gap_s=np.inf)
@@ -179,7 +179,11 @@ class MotionRecorder:
         return table[index]
 
 
-def _between(time_s: Array, values: Array, at_s: Array, *, gap_s: float) -> Array:
+def between_samples(time_s: Array, values: Array, at_s: Array, *, gap_s: float) -> Array:
+    """Return (N,) values at `at_s`, linear between samples (K,) in time order.
+
+    NaN outside of them, and between two that lie more than `gap_s` apart.
+    """
     if len(time_s) < 2:
         return np.full(len(at_s), np.nan)
     after = np.clip(np.searchsorted(time_s, at_s), 1, len(time_s) - 1)

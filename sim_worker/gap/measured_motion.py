@@ -10,6 +10,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from sim_worker.motion_record import between_samples
 
 _LONGEST_GAP_S = 0.5
 
@@ -51,16 +52,13 @@ def motion_on_grid(
         time_s = (state.stamp_ns - base_ns) * 1e-9
         if state.yaw_valid and np.isfinite(values).all() and (not rows or time_s > rows[-1][0]):
             rows.append((time_s, *values))
-    at = (stamp_ns - base_ns) * 1e-9
+    at = np.asarray((stamp_ns - base_ns) * 1e-9, dtype=np.float64)
     if len(rows) < 2:
         return MeasuredMotion(*(np.full(len(at), np.nan) for _ in MeasuredMotion._fields))
     table = np.array(rows)
     xy = local_from_geo(frame, table[:, 1], table[:, 2])
     yaw = np.unwrap(local_from_geo_yaw(frame, table[:, 3], table[:, 1], table[:, 2]))
-    after = np.clip(np.searchsorted(table[:, 0], at), 1, len(table) - 1)
-    near = (table[after, 0] - table[after - 1, 0] <= _LONGEST_GAP_S) & (at >= table[0, 0] - 1e-9)
-    near &= at <= table[-1, 0] + 1e-9
     columns = (xy[:, 0], xy[:, 1], yaw, table[:, 4], table[:, 5], table[:, 6])
     return MeasuredMotion(
-        *(np.where(near, np.interp(at, table[:, 0], column), np.nan) for column in columns)
+        *(between_samples(table[:, 0], column, at, gap_s=_LONGEST_GAP_S) for column in columns)
     )
