@@ -49,6 +49,21 @@ TABLES: dict[str, pa.Schema] = {
         + [(what, _F) for what in _ERROR]
         + [("path_offset_m", _F)]
     ),
+    "disagreements": pa.schema(
+        [
+            ("vehicle_id", _S), ("segment", _I), ("aspect", _S), ("kind", _S), ("stamp_ns", _I),
+            ("end_stamp_ns", _I), ("duration_s", _F), ("lat_deg", _F), ("lon_deg", _F),
+            ("junction_id", _S), ("route_m", _F), ("lateral_m", _F), ("along_m", _F),
+            ("speed_mps", _F),
+        ]
+    ),
+    "driven_segments": pa.schema(
+        [
+            ("number", _I), ("control_mode", _S), ("from_stamp_ns", _I), ("to_stamp_ns", _I),
+            ("plans", _I), ("cut", _I), ("too_short", _I), ("lateral_m", _F), ("along_m", _F),
+            ("speed_mps", _F), ("disagreements", _I),
+        ]
+    ),
     "mirror": pa.schema(
         [
             ("stamp_ns", _I), ("world_id", _S),
