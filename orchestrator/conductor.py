@@ -145,6 +145,7 @@ class Conductor:
         self.watch_telemetry(item.received_mono_ns)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.rounds.take_state(state)
+        self.rounds.windows.take(self.intake.surroundings, state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
 
     def watch_telemetry(self, mono_ns: int) -> None:

@@ -64,6 +64,15 @@ TABLES: dict[str, pa.Schema] = {
             ("speed_mps", _F), ("disagreements", _I),
         ]
     ),
+    "agreement": pa.schema(
+        [
+            ("round_id", _I), ("stamp_ns", _I), ("drive_time_s", _F), ("intersection_id", _S),
+            ("outcome", _S), ("observable", _S), ("simulated_fails", _S), ("driven_fails", _S),
+            ("gap_along_m", _F), ("gap_across_m", _F),
+            *((f"flip_{direction}_{what}", _F) for direction in ("along", "across", "both")
+              for what in ("factor", "m")),
+        ]
+    ),
     "mirror": pa.schema(
         [
             ("stamp_ns", _I), ("world_id", _S),

@@ -59,6 +59,7 @@ def run_record(
         "comparison": conductor.rounds.comparisons.record(independent=independent),
         "plan_comparison": conductor.rounds.plans.record(),
         "side_by_side": conductor.human.record(),
+        "agreement": conductor.rounds.windows.record(conductor.intake.start_stamp_ns),
         "workers": {
             "started": plan.config.workers,
             "restarted": supervisor.restarted,

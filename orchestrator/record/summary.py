@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from orchestrator.judge.verdict_rows import agreement_lines
+
 DISAGREEMENTS_SHOWN = 12
 BEGINNING_S = 0.5
 """Where a junction is near so soon, the drive began near it."""
@@ -69,5 +71,6 @@ def summary_text(record: dict[str, object]) -> str:
         for junction in junctions
     ]
     lines += side_by_side_lines(record.get("side_by_side"))
+    lines += agreement_lines(record.get("agreement"))  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join([*lines, attribution])
