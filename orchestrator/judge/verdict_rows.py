@@ -29,6 +29,7 @@ def judged_row(one: Judged, *, start_stamp_ns: int) -> dict[str, Any]:
     for flip in one.flips:
         row[f"flip_{flip.direction}_factor"] = flip.factor
         row[f"flip_{flip.direction}_m"] = flip.gap_m
+        row[f"flip_{flip.direction}_fails"] = " ".join(flip.fails)
     return row
 
 
@@ -44,11 +45,12 @@ def agreement_lines(found: dict[str, Any] | None) -> list[str]:
     ]
     for direction, flip in found["flips"].items():
         if flip["flipped"]:
+            fails = " and ".join(flip["smallest_factor_fails"]) or "nothing"
             lines.append(
                 f"  a gap {direction} flips {flip['flipped']}: the least at "
                 f"{flip['smallest_factor']:g} times the measured one "
-                f"({flip['smallest_factor_gap_m']:.2f} m at "
-                f"{flip['smallest_factor_at_s']:.1f} s), half below {flip['median_gap_m']:.2f} m"
+                f"({flip['smallest_factor_gap_m']:.2f} m at {flip['smallest_factor_at_s']:.1f} s, "
+                f"{fails} fails then), half below {flip['median_gap_m']:.2f} m"
             )
     return lines
 

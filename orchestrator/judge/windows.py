@@ -122,6 +122,8 @@ class WindowDesk:
         return tally(self.judged, start_stamp_ns=start_stamp_ns) if self.judged else None
 
     def _settle(self, one: _Simulated) -> None:
+        if self._windows and one.stamp_ns - self._windows[-1].stamp_ns < self._every_ns:
+            return
         window = self._window(one)
         if window is None:
             return

@@ -71,6 +71,7 @@ TABLES: dict[str, pa.Schema] = {
             ("gap_along_m", _F), ("gap_across_m", _F),
             *((f"flip_{direction}_{what}", _F) for direction in ("along", "across", "both")
               for what in ("factor", "m")),
+            *((f"flip_{direction}_fails", _S) for direction in ("along", "across", "both")),
         ]
     ),
     "mirror": pa.schema(

@@ -8,7 +8,7 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.frames import wrap_angle
-from sim_worker.agreement.criteria import Court, Users
+from sim_worker.agreement.criteria import CRITERIA, Court, Users
 from sim_worker.metrics.rollout import Flags
 
 DIRECTIONS = ("along", "across", "both")
@@ -35,11 +35,13 @@ class Gap(NamedTuple):
 
 
 class Flip(NamedTuple):
-    """The smallest growth that flips pass or fail; None where none up to `MOST_M` does."""
+    """The smallest growth that flips pass or fail, None where none up to `MOST_M` does, and the
+    criteria that fail then."""
 
     direction: str
     factor: float | None
     gap_m: float | None
+    fails: tuple[str, ...] = ()
 
 
 def gap_between(simulated: Array, driven: Array) -> Gap:
@@ -96,6 +98,7 @@ def flips(
     low = dict.fromkeys(there, 0.0)
     high = {name: MOST_M / gap.peak_m(name) for name in there}
     flipped = dict.fromkeys(there, True)
+    failed: dict[str, tuple[str, ...]] = {}
     for count in (_COARSE, _FINE):
         asked = [name for name in there if flipped[name]]
         if not asked:
@@ -105,15 +108,17 @@ def flips(
             for name in asked
         }
         states = np.concatenate([grown(simulated, gap, factors[name], name) for name in asked])
-        fails = (court.failures(states, users) & observable).any(axis=1)
-        for name, other in zip(asked, (fails == passes).reshape(len(asked), count), strict=True):
+        fails = (court.failures(states, users) & observable).reshape(len(asked), count, -1)
+        for name, mine in zip(asked, fails, strict=True):
+            other = mine.any(axis=1) == passes
             flipped[name] = bool(other.any())
             first = int(other.argmax())
             if flipped[name]:
                 high[name] = float(factors[name][first])
+                failed[name] = tuple(np.array(CRITERIA)[mine[first]].tolist())
                 low[name] = high[name] - float(factors[name][0] - low[name])
     return tuple(
-        Flip(name, high[name], high[name] * gap.peak_m(name))
+        Flip(name, high[name], high[name] * gap.peak_m(name), failed[name])
         if flipped.get(name, False)
         else Flip(name, None, None)
         for name in DIRECTIONS

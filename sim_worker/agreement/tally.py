@@ -73,18 +73,19 @@ def tally(windows: Sequence[Judged], *, start_stamp_ns: int) -> dict[str, Any]:
 def _flip_record(windows: Sequence[Judged], place: int, start_stamp_ns: int) -> dict[str, Any]:
     """Return how many windows flip, the smallest factor with its window, and median metres."""
     found = [
-        (flip.factor, flip.gap_m, one.window)
+        (flip.factor, flip.gap_m, one.window, flip.fails)
         for one in windows
         if (flip := one.flips[place]).factor is not None and flip.gap_m is not None
     ]
     if not found:
         return {"flipped": 0}
-    factor, gap_m, window = min(found, key=lambda one: one[0])
+    factor, gap_m, window, fails = min(found, key=lambda one: one[0])
     return {
         "flipped": len(found),
         "smallest_factor": round(factor, 3),
         "smallest_factor_gap_m": round(gap_m, 3),
         "smallest_factor_at_s": round((window.stamp_ns - start_stamp_ns) / 1e9, 2),
+        "smallest_factor_fails": list(fails),
         "smallest_gap_m": round(min(one[1] for one in found), 3),
         "median_gap_m": round(float(np.median([one[1] for one in found])), 3),
         "by_a_gap_no_larger_than_measured": sum(one[0] <= 1.0 for one in found),

@@ -132,6 +132,7 @@ def test_the_growth_that_leaves_the_road_is_that_of_the_closed_form() -> None:
     factor, gap_m = flip(one, "across")
     assert gap_m == pytest.approx(edge_m - WIDTH_M / 2, abs=FINE_M + 0.002)
     assert factor == pytest.approx((edge_m - WIDTH_M / 2) / 0.1, rel=0.02)
+    assert one.flips[1].fails == ("drivable_area",)
 
 
 def test_a_car_ahead_is_reached_by_the_gap_along_the_way() -> None:
