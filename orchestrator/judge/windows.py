@@ -25,7 +25,7 @@ from sim_worker.metrics.ground import DrivableGround
 from sim_worker.metrics.route_rules import RouteRules
 from sim_worker.planners.path import FrenetPath
 
-MOST_WINDOWS = 240
+MOST_WINDOWS = 120
 """When there are as many, every second one goes, and they are taken half as often from then on."""
 EVERY_NS = 1_000_000_000
 _HOLE_NS, _SEEN_HOLE_NS = 1_500_000_000, 1_000_000_000
