@@ -10,17 +10,19 @@ from contracts.arrays import Array
 from contracts.frames import wrap_angle
 from sim_worker.agreement.criteria import CRITERIA, Court, Users
 from sim_worker.metrics.rollout import Flags
+from sim_worker.planners.path import FrenetPath
 
 DIRECTIONS = ("along", "across", "both")
 MOST_M = 10.0
 """A gap grown beyond this is no gap any more."""
 _LEAST_M = 0.01
 """A smaller gap has no pattern that could be grown."""
+_LEAST_WAY_M, _NEAR_M = 2.0, 40.0
 _COARSE, _FINE = 40, 16
 
 
 class Gap(NamedTuple):
-    """Reality minus simulation at N instants, in the simulated car's axes."""
+    """Reality minus simulation at N instants, along and across the simulated way."""
 
     along_m: Array
     across_m: Array
@@ -45,15 +47,23 @@ class Flip(NamedTuple):
 
 
 def gap_between(simulated: Array, driven: Array) -> Gap:
-    """Return the gap of states (N, 8) against states (N, 8)."""
-    dx, dy = driven[:, 0] - simulated[:, 0], driven[:, 1] - simulated[:, 1]
-    cos, sin = np.cos(simulated[:, 2]), np.sin(simulated[:, 2])
-    return Gap(
-        cos * dx + sin * dy,
-        cos * dy - sin * dx,
-        np.asarray(wrap_angle(driven[:, 2] - simulated[:, 2])),
-        driven[:, 3] - simulated[:, 3],
-    )
+    """Return the gap of driven states (N, 8) from simulated ones (N, 8).
+
+    Along and across are measured on the simulated way, so that being late in a bend is a gap along
+    it; a car that stands has but its axes.
+    """
+    yaw = np.unwrap(simulated[:, 2])
+    arc = _arc_m(simulated)
+    speed = driven[:, 3] - simulated[:, 3]
+    if arc[-1] < _LEAST_WAY_M:
+        dx, dy = driven[:, 0] - simulated[:, 0], driven[:, 1] - simulated[:, 1]
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        turned = np.asarray(wrap_angle(driven[:, 2] - yaw))
+        return Gap(cos * dx + sin * dy, cos * dy - sin * dx, turned, speed)
+    way = FrenetPath(simulated[:, :2])
+    place = way.locate(driven[:, :2], near_arc_m=arc, within_m=_NEAR_M)
+    turned = np.asarray(wrap_angle(driven[:, 2] - np.interp(place.arc_m, arc, yaw)))
+    return Gap(place.arc_m - arc, place.offset_m, turned, speed)
 
 
 def grown(simulated: Array, gap: Gap, factors: Array, direction: str) -> Array:
@@ -65,8 +75,7 @@ def grown(simulated: Array, gap: Gap, factors: Array, direction: str) -> Array:
     factor = factors[:, None]
     found = np.repeat(simulated[None], len(factors), axis=0)
     if direction != "across":
-        steps = np.hypot(*np.diff(simulated[:, :2], axis=0).T)
-        arc = np.concatenate([[0.0], np.cumsum(steps)])
+        arc = _arc_m(simulated)
         yaw = np.unwrap(simulated[:, 2])
         far = 2.0 * MOST_M + float(np.abs(gap.along_m).max() * np.abs(factors).max(initial=0.0))
         ends = np.array([np.cos(yaw[[0, -1]]), np.sin(yaw[[0, -1]])]) * far
@@ -123,3 +132,8 @@ def flips(
         else Flip(name, None, None)
         for name in DIRECTIONS
     )
+
+
+def _arc_m(states: Array) -> Array:
+    steps = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])

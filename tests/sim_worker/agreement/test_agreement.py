@@ -155,7 +155,9 @@ def test_in_a_bend_a_gap_along_keeps_to_the_way() -> None:
         ),
         TIME_S,
     )
-    (moved,) = grown(states, gap_between(states, late), np.array([4.0]), "along")
+    gap = gap_between(states, late)
+    assert np.abs(gap.across_m[10:]).max() < 0.05  # late is all that it is
+    (moved,) = grown(states, gap, np.array([4.0]), "along")
     middle = slice(30, 60)
     radius = np.hypot(moved[middle, 0], moved[middle, 1] - 20.0)
     own = np.hypot(states[middle, 0], states[middle, 1] - 20.0)
@@ -209,6 +211,18 @@ def test_a_stop_sign_wants_a_car_to_stand() -> None:
     found = verdicts(*case(stops, rolls, sign=True))
     assert failed(found.simulated) == []
     assert failed(found.driven) == ["stop_line"]
+
+
+def test_the_gap_as_measured_leads_from_the_simulation_to_the_drive() -> None:
+    """Through a bend, earlier and aside: once the gap is the drive."""
+    angle = 0.08 * TIME_S + 0.004 * TIME_S**2
+    poses = np.column_stack([25.0 * np.sin(angle), 25.0 * (1.0 - np.cos(angle)), angle])
+    wide = np.column_stack([25.6 * np.sin(angle), 25.0 - 25.6 * np.cos(angle), angle])
+    simulated, driven = states_of_centre(poses, TIME_S), states_of_centre(wide, TIME_S + 0.0)
+    driven = driven[np.minimum(np.arange(81) + 4, 80)]
+    (found,) = grown(simulated, gap_between(simulated, driven), np.array([1.0]), "both")
+    assert found[:70, :2] == pytest.approx(driven[:70, :2], abs=0.05)
+    assert found[:70, 2:4] == pytest.approx(driven[:70, 2:4], abs=0.02)
 
 
 def test_what_reality_does_not_show_is_not_judged() -> None:
