@@ -100,8 +100,8 @@ class SideBySide:
 
     def take_state(self, state: VehicleState) -> list[Disagreement]:
         """Take where the car is; return disagreements that begin to be told of, or end."""
-        if not state.yaw_valid:
-            return []
+        if not state.yaw_valid or self._last_plan_ns is None:
+            return []  # what was driven before the first plan is compared with nothing
         if self._driven and state.stamp_ns <= self._driven[-1][0]:
             if state.stamp_ns < self._driven[-1][0] - 1_000_000_000:
                 return self._clock_stepped_back()
