@@ -196,6 +196,7 @@ class Mirror:
             gap_speed_mps=float(twin[3] - measured[3]),
             since_reset_s=(state.stamp_ns - self._seed_stamp_ns) / 1e9,
             independent=self._independent,
+            twin_yaw_rate_radps=float(twin[5]),
         )
 
     def _twin_at(self, stamp_ns: int) -> Array:
