@@ -49,7 +49,7 @@ def test_loss_and_jitter_are_learnt_and_silence_is_still_found(
 ) -> None:
     """Within 200 ms at 50 Hz and above, within two periods and the jitter below.
 
-    So soon means that at 10 Hz three samples lost one after the other look like silence.
+    So soon means that at 10 Hz two samples lost one after the other look like silence.
     """
     until_ms = 400 * period_ms
     watcher, overdue = kept_up(period_ms, until_ms=until_ms, loss=0.2, jitter_ms=50.0, seed=seed)
