@@ -174,6 +174,11 @@ def process_of_alive_key(full_key: str) -> str:
     return full_key.rsplit("/", 1)[1]
 
 
+def run_of_alive_key(full_key: str) -> str:
+    """Return the run id in a liveliness key."""
+    return full_key.rsplit("/", 3)[1]
+
+
 def _fill(template: str, **ids: str | None) -> str:
     given: dict[str, str] = {}
     for name, value in ids.items():
