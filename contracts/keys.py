@@ -10,7 +10,16 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts import drive, futures, gap, planner_link, simulation, towards_vehicle, tuning
+from contracts import (
+    drive,
+    futures,
+    gap,
+    planner_link,
+    roles,
+    simulation,
+    towards_vehicle,
+    tuning,
+)
 
 PREFIX = "foretwin/v1"
 
@@ -89,6 +98,8 @@ CHANNELS: dict[str, Channel] = {
              REQUEST, "the mirror's World", simulation.ActiveWorld),
         _row("use_vehicle", f"{_RUN}/worker/{{process}}/use_vehicle", tuning.UseVehicle, None,
              REQUEST, "parameters from now on", tuning.UseVehicle),
+        _row("use_roles", f"{_RUN}/worker/{{process}}/use_roles", roles.UseRoles, None, REQUEST,
+             "the mirror's roles", roles.UseRoles),
         _row("set", f"{_RUN}/set", tuning.SetRequest, None, REQUEST, "change a running drive",
              tuning.SetReply),
         _row("build", f"{_RUN}/builder/{{process}}/build", simulation.BuildRequest, None, REQUEST,

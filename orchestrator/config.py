@@ -10,6 +10,7 @@ from typing import Any, Literal
 import msgspec
 
 from contracts.errors import UserError
+from contracts.roles import Correction, Role
 
 View = Literal["auto", "native", "web", "none"]
 Source = Literal["auto", "log", "standin", "live"]
@@ -52,6 +53,10 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     seed: int = 0
     vehicle: str | None = None
     vehicle_id: str = "ego"
+    role: Role = "all"
+    """Of the car itself, as the drive begins: all is twin, shadow and ghost at once."""
+    correction: Correction = "free"
+    """Whether twins are drawn towards reality (follow) as the drive begins; see docs/roles.md."""
     view: View = "auto"
     out: str = "runs"
     radius_m: float = 150.0

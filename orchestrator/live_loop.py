@@ -52,6 +52,7 @@ class LiveLoop:
         next_housekeeping_s = next_due_s
         while not self._stop():
             self._each_turn()
+            conductor.make_changes()
             now_s = time.monotonic()
             if now_s >= next_housekeeping_s:
                 self._housekeeping(now_s)

@@ -58,6 +58,9 @@ TABLES: dict[str, pa.Schema] = {
             ("gap_speed_mps", _F), ("since_reset_s", _F), ("independent", _B),
         ]
     ),
+    "changes": pa.schema(
+        [("stamp_ns", _I), ("asked_stamp_ns", _I), ("key", _S), ("before", _S), ("value", _S)]
+    ),
     "events": pa.schema([("stamp_ns", _I), ("level", _S), ("source", _S), ("text", _S)]),
 }  # fmt: skip
 """Every table of `results/` with its columns."""
