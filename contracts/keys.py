@@ -110,6 +110,8 @@ CHANNELS: dict[str, Channel] = {
              "nominal future against reality"),
         _row("plan_comparison", f"{_RUN}/plan_comparison", simulation.PlanComparison, 2, RESULT,
              "the car's plan against ours"),
+        _row("other_vehicle", f"{_RUN}/other_vehicle", roles.OtherVehicle, 50, LIVE,
+             "another vehicle's state and commands"),
         _row("mirror", f"{_RUN}/mirror", simulation.MirrorSample, 10, RESULT,
              "twin, shadow, ghost and their gap"),
         _row("gap", f"{_RUN}/gap", gap.GapSample, 4, RESULT, "model against reality"),
@@ -172,6 +174,11 @@ def alive_key(*, run: str, process: str) -> str:
 def process_of_alive_key(full_key: str) -> str:
     """Return the process id in a liveliness key."""
     return full_key.rsplit("/", 1)[1]
+
+
+def vehicle_of_key(full_key: str) -> str:
+    """Return the vehicle's id in the key of a channel of a vehicle."""
+    return full_key.removeprefix(f"{PREFIX}/vehicle/").split("/", 1)[0]
 
 
 def _fill(template: str, **ids: str | None) -> str:

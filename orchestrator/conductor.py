@@ -13,7 +13,7 @@ import msgspec
 from contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
 from contracts.codec import SchemaMismatch
 from contracts.drive import VehicleInfo
-from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key
+from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key, vehicle_of_key
 from contracts.simulation import ActiveWorld
 from contracts.world import World
 from orchestrator.changes.desk import ChangeDesk
@@ -21,12 +21,13 @@ from orchestrator.changes.roles import CorrectionHandler, RoleHandler, RolesInFo
 from orchestrator.events import EventDesk
 from orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
 from orchestrator.intake import Intake
+from orchestrator.mirror_desk import MirrorDesk
 from orchestrator.mission import Mission
 from orchestrator.plan import DrivePlan
 from orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
-from orchestrator.record.result_rows import mirror_row
 from orchestrator.record.results import ResultTables
 from orchestrator.rounds.runner import RoundRunner
+from orchestrator.vehicles_beside import VehiclesBeside
 from orchestrator.world_desk import WorldDesk
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -76,16 +77,17 @@ class Conductor:
         """Rounds that no machine could have run: no heading known yet, or no road ahead."""
         self.unanswered = 0
         """Questions put by `ask` that are not answered yet: in lock step nothing goes on before."""
-        self.mirror_stamp_ns = 0
-        self.mirror_independent: bool | None = None
+        self.mirror = MirrorDesk(tables, self.tell)
         self.roles = RolesInForce(
-            {plan.config.vehicle_id: plan.config.role},
+            plan.config.roles,
             plan.config.correction,
             tell=lambda message: self.ask(MIRROR, "use_roles", message),
         )
         self.changes = ChangeDesk(
             {"role": RoleHandler(self.roles), "correction": CorrectionHandler(self.roles)}
         )
+        self.beside: VehiclesBeside | None = None
+        """Known once the car has said what it is."""
         self._active_world: str | None = None
         self._world_untold = False
 
@@ -94,8 +96,10 @@ class Conductor:
     def join(self) -> None:
         """Subscribe to everything a drive listens to."""
         run, vehicle = self.plan.run_id, self.plan.config.vehicle_id
-        for channel in TELEMETRY_CHANNELS:
-            self.bus.subscribe(channel, self.mailbox, vehicle=vehicle)
+        live = [one.config.id for one in self.plan.beside if one.config.live]
+        for one in (vehicle, *live):
+            for channel in TELEMETRY_CHANNELS:
+                self.bus.subscribe(channel, self.mailbox, vehicle=one)
         for channel in ("mirror", "event"):
             self.bus.subscribe(channel, self.mailbox, run=run)
         self.bus.serve("set", self.mailbox, run=run)
@@ -104,6 +108,11 @@ class Conductor:
     def take_info(self, info: VehicleInfo) -> None:
         """Begin to estimate: what the vehicle says of itself is known."""
         self.intake.take_info(info)
+        self.beside = VehiclesBeside(
+            self.plan,
+            own=info,
+            publish=lambda one: self.bus.publish("other_vehicle", one, run=self.plan.run_id),
+        )
         self.rounds.start_stamp_ns = info.start_stamp_ns
         self.mission.start_stamp_ns = info.start_stamp_ns
         if info.body_from_antenna_m is None:
@@ -119,10 +128,7 @@ class Conductor:
         """Take one item of the mailbox."""
         match item:
             case Received(channel="mirror"):
-                sample = item.message()
-                self.mirror_stamp_ns = sample.stamp_ns
-                self.mirror_independent = sample.independent
-                self.tables.add("mirror", [mirror_row(sample)])
+                self.mirror.take(item.message())
             case Received(channel="event"):
                 self.events.heard(item.message())
             case Received():
@@ -146,6 +152,11 @@ class Conductor:
 
     def take_telemetry(self, item: Received) -> None:
         """Take one sample, and let the mission go on where it gives a new state."""
+        sender = vehicle_of_key(item.key)
+        if sender != self.plan.config.vehicle_id:
+            if self.beside is not None:
+                self.beside.take_sample(sender, item)
+            return
         try:
             state = self.intake.take(item)
         except SchemaMismatch as error:
@@ -155,6 +166,8 @@ class Conductor:
         if state is None:
             return
         self.watch_telemetry(item.received_mono_ns)
+        if self.beside is not None:
+            self.beside.keep_up_with(state, self.intake.road_users)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.rounds.take_state(state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
@@ -177,7 +190,10 @@ class Conductor:
             else:
                 self.unseeded_rounds += 1
             return False
-        self.rounds.start(intent, latest, self.intake.surroundings, started_mono_ns=started_mono_ns)
+        said = self.intake.surroundings
+        if self.beside is not None:
+            said = self.beside.among(said, latest.state, self.roles.roles)
+        self.rounds.start(intent, latest, said, started_mono_ns=started_mono_ns)
         return True
 
     def finish(self) -> None:

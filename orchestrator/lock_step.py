@@ -100,7 +100,7 @@ class LockStepLoop:
         def said() -> bool:
             for sample in self._in_order():
                 conductor.take_telemetry(sample)
-            mirrored = conductor.mirror_stamp_ns >= last - 200_000_000
+            mirrored = conductor.mirror.stamp_ns >= last - 200_000_000
             return (conductor.intake.end is not None and mirrored) or time.monotonic() > deadline
 
         self._wait("the end", said)

@@ -11,6 +11,7 @@ from contracts.bus import Bus, Mailbox, Received, Request
 from contracts.drive import ControlCommand, VehicleState
 from contracts.errors import one_line
 from contracts.process import ProcessLife
+from contracts.roles import OtherVehicle, UseRoles
 from contracts.setup import WorkerSetup
 from contracts.simulation import ActiveWorld
 from sim_worker.twin import Mirror
@@ -28,7 +29,8 @@ class MirrorWorker:
     """Feeds a Mirror from messages; a message that cannot be used is logged and passed over.
 
     In lock step a state waits until the commands up to its stamp are there: they come from
-    another process, and results must not depend on who is faster.
+    another process, and results must not depend on who is faster. So do other vehicles, which keep
+    their place among the car's states.
     """
 
     def __init__(self, setup: WorkerSetup, bus: Bus) -> None:
@@ -36,7 +38,7 @@ class MirrorWorker:
         self._worlds_dir = Path(setup.worlds_dir)
         self._bus = bus
         self._waits = setup.bus.lossless and setup.commands_recorded
-        self._held: deque[VehicleState] = deque()
+        self._held: deque[VehicleState | OtherVehicle] = deque()
         self._commanded_ns: int | None = None
         self._mirror = Mirror(
             setup.vehicle,
@@ -44,13 +46,15 @@ class MirrorWorker:
             window_s=setup.mirror_window_s,
             rate_hz=setup.mirror_rate_hz,
             commands_recorded=setup.commands_recorded,
+            vehicle_id=setup.vehicle_id,
+            cast=setup.mirror_cast,
         )
 
     def handle(self, item: Received | Request) -> None:
         """Take one message or question; never raises."""
         try:
             message = item.message()
-            if isinstance(message, VehicleState):
+            if isinstance(message, VehicleState | OtherVehicle):
                 self._held.append(message)
                 self._release(everything=not self._waits)
             elif isinstance(message, ControlCommand):
@@ -59,6 +63,9 @@ class MirrorWorker:
                 self._release(everything=not self._waits)
             elif isinstance(message, ActiveWorld) and isinstance(item, Request):
                 self._change_world(message)
+                item.reply(message)
+            elif isinstance(message, UseRoles) and isinstance(item, Request):
+                self._mirror.set_roles(message)
                 item.reply(message)
         except Exception as error:
             log.exception("message on %s passed over", item.key)
@@ -74,7 +81,11 @@ class MirrorWorker:
             late = self._commanded_ns is None or self._held[0].stamp_ns > self._commanded_ns
             if late and not everything:
                 return
-            sample = self._mirror.handle_state(self._held.popleft())
+            heard = self._held.popleft()
+            if isinstance(heard, OtherVehicle):
+                self._mirror.handle_other(heard)
+                continue
+            sample = self._mirror.handle_state(heard)
             if sample is not None:
                 self._bus.publish("mirror", sample, run=self._run_id)
 
@@ -90,6 +101,8 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     mailbox = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
     worker = MirrorWorker(setup, bus)
     bus.serve("use_world", mailbox, run=setup.run_id, process=setup.process_id)
+    bus.serve("use_roles", mailbox, run=setup.run_id, process=setup.process_id)
+    bus.subscribe("other_vehicle", mailbox, run=setup.run_id)
     bus.subscribe("control", mailbox, vehicle=setup.vehicle_id)
     bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)
     life.ready()

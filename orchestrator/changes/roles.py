@@ -9,7 +9,10 @@ from orchestrator.changes.desk import Made, RefusedError
 
 
 class RolesInForce:
-    """The roles and the correction that count now; `tell` hands them to the mirror."""
+    """The roles and the correction that count now; `tell` hands them to the mirror.
+
+    The first of the roles is the car's own.
+    """
 
     def __init__(
         self,
@@ -40,8 +43,10 @@ class RoleHandler:
         if name not in self._in_force.roles:
             known = ", ".join(self._in_force.roles)
             raise RefusedError(f"role.{name}: no such vehicle in this drive; there are: {known}")
-        if value not in ROLES:
-            raise RefusedError(f"role.{name}={value}: must be {', '.join(ROLES)}")
+        own = next(iter(self._in_force.roles))
+        choices = [role for role in ROLES if role != "all" or name == own]
+        if value not in choices:
+            raise RefusedError(f"role.{name}={value}: must be {', '.join(choices)}")
 
     def make(self, name: str, value: str, *, stamp_ns: int) -> Made:
         """Give the vehicle its new role from `stamp_ns` on."""

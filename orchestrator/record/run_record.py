@@ -31,7 +31,7 @@ def run_record(
     """Return everything that run.json says."""
     futures = conductor.rounds.futures
     # Without a word of the mirror, whether commands were recorded decides.
-    independent = conductor.mirror_independent
+    independent = conductor.mirror.independent
     if independent is None:
         independent = plan.commands_recorded
     return {
