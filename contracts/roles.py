@@ -60,11 +60,17 @@ class FollowLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class OtherVehicle(msgspec.Struct, frozen=True, kw_only=True):
-    """A vehicle beside the car: its newest state, and what it was told since the one before."""
+    """A vehicle beside the car: a state of it, and what it was told since the one before."""
 
-    stamp_ns: int
     state: VehicleState
     commands: tuple[ControlCommand, ...] = ()
+
+
+class OtherVehicles(msgspec.Struct, frozen=True, kw_only=True):
+    """All that is new of the vehicles beside the car as it is in the state of `stamp_ns`."""
+
+    stamp_ns: int
+    heard: tuple[OtherVehicle, ...]
 
 
 class CastVehicle(msgspec.Struct, frozen=True, kw_only=True):

@@ -111,7 +111,7 @@ class Conductor:
         self.beside = VehiclesBeside(
             self.plan,
             own=info,
-            publish=lambda one: self.bus.publish("other_vehicle", one, run=self.plan.run_id),
+            publish=lambda one: self.bus.publish("other_vehicles", one, run=self.plan.run_id),
         )
         self.rounds.start_stamp_ns = info.start_stamp_ns
         self.mission.start_stamp_ns = info.start_stamp_ns

@@ -22,7 +22,7 @@ from contracts.drive import (
     VehicleState,
 )
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo, wrap_angle
-from contracts.roles import OtherVehicle, Role
+from contracts.roles import OtherVehicle, OtherVehicles, Role
 from contracts.vehicle import VehicleParameters
 from orchestrator.intake import Surroundings
 from orchestrator.plan import Beside, DrivePlan
@@ -73,7 +73,7 @@ class _Measured:
         commands, self._commands = tuple(self._commands), []
         self._last_ns = stamp_ns
         moved = msgspec.structs.replace(state, stamp_ns=stamp_ns, vehicle_id=self._id)
-        return OtherVehicle(stamp_ns=stamp_ns, state=moved, commands=commands)
+        return OtherVehicle(state=moved, commands=commands)
 
 
 class LogBeside:
@@ -176,7 +176,7 @@ class DetectedBeside:
             estimated=("yaw_rate_radps", "accel_mps2"),
         )
         self._last = state
-        self._heard.append(OtherVehicle(stamp_ns=stamp_ns, state=state))
+        self._heard.append(OtherVehicle(state=state))
 
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
         """Return what has been detected since the last time."""
@@ -228,7 +228,7 @@ class VehiclesBeside:
         plan: DrivePlan,
         *,
         own: VehicleInfo,
-        publish: Callable[[OtherVehicle], None],
+        publish: Callable[[OtherVehicles], None],
     ) -> None:
         """Opens logs; raises what their readers raise."""
         crew = plan.beside
@@ -248,15 +248,17 @@ class VehiclesBeside:
 
     def keep_up_with(self, own: VehicleState, detected: RoadUsers | None) -> None:
         """Pass on everything up to the car's own new state; `detected` is what it saw last."""
+        if not self._sources:
+            return
         if detected is not None and detected.stamp_ns != self._detected_ns:
             self._detected_ns = detected.stamp_ns
             for source in self._sources.values():
                 if isinstance(source, DetectedBeside):
                     source.take(detected)
         heard = [one for s in self._sources.values() for one in s.states_until(own)]
-        for one in sorted(heard, key=lambda one: (one.stamp_ns, one.state.vehicle_id)):
-            self._latest[one.state.vehicle_id] = one.state
-            self._publish(one)
+        heard.sort(key=lambda one: (one.state.stamp_ns, one.state.vehicle_id))
+        self._latest |= {one.state.vehicle_id: one.state for one in heard}
+        self._publish(OtherVehicles(stamp_ns=own.stamp_ns, heard=tuple(heard)))
 
     def among(
         self, said: Surroundings, own: VehicleState, roles: Mapping[str, Role]
