@@ -8,7 +8,8 @@ import rerun as rr
 
 from contracts.arrays import Array, Array32
 from contracts.simulation import Comparison, PlanComparison, RoundView
-from viewer.log_drive import PLAN, TWIN
+from viewer.log_drive import PLAN
+from viewer.log_roles import TWIN
 from viewer.meshes import Colour
 from viewer.rows import Row, static, table_cell
 
