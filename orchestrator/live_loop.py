@@ -93,6 +93,8 @@ class LiveLoop:
             if now_s - self._started_s > GIVE_UP_ROUND_S:
                 conductor.rounds.drop()
             return True
+        # Where the machine is too slow, one round follows the other without a turn between.
+        conductor.make_changes()
         if not conductor.start_round():
             return False
         self._started_s = now_s
