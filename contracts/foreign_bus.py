@@ -70,7 +70,6 @@ class ZenohForeignBus(ZenohSession):
 
     def subscribe(self, key: str, mailbox: Mailbox, *, history: bool = False) -> None:
         """Receive into `mailbox`; see ForeignBus."""
-        from zenoh import ext
 
         def land(sample: Any) -> None:
             attached = sample.attachment
@@ -84,12 +83,7 @@ class ZenohForeignBus(ZenohSession):
                 )
             )
 
-        if history:
-            kept = ext.HistoryConfig(detect_late_publishers=True)
-            declared = ext.declare_advanced_subscriber(self._session, key, land, history=kept)
-        else:
-            declared = self._session.declare_subscriber(key, land)
-        self._declared.append(declared)
+        self._hear(key, land, history=history)
 
     def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send one sample; see ForeignBus."""

@@ -11,6 +11,7 @@ DURATION_S = 200.0
 
 
 @pytest.mark.judge
+@pytest.mark.timeout(1800)
 def test_after_two_minutes_the_heading_is_within_a_degree_and_the_place_as_sure_as_it_says() -> (
     None
 ):
