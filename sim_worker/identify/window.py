@@ -30,7 +30,7 @@ TURNING_MPS2 = 0.5
 """Sideways acceleration from which the car counts as turning."""
 LEAST_TURNING_S, LEAST_STEERING_S = 5.0, 3.0
 _WIDE_RATIO, _WIDE_OFFSET_RAD, _WIDE_UNDERSTEER, _WIDE_GAIN, _WIDE_DELAY_S = (
-    0.05, 0.005, 0.0006, 0.08, 0.03,
+    0.05, 0.005, 0.001, 0.08, 0.03,
 )  # fmt: skip
 """Half intervals beyond which an estimate is told and not taken."""
 
@@ -89,7 +89,7 @@ def identify(
         ]
     else:
         estimates += _steering(fit, vehicle, turned_s)
-        bins = steering_map(record, fit, vehicle)
+        bins = steering_map(record, fit)
     estimates.append(_wheelbase(record, vehicle, turned_s))
     estimates += _following(record, vehicle)
     along, worked_s = _longitudinal(record, vehicle, grade)
