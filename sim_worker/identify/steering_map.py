@@ -23,8 +23,10 @@ def steering_map(record: MotionRecord, fit: SteeringFit) -> tuple[SteeringMapBin
     steering; `fit` is that of the same `record`.
     """
     period_s = float(record.time_s[1])
-    at = fit.used
-    speed, wheel, tyre = fit.speed_mps[at], fit.wheel_rad[at], fit.steered_rad[at]
+    signals, values = fit.signals, fit.fit.values
+    at = signals.used
+    speed, wheel = signals.speed_mps[at], signals.late_wheel_rad(values)[at]
+    tyre = signals.steered_rad(values)[at]
     bins = []
     for low, high in itertools.pairwise(EDGES_MPS):
         inside = (speed >= low) & (speed < high) & (np.abs(tyre) > _LEAST_TYRE_RAD)
