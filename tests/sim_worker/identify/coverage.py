@@ -58,11 +58,13 @@ def random_parameters(random: np.random.Generator) -> StandinParameters:
     return msgspec.structs.replace(given, car=car)
 
 
-def random_path(random: np.random.Generator, parameters: StandinParameters) -> DrivenPath:
-    """Return 700 m of streets with bends of 12 to 40 m radius, and a stop or two."""
+def random_path(
+    random: np.random.Generator, parameters: StandinParameters, *, length_m: float = 700.0
+) -> DrivenPath:
+    """Return streets with bends of 12 to 40 m radius, and a stop or two."""
     x, y, yaw = 0.0, 0.0, 0.0
     points = [(x, y)]
-    while len(points) < 700:
+    while len(points) < length_m:
         radius = random.uniform(12.0, 40.0)
         turn = random.choice([-1.0, 1.0]) * random.uniform(0.8, 1.6)
         for length, curvature in (
