@@ -3,7 +3,8 @@
 On the road, e a = G_d u⁺ - G_b u⁻ - (c v² + R)/m - g sin(grade), with the effective mass factor e,
 the command u of `accel_delay_s` ago, drive and brake gains G, drag c and rolling resistance R.
 Acceleration is the slope of the measured speed: an accelerometer would feel the body's pitch. In a
-bend it contains what the turned front wheels take, F_yf sin(δ), up to 0.2 m/s² in town.
+bend it contains what the turned front wheels take, F_yf sin(δ), up to 0.2 m/s² in town. What is
+left is noise of the measured speed: over 6 s it averages out as white noise does.
 """
 
 from __future__ import annotations
@@ -154,7 +155,9 @@ def fit_longitudinal(
         changing = [delayed(slope, period_s=period_s, delay_s=delay_s)[used] for slope in slopes]
         moved = -(gains[0] * changing[0] + gains[1] * changing[1])
         columns = np.stack([*acting(delay_s), *steady, moved], axis=1)
-        fit = fit_linear(columns, target, record.time_s[used], prior=centre, prior_std=spread)
+        fit = fit_linear(
+            columns, target, record.time_s[used], prior=centre, prior_std=spread, white=True
+        )
         gains = fit.values[:2]
         delay_s = max(delay_s + float(fit.values[DELAY]), 0.0)
     assert fit is not None

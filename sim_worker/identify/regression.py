@@ -6,6 +6,10 @@ driving after the other (the delete-a-block jackknife of Künsch, 1989; for clus
 MacKinnon, Nielsen and Webb, 2023, "Fast and reliable jackknife and bootstrap methods for
 cluster-robust inference"), averaged over where the stretches begin. A parameter that one single
 bend tells has no other to vouch for it, and its interval says so.
+
+Leaving out is exact for residuals that last as long as a stretch, and exaggerates by a stretch's
+leverage where they do not; what is known to be white is corrected by the root of it instead (CV2,
+Bell and McCaffrey, 2002).
 """
 
 from __future__ import annotations
@@ -55,12 +59,14 @@ def fit_linear(
     prior: Array | None = None,
     prior_std: Array | None = None,
     least_std: float = 0.0,
+    white: bool = False,
 ) -> Fit:
     """Solve `columns` (N, K) · values = `target` (N,) with Gaussian priors (K,), inf for none.
 
     `time_s` (N,) ascends; residuals count as alike within `length_s`. `least_std` is what one
     instant can be trusted to at best, however well the columns explain it: it weighs the priors
-    against the data and leaves the interval to the residuals.
+    against the data and leaves the interval to the residuals. `white` residuals come from sensors
+    alone, and are not alike for as long as a stretch.
 
     Raises ValueError for less than three stretches, or for a column of zeros without a prior.
     """
@@ -90,13 +96,13 @@ def fit_linear(
         values = np.linalg.solve(normal, moment / variance + precision * centre)
         residuals = target - scaled @ values
         cells = cells._replace(moments=np.add.reduceat(scaled * residuals[:, None], starts, axis=0))
-        white = float(np.mean(np.square(residuals))) + 1e-300
+        square = float(np.mean(np.square(residuals))) + 1e-300
         sums = _by_stretch(cells.moments, cells.number // _BEGINNINGS)
         # Alike residuals say less than as many white ones: priors must weigh accordingly.
-        likeness = float(np.mean(np.sum(np.square(sums), axis=0))) / white
-        variance = max(white * max(likeness, 1.0), least_std**2)
+        likeness = float(np.mean(np.sum(np.square(sums), axis=0))) / square
+        variance = max(square * max(likeness, 1.0), least_std**2)
     held = precision * variance + 1e-12
-    spread, freedom = _left_out(cells, gram + np.diag(held))
+    spread, freedom = _left_out(cells, gram + np.diag(held), white=white)
     inverse = np.linalg.inv(gram + np.diag(held))
     # What the prior holds is as uncertain as the prior.
     spread += inverse @ np.diag(precision * variance**2) @ inverse
@@ -113,7 +119,7 @@ def _by_stretch(values: Array, stretch: np.ndarray) -> Array:
     return np.asarray(np.add.reduceat(values, starts, axis=0))
 
 
-def _left_out(cells: _Cells, normal: Array) -> tuple[Array, Array]:
+def _left_out(cells: _Cells, normal: Array, *, white: bool) -> tuple[Array, Array]:
     """Return the jackknife's covariance (K, K) and its degrees of freedom (K,).
 
     The degrees are Satterthwaite's of a sum of as many squares as there are stretches, from the
@@ -123,11 +129,24 @@ def _left_out(cells: _Cells, normal: Array) -> tuple[Array, Array]:
     for beginning in range(_BEGINNINGS):
         stretch = (cells.number + beginning) // _BEGINNINGS
         grams, moments = _by_stretch(cells.grams, stretch), _by_stretch(cells.moments, stretch)
-        moved = np.linalg.solve(normal - grams, moments[..., None])[..., 0]
-        groups = len(moved)
+        groups, share = len(moments), 1.0
+        if white:
+            moved = _by_root(normal, grams, moments)
+        else:
+            moved = np.asarray(np.linalg.solve(normal - grams, moments[..., None])[..., 0])
+            share = (groups - 1.0) / groups
         squares = np.square(moved)
-        covariances.append((groups - 1.0) / groups * moved.T @ moved)
+        covariances.append(share * moved.T @ moved)
         alone = np.sum(np.square(squares), axis=0) + 1e-300
         freedom = _GAUSSIAN_KURTOSIS * np.square(np.sum(squares, axis=0)) / alone
         freedoms.append(np.clip(freedom, 1.0, groups - 1.0))
     return np.mean(covariances, axis=0), np.mean(freedoms, axis=0)
+
+
+def _by_root(normal: Array, grams: Array, moments: Array) -> Array:
+    """Return A^-½ (1 - H)^-½ A^-½ m (G, K) of each stretch, H being its leverage A^-½ G A^-½."""
+    root = np.linalg.inv(np.linalg.cholesky(normal))
+    weights, axes = np.linalg.eigh(root @ grams @ root.T)
+    weights = 1.0 / np.sqrt(np.maximum(1.0 - weights, 1e-6))
+    turned = np.einsum("gji,gj->gi", axes, moments @ root.T) * weights
+    return np.asarray(np.einsum("gij,gj->gi", axes, turned) @ root)
