@@ -33,7 +33,7 @@ driving leaves open, and does not pull at what it tells. Intervals hold for any 
 the average of cars like the file's."""
 _GYRO_BIAS_STD_RADPS = 0.02
 _OFFSET_STD_RAD = 0.1
-_PLAY_RAD = math.radians(0.6)
+PLAY_RAD = math.radians(0.6)
 """Between steering wheel and tyres: play, friction, twist and the sensor's steps, as a standard
 deviation. On centre it is a good part of the angle, and makes the ratio look too large."""
 _PULL_STD_RAD_PER_MPS2 = 0.002
@@ -104,7 +104,7 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     )  # fmt: skip
     # Play lasts: instants within the reach of the smoothing share it.
     alike = 2.0 * math.sqrt(math.pi) * WIDTH_S / float(record.time_s[1])
-    play = _PLAY_RAD / abs(vehicle.steering_ratio.value) * math.sqrt(np.mean(np.square(per_m)))
+    play = PLAY_RAD / abs(vehicle.steering_ratio.value) * math.sqrt(np.mean(np.square(per_m)))
     values = centre.copy()
     fit: Fit | None = None
     for _ in range(4):
@@ -125,5 +125,5 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     return SteeringFit(
         fit=fit._replace(covariance=covariance),
         signals=signals,
-        hidden_share=min(_PLAY_RAD**2 / (varied + 1e-12), 0.9),
+        hidden_share=min(PLAY_RAD**2 / (varied + 1e-12), 0.9),
     )

@@ -1,8 +1,8 @@
 """A step in the steering or the tyres: each short stretch of bends told by the car as identified.
 
 With all other parameters held, a single bend tells one of them far better than it tells all. What
-it then departs from zero by is compared with what the bends before departed by, and with what the
-identified parameters leave open there.
+it then departs from zero by is compared with what the bends before departed by, with what the
+identified parameters leave open there, and with what play in the steering may make of it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from contracts.arrays import Array
-from sim_worker.identify.steering import SteeringFit
+from sim_worker.identify.steering import PLAY_RAD, SteeringFit
 from sim_worker.identify.steering_signals import (
     INVERSE_RATIO,
     OFFSET,
@@ -24,6 +24,7 @@ from sim_worker.identify.steering_signals import (
 
 STRETCH_S, _LEAST_TURNING_S = 2.0, 1.0
 _LEAST_STRETCHES = 4
+_MUCH_WIDER = 1.5
 _STDS = 3.0
 """Twice in a row to the same side: once in 250,000 by chance, were it Gaussian."""
 TURNING_MPS2 = 0.5
@@ -37,6 +38,14 @@ class BendsBefore(NamedTuple):
     values: Array
     covariance: Array
     scatter: Array
+
+    def knows_less(self, other: BendsBefore) -> bool:
+        """Return whether it leaves much more open of the understeer gradient than another."""
+        mine, known = (
+            self.covariance[UNDERSTEER, UNDERSTEER],
+            other.covariance[UNDERSTEER, UNDERSTEER],
+        )
+        return bool(mine > (_MUCH_WIDER**2) * known)
 
 
 class Step(NamedTuple):
@@ -106,7 +115,9 @@ def find_step(signals: SteeringSignals, before: BendsBefore) -> Step | None:
 def _departed(told: _Stretches, before: BendsBefore, count: int) -> Step | None:
     departures, slopes = told.departures[-count:], told.slopes[-count:]
     open_std = np.sqrt(np.einsum("mji,ik,mjk->mj", slopes, before.covariance, slopes))
-    apart = departures / np.hypot(before.scatter, open_std)
+    # However alike bends were: the tyres need not stand as the steering wheel says.
+    play_std = np.abs(slopes[:, :, OFFSET] * (PLAY_RAD * before.values[INVERSE_RATIO]))
+    apart = departures / np.hypot(np.hypot(before.scatter, open_std), play_std)
     found: Step | None = None
     most = 0.0
     for index in _CANDIDATES:

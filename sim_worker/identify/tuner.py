@@ -197,8 +197,10 @@ class Tuner:
                 self._taken[found.name] = found
         for name in names:
             self._before.setdefault(name, []).append(getattr(previous, name))
-        if self._bends is not None and any(found.name in _STEERING for found in better):
-            self._known = self._bends
+        bends, known = self._bends, self._known
+        steered = any(found.name in _STEERING for found in better)
+        if steered and bends is not None and (known is None or not bends.knows_less(known)):
+            self._known = bends
         return changes
 
     def _is_news(self, found: ParameterEstimate) -> bool:

@@ -6,8 +6,8 @@ on the average over cars like the file's.
 
     python -m tests.sim_worker.identify.coverage [CARS]
 
-prints, for each parameter, how many of the intervals held the truth, how far the values were off,
-and the intervals' median half width; a car takes some seconds of CPU.
+prints, for each parameter, how many of the intervals held the truth, how many values were as near as
+they should be, how far they were off, and the intervals' median half width; a car takes some seconds of CPU.
 """
 
 from __future__ import annotations
@@ -33,6 +33,14 @@ from tests.sim_worker.standin_drives import MINUTE_S, driven, estimate, recorded
 from tests.telemetry.standin_drive import FRAME
 
 
+RELATIVE = {"steering_ratio": 0.02, "drive_gain": 0.03, "brake_gain": 0.03}
+ABSOLUTE = {
+    "steering_offset_rad": math.radians(0.2), UNDERSTEER_NAME: 0.0003,
+    "steering_delay_s": 0.010, "accel_delay_s": 0.010,
+}  # fmt: skip
+"""What a minute in town should tell a parameter to."""
+
+
 class Case(NamedTuple):
     """One interval and the truth that it should hold."""
 
@@ -46,6 +54,12 @@ class Case(NamedTuple):
     def holds(self) -> bool:
         """Whether the truth lies in the interval."""
         return self.low <= self.truth <= self.high
+
+    @property
+    def near(self) -> bool:
+        """Whether the value is as near the truth as it should be after a minute in town."""
+        reach = ABSOLUTE.get(self.name, RELATIVE.get(self.name, math.inf) * abs(self.truth))
+        return abs(self.value - self.truth) <= reach
 
 
 def random_parameters(random: np.random.Generator) -> StandinParameters:
@@ -190,7 +204,7 @@ def main() -> None:
         errors = np.array([case.value - case.truth for case in mine])
         half = np.median([0.5 * (case.high - case.low) for case in mine])
         print(
-            f"{name:34} {held:3} of {of:3} held; error {np.median(errors):+.5f} "
+            f"{name:34} {held:3} of {of:3} held, {sum(case.near for case in mine):3} near; error {np.median(errors):+.5f} "
             f"± {np.std(errors):.5f}, nine of ten within {np.quantile(np.abs(errors), 0.9):.5f}, "
             f"half interval {half:.5f}"
         )
