@@ -14,7 +14,7 @@ TIME_S = np.arange(0.0, 60.0, PERIOD_S)
 
 
 def line(seed: int, *, lasting: float, white: bool = False) -> Fit:
-    """Fit a line through 60 s of 3 s bends, with white noise and `lasting` as much for each bend."""
+    """Fit a line through 60 s of 3 s bends: white noise, and `lasting` as much for each bend."""
     random = np.random.default_rng(seed)
     per_bend = np.repeat(random.normal(size=(20, 2)), 60, axis=0)
     columns = np.column_stack([per_bend[:, 0], np.ones(len(TIME_S))])
