@@ -158,19 +158,21 @@ class PushTest:
                 found.append((cause, used[: count + 1], float(value[count]), float(std[count])))
         if not found:
             return None
-        # Blocks before the departure count too: what explains it must leave them as they were.
-        since = slice(max(0, min(int(used[-1]) for _, used, _, _ in found) - _BEFORE), None)
+        # Blocks before the departure count too. Drag does not set in: it is there in all of them.
+        since = max(0, min(int(used[-1]) for _, used, _, _ in found) - _BEFORE)
 
-        def left(value: float, column: Array) -> float:
-            return float(np.sum((weight * (gap - value * column) ** 2)[since]))
+        def left(value: float, column: Array, begun: int) -> float:
+            answer = value * column
+            answer[:begun] = 0.0
+            return float(np.sum((weight * (gap - answer) ** 2)[since:]))
 
         unexplained = [
-            left(value, parts[cause].column)
+            left(value, parts[cause].column, 0 if cause == "drag" else int(used[-1]))
             + (0.0 if math.isnan(parts[cause].plateau) else _PLATEAU)
-            for cause, _, value, _ in found
+            for cause, used, value, _ in found
         ]
         best = int(np.argmin(unexplained))
-        if unexplained[best] > 0.7 * left(0.0, gap):
+        if unexplained[best] > 0.7 * left(0.0, gap, 0):
             return None
         cause, used, value_of, std_of = found[best]
         chosen = PushBlocks(*(one[used] for one in blocks))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample
@@ -38,6 +40,66 @@ def verdicts_of(
             if until_first:
                 break
     return told
+
+
+class Case(NamedTuple):
+    """One fault on one way: what was said first, and after how much excitation (NaN: nothing)."""
+
+    fault: str
+    seed: int
+    said: Verdict | None
+    excited_s: float
+
+    @property
+    def right(self) -> bool:
+        return self.said is not None and self.said.culprit == culprit_of(self.fault)
+
+    @property
+    def named(self) -> bool:
+        return self.right and self.said is not None and self.said.cause in NAMES[self.fault]
+
+    @property
+    def in_time(self) -> bool:
+        return self.right and self.excited_s <= IN_TIME_S
+
+
+IN_TIME_S = 3.0
+NAMES = {
+    "slow_steering": {"steering_delay"},
+    "steering_gain": {"steering_gain"},
+    "saturated_steering": {"saturated_steering", "steering_gain"},
+    "saturated_brake": {"saturated_brake", "brake_gain"},
+    "low_drive": {"drive_gain"},
+    "brake_fade": {"brake_gain", "saturated_brake"},
+    "steering_read_in_degrees": {"steering_in_degrees"},
+    "steering_commanded_in_degrees": {"steering_in_degrees"},
+    "steering_sign": {"steering_sign"},
+    "offset_steering_sensor": {"offset_sensor"},
+    "offset_gyro": {"gyro_sensor"},
+    "scaled_gyro": {"gyro_sensor"},
+    "scaled_speed": {"speed_sensor"},
+    "offset_speed": {"speed_sensor"},
+    "wheelbase": {"steering_ratio"},  # whose text says "or wheelbase": motion does not tell them
+    "steering_ratio": {"steering_ratio"},
+    "steering_limit": {"steering_limit"},
+    "steering_offset": {"steering_offset"},
+    "inertia": {"inertia"},
+    "friction": {"friction", "cornering_stiffness"},
+    "cornering_stiffness": {"cornering_stiffness"},
+    "drag": {"drag"},
+    "drive_gain": {"drive_gain"},
+    "brake_gain": {"brake_gain"},
+    "steering_delay": {"steering_delay"},
+}
+"""Causes that describe each fault; two where a few seconds cannot tell them apart."""
+
+
+def judged(fault: str, *, seed: int) -> Case:
+    """Return what is said first of a drive with a fault."""
+    told = verdicts_of(fault, seed=seed)
+    said = told[0] if told else None
+    late_s = float("nan") if said is None else excited_s(fault, said, seed=seed)
+    return Case(fault, seed, said, late_s)
 
 
 def culprit_of(fault: str) -> str:
