@@ -20,9 +20,9 @@ from orchestrator.intake import Intake
 from orchestrator.mission import Mission
 from orchestrator.plan import DrivePlan
 from orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
-from orchestrator.result_rows import mirror_row
-from orchestrator.results import ResultTables
-from orchestrator.round_runner import RoundRunner
+from orchestrator.record.result_rows import mirror_row
+from orchestrator.record.results import ResultTables
+from orchestrator.rounds.runner import RoundRunner
 from orchestrator.world_desk import WorldDesk
 
 log = logging.getLogger(ORCHESTRATOR)

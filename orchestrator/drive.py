@@ -25,13 +25,13 @@ from orchestrator.mission import Mission, MissionSettings
 from orchestrator.plan import DrivePlan, make_plan, read_inputs
 from orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids
 from orchestrator.progress import ProgressLine
-from orchestrator.results import ResultTables
-from orchestrator.run_record import reserve_record, run_record, write_record
+from orchestrator.record.results import ResultTables
+from orchestrator.record.run_record import reserve_record, run_record, write_record
+from orchestrator.record.summary import summary_text
+from orchestrator.record.versions import versions
 from orchestrator.start_worlds import prepare_start
-from orchestrator.summary import summary_text
 from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
-from orchestrator.versions import versions
-from orchestrator.way_ahead import WayAhead
+from orchestrator.way.way_ahead import WayAhead
 
 log = logging.getLogger(ORCHESTRATOR)
 

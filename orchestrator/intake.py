@@ -16,7 +16,7 @@ from contracts.drive import (
     VehicleState,
 )
 from contracts.vehicle import VehicleParameters
-from orchestrator.bookkeeping import TelemetryCount
+from orchestrator.record.bookkeeping import TelemetryCount
 from orchestrator.telemetry_watch import TelemetryWatch, record
 from telemetry.estimator import StateEstimator
 

@@ -13,10 +13,10 @@ from typing import Any, Literal
 from contracts.drive import VehicleState
 from contracts.world import World
 from orchestrator.instructions import BuildWorld, Instruction, NotReady, RoundIntent, Tell, UseWorld
-from orchestrator.junctions_ahead import PassedJunction
-from orchestrator.map_matching import OffRoadStretch
 from orchestrator.visits import VisitBook
-from orchestrator.way_ahead import WayAhead
+from orchestrator.way.junctions_ahead import PassedJunction
+from orchestrator.way.map_matching import OffRoadStretch
+from orchestrator.way.way_ahead import WayAhead
 from world_gen.intersections import Junction
 
 MissionState = Literal["waiting", "following", "off_map"]

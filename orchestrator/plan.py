@@ -19,12 +19,12 @@ from contracts.vehicle import VehicleParameters
 from orchestrator.config import ConfigError, DriveConfig
 from orchestrator.doctor import has_display
 from orchestrator.endpoints import free_endpoint
-from orchestrator.line_matching import match_line
-from orchestrator.map_opening import Clip, open_map
-from orchestrator.road_index import RoadIndex
-from orchestrator.round_jobs import scenarios_of
-from orchestrator.route import Route
-from orchestrator.standin_path import StandinPath, standin_path
+from orchestrator.maps.opening import Clip, open_map
+from orchestrator.rounds.jobs import scenarios_of
+from orchestrator.way.line_matching import match_line
+from orchestrator.way.road_index import RoadIndex
+from orchestrator.way.route import Route
+from orchestrator.way.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import check_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line

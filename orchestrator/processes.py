@@ -16,7 +16,7 @@ from contracts.setup import (
     WorkerSetup,
 )
 from orchestrator.plan import DrivePlan
-from orchestrator.round_jobs import planners_of
+from orchestrator.rounds.jobs import planners_of
 
 ORCHESTRATOR = "orchestrator"
 BUILDER = "builder"

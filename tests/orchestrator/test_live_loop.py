@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator import live_loop
 from orchestrator.live_loop import LiveLoop
-from orchestrator.round_pace import Pace
+from orchestrator.rounds.pace import Pace
 
 
 class Clock:
