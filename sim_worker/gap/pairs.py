@@ -55,6 +55,12 @@ class Pairs(NamedTuple):
     model_tire_rad: Array
     pushes: PushBlocks
 
+    def latest(self, seconds: float) -> Pairs:
+        """Return the signals of the latest seconds, with all of the pushes."""
+        kept = slice(max(0, len(self.stamp_ns) - round(seconds / PERIOD_S)), None)
+        columns = {name: getattr(self, name)[kept] for name in self._fields if name != "pushes"}
+        return self._replace(**columns)
+
 
 def pairs_of(
     record: MotionRecord,

@@ -17,11 +17,11 @@ from sim_worker.gap.consistency import Consistency, consistency_of
 from sim_worker.gap.finding import Finding
 from sim_worker.gap.findings import findings_of
 from sim_worker.gap.free_run import FreeRunner
-from sim_worker.gap.pairs import pairs_of
+from sim_worker.gap.pairs import Pairs, pairs_of
 from sim_worker.gap.push import PushTest
 from sim_worker.motion_record import MotionRecord, MotionRecorder
 
-WINDOW_S, EVERY_S = 6.0, 0.2
+WINDOW_S, RECENT_S, EVERY_S = 6.0, 3.0, 0.2
 _EVERY_NS = round(EVERY_S * 1e9)
 _LATEST_S = 0.1
 """Samples of slower channels may still be on their way."""
@@ -89,10 +89,11 @@ class Judge:
         )
         self.latest = consistency_of(pairs)
         pushed = self._push.handle(pairs.pushes)
-        found = findings_of(self.latest)
-        if found is not None:
-            since_ns = began_ns(pairs, self.latest, found.evidence[0].name)
-            found = found._replace(since_ns=since_ns)
+        found = _found_in(pairs, self.latest)
+        if found is None:
+            # A departure that has just begun is a small part of the whole stretch.
+            recent = pairs.latest(RECENT_S)
+            found = _found_in(recent, consistency_of(recent))
         return self._weigh(found or pushed, to_ns)
 
     def _precise(self) -> bool:
@@ -133,6 +134,13 @@ class Judge:
             evidence=found.evidence,
             confidence=_confidence(found),
         )
+
+
+def _found_in(pairs: Pairs, seen: Consistency) -> Finding | None:
+    found = findings_of(seen)
+    if found is None:
+        return None
+    return found._replace(since_ns=began_ns(pairs, seen, found.evidence[0].name))
 
 
 def _confidence(found: Finding) -> float:

@@ -48,8 +48,8 @@ def print_quiet(seeds: range) -> None:
     for seed in seeds:
         said = verdicts_of(None, seed=seed, until_first=False)
         told += said
-        for one in said:
-            print(f"seed {seed}: {one.culprit} {one.cause}: {one.text}", flush=True)
+        accused = "; ".join(f"{one.culprit} {one.cause}: {one.text}" for one in said)
+        print(f"seed {seed}: {accused or 'nobody'}", flush=True)
     hours = len(seeds) * DURATION_S / 3600.0
     print(f"{hours:.2f} h of stand-in driving without faults: {len(told)} false alarms")
 
