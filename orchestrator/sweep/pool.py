@@ -15,6 +15,9 @@ ATTEMPTS = 3
 """A task on which so many workers died is given up."""
 _POLL_S = 0.5
 _END_S = 1.0
+_START_S = 60.0
+"""What a worker may take to start on top: a busy machine's imports are no fault of the task."""
+_STARTED = "started"
 
 Answer = Callable[[Any], Any]
 
@@ -43,12 +46,17 @@ class _Worker:
         self.process.start()
         theirs.close()
         self.task: Task | None = None
+        self.started = False
         self.since_s = 0.0
         self.place = ""
 
     def give(self, task: Task) -> None:
         self.task, self.since_s, self.place = task, time.monotonic(), task.place
         self.connection.send((task.number, task.question))
+
+    def is_late(self, timeout_s: float) -> bool:
+        limit_s = timeout_s if self.started else timeout_s + _START_S
+        return time.monotonic() - self.since_s > limit_s
 
     def end(self) -> None:
         self.connection.close()
@@ -66,6 +74,7 @@ def _serve(connection: Connection, start: Callable[[Any], Answer], setup: object
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answer = start(setup)
     try:
+        connection.send(_STARTED)
         while True:
             number, question = connection.recv()
             connection.send((number, answer(question)))
@@ -121,14 +130,17 @@ class Crew:
                 [w.connection for w in crew] + [w.process.sentinel for w in crew], _POLL_S
             )
             for index, worker in enumerate(crew):
-                if worker.connection in ready and (taken := _received(worker)) is not None:
+                said = _received(worker) if worker.connection in ready else None
+                if said == _STARTED:
+                    worker.started, worker.since_s = True, time.monotonic()
+                elif said is not None:
                     task, worker.task = worker.task, None
                     assert task is not None
-                    done(task, taken[1])
+                    done(task, said[1])
                 elif worker.connection in ready or worker.process.sentinel in ready:
                     crew[index] = self._worker()
                     _mourn(worker, pending, attempts, done)
-                elif worker.task and time.monotonic() - worker.since_s > self._timeout_s:
+                elif worker.task is not None and worker.is_late(self._timeout_s):
                     crew[index] = self._worker()
                     worker.end()
                     worker.join()
@@ -151,13 +163,12 @@ def _give(worker: _Worker, pending: list[Task], crew: Sequence[_Worker]) -> None
         worker.task = task  # It died idle: its end is seen next, and the task goes to another.
 
 
-def _received(worker: _Worker) -> tuple[int, Any] | None:
-    """Return an answer; None where the worker's end of the line is gone."""
+def _received(worker: _Worker) -> Any:
+    """Return `_STARTED` or a number and its answer; None where the worker's end is gone."""
     try:
-        number, answer = worker.connection.recv()
+        return worker.connection.recv()
     except (EOFError, OSError):
         return None
-    return number, answer
 
 
 def _mourn(

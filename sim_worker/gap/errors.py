@@ -23,6 +23,7 @@ from sim_worker.vehicle.lag import without_lags
 
 HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")
+"""Of a sample; a row has `position_m` too, how far apart both are."""
 
 
 class GapRow(NamedTuple):
@@ -131,6 +132,7 @@ def gap_table(samples: Sequence[GapSample]) -> list[GapRow]:
     for horizon, manoeuvre in sorted(groups, key=lambda key: (key[0], MANOEUVRES.index(key[1]))):
         group = groups[horizon, manoeuvre]
         values = {name: np.array([getattr(one, name) for one in group]) for name in QUANTITIES}
+        values["position_m"] = np.hypot(values["along_m"], values["across_m"])
         rows.append(
             GapRow(
                 horizon_s=horizon,
