@@ -11,25 +11,21 @@ from typing import Any
 import msgspec
 
 from contracts.drive import GnssFix
-from contracts.errors import UserError
 from contracts.frames import LocalFrame
-from contracts.tuning import Identification, ParameterChange, ParameterEstimate, ParameterOrigin
-from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.identify.acceptance import accepted, in_force, is_acceptable
-from sim_worker.identify.window import UNDERSTEER_NAME, identify
+from contracts.tuning import Identification
+from contracts.vehicle import VehicleParameters
+from sim_worker.identify.acceptance import in_force, is_acceptable
+from sim_worker.identify.parameters_in_force import ParametersInForce, std_of
+from sim_worker.identify.window import identify
 from sim_worker.motion_record import MotionRecorder
-from sim_worker.vehicle.parameters import check_vehicle
 
 _PERIOD_S = 0.01
 _LEAST_S = 20.0
 _STEP_STDS = 4.0
 """Between two intervals' middles, over their common standard deviation: chance is one in 16,000."""
-_MUCH_WIDER = 1.5
-_HALF_OF_95 = 1.96
-_STIFFNESS = "front_cornering_stiffness_npr"
 
 
-class Tuner:
+class Tuner(ParametersInForce):
     """Identifies every `every_s` of drive time from the last `window_s`, and holds what counts.
 
     `handle` takes samples in any order and returns an Identification when one is due; `take` makes
@@ -48,20 +44,13 @@ class Tuner:
         every_s: float = 10.0,
     ) -> None:
         """Without a `frame`, samples count from the first position on, around which it is laid."""
-        self.vehicle = vehicle
-        """The parameters in force."""
-        # Windows overlap: what one has told must not weigh as a prior in the next.
-        self._given = vehicle
-        self.pinned: set[str] = set()
-        self._vehicle_id = vehicle_id
+        super().__init__(vehicle=vehicle, vehicle_id=vehicle_id)
         self._window_ns, self._every_ns = round(window_s * 1e9), round(every_s * 1e9)
         self._recorder: MotionRecorder | None = None
         if frame is not None:
             self._recorder = self._new_recorder(frame)
         self._from_ns: int | None = None
         self._due_ns = 0
-        self._taken: dict[str, ParameterEstimate] = {}
-        self._before: dict[str, list[Parameter]] = {}
 
     def _new_recorder(self, frame: LocalFrame) -> MotionRecorder:
         return MotionRecorder(frame=frame, keep_s=self._window_ns * 1e-9 + 5.0)
@@ -120,92 +109,8 @@ class Tuner:
             assert found.value is not None
             assert before.value is not None
             apart = abs(found.value - before.value)
-            if apart > _STEP_STDS * math.hypot(_std(found), _std(before)):
+            if apart > _STEP_STDS * math.hypot(std_of(found), std_of(before)):
                 noticed[found.name] = (
                     f"{found.name} went from {before.value:.4g} to {found.value:.4g} or beyond"
                 )
         return noticed
-
-    def _is_pinned(self, name: str) -> bool:
-        return name in self.pinned or (name == UNDERSTEER_NAME and _STIFFNESS in self.pinned)
-
-    def take(self, told: Identification) -> tuple[ParameterChange, ...]:
-        """Let what `told` says count, save where it is pinned or known better; the changes."""
-        better = [
-            found
-            for found in told.estimates
-            if is_acceptable(found) and not self._is_pinned(found.name) and self._is_news(found)
-        ]
-        chosen = msgspec.structs.replace(told, estimates=tuple(better))
-        previous = self.vehicle
-        self.vehicle, changes = accepted(chosen, self.vehicle)
-        names = {change.name for change in changes}
-        for found in better:
-            if found.name in names or (found.name == UNDERSTEER_NAME and _STIFFNESS in names):
-                self._taken[found.name] = found
-        for name in names:
-            self._before.setdefault(name, []).append(getattr(previous, name))
-        return changes
-
-    def _is_news(self, found: ParameterEstimate) -> bool:
-        before = self._taken.get(found.name)
-        return before is None or _std(found) <= _MUCH_WIDER * _std(before)
-
-    def set(self, name: str, value: float, *, stamp_ns: int) -> ParameterChange:
-        """Set a parameter by hand and pin it; UserError for a name or value that is none."""
-        in_force(self.vehicle, name)
-        if name == UNDERSTEER_NAME:
-            raise UserError(f"{name} follows from the stiffnesses: set {_STIFFNESS}")
-        change = self._replace(name, Parameter(value, None, "set by hand"), "set", stamp_ns, True)
-        self.pinned.add(name)
-        return change
-
-    def pin(self, name: str) -> None:
-        """Keep a parameter as it is, whatever is identified; UserError for another name."""
-        in_force(self.vehicle, name)
-        self.pinned.add(name)
-
-    def unpin(self, name: str) -> None:
-        """Let a parameter be identified again; UserError for another name."""
-        in_force(self.vehicle, name)
-        self.pinned.discard(name)
-
-    def rollback(self, name: str, *, stamp_ns: int) -> ParameterChange:
-        """Go back to the value before the last change, and pin it; UserError where none is."""
-        in_force(self.vehicle, name)
-        history = self._before.get(name)
-        if not history:
-            raise UserError(f"{name} has not changed: there is nothing to roll back to")
-        earlier = history[-1]
-        change = self._replace(name, earlier, "rolled_back", stamp_ns, True)
-        del self._before[name][-2:]
-        self.pinned.add(name)
-        return change
-
-    def _replace(
-        self, name: str, parameter: Parameter, origin: ParameterOrigin, stamp_ns: int, pinned: bool
-    ) -> ParameterChange:
-        before: Parameter = getattr(self.vehicle, name)
-        try:
-            self.vehicle = check_vehicle(msgspec.structs.replace(self.vehicle, **{name: parameter}))
-        except ValueError as error:
-            raise UserError(str(error)) from error
-        self._before.setdefault(name, []).append(before)
-        self._given = msgspec.structs.replace(self._given, **{name: parameter})
-        self._taken.pop(UNDERSTEER_NAME if name == _STIFFNESS else name, None)
-        return ParameterChange(
-            vehicle_id=self._vehicle_id,
-            stamp_ns=stamp_ns,
-            name=name,
-            before=before.value,
-            value=parameter.value,
-            std=parameter.std,
-            origin=origin,
-            pinned=pinned,
-        )
-
-
-def _std(found: ParameterEstimate) -> float:
-    assert found.high is not None
-    assert found.low is not None
-    return (found.high - found.low) / (2.0 * _HALF_OF_95)

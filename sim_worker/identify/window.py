@@ -9,7 +9,12 @@ import msgspec
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.tuning import Identification, ParameterEstimate, SteeringMapBin
+from contracts.tuning import (
+    UNDERSTEER_GRADIENT,
+    Identification,
+    ParameterEstimate,
+    SteeringMapBin,
+)
 from contracts.vehicle import Parameter, VehicleParameters
 from sim_worker.identify import longitudinal
 from sim_worker.identify.actuator import fit_following
@@ -25,7 +30,7 @@ from sim_worker.identify.steering_map import steering_map
 from sim_worker.motion_record import MotionRecord
 from sim_worker.vehicle.parameters import understeer_gradient
 
-UNDERSTEER_NAME = "understeer_gradient_rad_per_mps2"
+UNDERSTEER_NAME = UNDERSTEER_GRADIENT
 TURNING_MPS2 = 0.5
 """Sideways acceleration from which the car counts as turning."""
 LEAST_TURNING_S, LEAST_STEERING_S = 5.0, 3.0
