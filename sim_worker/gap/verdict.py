@@ -59,6 +59,12 @@ class Judge:
         """The samples that are kept."""
         return self._recorder
 
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Judge a model of other parameters from now on; what was about to be said is forgotten."""
+        self._runner = FreeRunner(vehicle)
+        self._push = PushTest()
+        self._pending = None
+
     def handle(self, channel: str, message: Any) -> Verdict | None:
         """Take one sample; return a verdict where one is due."""
         stamp_ns = getattr(message, "stamp_ns", None)
