@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from orchestrator.tuning.words import summary_lines
+
 BEGINNING_S = 0.5
 """Where a junction is near so soon, the drive began near it."""
 
@@ -47,5 +49,6 @@ def summary_text(record: dict[str, object]) -> str:
         f"{junction['name'] or junction['id']}  {_readiness(junction, lock_step=lock_step)}"
         for junction in junctions
     ]
+    lines += summary_lines(record["tuning"])  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join([*lines, attribution])
