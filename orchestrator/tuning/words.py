@@ -15,6 +15,7 @@ _QUANTITIES = {
     "speed_mps": ("speed", "m/s", 1.0),
 }
 _HOW = {"identified": "identified", "set": "set by hand", "rolled_back": "rolled back"}
+_EACH_ITS_LINE = 3
 _CULPRITS = {
     "vehicle": "the vehicle", "model": "the model", "both": "vehicle and model",
     "none": "neither", "undecided": "undecided",
@@ -71,10 +72,12 @@ def summary_lines(tuning: dict[str, Any]) -> list[str]:
         f"  {name} {first[name]:.5g} -> {change['value']:.5g} ({_HOW[change['origin']]})"
         for name, change in last.items()
     ]
-    for one in tuning["parameters"]:
-        if one["departs"]:
-            lines.append(
-                f"  {one['name']}: the driving says {one['identified']:.5g} ({one['low']:.5g} to "
-                f"{one['high']:.5g}), in use is {one['in_use']:.5g}"
-            )
-    return lines
+    apart = [one for one in tuning["parameters"] if one["departs"]]
+    if len(apart) > _EACH_ITS_LINE:
+        told = ", ".join(f"{one['name']} {one['identified']:.4g}" for one in apart)
+        return [*lines, f"  the driving says other than the vehicle in use: {told}"]
+    return lines + [
+        f"  {one['name']}: the driving says {one['identified']:.5g} ({one['low']:.5g} to "
+        f"{one['high']:.5g}), in use is {one['in_use']:.5g}"
+        for one in apart
+    ]

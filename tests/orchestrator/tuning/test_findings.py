@@ -101,3 +101,14 @@ def test_a_departure_is_told_once_and_a_drive_without_findings_says_nothing(tmp_
     kept = Kept(tmp_path, reply, reply)
     assert len(kept.told) == 1
     assert summary_lines(Kept(tmp_path / "none").record) == []
+
+
+def test_many_departures_share_a_line(tmp_path: Path) -> None:
+    names = ("steering_ratio", "drive_gain", "brake_gain", "mass_kg")
+    estimates = tuple(ParameterEstimate(name=name, value=3.0, low=2.9, high=3.1) for name in names)
+    told = Identification(vehicle_id="ego", from_stamp_ns=0, stamp_ns=8, estimates=estimates)
+    (line,) = summary_lines(Kept(tmp_path, TuneReply(identifications=(told,))).record)
+    assert line == (
+        "  the driving says other than the vehicle in use: steering_ratio 3, drive_gain 3, "
+        "brake_gain 3, mass_kg 3"
+    )
