@@ -68,6 +68,8 @@ class TuningLink:
         if item.channel == "tune":
             self.weighing = False
             self._weighed = item.message
+            if item.message is None and TUNING in self._alive:
+                self._events.tell(Tell("error", f"{TUNING}: {item.error}"))
             return ""
         process_id: str = item.tag
         if item.message is None and process_id in self._alive:

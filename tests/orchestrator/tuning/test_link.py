@@ -171,6 +171,13 @@ def test_in_lock_step_findings_count_when_they_are_taken(tmp_path: Path) -> None
     assert not tuning.parameters.waiting
     tuning.take_weighed()
     assert tuning.parameters.waiting
+    tuning.weigh({"gnss": 5})
+    question = questions.take()
+    assert isinstance(question, Request)
+    question.refuse("out of words")
+    house.settle()
+    assert not tuning.weighing
+    assert "tuning: out of words" in [event.text for event in house.watched("event")]
     house.tables.close()
 
 
