@@ -16,6 +16,7 @@ from contracts import (
     gap,
     planner_link,
     roles,
+    side_by_side,
     simulation,
     towards_vehicle,
     tuning,
@@ -114,6 +115,8 @@ CHANNELS: dict[str, Channel] = {
              "the car's plan against ours"),
         _row("other_vehicles", f"{_RUN}/other_vehicles", roles.OtherVehicles, 50, LIVE,
              "states of the vehicles beside the car"),
+        _row("disagreement", f"{_RUN}/disagreement", side_by_side.Disagreement, None, RESULT,
+             "human and ADS disagree"),
         _row("mirror", f"{_RUN}/mirror", simulation.MirrorSample, 10, RESULT,
              "twin, shadow, ghost and their gap"),
         _row("gap", f"{_RUN}/gap", gap.GapSample, 4, RESULT, "model against reality"),
@@ -181,6 +184,11 @@ def process_of_alive_key(full_key: str) -> str:
 def vehicle_of_key(full_key: str) -> str:
     """Return the vehicle's id in the key of a channel of a vehicle."""
     return full_key.removeprefix(f"{PREFIX}/vehicle/").split("/", 1)[0]
+
+
+def run_of_alive_key(full_key: str) -> str:
+    """Return the run id in a liveliness key."""
+    return full_key.rsplit("/", 3)[1]
 
 
 def _fill(template: str, **ids: str | None) -> str:

@@ -166,6 +166,7 @@ class MirrorSample(msgspec.Struct, frozen=True, kw_only=True):
     others: tuple[MirroredVehicle, ...] = ()
     touches: tuple[tuple[str, str], ...] = ()
     """Who touched whom since the last sample, by vehicle ids; `world` is what stands."""
+    twin_yaw_rate_radps: float = 0.0
 
 
 class WorldNotice(msgspec.Struct, frozen=True, kw_only=True):

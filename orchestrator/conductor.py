@@ -19,6 +19,7 @@ from orchestrator.changes.roles import CorrectionHandler, RoleHandler, RolesInFo
 from orchestrator.events import EventDesk
 from orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
 from orchestrator.intake import Intake
+from orchestrator.judge.human_desk import HumanDesk
 from orchestrator.mirror_desk import MirrorDesk
 from orchestrator.mission import Mission
 from orchestrator.plan import DrivePlan
@@ -60,6 +61,7 @@ class Conductor:
             plan, bus, self.mailbox, tables, world_of=self.worlds.world, tell=self.tell,
             on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
         )  # fmt: skip
+        self.human = HumanDesk(plan, bus, tables, self.intake, mission, tell=self.tell)
         self.alive: set[str] = set()
         self.missed_rounds = 0
         self.spared_rounds = 0
@@ -81,8 +83,9 @@ class Conductor:
             {"role": RoleHandler(self.roles), "correction": CorrectionHandler(self.roles),
              "vehicle": VehicleHandler(self.tuning.parameters)}
         )  # fmt: skip
-        self.beside: VehiclesBeside | None = None
-        """Known once the car has said what it is."""
+        self.beside = VehiclesBeside(
+            plan, publish=lambda message: bus.publish("other_vehicles", message, run=plan.run_id)
+        )
         self._active_world: str | None = None
         self._world_untold = False
 
@@ -104,11 +107,7 @@ class Conductor:
     def take_info(self, info: VehicleInfo) -> None:
         """Begin to estimate: what the vehicle says of itself is known."""
         self.intake.take_info(info)
-        self.beside = VehiclesBeside(
-            self.plan,
-            own=info,
-            publish=lambda one: self.bus.publish("other_vehicles", one, run=self.plan.run_id),
-        )
+        self.beside.begin(info)
         self.rounds.start_stamp_ns = info.start_stamp_ns
         self.mission.start_stamp_ns = info.start_stamp_ns
         if info.body_from_antenna_m is None:
@@ -156,8 +155,7 @@ class Conductor:
         """Take one sample, and let the mission go on where it gives a new state."""
         sender = vehicle_of_key(item.key)
         if sender != self.plan.config.vehicle_id:
-            if self.beside is not None:
-                self.beside.take_sample(sender, item)
+            self.beside.take_sample(sender, item)
             return
         try:
             state = self.intake.take(item)
@@ -165,13 +163,14 @@ class Conductor:
             if self.intake.refused == 1:
                 self.tell(Tell("error", str(error)))
             return
+        self.human.take(state)
         if state is None:
             return
         self.watch_telemetry(item.received_mono_ns)
-        if self.beside is not None:
-            self.beside.keep_up_with(state, self.intake.road_users)
+        self.beside.keep_up_with(state, self.intake.road_users)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.rounds.take_state(state)
+        self.rounds.windows.take(self.intake.surroundings, state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
 
     def watch_telemetry(self, mono_ns: int) -> None:
@@ -192,15 +191,14 @@ class Conductor:
             else:
                 self.unseeded_rounds += 1
             return False
-        said = self.intake.surroundings
-        if self.beside is not None:
-            said = self.beside.among(said, latest.state, self.roles.roles)
+        said = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
         self.rounds.start(intent, latest, said, started_mono_ns=started_mono_ns)
         return True
 
     def finish(self) -> None:
         """Compare what can still be compared and settle the counts."""
         self.rounds.finish()
+        self.human.finish()
         if self.intake.end is not None:
             self.intake.counts.settle(self.intake.end.published)
 

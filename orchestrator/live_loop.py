@@ -95,7 +95,9 @@ class LiveLoop:
             if now_s - self._started_s > GIVE_UP_ROUND_S:
                 conductor.rounds.drop()
             return True
-        if not conductor.start_round():
+        # Where the machine is too slow, one round follows the other without a turn between.
+        conductor.make_changes()
+        if not (conductor.tuning.parameters.settled and conductor.start_round()):
             return False
         self._started_s = now_s
         return True

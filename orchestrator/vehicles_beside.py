@@ -223,22 +223,19 @@ def _source_of(beside: Beside, own: VehicleInfo) -> LogBeside | LiveBeside | Det
 class VehiclesBeside:
     """All vehicles beside the car: passes their states on, and shows them to futures."""
 
-    def __init__(
-        self,
-        plan: DrivePlan,
-        *,
-        own: VehicleInfo,
-        publish: Callable[[OtherVehicles], None],
-    ) -> None:
-        """Opens logs; raises what their readers raise."""
-        crew = plan.beside
-        self._sources = {one.config.id: _source_of(one, own) for one in crew}
+    def __init__(self, plan: DrivePlan, *, publish: Callable[[OtherVehicles], None]) -> None:
+        self._crew = crew = plan.beside
+        self._sources: dict[str, LogBeside | LiveBeside | DetectedBeside] = {}
         self._vehicles = {one.config.id: one.vehicle for one in crew}
         self._seen_as = {one.config.seen_as for one in crew}
         self._frame = plan.drive_frame
         self._publish = publish
         self._latest: dict[str, VehicleState] = {}
         self._detected_ns: int | None = None
+
+    def begin(self, own: VehicleInfo) -> None:
+        """Open what there is, now that the car's clock is known; raises what readers raise."""
+        self._sources = {one.config.id: _source_of(one, own) for one in self._crew}
 
     def take_sample(self, vehicle_id: str, item: Received) -> None:
         """Take a sample of a vehicle on the bus."""

@@ -11,7 +11,7 @@ from contracts.roles import MirrorCast, OtherVehicle, UseRoles
 from contracts.simulation import MirrorSample, PlaneState
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from sim_worker.commands import CommandMemory, TwinCommand, estimated_command
+from sim_worker.commands import STEP_BACK_NS, CommandMemory, TwinCommand, estimated_command
 from sim_worker.mirror_world import GHOST, SHADOW, MirrorWorld
 from sim_worker.roles.casting import Casting, FreeTwin
 from sim_worker.roles.member import CastMember
@@ -102,11 +102,16 @@ class Mirror:
     def handle_state(self, state: VehicleState) -> MirrorSample | None:
         """Step the twin up to the state; returns a sample where one is due.
 
-        States without a known heading and out of time order are passed over. Raises ValueError
-        for a state that is not finite.
+        States without a known heading and out of time order are passed over; after a step of the
+        car's clock back by a second or more everything begins anew. Raises ValueError for a state
+        that is not finite.
         """
         if not state.yaw_valid:
             return None
+        if self._measured is not None and (state.stamp_ns < self._measured_stamp_ns - STEP_BACK_NS):
+            # Worlds that were to come by the old clock are due: their time has passed.
+            self._pending = [(state.stamp_ns, world) for _, world in self._pending]
+            self._measured, self._first_stamp_ns, self._last_index = None, None, -1
         if self._measured is not None and state.stamp_ns <= self._measured_stamp_ns:
             return None
         self._change_vehicle(state.stamp_ns)
@@ -236,6 +241,7 @@ class Mirror:
             gap_speed_mps=float(twin[3] - measured[3]),
             since_reset_s=(state.stamp_ns - self._seed_stamp_ns) / 1e9,
             independent=self._independent,
+            twin_yaw_rate_radps=float(twin[5]),
         )
         return self._casting.told(sample)
 

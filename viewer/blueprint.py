@@ -117,7 +117,7 @@ def drive_blueprint(
         rrb.TextDocumentView(origin="/parameters/table", name="Table"),
         name="Parameters",
     )
-    details = ("Comparison", "Short", "Plan", "Scenarios", "Reality", "Parameters")
+    details = ("Comparison", "Short", "Plan", "Scenarios", "Correction", "Reality", "Parameters")
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(
@@ -143,6 +143,7 @@ def drive_blueprint(
                     short,
                     _plot("/comparison/plan", "Plan", last_30_s, legend=True),
                     rrb.TextDocumentView(origin="/scenarios/table", name="Scenarios"),
+                    _plot("/correction", "Correction, m/s²", last_30_s, legend=True),
                     reality,
                     parameters,
                     active_tab=details.index(detail),

@@ -9,7 +9,8 @@ import rerun as rr
 
 from contracts.gap import GapSample, Manoeuvre, Verdict
 from contracts.tuning import Identification, ParameterChange, ParameterEstimate
-from viewer.log_drive import LIMIT, PLAN, REAL, TWIN
+from viewer.log_drive import LIMIT, PLAN
+from viewer.log_roles import REAL, TWIN
 from viewer.meshes import Colour
 from viewer.rows import Row, plain_text, static, table_cell
 

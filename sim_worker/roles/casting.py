@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import msgspec
+
 from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import LocalFrame
@@ -12,7 +14,7 @@ from contracts.roles import Correction, MirrorCast, OtherVehicle, Role, UseRoles
 from contracts.simulation import MirrorSample
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from sim_worker.commands import CommandMemory
+from sim_worker.commands import STEP_BACK_NS, CommandMemory
 from sim_worker.roles.cast import Cast
 from sim_worker.roles.member import CastMember
 from sim_worker.roles.told import with_cast
@@ -101,6 +103,8 @@ class Casting:
 
     def before(self, state: VehicleState, free_twin: Callable[[], FreeTwin | None]) -> None:
         """Make the changes that are due at a state of the car, and take the state."""
+        if self._last is not None and state.stamp_ns < self._last.stamp_ns - STEP_BACK_NS:
+            self._begin_anew(state.stamp_ns)
         due = [use for use in self._pending if use.stamp_ns <= state.stamp_ns]
         self._pending = [use for use in self._pending if use.stamp_ns > state.stamp_ns]
         for use in due:
@@ -113,6 +117,14 @@ class Casting:
         self._last = state
         if self._cast is not None:
             self._cast.take_state(self._car, state)
+
+    def _begin_anew(self, stamp_ns: int) -> None:
+        """Forget what was by the old clock; roles that were to come by it are due."""
+        self._pending = [msgspec.structs.replace(use, stamp_ns=stamp_ns) for use in self._pending]
+        self._last = None
+        if self._cast is not None:
+            self._cast = self._new_cast()
+            self._cast.correction = self._correction
 
     def _apply(self, free_twin: Callable[[], FreeTwin | None]) -> None:
         if self._cast is None:

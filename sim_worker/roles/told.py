@@ -45,7 +45,9 @@ def with_cast(
     box = plane(car.box(car.track.at(sample.stamp_ns)))
     changes: dict[str, object] = {"shadow": box, "ghost": box}
     if car.has_twin and car.present:
-        changes["twin"] = plane(_twin_at(cast, car, sample.stamp_ns))
+        twin_now = _twin_at(cast, car, sample.stamp_ns)
+        changes["twin"] = plane(twin_now)
+        changes["twin_yaw_rate_radps"] = float(twin_now.rate[2])
         changes["free"] = sample.twin
     others = []
     for name, member in cast.members.items():

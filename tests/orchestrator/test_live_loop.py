@@ -241,3 +241,9 @@ def test_something_is_done_each_turn_at_least_every_50_ms(monkeypatch: pytest.Mo
 def test_changes_asked_for_are_looked_at_every_turn(driven: Any) -> None:
     conductor = driven(states_s=[0.0, 0.3], end_s=1.0)
     assert np.diff([*conductor.changes_made_s, 1.0]).max() < 0.051
+
+
+def test_changes_are_made_between_rounds_that_follow_one_another(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7)
+    for started_s in conductor.started_s:
+        assert min(abs(made_s - started_s) for made_s in conductor.changes_made_s) < 1e-9

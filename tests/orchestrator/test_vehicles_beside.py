@@ -54,7 +54,9 @@ def crew(folder: Path, *configs: VehicleBeside) -> tuple[VehiclesBeside, list[Ot
     members = tuple(Beside(config, VAN, commands_recorded=False) for config in configs)
     plan = replace(town_plan(folder), beside=members, drive_frame=FRAME)
     heard: list[OtherVehicles] = []
-    return VehiclesBeside(plan, own=INFO, publish=heard.append), heard
+    beside = VehiclesBeside(plan, publish=heard.append)
+    beside.begin(INFO)
+    return beside, heard
 
 
 def van_log(folder: Path, *, start_ns: int) -> Path:

@@ -157,3 +157,19 @@ def test_a_twin_that_is_lost_starts_anew() -> None:
         cast.take_state("car", state)
         cast.advance(k * TICK_NS)
     assert cast.members["car"].twin().pose[0] == pytest.approx(8.0 * 99 / 50 + 30.0, abs=0.5)
+
+
+def test_a_clock_that_steps_back_lets_everything_begin_anew() -> None:
+    mirror = _mirror()
+    mirror.set_roles(UseRoles(stamp_ns=0, roles={"ego": "twin"}, correction="follow"))
+    samples = []
+    for k in [*range(1000, 1030), *range(100, 130)]:
+        state = weaving(k)
+        sample = mirror.handle_state(state)
+        assert sample is not None
+        samples.append(sample)
+    after = samples[30:]
+    assert [s.stamp_ns for s in after] == [k * TICK_NS for k in range(100, 130)]
+    assert {s.role for s in after} == {"twin"}
+    away_m = [math.hypot(s.twin.x_m - s.real.x_m, s.twin.y_m - s.real.y_m) for s in after]
+    assert max(away_m) < 0.5
