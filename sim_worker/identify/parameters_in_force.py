@@ -18,7 +18,7 @@ from sim_worker.vehicle.parameters import check_vehicle
 from sim_worker.vehicle.plausible import check_plausible
 
 _MUCH_WIDER = 1.5
-_STIFFNESS = "front_cornering_stiffness_npr"
+STIFFNESS = "front_cornering_stiffness_npr"
 
 
 class ParametersInForce:
@@ -35,7 +35,7 @@ class ParametersInForce:
         self._before: dict[str, list[Parameter]] = {}
 
     def _is_pinned(self, name: str) -> bool:
-        return name in self.pinned or (name == UNDERSTEER_GRADIENT and _STIFFNESS in self.pinned)
+        return name in self.pinned or (name == UNDERSTEER_GRADIENT and STIFFNESS in self.pinned)
 
     def take(self, told: Identification) -> tuple[ParameterChange, ...]:
         """Let what `told` says count, save where it is pinned or known better; the changes."""
@@ -49,7 +49,7 @@ class ParametersInForce:
         self.vehicle, changes = accepted(chosen, self.vehicle)
         names = {change.name for change in changes}
         for found in better:
-            if found.name in names or (found.name == UNDERSTEER_GRADIENT and _STIFFNESS in names):
+            if found.name in names or (found.name == UNDERSTEER_GRADIENT and STIFFNESS in names):
                 self._taken[found.name] = found
         for name in names:
             self._before.setdefault(name, []).append(getattr(previous, name))
@@ -70,7 +70,7 @@ class ParametersInForce:
         """Raise UserError, in one line, where `set` would."""
         in_force(self.vehicle, name)
         if name == UNDERSTEER_GRADIENT:
-            raise UserError(f"{name} follows from the stiffnesses: set {_STIFFNESS}")
+            raise UserError(f"{name} follows from the stiffnesses: set {STIFFNESS}")
         try:
             check_plausible(name, value)
             check_vehicle(msgspec.structs.replace(self.vehicle, **{name: Parameter(value)}))
@@ -112,7 +112,7 @@ class ParametersInForce:
             raise UserError(str(error)) from error
         self._before.setdefault(name, []).append(before)
         self._given = msgspec.structs.replace(self._given, **{name: parameter})
-        self._taken.pop(UNDERSTEER_GRADIENT if name == _STIFFNESS else name, None)
+        self._taken.pop(UNDERSTEER_GRADIENT if name == STIFFNESS else name, None)
         return ParameterChange(
             vehicle_id=self._vehicle_id,
             stamp_ns=stamp_ns,
