@@ -72,8 +72,8 @@ class ParametersInForce:
         if name == UNDERSTEER_GRADIENT:
             raise UserError(f"{name} follows from the stiffnesses: set {STIFFNESS}")
         try:
-            check_plausible(name, value)
             check_vehicle(msgspec.structs.replace(self.vehicle, **{name: Parameter(value)}))
+            check_plausible(name, value)
         except ValueError as error:
             raise UserError(str(error)) from error
 
