@@ -30,7 +30,7 @@ def drives(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Finished]:
     for mode in ("apply", "report"):
         found[mode] = foretwin(
             folder / mode, "--speed", "max", "--futures", "8", "--rate", "0.25", "--workers", "1",
-            "--end", "55", "--vehicle", str(car), "--tuning", mode, timeout_s=900.0,
+            "--end", "68", "--vehicle", str(car), "--tuning", mode, timeout_s=900.0,
         )  # fmt: skip
         assert found[mode].code == 0, found[mode].screen
     return found
