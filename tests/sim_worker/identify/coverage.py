@@ -6,8 +6,9 @@ on the average over cars like the file's.
 
     python -m tests.sim_worker.identify.coverage [CARS]
 
-prints, for each parameter, how many of the intervals held the truth, how many values were as near as
-they should be, how far they were off, and the intervals' median half width; a car takes some seconds of CPU.
+prints, for each parameter, how many of the intervals held the truth, how many values were as near
+as they should be, how far they were off, and the intervals' median half width; a car takes some
+seconds of CPU.
 """
 
 from __future__ import annotations
@@ -202,8 +203,9 @@ def main() -> None:
         mine = [case for case in told if case.name == name]
         errors = np.array([case.value - case.truth for case in mine])
         half = np.median([0.5 * (case.high - case.low) for case in mine])
+        near = sum(case.near for case in mine)
         print(
-            f"{name:34} {held:3} of {of:3} held, {sum(case.near for case in mine):3} near; error {np.median(errors):+.5f} "
+            f"{name:34} {held:3} of {of:3} held, {near:3} near; error {np.median(errors):+.5f} "
             f"± {np.std(errors):.5f}, nine of ten within {np.quantile(np.abs(errors), 0.9):.5f}, "
             f"half interval {half:.5f}"
         )
