@@ -21,7 +21,7 @@ from contracts.drive import (
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from contracts.mailbox import Mailbox
 from contracts.memory_bus import MemoryBus
-from contracts.roles import OtherVehicles
+from contracts.roles import OtherVehicles, Role
 from orchestrator.config import ConfigError, DriveConfig, VehicleBeside, load_config
 from orchestrator.intake import Surroundings
 from orchestrator.plan import Beside, read_inputs
@@ -29,6 +29,7 @@ from orchestrator.vehicles_beside import VehiclesBeside
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.vehicle.planar import box_centre_from_base_m
 from telemetry.mcap_file import create
+from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
 
 VAN = load_vehicle("vw_vanagon")
@@ -186,6 +187,32 @@ def test_the_van_as_a_road_user_has_its_own_size_and_centre(tmp_path: Path) -> N
     assert (van.length_m, van.width_m) == (VAN.length_m.value, VAN.width_m.value)
     centre = local_from_geo(FRAME, van.position.lat_deg, van.position.lon_deg)
     assert centre[0] == pytest.approx(20.0 + box_centre_from_base_m(VAN), abs=0.3)
+
+
+@pytest.mark.parametrize(("role", "met"), [("shadow", {"van"}), ("ghost", set())])
+def test_jobs_of_a_drive_hold_who_is_beside_the_car(tmp_path: Path, role: Role, met: set) -> None:
+    house = House(tmp_path, futures=2)
+    config = VehicleBeside(id="van", seen_as="17", role=role)
+    plan = replace(house.plan, beside=(Beside(config, VAN, commands_recorded=False),))
+    house.conductor.beside = VehiclesBeside(plan, publish=lambda _: None)
+    house.conductor.beside.begin(INFO)
+    house.conductor.roles.roles["van"] = role
+    house.drive(25)
+    car = house.states[25]
+    ahead = RoadUser(
+        user_id="17", kind="car", position=house.states[27].position, yaw_rad=car.yaw_rad,
+        speed_mps=5.0, length_m=4.0, width_m=1.7,
+    )  # fmt: skip
+    users = RoadUsers(stamp_ns=car.stamp_ns, users=(ahead,))
+    house.bus.publish("objects", users, vehicle="ego")
+    house.send(car)
+    house.settle()
+    assert house.conductor.start_round()
+    jobs = [request.message() for worker in house.workers for request in worker.take()]
+    assert {user.length_m for job in jobs for user in job.road_users} == {
+        VAN.length_m.value for _ in met
+    }
+    house.tables.close()
 
 
 @pytest.mark.parametrize(

@@ -22,12 +22,12 @@ from tests.sim_worker.roles.test_cast import TICK_NS, weaving
 
 CAR = load_vehicle()
 LIMITS = FollowLimits()
-TICKS = 850
+TICKS = 820
 
 
-@settings(max_examples=5, deadline=None, phases=[Phase.explicit, Phase.generate])
+@settings(max_examples=4, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(
-    along=st.floats(-6.0, 6.0), across=st.floats(-3.0, 3.0), yaw=st.sampled_from([0.0, 0.1]),
+    along=st.floats(-3.0, 3.0), across=st.floats(-2.0, 2.0), yaw=st.sampled_from([0.0, 0.1]),
     speed=st.sampled_from([0.0, 3.0, 12.0]),
 )  # fmt: skip
 def test_a_gap_closes_within_the_bounds_and_without_overshoot(
@@ -38,7 +38,7 @@ def test_a_gap_closes_within_the_bounds_and_without_overshoot(
     cast.correction = "follow"
     member = cast.members["car"]
     gaps, accels = [], []
-    for k in range(800):
+    for k in range(650):
         cast.take_state("car", state_at(speed * k / 50.0, 0.0, 0.0, speed, stamp_ns=k * TICK_NS))
         cast.advance(k * TICK_NS)
         if k == 5:
@@ -59,10 +59,12 @@ def test_a_gap_closes_within_the_bounds_and_without_overshoot(
         assert np.abs(np.diff(drawn[:, axis])).max() <= jerk * TICK_NS / 1e9 + 1e-9
 
 
-def drive(mirror: Mirror, *, wrong_gain: float, changes: dict[int, str]) -> list[MirrorSample]:
+def drive(
+    mirror: Mirror, *, wrong_gain: float, changes: dict[int, str], ticks: int = 600
+) -> list[MirrorSample]:
     """A car that weaves, told a little more acceleration than it takes; `changes` by tick."""
     samples = []
-    for k in range(TICKS):
+    for k in range(ticks):
         if k in changes:
             mirror.set_roles(
                 UseRoles(stamp_ns=k * TICK_NS, roles={}, correction=changes[k])  # type: ignore[arg-type]
@@ -111,7 +113,7 @@ def test_a_following_twin_does_not_jump_where_a_free_one_does_and_stays_nearer()
 
 def test_switching_on_and_off_keeps_position_and_speed() -> None:
     on, off = 230, 500
-    samples = drive(_mirror(), wrong_gain=0.1, changes={on: "follow", off: "free"})
+    samples = drive(_mirror(), wrong_gain=0.1, changes={on: "follow", off: "free"}, ticks=TICKS)
     jumps = _jumps(samples)
     # Free again, it goes on from where it is until the next window's end.
     since_s = [sample.since_reset_s for sample in samples]
@@ -133,7 +135,7 @@ def test_a_new_world_does_not_move_a_following_twin() -> None:
     mirror = _mirror()
     mirror.set_roles(UseRoles(stamp_ns=0, roles={}, correction="follow"))
     mirror.set_world(crossroads(), from_stamp_ns=300 * TICK_NS)
-    samples = drive(mirror, wrong_gain=0.1, changes={})
+    samples = drive(mirror, wrong_gain=0.1, changes={}, ticks=450)
     assert {s.world_id for s in samples} == {None, "crossroads"}
     assert _jumps(samples)[:, 0].max() < 0.03
 
