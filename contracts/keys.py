@@ -10,7 +10,16 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts import drive, futures, gap, planner_link, simulation, towards_vehicle, tuning
+from contracts import (
+    drive,
+    futures,
+    gap,
+    planner_link,
+    side_by_side,
+    simulation,
+    towards_vehicle,
+    tuning,
+)
 
 PREFIX = "foretwin/v1"
 
@@ -99,6 +108,8 @@ CHANNELS: dict[str, Channel] = {
              "nominal future against reality"),
         _row("plan_comparison", f"{_RUN}/plan_comparison", simulation.PlanComparison, 2, RESULT,
              "the car's plan against ours"),
+        _row("disagreement", f"{_RUN}/disagreement", side_by_side.Disagreement, None, RESULT,
+             "human and ADS disagree"),
         _row("mirror", f"{_RUN}/mirror", simulation.MirrorSample, 10, RESULT,
              "twin, shadow, ghost and their gap"),
         _row("gap", f"{_RUN}/gap", gap.GapSample, 4, RESULT, "model against reality"),
@@ -161,6 +172,11 @@ def alive_key(*, run: str, process: str) -> str:
 def process_of_alive_key(full_key: str) -> str:
     """Return the process id in a liveliness key."""
     return full_key.rsplit("/", 1)[1]
+
+
+def run_of_alive_key(full_key: str) -> str:
+    """Return the run id in a liveliness key."""
+    return full_key.rsplit("/", 3)[1]
 
 
 def _fill(template: str, **ids: str | None) -> str:

@@ -131,6 +131,7 @@ class MirrorSample(msgspec.Struct, frozen=True, kw_only=True):
     gap_speed_mps: float
     since_reset_s: float
     independent: bool
+    twin_yaw_rate_radps: float = 0.0
 
 
 class WorldNotice(msgspec.Struct, frozen=True, kw_only=True):

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from contracts.errors import UserError
-from orchestrator.cli_logs import convert, gap, identify
+from orchestrator.cli_logs import convert, gap, identify, judge
 from orchestrator.cli_options import MapArgument, OutOption, ServiceRoadsOption
 from orchestrator.cli_scenarios import scenarios
 
@@ -207,7 +207,7 @@ def sweep(
     raise typer.Exit(run_sweep(SweepRequest(spec, out, workers, fresh, as_json)))
 
 
-for about_logs in (convert, identify, gap):
+for about_logs in (convert, identify, gap, judge):
     app.command()(about_logs)
 
 

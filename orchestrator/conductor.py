@@ -17,6 +17,7 @@ from contracts.simulation import ActiveWorld, Event
 from contracts.world import World
 from orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
 from orchestrator.intake import Intake
+from orchestrator.judge.human_desk import HumanDesk
 from orchestrator.mission import Mission
 from orchestrator.plan import DrivePlan
 from orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
@@ -61,6 +62,7 @@ class Conductor:
             on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
             tell=self.tell,
         )
+        self.human = HumanDesk(plan, bus, tables, self.intake, mission, tell=self.tell)
         self.alive: set[str] = set()
         self.missed_rounds = 0
         self.spared_rounds = 0
@@ -137,11 +139,13 @@ class Conductor:
             if self.intake.refused == 1:
                 self.tell(Tell("error", str(error)))
             return
+        self.human.take(state)
         if state is None:
             return
         self.watch_telemetry(item.received_mono_ns)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.rounds.take_state(state)
+        self.rounds.windows.take(self.intake.surroundings, state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
 
     def watch_telemetry(self, mono_ns: int) -> None:
@@ -168,6 +172,7 @@ class Conductor:
     def finish(self) -> None:
         """Compare what can still be compared and settle the counts."""
         self.rounds.finish()
+        self.human.finish()
         if self.intake.end is not None:
             self.intake.counts.settle(self.intake.end.published)
 

@@ -62,6 +62,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     endpoint: str | None = None
     """Where the router listens, such as tcp/127.0.0.1:7447; None takes a free loopback port."""
     standin_plan_shift_m: float = 0.0
+    standin_parameters: str | None = None
+    """What the stand-in car really is, hidden from the twin: a TOML file, or the bundled one."""
     ros2: str | None = None
     """A mapping in TOML, or `autoware`: the live car speaks ROS 2; see docs/ros2.md."""
     towards_vehicle: bool = False

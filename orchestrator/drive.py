@@ -63,13 +63,16 @@ class _Interrupt:
 
 def drive(config: DriveConfig) -> int:
     """Run one drive; returns its exit code. Raises UserError before anything is written."""
-    inputs = read_inputs(config)
-    plan = make_plan(inputs, datetime.datetime.now())
+    return carry_out(make_plan(read_inputs(config), datetime.datetime.now()))
+
+
+def carry_out(plan: DrivePlan) -> int:
+    """Run a drive whose folder is made; returns its exit code."""
     log_to_file(
         ProcessSetup(
             run_id=plan.run_id,
             process_id=ORCHESTRATOR,
-            vehicle_id=config.vehicle_id,
+            vehicle_id=plan.config.vehicle_id,
             bus=plan.bus,
             log_file=str(plan.folder / "log.jsonl"),
         )

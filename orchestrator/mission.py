@@ -120,6 +120,18 @@ class Mission:
             return ahead.junction.summary.name or ahead.junction.summary.id, ahead.in_s
         return None
 
+    @property
+    def junction_id(self) -> str | None:
+        """The junction that the car is at, or has before it."""
+        if self._current is not None:
+            return self._current
+        return next((a.junction.summary.id for a in self._way.junctions), None)
+
+    @property
+    def route_m(self) -> float | None:
+        """How far along its route the car is, None off the map."""
+        return self._way.s_m if self.state == "following" else None
+
     def worlds_ahead(self) -> list[str]:
         """Ids of the Worlds that the coming rounds need, the current one first."""
         ids = [self._current] if self._current else []

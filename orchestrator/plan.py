@@ -29,6 +29,7 @@ from sim_worker.planners.registry import check_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line
 from telemetry.ros2.mapping import MappingFile, read_mapping
+from telemetry.standin.parameters import read_parameters
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
@@ -119,6 +120,8 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         raise ConfigError(str(error)) from error
     scenarios_of(config)  # an unknown one is told before anything long begins
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
+    if config.standin_parameters is not None:
+        read_parameters(Path(config.standin_parameters))
     ros2 = read_mapping(Path(config.ros2)) if config.ros2 else None
     map_file = Path(config.map) if config.map else EMBEDDED_MAP
     source = config.resolved_source

@@ -121,6 +121,7 @@ def _standin(plan: DrivePlan, process_id: str) -> ProcessSetup:
         speed=plan.config.speed,
         seed=plan.config.seed,
         plan_shift_m=plan.config.standin_plan_shift_m,
+        parameters_file=plan.config.standin_parameters,
     )
 
 

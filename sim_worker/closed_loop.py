@@ -72,10 +72,13 @@ class _Loop:
     def advance(self, tick: int) -> None:
         scene, stage = self._scene, self._stage
         now = stage.states
-        if not self._sound:
+        if self._sound:
+            view = self._play.look(tick, now, stage.heading)
+        else:
             # What has failed is not shown to planners: one bad future must not spoil the job.
             now = np.where(self._valid[:, tick, None], now, scene.starts)
-        answer = self._planners.plan(self._play.look(tick, now))
+            view = self._play.look(tick, now)
+        answer = self._planners.plan(view)
         self._play.act(tick * stage.control_dt_s, answer)
         self._keep(tick + 1)
 

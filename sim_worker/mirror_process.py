@@ -13,6 +13,7 @@ from contracts.errors import one_line
 from contracts.process import ProcessLife
 from contracts.setup import WorkerSetup
 from contracts.simulation import ActiveWorld
+from sim_worker.commands import STEP_BACK_NS
 from sim_worker.twin import Mirror
 from sim_worker.world_file import load_world
 
@@ -54,6 +55,8 @@ class MirrorWorker:
                 self._held.append(message)
                 self._release(everything=not self._waits)
             elif isinstance(message, ControlCommand):
+                if message.stamp_ns < (self._commanded_ns or 0) - STEP_BACK_NS:
+                    self._release(everything=True)  # no more commands of the old clock will come
                 self._mirror.handle_command(message)
                 self._commanded_ns = message.stamp_ns
                 self._release(everything=not self._waits)

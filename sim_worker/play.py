@@ -70,13 +70,16 @@ class Play:
         if scene.sight is not None and before.sight is not None:
             scene.sight.carry_on(before.sight, others, looked=looked)
 
-    def look(self, tick: int, now: Array) -> PlannerView:
-        """Return what planners see of the states (S, 8), the law-abiding having decided."""
+    def look(self, tick: int, now: Array, heading: Array | None = None) -> PlannerView:
+        """Return what planners see of the states (S, 8), the law-abiding having decided.
+
+        `heading` (2, S) is the cosine and sine of their yaw, where these are known.
+        """
         time_s = tick * self.stage.control_dt_s
         place = self._locate(now)
         if tick % self._decide_every == 0:
             self._decide(self.scene.red_arcs_m(time_s), now, place)
-        return self._view(tick, time_s, now, place)
+        return self._view(tick, time_s, now, place, heading)
 
     def look_by_row(self, ticks: Rows, lights_s: Array, now: Array) -> PlannerView:
         """Do the same for cars that began at different times, and decide at every tick.
@@ -122,7 +125,14 @@ class Play:
         )
         scene.traffic.decide(ego, red_arcs_m)
 
-    def _view(self, tick: int | Rows, time_s: float, now: Array, place: FrenetPoint) -> PlannerView:
+    def _view(
+        self,
+        tick: int | Rows,
+        time_s: float,
+        now: Array,
+        place: FrenetPoint,
+        heading: Array | None = None,
+    ) -> PlannerView:
         scene = self.scene
         target, stop, seen = scene.aims.target_speed_mps, None, None
         if scene.sight is not None and scene.traffic is not None:
@@ -155,6 +165,7 @@ class Play:
             users=seen,
             ground=scene.ground,
             car_plan=scene.car_plan,
+            heading=heading,
         )
 
 

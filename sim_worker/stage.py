@@ -20,7 +20,7 @@ from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
 from sim_worker.vehicle.planar import (
     JOINTS,
     TIMESTEP_S,
-    base_from_cog,
+    BaseFromCog,
     box_centre_from_base_m,
     check_steering_delay,
     cog_from_base,
@@ -84,7 +84,7 @@ class Stage:
         self._count = 0
         # Columns that lie together in memory: each is read far more often than a row.
         self._states = np.zeros((8, nsim)).T
-        self._sane = np.repeat(_SANE, nsim, axis=1)
+        self._live = self._states[:0]
 
     def _bind(self) -> None:
         model = self.model
@@ -149,6 +149,7 @@ class Stage:
         rate = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
         reach = rate * np.arange(1.0, self.steps_per_tick + 1)
         self._reach = np.repeat(reach[:, None], count, axis=1)
+        self._reach_back = -self._reach
         self._actuation = Actuation(
             self.vehicle,
             self._actuators,
@@ -164,8 +165,12 @@ class Stage:
         """(S,) bool: whether the vehicle touched a building or island during the last tick."""
         self.looked = False
         """Whether contacts were looked for in any simulation during the last tick."""
-        self._motion_now = self._physics.motion[rows]
-        self._motion = np.empty((8, count)).T
+        self._live = self._states[rows]
+        self._motion_now = self._physics.motion[rows].T
+        self._motion = np.empty((8, count))
+        self._base = BaseFromCog(self.vehicle, self._motion, self._live.T)
+        self._base.heading[:] = np.cos(start[:, 2]), np.sin(start[:, 2])
+        self._sane = np.repeat(_SANE, count, axis=1)
 
     def reseed(
         self,
@@ -179,6 +184,7 @@ class Stage:
         check_steering_delay(steering_delay_s)
         self._physics.reset(rows)
         start = self._place(rows, states)
+        self._base.heading[:, rows] = np.cos(start[:, 2]), np.sin(start[:, 2])
         self._tire_command[rows] = start[:, 6]
         self._physics.history[rows, self._steer_history] = start[:, 6:7]
         self._physics.delay[rows, self._actuators.steer] = steering_delay_s
@@ -201,20 +207,19 @@ class Stage:
 
     def step(self, controls: Controls) -> None:
         """Advance one control tick."""
-        rows = slice(0, self._count)
-        states = self._states[rows]
-        speed, accel = states[:, 3], states[:, 7]
+        columns = self._live.T
+        speed, accel = columns[3], columns[7]
         self._actuation.apply(speed_mps=speed, accel_mps2=controls.accel_mps2)
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
         change = controls.tire_angle_rad - self._tire_command
         ramp = np.minimum(change, self._reach)
-        np.maximum(ramp, -self._reach, out=ramp)
+        np.maximum(ramp, self._reach_back, out=ramp)
         np.add(ramp, self._tire_command, out=self._steer_controls)
         np.copyto(self._tire_command, self._steer_controls[-1])
         self._advance(self._controls)
         np.negative(speed, out=accel)
         np.copyto(self._motion, self._motion_now)
-        base_from_cog(self.vehicle, self._motion[:, :4], self._motion[:, 4:], states)
+        self._base.read()
         accel += speed
         accel /= self.control_dt_s
 
@@ -223,7 +228,7 @@ class Stage:
             self.static_contact[:] = False
         self.looked = False
         if not self._near_statics.empty:
-            near = self._near_statics_of(self.states)
+            near = self._near_statics_of(self._live.T)
             self.looked = bool(np.count_nonzero(near))
         if not self.looked:
             self._physics.advance(per_step, None if self._count == self.nsim else self._ids)
@@ -233,13 +238,12 @@ class Stage:
         if len(far):
             self._physics.advance(per_step[far], far)
 
-    def _near_statics_of(self, states: Array) -> npt.NDArray[np.bool_]:
-        """(S,) bool: whether a contact during the coming tick cannot be ruled out."""
-        columns = states.T
-        centre = np.empty((2, len(states)))
-        np.cos(columns[2], out=centre[0])
-        np.sin(columns[2], out=centre[1])
-        centre *= self._centre_ahead_m
+    def _near_statics_of(self, columns: Array) -> npt.NDArray[np.bool_]:
+        """(S,) bool: whether a contact during the coming tick cannot be ruled out.
+
+        `columns` (8, S) are those of the states.
+        """
+        centre = self._base.heading * self._centre_ahead_m
         centre += columns[:2]
         near = self._near_statics.at(centre)
         slow = np.abs(columns[3:6]) < self._bounds
@@ -250,7 +254,12 @@ class Stage:
     @property
     def states(self) -> Array:
         """Base_link states (S, 8) now; a live array that the next step overwrites."""
-        return self._states[: self._count]
+        return self._live
+
+    @property
+    def heading(self) -> Array:
+        """(2, S) cosine and sine of their yaw; live as well."""
+        return self._base.heading
 
     def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""
@@ -262,4 +271,4 @@ class Stage:
         return bool(np.count_nonzero(sane) < sane.size)
 
     def _is_sane(self) -> npt.NDArray[np.bool_]:
-        return np.abs(self._states.T[:, : self._count]) < self._sane[:, : self._count]
+        return np.abs(self._live.T) < self._sane

@@ -33,6 +33,9 @@ def compile_open(vehicle: VehicleParameters) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     set_physics_options(spec)
     spec.attach(vehicle_spec(vehicle), prefix=PREFIX, frame=spec.worldbody.add_frame())
+    for geom in spec.geoms:
+        # Its mass is the chassis's own: only its place would be worked out at each step.
+        spec.delete(geom)
     disable = mujoco.mjtDisableBit
     # The planar vehicle has no other constraint than contacts.
     spec.option.disableflags |= int(disable.mjDSBL_CONSTRAINT | disable.mjDSBL_CONTACT)

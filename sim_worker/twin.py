@@ -10,7 +10,7 @@ from contracts.frames import LocalFrame, target_from_source, wrap_angle
 from contracts.simulation import MirrorSample, PlaneState
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from sim_worker.commands import CommandMemory, TwinCommand, estimated_command
+from sim_worker.commands import STEP_BACK_NS, CommandMemory, TwinCommand, estimated_command
 from sim_worker.mirror_world import GHOST, SHADOW, MirrorWorld
 from sim_worker.seeding import local_state
 from sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
@@ -78,11 +78,16 @@ class Mirror:
     def handle_state(self, state: VehicleState) -> MirrorSample | None:
         """Step the twin up to the state; returns a sample where one is due.
 
-        States without a known heading and out of time order are passed over. Raises ValueError
-        for a state that is not finite.
+        States without a known heading and out of time order are passed over; after a step of the
+        car's clock back by a second or more everything begins anew. Raises ValueError for a state
+        that is not finite.
         """
         if not state.yaw_valid:
             return None
+        if self._measured is not None and (state.stamp_ns < self._measured_stamp_ns - STEP_BACK_NS):
+            # Worlds that were to come by the old clock are due: their time has passed.
+            self._pending = [(state.stamp_ns, world) for _, world in self._pending]
+            self._measured, self._first_stamp_ns, self._last_index = None, None, -1
         if self._measured is not None and state.stamp_ns <= self._measured_stamp_ns:
             return None
         self._change_world(state.stamp_ns)
@@ -191,6 +196,7 @@ class Mirror:
             gap_speed_mps=float(twin[3] - measured[3]),
             since_reset_s=(state.stamp_ns - self._seed_stamp_ns) / 1e9,
             independent=self._independent,
+            twin_yaw_rate_radps=float(twin[5]),
         )
 
     def _twin_at(self, stamp_ns: int) -> Array:

@@ -18,6 +18,7 @@ from viewer.log_run import RunLog, rows_of_event
 from viewer.log_scenarios import (
     no_futures,
     rows_of_comparison,
+    rows_of_disagreement,
     rows_of_plan_comparison,
     rows_of_round,
 )
@@ -26,8 +27,8 @@ from viewer.rows import Row
 
 VEHICLE_CHANNELS = ("state", "gnss", "plan", "end")
 RUN_CHANNELS = (
-    "round", "comparison", "plan_comparison", "mirror", "active_world", "world", "worker_status",
-    "progress", "event",
+    "round", "comparison", "plan_comparison", "disagreement", "mirror", "active_world", "world",
+    "worker_status", "progress", "event",
 )  # fmt: skip
 
 _log = logging.getLogger(__name__)
@@ -75,6 +76,7 @@ class Monitor:
             "round": rows_of_round,
             "comparison": rows_of_comparison,
             "plan_comparison": rows_of_plan_comparison,
+            "disagreement": lambda one, ns: rows_of_disagreement(one, ns, self._frame),
             "mirror": self._drive.mirror,
             "active_world": self._active_world,
             "world": self._world,

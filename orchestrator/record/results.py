@@ -49,6 +49,31 @@ TABLES: dict[str, pa.Schema] = {
         + [(what, _F) for what in _ERROR]
         + [("path_offset_m", _F)]
     ),
+    "disagreements": pa.schema(
+        [
+            ("vehicle_id", _S), ("segment", _I), ("aspect", _S), ("kind", _S), ("stamp_ns", _I),
+            ("end_stamp_ns", _I), ("duration_s", _F), ("lat_deg", _F), ("lon_deg", _F),
+            ("junction_id", _S), ("route_m", _F), ("lateral_m", _F), ("along_m", _F),
+            ("speed_mps", _F),
+        ]
+    ),
+    "driven_segments": pa.schema(
+        [
+            ("number", _I), ("control_mode", _S), ("from_stamp_ns", _I), ("to_stamp_ns", _I),
+            ("plans", _I), ("cut", _I), ("too_short", _I), ("lateral_m", _F), ("along_m", _F),
+            ("speed_mps", _F), ("disagreements", _I),
+        ]
+    ),
+    "agreement": pa.schema(
+        [
+            ("round_id", _I), ("stamp_ns", _I), ("drive_time_s", _F), ("intersection_id", _S),
+            ("outcome", _S), ("observable", _S), ("simulated_fails", _S), ("driven_fails", _S),
+            ("gap_along_m", _F), ("gap_across_m", _F),
+            *((f"flip_{direction}_{what}", _F) for direction in ("along", "across", "both")
+              for what in ("factor", "m")),
+            *((f"flip_{direction}_fails", _S) for direction in ("along", "across", "both")),
+        ]
+    ),
     "mirror": pa.schema(
         [
             ("stamp_ns", _I), ("world_id", _S),

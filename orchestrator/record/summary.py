@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from orchestrator.judge.verdict_rows import agreement_lines
+
+DISAGREEMENTS_SHOWN = 12
 BEGINNING_S = 0.5
 """Where a junction is near so soon, the drive began near it."""
 
@@ -21,6 +24,26 @@ def _readiness(junction: dict[str, Any], *, lock_step: bool) -> str:
     if junction["within_radius_at_s"] < BEGINNING_S:
         return "world ready before the drive began"
     return f"world ready {before_s:.1f} s before the car came near"
+
+
+def side_by_side_lines(found: Any) -> list[str]:
+    """Return what is said of human and ADS: each segment, and where they disagree."""
+    if found is None:
+        return []
+    lines = [
+        f"  {one['control_mode']} for {(one['to_stamp_ns'] - one['from_stamp_ns']) / 1e9:.1f} s: "
+        f"{one['plans']} plans of the ADS, 95 % within {one['lateral_m']:.1f} m across, "
+        f"{one['along_m']:.1f} m along, {one['speed_mps']:.1f} m/s of what was then driven"
+        for one in found["segments"]
+        if one["plans"]
+    ]
+    lines += [
+        f"  {one['drive_time_s']:7.1f} s  {one['kind']} for {one['duration_s']:.1f} s at "
+        f"{one['lat_deg']:.6f}, {one['lon_deg']:.6f} ({one['junction_id'] or 'no junction ahead'})"
+        for one in found["disagreements"][:DISAGREEMENTS_SHOWN]
+    ]
+    more = len(found["disagreements"]) - DISAGREEMENTS_SHOWN
+    return [*lines, f"  and {more} more in results/disagreements.parquet"] if more > 0 else lines
 
 
 def summary_text(record: dict[str, object]) -> str:
@@ -47,5 +70,7 @@ def summary_text(record: dict[str, object]) -> str:
         f"{junction['name'] or junction['id']}  {_readiness(junction, lock_step=lock_step)}"
         for junction in junctions
     ]
+    lines += side_by_side_lines(record.get("side_by_side"))
+    lines += agreement_lines(record.get("agreement"))  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join([*lines, attribution])

@@ -14,6 +14,8 @@ from contracts.simulation import Comparison
 from contracts.world import World
 from orchestrator.instructions import RoundIntent, Tell
 from orchestrator.intake import LatestState, Surroundings
+from orchestrator.judge.verdict_rows import judged_row
+from orchestrator.judge.windows import WindowDesk
 from orchestrator.plan import DrivePlan
 from orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from orchestrator.record.result_rows import (
@@ -74,6 +76,7 @@ class RoundRunner:
         self._on_round = on_round
         self._tell = tell
         self._comparison_desk = ComparisonDesk(plan.drive_frame, plan.config.horizon_s)
+        self.windows = WindowDesk(plan.vehicle, horizon_s=plan.config.horizon_s)
         self._planner = RoundPlanner(plan.config, plan.vehicle)
         self.draw_cases = self._planner.draw_cases
         self.pace = RoundPace(
@@ -174,6 +177,8 @@ class RoundRunner:
         """Compare what can still be compared at the drive's end."""
         for comparison in self._comparison_desk.flush():
             self._keep(comparison)
+        rows = [judged_row(o, start_stamp_ns=self.start_stamp_ns) for o in self.windows.finish()]
+        self._tables.add("agreement", rows)
 
     def _take_apart(self, done: RoundDone) -> None:
         order = done.order
@@ -199,6 +204,7 @@ class RoundRunner:
         self._tell_of_planners(done, seed.variants)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._comparison_desk.take_round(done, world.frame, seed.state)
+            self.windows.take_round(done, seed.intent.path, world)
             self._compare_plans(done, seed, world)
 
     def _tell_of_planners(self, done: RoundDone, variants: tuple[Variant, ...]) -> None:

@@ -65,7 +65,8 @@ class PlannerView(NamedTuple):
     is how much faster than the nominal future this one likes everything, curves included;
     `lead_gap_m` (S,) from bumper to bumper, infinite without a lead, and `lead_speed_mps` (S,);
     `stop_arc_m` (S,) where the front has to stand for a light, infinite without one; `users` and
-    `ground` are None where there are none; `car_plan` where none was received.
+    `ground` are None where there are none; `car_plan` where none was received; `heading` (2, S) is
+    the cosine and sine of the states' yaw, where these are known already.
     """
 
     time_s: float
@@ -83,6 +84,7 @@ class PlannerView(NamedTuple):
     users: SeenUsers | None = None
     ground: SharedGround | None = None
     car_plan: KnownPlan | None = None
+    heading: Array | None = None
 
 
 class PlannerOutput(NamedTuple):
@@ -135,4 +137,5 @@ def rows_of(view: PlannerView, rows: npt.NDArray[np.intp]) -> PlannerView:
         lead_speed_mps=view.lead_speed_mps[rows],
         stop_arc_m=None if view.stop_arc_m is None else view.stop_arc_m[rows],
         users=users,
+        heading=None if view.heading is None else view.heading[:, rows],
     )

@@ -39,10 +39,6 @@ class NodePlace(NamedTuple):
     node: npt.NDArray[np.intp]
     share: Array
 
-    def row(self, index: int) -> NodePlace:
-        """Return one of several rows of places."""
-        return NodePlace(self.node[index], self.share[index])
-
 
 class PathPose(NamedTuple):
     """Points of a path: positions (S, 2) and headings (S,)."""
@@ -137,19 +133,21 @@ class FrenetPath:
         √(a_lat / |κ|) at every node, lowered so that a deceleration of `decel_mps2` suffices to
         reach what lies ahead.
         """
-        return np.asarray(self._curve_speeds(lateral_accel_mps2, decel_mps2)[0])
+        return np.asarray(self._curve_speeds(lateral_accel_mps2, decel_mps2)[len(self._nodes)])
 
     @functools.cached_property
     def _profiles(self) -> dict[tuple[float, float], Array]:
         return {}
 
     def _curve_speeds(self, lateral_accel_mps2: float, decel_mps2: float) -> Array:
+        """Return (10, M) the nodes with the speeds that curves allow there, and their steps."""
         key = (lateral_accel_mps2, decel_mps2)
         if key not in self._profiles:
             square = lateral_accel_mps2 / np.maximum(np.abs(self.curvature_pm), 1e-6)
             slope = 2.0 * decel_mps2 * self.arc_m
             ahead = np.minimum.accumulate((square + slope)[::-1])[::-1]
-            self._profiles[key] = _with_steps(np.sqrt(np.minimum(ahead - slope, square))[None])
+            speed = np.sqrt(np.minimum(ahead - slope, square))
+            self._profiles[key] = _with_steps(np.concatenate([self._nodes, speed[None]]))
         return self._profiles[key]
 
     def place(self, arc_m: Array) -> NodePlace:
@@ -167,12 +165,24 @@ class FrenetPath:
         low = values[node]
         return np.asarray(low + share * (values[node + 1] - low))
 
-    def curve_speed(
-        self, place: NodePlace, *, lateral_accel_mps2: float, decel_mps2: float
-    ) -> Array:
-        """Return (…) the `speed_profile` at places."""
-        found = _between(self._curve_speeds(lateral_accel_mps2, decel_mps2), place)
-        return np.asarray(found[0])
+    def goal_and_speed(
+        self, arc_m: Array, offset_m: Array, *, lateral_accel_mps2: float, decel_mps2: float
+    ) -> tuple[Array, Array]:
+        """Return points (2, S) at the first row of arc lengths (2, S) and at offsets to the left,
+        and the `speed_profile` (S,) at the second row: one look-up for both.
+
+        No arc length may lie before the path's first node.
+        """
+        share = arc_m - self._first_arc
+        node = share.astype(np.intp)
+        share -= node
+        # From the last node on, there are no more steps: clipping the nodes is enough.
+        table = self._curve_speeds(lateral_accel_mps2, decel_mps2)
+        found = _between(table, NodePlace(node, share))
+        goal, left = found[:2, 0], found[2:4, 0]
+        left *= offset_m
+        goal += left
+        return goal, found[4, 1]
 
     def point_of(self, place: NodePlace, offset_m: Array | float = 0.0) -> Array:
         """Return positions (2, …), x and y, at places and offsets to the left."""
@@ -251,7 +261,7 @@ def _with_steps(values: Array) -> Array:
 
 def _between(table: Array, place: NodePlace) -> Array:
     """Return values (K, …) at places, from a table (2 K, M) of them with their steps."""
-    found = table.take(place.node, axis=1)
+    found = table.take(place.node, axis=1, mode="clip")
     half = len(table) // 2
     steps = found[half:]
     steps *= place.share

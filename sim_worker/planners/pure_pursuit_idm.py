@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from contracts.arrays import Array
 from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.path import NodePlace
 from sim_worker.planners.tracking import (
     aside_m,
     front_from_base_m,
@@ -62,12 +61,17 @@ class PurePursuitIdm:
         speed = np.maximum(view.states[:, 3], 0.0)
         # Where to steer for, and where the speed is looked up.
         arcs = np.empty((2, len(speed)))
-        np.add(view.arc_m, lookahead_m(speed, aside_m(view)), out=arcs[0])
-        np.add(view.arc_m, _CURVE_TIME_S * speed, out=arcs[1])
-        ahead = view.path.place(arcs)
-        goal = view.path.point_of(ahead.row(0), view.desired_offset_m)
+        arcs[0] = lookahead_m(speed, aside_m(view))
+        np.multiply(speed, _CURVE_TIME_S, out=arcs[1])
+        arcs += view.arc_m
+        goal, allowed = view.path.goal_and_speed(
+            arcs,
+            view.desired_offset_m,
+            lateral_accel_mps2=LATERAL_ACCEL_MPS2,
+            decel_mps2=COMFORT_DECEL_MPS2,
+        )
         angle = steer_towards(view, goal.T)
-        accel = self._curves(view, speed, angle, ahead.row(1))
+        accel = self._curves(view, speed, angle, allowed)
         np.minimum(accel, self._free(view, speed), out=accel)
         if view.stop_arc_m is not None or np.count_nonzero(view.lead_gap_m < np.inf):
             accel -= self._interaction(view, speed)
@@ -119,12 +123,9 @@ class PurePursuitIdm:
             )
         return known
 
-    def _curves(self, view: PlannerView, speed: Array, angle: Array, ahead: NodePlace) -> Array:
+    def _curves(self, view: PlannerView, speed: Array, angle: Array, profile_mps: Array) -> Array:
         """Acceleration that follows the speed profile of the curves ahead and of the wheels."""
-        allowed = view.path.curve_speed(
-            ahead, lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
-        )
-        allowed *= view.speed_factor
+        allowed = profile_mps * view.speed_factor
         turning = turning_speed(view, angle, lateral_accel_mps2=TURNING_ACCEL_MPS2)
         np.minimum(allowed, turning, out=allowed)
         allowed -= speed

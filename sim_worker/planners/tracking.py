@@ -39,11 +39,11 @@ def aside_m(view: PlannerView) -> Array:
 
 def lookahead_m(speed_mps: Array, aside_m: Array) -> Array:
     """Return how far ahead goals lie for cars so far beside their lines, each (S,)."""
+    lookahead = LOOKAHEAD_TIME_S * speed_mps
+    np.maximum(lookahead, MIN_LOOKAHEAD_M, out=lookahead)
     more = aside_m - _KEPT_M
     np.maximum(more, 0.0, out=more)
     more *= _LOOKAHEAD_ASIDE
-    lookahead = LOOKAHEAD_TIME_S * speed_mps
-    np.maximum(lookahead, MIN_LOOKAHEAD_M, out=lookahead)
     lookahead += more
     return lookahead
 
@@ -54,11 +54,11 @@ def steer_towards(view: PlannerView, goal: Array) -> Array:
     Goals behind the car are those of one that drives backwards.
     """
     states, wheelbase = view.states.T, view.vehicle.wheelbase_m.value
+    heading = view.heading
+    if heading is None:
+        heading = np.array([np.cos(states[2]), np.sin(states[2])])
     way = goal.T - states[:2]
-    ahead = np.empty_like(way)
-    np.cos(states[2], out=ahead[0])
-    np.sin(states[2], out=ahead[1])
-    ahead *= way[::-1]
+    ahead = heading * way[::-1]
     slope = ahead[0] - ahead[1]
     slope *= 2.0 * wheelbase
     way *= way
@@ -87,18 +87,19 @@ def turning_speed(view: PlannerView, tire_angle_rad: Array, *, lateral_accel_mps
     have to turn: a car that starts with wheels turned would drive a loop before they are straight.
     """
     vehicle, present = view.vehicle, view.states[:, 6]
-    curvature, turned = np.abs(present), np.abs(tire_angle_rad)
-    np.maximum(curvature, turned, out=curvature)
-    np.tan(curvature, out=curvature)
-    curvature /= vehicle.wheelbase_m.value
-    curvature += 1e-6
+    wheelbase, rate = vehicle.wheelbase_m.value, vehicle.max_tire_rate_radps.value
+    bend, turned = np.abs(present), np.abs(tire_angle_rad)
+    np.maximum(bend, turned, out=bend)
+    # κ L of the wider angle, and the time until the wheels are where they should be times their
+    # rate; neither may be zero.
+    np.tan(bend, out=bend)
+    bend += 1e-6 * wheelbase
     np.subtract(present, tire_angle_rad, out=turned)
     np.abs(turned, out=turned)
-    turned /= vehicle.max_tire_rate_radps.value
-    turned += 1e-6
-    # What the car turns by at 1 m/s until the wheels are where they should be.
-    turned *= curvature
-    np.divide(_MAX_TURN_RAD, turned, out=turned)
-    np.divide(lateral_accel_mps2, curvature, out=curvature)
-    np.sqrt(curvature, out=curvature)
-    return np.minimum(curvature, turned, out=curvature)
+    turned += 1e-6 * rate
+    # What the car turns by at 1 m/s until then.
+    turned *= bend
+    np.divide(_MAX_TURN_RAD * wheelbase * rate, turned, out=turned)
+    np.divide(lateral_accel_mps2 * wheelbase, bend, out=bend)
+    np.sqrt(bend, out=bend)
+    return np.minimum(bend, turned, out=bend)

@@ -146,7 +146,7 @@ class Actuation:
         slow = np.maximum(speed, _MIN_SPEED_MPS)
         np.divide(self._stiffness_prkg * axles, slow, out=self._damping)
         axles *= across
-        np.copyto(self._lateral_high, axles)
+        self._lateral_high[...] = axles
         np.negative(axles, out=self._lateral_low)
         force = self._mass * accel
         drive = np.maximum(force, 0.0)
@@ -154,10 +154,11 @@ class Actuation:
         brake += self._rolling
         if self._gear is not None:
             drive *= self._gear
-        speed *= speed_mps
-        speed *= self._drag
-        drive -= speed
-        np.copyto(self._drive_n, drive)
+        if self._drag:
+            speed *= speed_mps
+            speed *= self._drag
+            drive -= speed
+        self._drive_n[...] = drive
         np.subtract(drive, brake, out=self._along_low)
         np.add(drive, brake, out=self._along_high)
 

@@ -11,8 +11,11 @@ from contracts.vehicle import VehicleParameters
 def resistance_mps2(vehicle: VehicleParameters, speed_mps: Array) -> Array:
     """Return the deceleration by drag and rolling at `speed_mps`, for a command to undo."""
     mass, rolling = vehicle.mass_kg.value, vehicle.rolling_resistance_n.value
+    drag = vehicle.drag_npv2.value
+    if drag == rolling == 0.0:
+        return np.zeros(np.shape(speed_mps))
     speed = np.abs(speed_mps)
-    decel = vehicle.drag_npv2.value / mass * speed
+    decel = drag / mass * speed
     decel *= speed_mps
     if rolling > 0.0:
         decel += (speed > 0.1) * np.sign(speed_mps) * (rolling / mass)
