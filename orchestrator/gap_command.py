@@ -56,7 +56,7 @@ def gap_of(log: Log, vehicle: VehicleParameters, *, name: str, progress: bool = 
     seconds = (stamps[-1] - stamps[0]) // _SECOND_NS
     if not progress:
         return _measured(log, messages, vehicle, LocalFrame(first.position), name, lambda _: None)
-    with progress_bar(seconds, "seconds judged") as (advance, _):
+    with progress_bar(seconds, "seconds") as (advance, _):
         return _measured(log, messages, vehicle, LocalFrame(first.position), name, advance)
 
 
@@ -84,7 +84,7 @@ def _measured(
         next_ns = stamp_ns + _SECOND_NS if next_ns is None else next_ns
         while stamp_ns >= next_ns:
             next_ns += _SECOND_NS
-            advance("seconds judged")
+            advance(Path(name).name)
         recorder.handle(channel, message)
         verdict = judge.handle(channel, message)
         if verdict is not None:
@@ -123,7 +123,9 @@ def report_gap(
         from orchestrator.gap_plots import write_plots
 
         out.mkdir(parents=True, exist_ok=True)
-        plots = write_plots(report.samples, out)
+        plots = write_plots(
+            report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
+        )
     if as_json:
         print(json.dumps(as_object(report), indent=2))
         return

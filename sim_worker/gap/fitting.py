@@ -1,4 +1,9 @@
-"""Straight lines through pairs of signals, with honest deviations, delays and saturation."""
+"""Straight lines through pairs of signals, with honest deviations, delays and saturation.
+
+Of seconds, many times a second. `sim_worker.identify` fits lines to minutes: its deviations take
+four stretches of three seconds at least and ten times as long, and its actuators follow with a lag,
+where here a pure delay must be found even if command and answer differ in sign, or 57 times.
+"""
 
 from __future__ import annotations
 

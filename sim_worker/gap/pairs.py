@@ -21,6 +21,8 @@ _RUN, _TAIL = round(1.0 / PERIOD_S), 2 * BLOCK
 _SMOOTH_HALF, _COURSE_HALF, _TURN_HALF = 3, round(0.3 / PERIOD_S), round(0.24 / PERIOD_S)
 MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
 """Above them turning, and acceleration alone, say something."""
+_FASTEST_MPS = 80.0
+"""No car's: positions that leap say nothing of its sensors."""
 _MIN_TURN_RAD = 0.012
 
 
@@ -117,6 +119,8 @@ def _sensors(record: MotionRecord, ahead_m: float) -> tuple[Array, Array, Array,
         dx[half : count - half] = record.x_m[2 * half :] - record.x_m[: count - 2 * half]
         dy[half : count - half] = record.y_m[2 * half :] - record.y_m[: count - 2 * half]
     gone = np.hypot(dx, dy) / (2 * half * PERIOD_S)
+    leapt = gone > _FASTEST_MPS
+    dx[leapt], gone[leapt] = np.nan, np.nan
     drives = gone > MOVES_MPS
     rate = np.where(drives, record.yaw_rate_radps, np.nan)
     course = np.arctan2(dy, dx)
