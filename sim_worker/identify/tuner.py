@@ -200,7 +200,7 @@ def _in_words(step: Step) -> dict[str, str]:
     name = {OFFSET: "steering_offset_rad", UNDERSTEER: UNDERSTEER_GRADIENT}.get(step.parameter)
     if name is None:
         return {
-            UNDERSTEER_GRADIENT: "the tyres' stiffness: the tyre angle that turning needs went from "
-            f"{before:.4g} to about {after:.4g} rad per rad/s²"
+            UNDERSTEER_GRADIENT: "the tyres' stiffness: the tyre angle that turning needs went "
+            f"from {before:.4g} to about {after:.4g} rad per rad/s²"
         }
     return {name: f"{name} went from {before:.4g} to about {after:.4g}"}
