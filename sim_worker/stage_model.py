@@ -28,11 +28,16 @@ def world_spec(world: World | None) -> mujoco.MjSpec:
     return spec
 
 
-def compile_open(vehicle: VehicleParameters) -> mujoco.MjModel:
-    """Return the vehicle where it can touch nothing: the state of `compile_stage`, nothing else."""
+def _alone(vehicle: VehicleParameters) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     set_physics_options(spec)
     spec.attach(vehicle_spec(vehicle), prefix=PREFIX, frame=spec.worldbody.add_frame())
+    return spec
+
+
+def compile_open(vehicle: VehicleParameters) -> mujoco.MjModel:
+    """Return the vehicle where it can touch nothing: the state of `compile_stage`, nothing else."""
+    spec = _alone(vehicle)
     for geom in spec.geoms:
         # Its mass is the chassis's own: only its place would be worked out at each step.
         spec.delete(geom)
@@ -74,7 +79,7 @@ def change_vehicle(
 
     The same bits as compiling anew, at a tenth of the cost: the World stays as it is.
     """
-    alone = compile_open(vehicle)
+    alone = _alone(vehicle).compile()
     for kind, count, fields in (
         (mujoco.mjtObj.mjOBJ_BODY, alone.nbody, _OF_BODIES),
         (mujoco.mjtObj.mjOBJ_GEOM, alone.ngeom, _OF_GEOMS),
@@ -88,6 +93,10 @@ def change_vehicle(
             there = mujoco.mj_name2id(model, kind, prefix + name.removeprefix(PREFIX))
             for field in fields:
                 getattr(model, field)[there] = getattr(alone, field)[here]
+            if kind == mujoco.mjtObj.mjOBJ_BODY and alone.body_bvhnum[here]:
+                ours, theirs = alone.body_bvhadr[here], model.body_bvhadr[there]
+                boxes = alone.bvh_aabb[ours : ours + alone.body_bvhnum[here]]
+                model.bvh_aabb[theirs : theirs + len(boxes)] = boxes
     mujoco.mj_setConst(model, mujoco.MjData(model))
     # The solver's scale; nothing but the vehicle moves, so that it is the same in both.
     model.stat.meaninertia = alone.stat.meaninertia
