@@ -12,6 +12,7 @@ from contracts.errors import UserError
 from orchestrator.cli_logs import convert, gap, identify, judge
 from orchestrator.cli_options import MapArgument, OutOption, ServiceRoadsOption
 from orchestrator.cli_scenarios import scenarios
+from orchestrator.cli_set import set_value
 
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
 PATH_ERRORS = (
@@ -209,6 +210,8 @@ def sweep(
 
 for about_logs in (convert, identify, gap, judge):
     app.command()(about_logs)
+
+app.command("set")(set_value)
 
 
 @app.command()

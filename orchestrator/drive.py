@@ -104,7 +104,7 @@ class _Drive:
         """Run to the end, whatever ends it; the run's files are complete afterwards."""
         plan = self._plan
         started_s = time.monotonic()
-        reserve_record(plan.run_id, plan.folder / "run.json")
+        reserve_record(plan, plan.folder / "run.json")
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
         with ZenohBus(plan.bus, router=True) as bus:
             tables = ResultTables(
@@ -120,7 +120,7 @@ class _Drive:
             exit_word, code = "failed", EXIT_FAILED
             with ProgressLine(conductor, self._mission) as line:
                 line.say(f"run {plan.folder}")
-                conductor.on_event = line.tell
+                conductor.events.on_event = line.tell
                 try:
                     exit_word, code = self._go(bus, conductor, line)
                 except Exception:
@@ -261,6 +261,7 @@ class _Drive:
             log.warning("had to kill %s", ", ".join(killed))
         while (item := conductor.mailbox.take()) is not None:
             conductor.handle(item)
+        conductor.changes.refuse_all("the drive is over")
         conductor.tables.close()
         if conductor.tables.failed:
             line.say(f"error: {conductor.tables.failed}")

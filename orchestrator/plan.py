@@ -7,6 +7,7 @@ import json
 import secrets
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from contracts.errors import UserError
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from contracts.setup import BusSetup
 from contracts.vehicle import VehicleParameters
-from orchestrator.config import ConfigError, DriveConfig
+from orchestrator.config import ConfigError, DriveConfig, VehicleBeside
 from orchestrator.doctor import has_display
 from orchestrator.endpoints import free_endpoint
 from orchestrator.maps.opening import Clip, open_map
@@ -46,6 +47,14 @@ CORRIDOR_M = 2000.0
 """Of a large map, what lies within this distance of a given route or drive is read."""
 
 
+class Beside(NamedTuple):
+    """A vehicle beside the car, its parameters, and whether its commands are recorded."""
+
+    config: VehicleBeside
+    vehicle: VehicleParameters
+    commands_recorded: bool
+
+
 @dataclass(frozen=True, kw_only=True)
 class DriveInputs:
     """Everything read: nothing here has touched the folder of runs yet."""
@@ -64,6 +73,7 @@ class DriveInputs:
     route_source: str
     drive_frame: LocalFrame
     vehicle: VehicleParameters
+    beside: tuple[Beside, ...]
     log_file: Path | None
     info: VehicleInfo | None
     standin: StandinPath | None
@@ -168,6 +178,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         route_source=route_source,
         drive_frame=LocalFrame(GeoPoint(float(origin[0]), float(origin[1]))),
         vehicle=vehicle,
+        beside=tuple(_read_beside(one, vehicle) for one in config.vehicles),
         log_file=log_file,
         info=info,
         standin=standin,
@@ -186,6 +197,16 @@ def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
         end = "its end" if config.end_s is None else f"--end {config.end_s:g}"
         raise UserError(f"{log_file} from --start {config.start_s:g} to {end}: {error}") from error
     return log.info, line.lat_lon_deg
+
+
+def _read_beside(config: VehicleBeside, own: VehicleParameters) -> Beside:
+    vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
+    if config.log is None:
+        return Beside(config, vehicle, commands_recorded=config.live)
+    file = Path(config.log)
+    if not file.exists():
+        raise FileNotFoundError(f"recorded drive {file} of {config.id}: no such file or folder")
+    return Beside(config, vehicle, commands_recorded="control" in open_log(file).info.sends)
 
 
 def _check_in_map(positions: Array, log_file: Path, index: RoadIndex, map_file: Path) -> None:

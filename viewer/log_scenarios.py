@@ -10,7 +10,8 @@ from contracts.arrays import Array, Array32
 from contracts.frames import LocalFrame, local_from_geo
 from contracts.side_by_side import Disagreement
 from contracts.simulation import Comparison, PlanComparison, RoundView
-from viewer.log_drive import PLAN, TWIN
+from viewer.log_drive import PLAN
+from viewer.log_roles import TWIN
 from viewer.meshes import Colour
 from viewer.rows import Row, static, table_cell
 

@@ -12,7 +12,7 @@ from contracts.codec import read_message
 from contracts.frames import LocalFrame
 from contracts.simulation import ActiveWorld, Event, WorldNotice
 from contracts.world import ATTRIBUTION, World
-from viewer import log_drive, log_scenarios
+from viewer import log_drive, log_roles, log_scenarios
 from viewer.log_drive import DriveLog
 from viewer.log_run import RunLog, rows_of_event
 from viewer.log_scenarios import (
@@ -89,6 +89,7 @@ class Monitor:
         """Return the rows that come before every message."""
         return [
             *log_drive.static_rows(),
+            *log_roles.static_rows(),
             *log_scenarios.static_rows(),
             *self._run.static_rows(),
             self._run.first_status(),

@@ -9,7 +9,7 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.futures import FuturesResult, Variant
-from contracts.simulation import Comparison, HorizonError, MirrorSample, PlanComparison
+from contracts.simulation import Comparison, HorizonError, PlanComparison
 from orchestrator.rounds.desk import RoundDone
 from sim_worker.metrics.displacement import distinct_count
 
@@ -134,23 +134,6 @@ def plan_row(comparison: PlanComparison) -> dict[str, Any]:
         "path_offset_m": comparison.path_offset_m,
         **_error(comparison.difference),
     }
-
-
-def mirror_row(sample: MirrorSample) -> dict[str, Any]:
-    """Return the row of one mirror sample."""
-    row: dict[str, Any] = {
-        name: getattr(sample, name)
-        for name in (
-            "stamp_ns", "world_id", "gap_m", "gap_along_m", "gap_across_m", "gap_yaw_rad",
-            "gap_speed_mps", "since_reset_s", "independent",
-        )
-    }  # fmt: skip
-    for who in ("real", "twin", "shadow", "ghost"):
-        pose = getattr(sample, who)
-        row |= {
-            f"{who}_{what}": getattr(pose, what) for what in ("x_m", "y_m", "yaw_rad", "speed_mps")
-        }
-    return row
 
 
 def _error(error: HorizonError) -> dict[str, float]:

@@ -17,6 +17,14 @@ log = logging.getLogger("results")
 _F, _I, _S, _B = pa.float64(), pa.int64(), pa.string(), pa.bool_()
 _ERROR = ("ade_m", "fde_m", "lateral_m", "longitudinal_m", "heading_rad")
 
+_CORRECTION = [(f"correction_{what}", _F) for what in ("along_mps2", "across_mps2", "yaw_radps2")]
+
+
+def _poses(*names: str) -> list[tuple[str, pa.DataType]]:
+    pose = ("x_m", "y_m", "yaw_rad", "speed_mps")
+    return [(f"{name}_{what}", _F) for name in names for what in pose]
+
+
 TABLES: dict[str, pa.Schema] = {
     "rounds": pa.schema(
         [
@@ -77,11 +85,21 @@ TABLES: dict[str, pa.Schema] = {
     "mirror": pa.schema(
         [
             ("stamp_ns", _I), ("world_id", _S),
-            *((f"{who}_{what}", _F) for who in ("real", "twin", "shadow", "ghost")
-              for what in ("x_m", "y_m", "yaw_rad", "speed_mps")),
+            *_poses("real", "twin", "shadow", "ghost", "free"),
             ("gap_m", _F), ("gap_along_m", _F), ("gap_across_m", _F), ("gap_yaw_rad", _F),
             ("gap_speed_mps", _F), ("since_reset_s", _F), ("independent", _B),
+            ("role", _S), *_CORRECTION,
         ]
+    ),
+    "mirrored": pa.schema(
+        [
+            ("stamp_ns", _I), ("vehicle_id", _S), ("role", _S), *_poses("real", "shown"),
+            *_CORRECTION,
+        ]
+    ),
+    "touches": pa.schema([("stamp_ns", _I), ("one", _S), ("other", _S)]),
+    "changes": pa.schema(
+        [("stamp_ns", _I), ("asked_stamp_ns", _I), ("key", _S), ("before", _S), ("value", _S)]
     ),
     "events": pa.schema([("stamp_ns", _I), ("level", _S), ("source", _S), ("text", _S)]),
 }  # fmt: skip

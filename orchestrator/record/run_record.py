@@ -31,7 +31,7 @@ def run_record(
     """Return everything that run.json says."""
     futures = conductor.rounds.futures
     # Without a word of the mirror, whether commands were recorded decides.
-    independent = conductor.mirror_independent
+    independent = conductor.mirror.independent
     if independent is None:
         independent = plan.commands_recorded
     return {
@@ -47,6 +47,7 @@ def run_record(
         "route_source": plan.route_source,
         "config": msgspec.to_builtins(plan.config),
         "intersections": mission.records(mono_s=mono_s),
+        "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
         "futures": futures.record(
             wanted=plan.config.futures,
@@ -87,9 +88,9 @@ def run_record(
     }
 
 
-def reserve_record(run_id: str, file: Path) -> None:
+def reserve_record(plan: DrivePlan, file: Path) -> None:
     """Write a run.json that says that the run goes on, and keeps room on the disk for the last."""
-    begun = json.dumps({"run_id": run_id, "exit": "running"})
+    begun = json.dumps({"run_id": plan.run_id, "exit": "running", "endpoint": plan.bus.endpoint})
     file.write_text(begun.ljust(RESERVED_BYTES) + "\n", encoding="utf-8")
 
 

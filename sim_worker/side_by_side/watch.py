@@ -65,6 +65,9 @@ class SideBySide:
             return
         if self._open:
             before = self._open[-1]
+            if before.mode == "unknown" and status.stamp_ns - before.from_ns < _LEAST_S * 1e9:
+                before.mode = mode  # told a moment after the first plan, not taken over
+                return
             if status.stamp_ns <= before.from_ns:
                 return
             before.until_ns = status.stamp_ns

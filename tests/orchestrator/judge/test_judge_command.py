@@ -7,10 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
+import numpy as np
 import pytest
 
+from contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
 from orchestrator.cli import run
 from orchestrator.plan import EMBEDDED_MAP
+from telemetry.logs import open_log
+from telemetry.mcap_file import create
 from tests.system.foretwin_command import environment, foretwin
 
 
@@ -78,3 +83,38 @@ def test_a_forgotten_stop_sign_changes_the_verdict_of_a_recorded_drive(tmp_path:
     # Nothing corrected, nothing changes: the recorded drive is the drive.
     assert same["outcomes"] == []
     assert same["gap"]["nominal_ade_m"]["before"] == same["gap"]["nominal_ade_m"]["after"]
+
+
+@pytest.mark.judge
+def test_a_disagreement_injected_into_a_recording_is_listed_where_it_is(tmp_path: Path) -> None:
+    """A stand-in's drive, told to be a human's for 15 s, in which the software would have taken
+    the other lane from 6 s to 9 s."""
+    driven = foretwin(
+        tmp_path / "runs", "--speed", "max", "--futures", "4", "--rate", "0.2", "--end", "22",
+        "--workers", "1",
+    )  # fmt: skip
+    assert driven.run is not None, driven.screen
+    log = open_log(driven.run / "drive.mcap")
+    with create(tmp_path / "injected.mcap", info=log.info) as writer:
+        for channel, message in log.samples():
+            at_s = (message.stamp_ns - log.info.start_stamp_ns) / 1e9
+            if isinstance(message, VehicleStatus):
+                mode: ControlMode = "manual" if at_s < 15.0 else "autonomous"
+                message = msgspec.structs.replace(message, control_mode=mode)
+            elif isinstance(message, PlannedTrajectory) and 6.0 <= at_s < 9.0:
+                north = 3.5 / 111_200.0 * np.clip(message.time_from_stamp_s / 3.0, 0.0, 1.0)
+                message = msgspec.structs.replace(message, lat_deg=message.lat_deg + north)
+            writer.add(channel, message)
+    again = foretwin(
+        tmp_path / "again", "--speed", "max", "--futures", "4", "--rate", "0.2", "--workers", "1",
+        "--map", str(EMBEDDED_MAP), "--log", str(tmp_path / "injected.mcap"),
+        "--route", "from-log",
+    )  # fmt: skip
+    assert again.code == 0, again.screen
+    (one,) = again.rows("disagreements")
+    assert one["kind"] == "ads_in_another_lane"
+    assert one["lateral_m"] == pytest.approx(3.4, abs=0.4)
+    assert (one["duration_s"], one["junction_id"]) == (pytest.approx(2.8, abs=0.4), "n4")
+    human, software = again.record()["side_by_side"]["segments"]
+    assert (human["control_mode"], software["control_mode"]) == ("manual", "autonomous")
+    assert software["lateral_m"] < 0.5

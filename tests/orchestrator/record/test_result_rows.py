@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from contracts.simulation import MirrorSample, PlaneState
+from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
+from orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
 from orchestrator.record.result_rows import (
     comparison_row,
     future_rows,
-    mirror_row,
     plan_row,
     round_row,
 )
@@ -87,6 +87,26 @@ def test_a_mirror_row_keeps_who_is_who() -> None:
     )  # fmt: skip
 
     assert [row[f"{who}_x_m"] for who in poses] == [0.0, 1.0, 2.0, 3.0]
+    assert (row["role"], row["free_x_m"], row["correction_along_mps2"]) == ("all", None, None)
+
+
+def test_vehicles_beside_and_touches_have_rows_of_their_own() -> None:
+    here = PlaneState(1.0, 2.0, 0.0, 3.0)
+    other = MirroredVehicle(
+        vehicle_id="van", role="twin", real=here, shown=here, length_m=4.5, width_m=1.8,
+        height_m=2.0, rear_overhang_m=0.9,
+        correction=TwinCorrection(along_mps2=0.5, across_mps2=0.0, yaw_radps2=0.0),
+    )  # fmt: skip
+    sample = MirrorSample(
+        stamp_ns=1, world_id=None, gap_m=1.0, gap_along_m=1.0, gap_across_m=0.0,
+        gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=2.0, independent=False, real=here,
+        twin=here, shadow=here, ghost=here, others=(other,), touches=(("ego", "van"),),
+    )  # fmt: skip
+    (row,) = mirrored_rows(sample)
+    assert set(row) == set(TABLES["mirrored"].names)
+    assert (row["role"], row["shown_y_m"], row["correction_along_mps2"]) == ("twin", 2.0, 0.5)
+    assert touch_rows(sample) == [{"stamp_ns": 1, "one": "ego", "other": "van"}]
+    assert {"stamp_ns", "one", "other"} == set(TABLES["touches"].names)
 
 
 def view_of(**outcome: np.ndarray):

@@ -82,7 +82,7 @@ def test_the_record_is_json_whatever_came_of_the_drive(house: House, length: int
 
 def test_the_stand_ins_commands_are_its_own_and_so_is_the_judgement(house: House) -> None:
     assert record_of(house)["comparison"]["independent"] is True
-    house.conductor.mirror_independent = False
+    house.conductor.mirror.independent = False
     assert record_of(house)["comparison"]["independent"] is False
 
 

@@ -94,7 +94,7 @@ def test_late_rounds_make_the_next_ones_smaller_and_say_so(
     house = House(tmp_path, futures=64, futures_per_job=32, least_futures=16, rate_hz=2.0)
     house.drive(20)
     told: list[Event] = []
-    house.conductor.on_event = told.append
+    house.conductor.events.on_event = told.append
     sizes = []
     for seconds in (0.1, 0.7, 0.7, 0.7, 0.7):
         assert house.conductor.start_round()
@@ -128,7 +128,7 @@ def test_who_acts_for_a_planner_is_said_once_for_each(tmp_path: Path) -> None:
     house = House(tmp_path, planner="remote", futures=16, futures_per_job=8)
     house.drive(20)
     told: list[Event] = []
-    house.conductor.on_event = told.append
+    house.conductor.events.on_event = told.append
     for worker in house.workers:
         worker.remark = "fallback 'pure_pursuit_idm' acted from 0 s on: no answer within 1 s"
     for _ in range(3):

@@ -221,6 +221,13 @@ def test_no_comparison_spans_a_takeover() -> None:
     assert [segment.disagreements for segment in segments] == [1, 0, 0]
 
 
+def test_who_drives_may_be_told_a_moment_after_the_first_plan() -> None:
+    _, (segment,) = side_by_side(straight, as_driven(straight), modes={0.3: "manual"})
+    assert segment.control_mode == "manual"
+    _, segments = side_by_side(straight, as_driven(straight), modes={3.0: "manual"})
+    assert [one.control_mode for one in segments] == ["unknown", "manual"]
+
+
 def test_the_software_s_own_tracking_is_no_disagreement() -> None:
     def aside(at_s: float, ahead: Array) -> Array:
         rows = straight(at_s + ahead)
