@@ -41,13 +41,15 @@ def write_plots(
             axis.axvline(at_s, color="0.4", linewidth=0.8)
         axis.set_ylabel(label)
         axis.grid(visible=True, alpha=0.3)
-    for verdict in verdicts:
+    for number, verdict in enumerate(verdicts):
+        # In turn one below the other: verdicts may follow each other closely.
         axes[0].annotate(
             f"{verdict.culprit}: {verdict.cause}", ((verdict.stamp_ns - start_ns) * 1e-9, 1.0),
-            xycoords=("data", "axes fraction"), xytext=(3, -10), textcoords="offset points",
-            fontsize=8,
+            xycoords=("data", "axes fraction"), xytext=(3, -10 - 11 * (number % 4)),
+            textcoords="offset points", fontsize=8,
         )  # fmt: skip
-    axes[0].legend(title="after", ncols=len(horizons))
+    lines, labels = axes[0].get_legend_handles_labels()
+    over_time.legend(lines, labels, title="after", ncols=len(horizons), loc="outside lower center")
     axes[0].set_title("model minus reality")
     axes[-1].set_xlabel("drive time, s")
     by_horizon = Figure(figsize=(10, 4), layout="constrained")

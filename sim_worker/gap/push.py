@@ -154,8 +154,11 @@ class PushTest:
             sure = (np.abs(value) - left_open) / std
             sure[: _LEAST - 1] = -np.inf
             count = int(np.argmax(sure))
-            if sure[count] > _SURE:
-                found.append((cause, used[: count + 1], float(value[count]), float(std[count])))
+            used, off, doubt = used[: count + 1], float(value[count]), float(std[count])
+            if sure[count] > _SURE and not (
+                cause.startswith("saturated") and _exceeds(blocks, parts[cause], used, off, doubt)
+            ):
+                found.append((cause, used, off, doubt))
         if not found:
             return None
         # Blocks before the departure count too. Drag does not set in: it is there in all of them.
@@ -175,16 +178,30 @@ class PushTest:
         if unexplained[best] > 0.7 * left(0.0, gap, 0):
             return None
         cause, used, value_of, std_of = found[best]
-        chosen = PushBlocks(*(one[used] for one in blocks))
-        part = parts[cause]._replace(column=parts[cause].column[used], rest=parts[cause].rest[used])
-        return _finding(cause, chosen, part, value_of, std_of)
+        return _finding(cause, *_of(blocks, parts[cause], used), value_of, std_of)
+
+
+def _by_car(blocks: PushBlocks, part: _Part) -> float:
+    """Return how much of a cause's column the car does."""
+    weighted = blocks.std_mps2**-2 * part.column
+    done = float(np.sum(weighted * (blocks.car_mps2 - part.rest)))
+    return done / float(np.sum(weighted * part.column))
+
+
+def _of(blocks: PushBlocks, part: _Part, used: Indices) -> tuple[PushBlocks, _Part]:
+    chosen = PushBlocks(*(one[used] for one in blocks))
+    return chosen, part._replace(column=part.column[used], rest=part.rest[used])
+
+
+def _exceeds(blocks: PushBlocks, part: _Part, used: Indices, off: float, doubt: float) -> bool:
+    """Return whether somebody does more than is asked: who does has come to no end of it."""
+    by_car = _by_car(*_of(blocks, part, used))
+    return max(by_car, by_car + off) > 1.0 + _KINDS["saturated_drive"].limit + 3.0 * doubt
 
 
 def _finding(cause: str, blocks: PushBlocks, part: _Part, value: float, std: float) -> Finding:
     """Say who departs: achieved over commanded is 1 for a car that does as told."""
-    kind, weight, column = _KINDS[cause], blocks.std_mps2**-2, part.column
-    goal = weight * column * (blocks.car_mps2 - part.rest)
-    by_car = float(np.sum(goal) / np.sum(weight * column * column))
+    kind, by_car = _KINDS[cause], _by_car(blocks, part)
     by_model = by_car + value
     off_car, off_model = abs(by_car - kind.usual), abs(by_model - kind.usual)
     culprit: Culprit = "vehicle" if off_car > off_model else "model"
