@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
+from sim_worker import compiled
 from sim_worker.vehicle.lag import ForceLag, lags_of_force
 from sim_worker.vehicle.parameters import GRAVITY_MPS2
 from sim_worker.vehicle.planar import DRIVE, STEER, TYRE_FRONT, TYRE_REAR
@@ -100,6 +101,7 @@ class Actuation:
         self._gear: Array | None = None
         if backwards is not None and backwards.any():
             self._gear = np.where(backwards, -1.0, 1.0)
+        self._ways = np.ones(count) if self._gear is None else self._gear
         self._lag: ForceLag | None = None
         if tick_s is not None and lags_of_force(vehicle):
             start = np.zeros(count) if accel_mps2 is None else accel_mps2
@@ -133,34 +135,23 @@ class Actuation:
         inertia to the chassis, which would add it sideways too.
         """
         accel = self._carried_out(accel_mps2)
-        # The friction circle: what is left across the road.
-        across = np.square(accel)
-        np.subtract(self._grip_square, across, out=across)
-        np.maximum(across, self._least_square, out=across)
-        np.sqrt(across, out=across)
-        axles = self._transfer_kgpmps2 * (accel if self._gear is None else accel * self._gear)
-        axles += self._axles_kg
-        if self._may_lift:
-            np.maximum(axles, _TINY_KG, out=axles)
-        speed = np.abs(speed_mps)
-        slow = np.maximum(speed, _MIN_SPEED_MPS)
-        np.divide(self._stiffness_prkg * axles, slow, out=self._damping)
-        axles *= across
-        self._lateral_high[...] = axles
-        np.negative(axles, out=self._lateral_low)
-        force = self._mass * accel
-        drive = np.maximum(force, 0.0)
-        brake = drive - force
-        brake += self._rolling
-        if self._gear is not None:
-            drive *= self._gear
-        if self._drag:
-            speed *= speed_mps
-            speed *= self._drag
-            drive -= speed
-        self._drive_n[...] = drive
-        np.subtract(drive, brake, out=self._along_low)
-        np.add(drive, brake, out=self._along_high)
+        compiled.forces(
+            accel,
+            speed_mps,
+            self._grip_square,
+            self._least_square,
+            self._transfer_kgpmps2,
+            self._axles_kg,
+            self._stiffness_prkg,
+            (self._mass, self._rolling, self._drag, _TINY_KG, _MIN_SPEED_MPS),
+            self._ways,
+            self._damping,
+            self._lateral_low,
+            self._lateral_high,
+            np.atleast_2d(self._drive_n),
+            self._along_low,
+            self._along_high,
+        )
 
     def _carried_out(self, command_mps2: Array) -> Array:
         """Return the acceleration (S,) by the tyres that a command leads to now."""
