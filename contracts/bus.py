@@ -10,6 +10,7 @@ import collections
 import json
 import threading
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Protocol, Self
 
@@ -172,6 +173,17 @@ class ZenohSession:
         self._declared.append(
             self._session.liveliness().declare_subscriber(alive_key, land, history=True)
         )
+
+    def _hear(self, key: str, land: Callable[[Any], None], *, history: bool) -> None:
+        """Call `land` with each sample; with `history` also with what publishers have kept."""
+        if history:
+            from zenoh import ext
+
+            kept = ext.HistoryConfig(detect_late_publishers=True)
+            heard = ext.declare_advanced_subscriber(self._session, key, land, history=kept)
+        else:
+            heard = self._session.declare_subscriber(key, land)
+        self._declared.append(heard)
 
     def close(self) -> None:
         """Close the session; idempotent."""

@@ -35,8 +35,11 @@ class ForeignBus(Protocol):
     def connected(self) -> bool:
         """Whether a router or peer is there now."""
 
-    def subscribe(self, key: str, mailbox: Mailbox) -> None:
-        """Let every sample on the key expression land in `mailbox` as Arrived."""
+    def subscribe(self, key: str, mailbox: Mailbox, *, history: bool = False) -> None:
+        """Let every sample on the key expression land in `mailbox` as Arrived.
+
+        With `history` also what publishers have said before and keep for who comes later.
+        """
 
     def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send one sample; never raises for a lost link, drops rather than waits."""
@@ -65,7 +68,7 @@ class ZenohForeignBus(ZenohSession):
         info = self._session.info
         return bool(info.routers_zid() or info.peers_zid())
 
-    def subscribe(self, key: str, mailbox: Mailbox) -> None:
+    def subscribe(self, key: str, mailbox: Mailbox, *, history: bool = False) -> None:
         """Receive into `mailbox`; see ForeignBus."""
 
         def land(sample: Any) -> None:
@@ -80,7 +83,7 @@ class ZenohForeignBus(ZenohSession):
                 )
             )
 
-        self._declared.append(self._session.declare_subscriber(key, land))
+        self._hear(key, land, history=history)
 
     def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send one sample; see ForeignBus."""

@@ -10,7 +10,17 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts import drive, futures, gap, planner_link, simulation, towards_vehicle, tuning
+from contracts import (
+    drive,
+    futures,
+    gap,
+    planner_link,
+    roles,
+    side_by_side,
+    simulation,
+    towards_vehicle,
+    tuning,
+)
 
 PREFIX = "foretwin/v1"
 
@@ -89,6 +99,8 @@ CHANNELS: dict[str, Channel] = {
              REQUEST, "the mirror's World", simulation.ActiveWorld),
         _row("use_vehicle", f"{_RUN}/worker/{{process}}/use_vehicle", tuning.UseVehicle, None,
              REQUEST, "parameters from now on", tuning.UseVehicle),
+        _row("use_roles", f"{_RUN}/worker/{{process}}/use_roles", roles.UseRoles, None, REQUEST,
+             "the mirror's roles", roles.UseRoles),
         _row("set", f"{_RUN}/set", tuning.SetRequest, None, REQUEST, "change a running drive",
              tuning.SetReply),
         _row("build", f"{_RUN}/builder/{{process}}/build", simulation.BuildRequest, None, REQUEST,
@@ -99,6 +111,10 @@ CHANNELS: dict[str, Channel] = {
              "nominal future against reality"),
         _row("plan_comparison", f"{_RUN}/plan_comparison", simulation.PlanComparison, 2, RESULT,
              "the car's plan against ours"),
+        _row("other_vehicles", f"{_RUN}/other_vehicles", roles.OtherVehicles, 50, LIVE,
+             "states of the vehicles beside the car"),
+        _row("disagreement", f"{_RUN}/disagreement", side_by_side.Disagreement, None, RESULT,
+             "human and ADS disagree"),
         _row("mirror", f"{_RUN}/mirror", simulation.MirrorSample, 10, RESULT,
              "twin, shadow, ghost and their gap"),
         _row("gap", f"{_RUN}/gap", gap.GapSample, 4, RESULT, "model against reality"),
@@ -161,6 +177,16 @@ def alive_key(*, run: str, process: str) -> str:
 def process_of_alive_key(full_key: str) -> str:
     """Return the process id in a liveliness key."""
     return full_key.rsplit("/", 1)[1]
+
+
+def vehicle_of_key(full_key: str) -> str:
+    """Return the vehicle's id in the key of a channel of a vehicle."""
+    return full_key.removeprefix(f"{PREFIX}/vehicle/").split("/", 1)[0]
+
+
+def run_of_alive_key(full_key: str) -> str:
+    """Return the run id in a liveliness key."""
+    return full_key.rsplit("/", 3)[1]
 
 
 def _fill(template: str, **ids: str | None) -> str:

@@ -8,6 +8,7 @@ from typing import TypeVar
 import msgspec
 
 from contracts.frames import LocalFrame
+from contracts.roles import MirrorCast
 from contracts.vehicle import VehicleParameters
 from contracts.world import ATTRIBUTION
 
@@ -81,6 +82,7 @@ class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     mirror_window_s: float = 8.0
     mirror_rate_hz: float = 10.0
     commands_recorded: bool = False
+    mirror_cast: MirrorCast = MirrorCast()
     threads: int = 1
     planners: tuple[str, ...] = ()
     """Loaded before the first job: those of other packages live in processes of their own."""

@@ -7,6 +7,7 @@ from typing import Literal
 import msgspec
 
 from contracts.arrays import Array32
+from contracts.roles import Role
 
 
 class PrepareRequest(msgspec.Struct, frozen=True, kw_only=True):
@@ -111,11 +112,36 @@ class PlaneState(msgspec.Struct, frozen=True):
     speed_mps: float
 
 
+class TwinCorrection(msgspec.Struct, frozen=True, kw_only=True):
+    """What draws a twin towards its vehicle, in the twin's own axes, positive ahead and left."""
+
+    along_mps2: float
+    across_mps2: float
+    yaw_radps2: float
+
+
+class MirroredVehicle(msgspec.Struct, frozen=True, kw_only=True):
+    """Another vehicle beside the car: where it was measured, and where it stands in its role."""
+
+    vehicle_id: str
+    role: Role
+    real: PlaneState
+    shown: PlaneState
+    length_m: float
+    width_m: float
+    height_m: float
+    rear_overhang_m: float
+    correction: TwinCorrection | None = None
+    """Of a twin that follows."""
+
+
 class MirrorSample(msgspec.Struct, frozen=True, kw_only=True):
     """The real car and its twin, shadow and ghost at one instant, and the gap between them.
 
-    Gaps are twin minus real: along and across the real heading. `independent` is false where the
-    twin was driven by commands estimated from the very motion it is compared with.
+    Gaps are free twin minus real: along and across the real heading. The free twin runs on commands
+    alone, alone in its World, and starts anew every few seconds, whatever the role: no correction
+    and no other vehicle hides what the model does. `independent` is false where it was driven by
+    commands estimated from the very motion it is compared with.
     """
 
     stamp_ns: int
@@ -131,6 +157,16 @@ class MirrorSample(msgspec.Struct, frozen=True, kw_only=True):
     gap_speed_mps: float
     since_reset_s: float
     independent: bool
+    role: Role = "all"
+    """Which of the three are there; of the others, `twin` is the free one, the rest as measured."""
+    free: PlaneState | None = None
+    """The free twin, where `twin` is another one: corrected, or among other vehicles."""
+    correction: TwinCorrection | None = None
+    """Of a twin that follows."""
+    others: tuple[MirroredVehicle, ...] = ()
+    touches: tuple[tuple[str, str], ...] = ()
+    """Who touched whom since the last sample, by vehicle ids; `world` is what stands."""
+    twin_yaw_rate_radps: float = 0.0
 
 
 class WorldNotice(msgspec.Struct, frozen=True, kw_only=True):

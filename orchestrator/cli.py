@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 from contracts.errors import UserError
-from orchestrator.cli_logs import convert, gap, identify
+from orchestrator.cli_logs import convert, gap, identify, judge
 from orchestrator.cli_options import MapArgument, OutOption, ServiceRoadsOption
 from orchestrator.cli_scenarios import scenarios
+from orchestrator.cli_set import set_value
 
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
 PATH_ERRORS = (
@@ -104,7 +105,7 @@ def intersections(
     as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
 ) -> None:
     """List the junctions of a map, each one as a driver sees it."""
-    from orchestrator.map_commands import list_intersections
+    from orchestrator.maps.commands import list_intersections
 
     list_intersections(map_file, route=route, as_json=as_json, service_roads=service_roads)
 
@@ -145,7 +146,7 @@ def world(
     ] = False,
 ) -> None:
     """Write Worlds of a map: models, road networks for other simulators, or pictures."""
-    from orchestrator.world_command import WorldRequest, write_worlds
+    from orchestrator.maps.world_command import WorldRequest, write_worlds
 
     raise typer.Exit(
         write_worlds(
@@ -170,7 +171,7 @@ def get_map(
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
 ) -> None:
     """Fetch the map of a region, or of a route's surroundings, from an Overpass endpoint."""
-    from orchestrator.map_get import get_map as fetch
+    from orchestrator.maps.get import get_map as fetch
 
     fetch(area, out=out, config=config)
 
@@ -183,7 +184,7 @@ def index_map(
     ] = None,
 ) -> None:
     """Read a map of any size into an index on disk, from which places and routes are clipped."""
-    from orchestrator.map_index_command import index_map_file
+    from orchestrator.maps.index_command import index_map_file
 
     index_map_file(map_file, folder=folder)
 
@@ -201,14 +202,16 @@ def sweep(
     as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
 ) -> None:
     """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
-    from orchestrator.sweep_command import SweepRequest
-    from orchestrator.sweep_command import sweep as run_sweep
+    from orchestrator.sweep.command import SweepRequest
+    from orchestrator.sweep.command import sweep as run_sweep
 
     raise typer.Exit(run_sweep(SweepRequest(spec, out, workers, fresh, as_json)))
 
 
-for about_logs in (convert, identify, gap):
+for about_logs in (convert, identify, gap, judge):
     app.command()(about_logs)
+
+app.command("set")(set_value)
 
 
 @app.command()

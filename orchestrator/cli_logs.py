@@ -43,6 +43,29 @@ def identify(
     raise typer.Exit(identify_log(log, vehicle_file=vehicle, as_json=as_json, out=out))
 
 
+def judge(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="corrected map [default: the run's own]")
+    ] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="corrected vehicle parameters [default: the run's own]")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="folder for the runs it makes [default: RUN/judged]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="what changes as JSON")] = False,
+) -> None:
+    """Judge a run's recorded drive again with a corrected map or vehicle: what changes?"""
+    from orchestrator.judge.command import JudgeRequest
+    from orchestrator.judge.command import judge as judge_run
+
+    request = JudgeRequest(
+        run=run_folder, map_file=map_file, vehicle=vehicle, out=out, as_json=as_json
+    )
+    raise typer.Exit(judge_run(request))
+
+
 def gap(
     recording: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
     vehicle: Annotated[

@@ -7,29 +7,34 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
 
-from contracts.bus import Alive, Bus, Mailbox, Received, Reply
+import msgspec
+
+from contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
 from contracts.codec import SchemaMismatch
 from contracts.drive import VehicleInfo
-from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key
-from contracts.simulation import ActiveWorld, Event
+from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key, vehicle_of_key
+from contracts.simulation import ActiveWorld
 from contracts.world import World
+from orchestrator.changes.desk import ChangeDesk
+from orchestrator.changes.roles import CorrectionHandler, RoleHandler, RolesInForce
+from orchestrator.events import EventDesk
 from orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
 from orchestrator.intake import Intake
+from orchestrator.judge.human_desk import HumanDesk
+from orchestrator.mirror_desk import MirrorDesk
 from orchestrator.mission import Mission
 from orchestrator.plan import DrivePlan
 from orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
-from orchestrator.result_rows import mirror_row
-from orchestrator.results import ResultTables
-from orchestrator.round_runner import RoundRunner
+from orchestrator.record.results import ResultTables
+from orchestrator.rounds.runner import RoundRunner
+from orchestrator.vehicles_beside import VehiclesBeside
 from orchestrator.world_desk import WorldDesk
 
 log = logging.getLogger(ORCHESTRATOR)
 
 MAILBOX_DEPTH = 16384
-MIRROR_TIMEOUT_S = 10.0
-_LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
+ANSWER_TIMEOUT_S = 10.0
 
 
 class Conductor:
@@ -44,6 +49,10 @@ class Conductor:
             MAILBOX_DEPTH, when_full="block" if plan.config.lock_step else "drop_oldest"
         )
         self.intake = Intake(plan.vehicle, pace=plan.config.speed)
+        self.events = EventDesk(
+            bus, tables, run_id=plan.run_id, now_stamp_ns=lambda: self.intake.now_stamp_ns
+        )
+        self.tell = self.events.tell
         self.worlds = WorldDesk(
             plan,
             bus,
@@ -61,17 +70,27 @@ class Conductor:
             on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
             tell=self.tell,
         )
+        self.human = HumanDesk(plan, bus, tables, self.intake, mission, tell=self.tell)
         self.alive: set[str] = set()
         self.missed_rounds = 0
         self.spared_rounds = 0
         """Rounds that were not due since the machine is too slow for them."""
         self.unseeded_rounds = 0
         """Rounds that no machine could have run: no heading known yet, or no road ahead."""
-        self.mirror_asked = 0
-        """Questions to the mirror that are not answered yet."""
-        self.mirror_stamp_ns = 0
-        self.mirror_independent: bool | None = None
-        self.on_event: Callable[[Event], None] | None = None
+        self.unanswered = 0
+        """Questions put by `ask` that are not answered yet: in lock step nothing goes on before."""
+        self.mirror = MirrorDesk(tables, self.tell)
+        self.roles = RolesInForce(
+            plan.config.roles,
+            plan.config.correction,
+            tell=lambda message: self.ask(MIRROR, "use_roles", message),
+        )
+        self.changes = ChangeDesk(
+            {"role": RoleHandler(self.roles), "correction": CorrectionHandler(self.roles)}
+        )
+        self.beside = VehiclesBeside(
+            plan, publish=lambda message: bus.publish("other_vehicles", message, run=plan.run_id)
+        )
         self._active_world: str | None = None
         self._world_untold = False
 
@@ -80,15 +99,19 @@ class Conductor:
     def join(self) -> None:
         """Subscribe to everything a drive listens to."""
         run, vehicle = self.plan.run_id, self.plan.config.vehicle_id
-        for channel in TELEMETRY_CHANNELS:
-            self.bus.subscribe(channel, self.mailbox, vehicle=vehicle)
+        live = [one.config.id for one in self.plan.beside if one.config.live]
+        for one in (vehicle, *live):
+            for channel in TELEMETRY_CHANNELS:
+                self.bus.subscribe(channel, self.mailbox, vehicle=one)
         for channel in ("mirror", "event"):
             self.bus.subscribe(channel, self.mailbox, run=run)
+        self.bus.serve("set", self.mailbox, run=run)
         self.bus.watch_alive(alive_key(run=run, process="*"), self.mailbox)
 
     def take_info(self, info: VehicleInfo) -> None:
         """Begin to estimate: what the vehicle says of itself is known."""
         self.intake.take_info(info)
+        self.beside.begin(info)
         self.rounds.start_stamp_ns = info.start_stamp_ns
         self.mission.start_stamp_ns = info.start_stamp_ns
         if info.body_from_antenna_m is None:
@@ -104,14 +127,9 @@ class Conductor:
         """Take one item of the mailbox."""
         match item:
             case Received(channel="mirror"):
-                sample = item.message()
-                self.mirror_stamp_ns = sample.stamp_ns
-                self.mirror_independent = sample.independent
-                self.tables.add("mirror", [mirror_row(sample)])
+                self.mirror.take(item.message())
             case Received(channel="event"):
-                event = item.message()
-                if event.source != ORCHESTRATOR:
-                    self._keep_event(event)
+                self.events.heard(item.message())
             case Received():
                 self.take_telemetry(item)
             case Reply(channel="job"):
@@ -122,8 +140,10 @@ class Conductor:
                 )
             case Reply(channel="prepare"):
                 self.worlds.prepare_reply(item)
-            case Reply(channel="use_world"):
-                self.mirror_asked -= 1
+            case Reply(channel="use_world" | "use_roles"):
+                self.unanswered -= 1
+            case Request(channel="set"):
+                self.changes.take(item, stamp_ns=self.intake.now_stamp_ns)
             case Alive():
                 self._alive(item)
             case _:
@@ -131,17 +151,24 @@ class Conductor:
 
     def take_telemetry(self, item: Received) -> None:
         """Take one sample, and let the mission go on where it gives a new state."""
+        sender = vehicle_of_key(item.key)
+        if sender != self.plan.config.vehicle_id:
+            self.beside.take_sample(sender, item)
+            return
         try:
             state = self.intake.take(item)
         except SchemaMismatch as error:
             if self.intake.refused == 1:
                 self.tell(Tell("error", str(error)))
             return
+        self.human.take(state)
         if state is None:
             return
         self.watch_telemetry(item.received_mono_ns)
+        self.beside.keep_up_with(state, self.intake.road_users)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
         self.rounds.take_state(state)
+        self.rounds.windows.take(self.intake.surroundings, state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
 
     def watch_telemetry(self, mono_ns: int) -> None:
@@ -162,12 +189,14 @@ class Conductor:
             else:
                 self.unseeded_rounds += 1
             return False
-        self.rounds.start(intent, latest, self.intake.surroundings, started_mono_ns=started_mono_ns)
+        said = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
+        self.rounds.start(intent, latest, said, started_mono_ns=started_mono_ns)
         return True
 
     def finish(self) -> None:
         """Compare what can still be compared and settle the counts."""
         self.rounds.finish()
+        self.human.finish()
         if self.intake.end is not None:
             self.intake.counts.settle(self.intake.end.published)
 
@@ -197,16 +226,7 @@ class Conductor:
         self._world_untold = False
         active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns + 1, world_id=self._active_world)
         self.bus.publish("active_world", active, run=self.plan.run_id)
-        if MIRROR in self.alive:
-            self.mirror_asked += 1
-            self.bus.request(
-                "use_world",
-                active,
-                self.mailbox,
-                timeout_s=MIRROR_TIMEOUT_S,
-                run=self.plan.run_id,
-                process=MIRROR,
-            )
+        self.ask(MIRROR, "use_world", active)
 
     def _world_ready(self, junction_id: str, world: World) -> None:
         self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
@@ -215,7 +235,32 @@ class Conductor:
         self.tell(Tell("error", f"no world for {junction_id}: {reason}"))
         self.mission.on_world_failed(junction_id)
 
+    # Changes.
+
+    def make_changes(self) -> None:
+        """Make what `foretwin set` asked for; between rounds, and from the next state on."""
+        if not self.changes.waiting or self.rounds.desk.open_rounds:
+            return
+        stamp_ns, start_ns = self.intake.now_stamp_ns + 1, self.intake.start_stamp_ns
+        for change in self.changes.make(stamp_ns=stamp_ns, start_stamp_ns=start_ns):
+            self.tell(Tell("info", f"set {change.text}"))
+            self.tables.add("changes", [change.row()])
+
     # Processes.
+
+    def ask(self, process_id: str, channel: str, message: msgspec.Struct) -> None:
+        """Ask a process, where it is alive; see `unanswered`."""
+        if process_id not in self.alive:
+            return
+        self.unanswered += 1
+        self.bus.request(
+            channel,
+            message,
+            self.mailbox,
+            timeout_s=ANSWER_TIMEOUT_S,
+            run=self.plan.run_id,
+            process=process_id,
+        )
 
     def _alive(self, item: Alive) -> None:
         process_id = process_of_alive_key(item.key)
@@ -236,6 +281,7 @@ class Conductor:
         elif process_id == MIRROR:
             self._world_untold = True
             self.announce_world()
+            self.roles.announce(self.intake.now_stamp_ns)
         elif process_id == BUILDER:
             self.worlds.builder_up()
 
@@ -248,28 +294,3 @@ class Conductor:
             self.rounds.desk.worker_down(process_id)
             self.worlds.worker_down(process_id)
             self.rounds.give_out()
-
-    # Telling.
-
-    def tell(self, tell: Tell) -> None:
-        """Log an event, publish it, and keep it."""
-        event = Event(
-            stamp_ns=self.intake.now_stamp_ns,
-            level=tell.level,
-            source=ORCHESTRATOR,
-            text=tell.text,
-        )
-        self.bus.publish("event", event, run=self.plan.run_id)
-        self._keep_event(event)
-
-    def _keep_event(self, event: Event) -> None:
-        log.log(_LEVELS[event.level], "%s: %s", event.source, event.text)
-        if self.on_event is not None:
-            self.on_event(event)
-        row = {
-            "stamp_ns": event.stamp_ns,
-            "level": event.level,
-            "source": event.source,
-            "text": event.text,
-        }
-        self.tables.add("events", [row])

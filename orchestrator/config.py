@@ -10,6 +10,7 @@ from typing import Any, Literal
 import msgspec
 
 from contracts.errors import UserError
+from contracts.roles import Correction, FollowLimits, Role
 
 View = Literal["auto", "native", "web", "none"]
 Source = Literal["auto", "log", "standin", "live"]
@@ -20,6 +21,35 @@ HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 
 class ConfigError(UserError):
     """A setting that cannot be used; the message names it and what would be right."""
+
+
+class VehicleBeside(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A vehicle beside the car: its role, its parameters, and where its telemetry comes from.
+
+    One of three: a recorded drive (`log`), a vehicle of this id on the bus (`live`), or who the car
+    itself detects under the id `seen_as`.
+    """
+
+    id: str
+    role: Role = "shadow"
+    vehicle: str | None = None
+    """A parameter file or the name of a bundled vehicle; the car's own where left out."""
+    log: str | None = None
+    log_offset_s: float | None = None
+    """Seconds of the log that have passed as the car's drive begins; None: by UTC, where both logs
+    have it, else none."""
+    live: bool = False
+    seen_as: str | None = None
+
+    def trouble(self) -> str | None:
+        """Return what is wrong with it, None where nothing is."""
+        if not self.id or any(c in self.id for c in "/*$#?{} ."):
+            return f"id {self.id!r} must be one word without / * $ # ? ."
+        if self.role == "all":
+            return "role all is the car's alone; must be twin, shadow or ghost"
+        if (self.log is not None) + self.live + (self.seen_as is not None) != 1:
+            return "needs exactly one of log = FILE, live = true, seen_as = ID"
+        return None
 
 
 class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -52,6 +82,14 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     seed: int = 0
     vehicle: str | None = None
     vehicle_id: str = "ego"
+    role: Role = "all"
+    """Of the car itself, as the drive begins: all is twin, shadow and ghost at once."""
+    correction: Correction = "free"
+    """Whether twins are drawn towards reality (follow) as the drive begins; see docs/roles.md."""
+    follow: FollowLimits = FollowLimits()
+    """How hard a twin that follows may be drawn."""
+    vehicles: tuple[VehicleBeside, ...] = ()
+    """Others in the mirror besides the car, each with a role of its own."""
     view: View = "auto"
     out: str = "runs"
     radius_m: float = 150.0
@@ -62,6 +100,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     endpoint: str | None = None
     """Where the router listens, such as tcp/127.0.0.1:7447; None takes a free loopback port."""
     standin_plan_shift_m: float = 0.0
+    standin_parameters: str | None = None
+    """What the stand-in car really is, hidden from the twin: a TOML file, or the bundled one."""
     ros2: str | None = None
     """A mapping in TOML, or `autoware`: the live car speaks ROS 2; see docs/ros2.md."""
     towards_vehicle: bool = False
@@ -121,10 +161,36 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
                 "it) or --source live",
             ),
         )  # fmt: skip
-        for holds, text in checks:
+        for holds, text in (*checks, *self._checks_of_vehicles()):
             if not holds:
                 raise ConfigError(text)
         return self
+
+    def _checks_of_vehicles(self) -> list[tuple[bool, str]]:
+        ids = [self.vehicle_id, *(other.id for other in self.vehicles)]
+        checks = [
+            (trouble is None, f"vehicles, {other.id}: {trouble}")
+            for other in self.vehicles
+            for trouble in (other.trouble(),)
+        ]
+        return [
+            *checks,
+            (
+                self.follow.trouble() is None,
+                f"follow: {self.follow.trouble()}",
+            ),
+            (len(set(ids)) == len(ids), f"vehicles: ids {', '.join(ids)} must differ"),
+            (
+                not (self.lock_step and any(other.live for other in self.vehicles)),
+                "vehicles: a live vehicle knows no --speed max",
+            ),
+        ]
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """Roles as the drive begins, by vehicle id, the car's own first."""
+        others = {other.id: other.role for other in self.vehicles}
+        return {self.vehicle_id: self.role, **others}
 
     @property
     def lock_step(self) -> bool:

@@ -25,13 +25,13 @@ from orchestrator.mission import Mission, MissionSettings
 from orchestrator.plan import DrivePlan, make_plan, read_inputs
 from orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids
 from orchestrator.progress import ProgressLine
-from orchestrator.results import ResultTables
-from orchestrator.run_record import reserve_record, run_record, write_record
+from orchestrator.record.results import ResultTables
+from orchestrator.record.run_record import reserve_record, run_record, write_record
+from orchestrator.record.summary import summary_text
+from orchestrator.record.versions import versions
 from orchestrator.start_worlds import prepare_start
-from orchestrator.summary import summary_text
 from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
-from orchestrator.versions import versions
-from orchestrator.way_ahead import WayAhead
+from orchestrator.way.way_ahead import WayAhead
 
 log = logging.getLogger(ORCHESTRATOR)
 
@@ -63,13 +63,16 @@ class _Interrupt:
 
 def drive(config: DriveConfig) -> int:
     """Run one drive; returns its exit code. Raises UserError before anything is written."""
-    inputs = read_inputs(config)
-    plan = make_plan(inputs, datetime.datetime.now())
+    return carry_out(make_plan(read_inputs(config), datetime.datetime.now()))
+
+
+def carry_out(plan: DrivePlan) -> int:
+    """Run a drive whose folder is made; returns its exit code."""
     log_to_file(
         ProcessSetup(
             run_id=plan.run_id,
             process_id=ORCHESTRATOR,
-            vehicle_id=config.vehicle_id,
+            vehicle_id=plan.config.vehicle_id,
             bus=plan.bus,
             log_file=str(plan.folder / "log.jsonl"),
         )
@@ -101,7 +104,7 @@ class _Drive:
         """Run to the end, whatever ends it; the run's files are complete afterwards."""
         plan = self._plan
         started_s = time.monotonic()
-        reserve_record(plan.run_id, plan.folder / "run.json")
+        reserve_record(plan, plan.folder / "run.json")
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
         with ZenohBus(plan.bus, router=True) as bus:
             tables = ResultTables(
@@ -117,7 +120,7 @@ class _Drive:
             exit_word, code = "failed", EXIT_FAILED
             with ProgressLine(conductor, self._mission) as line:
                 line.say(f"run {plan.folder}")
-                conductor.on_event = line.tell
+                conductor.events.on_event = line.tell
                 try:
                     exit_word, code = self._go(bus, conductor, line)
                 except Exception:
@@ -258,6 +261,7 @@ class _Drive:
             log.warning("had to kill %s", ", ".join(killed))
         while (item := conductor.mailbox.take()) is not None:
             conductor.handle(item)
+        conductor.changes.refuse_all("the drive is over")
         conductor.tables.close()
         if conductor.tables.failed:
             line.say(f"error: {conductor.tables.failed}")

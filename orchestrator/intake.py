@@ -14,9 +14,10 @@ from contracts.drive import (
     SignalState,
     VehicleInfo,
     VehicleState,
+    VehicleStatus,
 )
 from contracts.vehicle import VehicleParameters
-from orchestrator.bookkeeping import TelemetryCount
+from orchestrator.record.bookkeeping import TelemetryCount
 from orchestrator.telemetry_watch import TelemetryWatch, record
 from telemetry.estimator import StateEstimator
 
@@ -49,6 +50,7 @@ class Intake:
         self.end: DriveEnd | None = None
         self.latest: LatestState | None = None
         self.plan: PlannedTrajectory | None = None
+        self.status: VehicleStatus | None = None
         self.road_users: RoadUsers | None = None
         self.signals: dict[str, SignalState] = {}
         """The newest of each signal group."""
@@ -90,6 +92,8 @@ class Intake:
         self.counts.take(key=item.key, channel=item.channel, seq=envelope.seq, age_ms=age_ms)
         if isinstance(message, PlannedTrajectory):
             self.plan = message
+        elif isinstance(message, VehicleStatus):
+            self.status = message
         elif isinstance(message, RoadUsers):
             self.road_users = message
         elif isinstance(message, SignalState):

@@ -52,6 +52,7 @@ class LiveLoop:
         next_housekeeping_s = next_due_s
         while not self._stop():
             self._each_turn()
+            conductor.make_changes()
             now_s = time.monotonic()
             if now_s >= next_housekeeping_s:
                 self._housekeeping(now_s)
@@ -92,6 +93,8 @@ class LiveLoop:
             if now_s - self._started_s > GIVE_UP_ROUND_S:
                 conductor.rounds.drop()
             return True
+        # Where the machine is too slow, one round follows the other without a turn between.
+        conductor.make_changes()
         if not conductor.start_round():
             return False
         self._started_s = now_s

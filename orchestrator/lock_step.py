@@ -59,7 +59,9 @@ class LockStepLoop:
                 conductor.take_telemetry(sample)
             self._wait("worlds", lambda: not conductor.worlds.building)
             conductor.announce_world()
-            self._wait("the mirror", lambda: not conductor.mirror_asked)
+            self._wait("the mirror", lambda: not conductor.unanswered)
+            conductor.make_changes()
+            self._wait("changes", lambda: not conductor.unanswered)
             if not advanced.ended and conductor.start_round():
                 self._wait("the round", lambda: not conductor.rounds.desk.open_rounds)
             if self._stop():
@@ -98,7 +100,7 @@ class LockStepLoop:
         def said() -> bool:
             for sample in self._in_order():
                 conductor.take_telemetry(sample)
-            mirrored = conductor.mirror_stamp_ns >= last - 200_000_000
+            mirrored = conductor.mirror.stamp_ns >= last - 200_000_000
             return (conductor.intake.end is not None and mirrored) or time.monotonic() > deadline
 
         self._wait("the end", said)

@@ -13,10 +13,10 @@ from typing import Any, Literal
 from contracts.drive import VehicleState
 from contracts.world import World
 from orchestrator.instructions import BuildWorld, Instruction, NotReady, RoundIntent, Tell, UseWorld
-from orchestrator.junctions_ahead import PassedJunction
-from orchestrator.map_matching import OffRoadStretch
 from orchestrator.visits import VisitBook
-from orchestrator.way_ahead import WayAhead
+from orchestrator.way.junctions_ahead import PassedJunction
+from orchestrator.way.map_matching import OffRoadStretch
+from orchestrator.way.way_ahead import WayAhead
 from world_gen.intersections import Junction
 
 MissionState = Literal["waiting", "following", "off_map"]
@@ -119,6 +119,18 @@ class Mission:
         for ahead in self._way.junctions[:1]:
             return ahead.junction.summary.name or ahead.junction.summary.id, ahead.in_s
         return None
+
+    @property
+    def junction_id(self) -> str | None:
+        """The junction that the car is at, or has before it."""
+        if self._current is not None:
+            return self._current
+        return next((a.junction.summary.id for a in self._way.junctions), None)
+
+    @property
+    def route_m(self) -> float | None:
+        """How far along its route the car is, None off the map."""
+        return self._way.s_m if self.state == "following" else None
 
     def worlds_ahead(self) -> list[str]:
         """Ids of the Worlds that the coming rounds need, the current one first."""

@@ -7,6 +7,7 @@ import json
 import secrets
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,19 +17,20 @@ from contracts.errors import UserError
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from contracts.setup import BusSetup
 from contracts.vehicle import VehicleParameters
-from orchestrator.config import ConfigError, DriveConfig
+from orchestrator.config import ConfigError, DriveConfig, VehicleBeside
 from orchestrator.doctor import has_display
 from orchestrator.endpoints import free_endpoint
-from orchestrator.line_matching import match_line
-from orchestrator.map_opening import Clip, open_map
-from orchestrator.road_index import RoadIndex
-from orchestrator.round_jobs import scenarios_of
-from orchestrator.route import Route
-from orchestrator.standin_path import StandinPath, standin_path
+from orchestrator.maps.opening import Clip, open_map
+from orchestrator.rounds.jobs import scenarios_of
+from orchestrator.way.line_matching import match_line
+from orchestrator.way.road_index import RoadIndex
+from orchestrator.way.route import Route
+from orchestrator.way.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import check_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line
 from telemetry.ros2.mapping import MappingFile, read_mapping
+from telemetry.standin.parameters import read_parameters
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
 from world_gen.road_graph import RoadGraph
@@ -43,6 +45,14 @@ NEAR_ROAD_M = 50.0
 
 CORRIDOR_M = 2000.0
 """Of a large map, what lies within this distance of a given route or drive is read."""
+
+
+class Beside(NamedTuple):
+    """A vehicle beside the car, its parameters, and whether its commands are recorded."""
+
+    config: VehicleBeside
+    vehicle: VehicleParameters
+    commands_recorded: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +73,7 @@ class DriveInputs:
     route_source: str
     drive_frame: LocalFrame
     vehicle: VehicleParameters
+    beside: tuple[Beside, ...]
     log_file: Path | None
     info: VehicleInfo | None
     standin: StandinPath | None
@@ -119,6 +130,8 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         raise ConfigError(str(error)) from error
     scenarios_of(config)  # an unknown one is told before anything long begins
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
+    if config.standin_parameters is not None:
+        read_parameters(Path(config.standin_parameters))
     ros2 = read_mapping(Path(config.ros2)) if config.ros2 else None
     map_file = Path(config.map) if config.map else EMBEDDED_MAP
     source = config.resolved_source
@@ -165,6 +178,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         route_source=route_source,
         drive_frame=LocalFrame(GeoPoint(float(origin[0]), float(origin[1]))),
         vehicle=vehicle,
+        beside=tuple(_read_beside(one, vehicle) for one in config.vehicles),
         log_file=log_file,
         info=info,
         standin=standin,
@@ -183,6 +197,16 @@ def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
         end = "its end" if config.end_s is None else f"--end {config.end_s:g}"
         raise UserError(f"{log_file} from --start {config.start_s:g} to {end}: {error}") from error
     return log.info, line.lat_lon_deg
+
+
+def _read_beside(config: VehicleBeside, own: VehicleParameters) -> Beside:
+    vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
+    if config.log is None:
+        return Beside(config, vehicle, commands_recorded=config.live)
+    file = Path(config.log)
+    if not file.exists():
+        raise FileNotFoundError(f"recorded drive {file} of {config.id}: no such file or folder")
+    return Beside(config, vehicle, commands_recorded="control" in open_log(file).info.sends)
 
 
 def _check_in_map(positions: Array, log_file: Path, index: RoadIndex, map_file: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
+from contracts.roles import CastVehicle, MirrorCast
 from contracts.setup import (
     BuilderSetup,
     ProcessSetup,
@@ -16,7 +17,7 @@ from contracts.setup import (
     WorkerSetup,
 )
 from orchestrator.plan import DrivePlan
-from orchestrator.round_jobs import planners_of
+from orchestrator.rounds.jobs import planners_of
 
 ORCHESTRATOR = "orchestrator"
 BUILDER = "builder"
@@ -65,6 +66,17 @@ def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
         vehicle=plan.vehicle,
         drive_frame=plan.drive_frame,
         commands_recorded=plan.commands_recorded,
+        mirror_cast=MirrorCast(
+            others=tuple(
+                CastVehicle(
+                    vehicle_id=one.config.id,
+                    vehicle=one.vehicle,
+                    commands_recorded=one.commands_recorded,
+                )
+                for one in plan.beside
+            ),
+            limits=plan.config.follow,
+        ),
         planners=() if process_id == MIRROR else tuple(planners_of(plan.config.planner)),
     )
 
@@ -121,6 +133,7 @@ def _standin(plan: DrivePlan, process_id: str) -> ProcessSetup:
         speed=plan.config.speed,
         seed=plan.config.seed,
         plan_shift_m=plan.config.standin_plan_shift_m,
+        parameters_file=plan.config.standin_parameters,
     )
 
 

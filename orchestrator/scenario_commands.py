@@ -12,14 +12,14 @@ import numpy as np
 
 from contracts.errors import UserError
 from contracts.scenario import Scenario
-from orchestrator.map_choice import (
+from orchestrator.maps.choice import (
     FARTHEST_M,
     junction_by_id,
     nearest_junction,
     node_of_id,
     parse_place,
 )
-from orchestrator.map_opening import Clip, NodeClip, OpenMap, open_map
+from orchestrator.maps.opening import Clip, NodeClip, OpenMap, open_map
 from orchestrator.progress_bar import progress_bar
 from sim_worker.scenarios.drawing import draw_cases
 from sim_worker.scenarios.placement import places

@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable, Iterable
 
 from orchestrator.conductor import Conductor
-from orchestrator.junctions_ahead import encounters
 from orchestrator.plan import DrivePlan
-from orchestrator.route import Route
+from orchestrator.way.junctions_ahead import encounters
+from orchestrator.way.route import Route
 from world_gen.intersections import Junction
 
 WITHIN_M = 300.0

@@ -12,7 +12,7 @@ from contracts.bus import Bus, Mailbox, Request
 from contracts.process import ProcessLife, run_process
 from contracts.setup import BuilderSetup
 from contracts.simulation import BuildReply
-from orchestrator.map_opening import Clip, open_map
+from orchestrator.maps.opening import Clip, open_map
 from world_gen.map_index import index_map
 from world_gen.world_store import WorldStore, cached_build
 

@@ -12,6 +12,8 @@ from contracts.drive import ControlCommand
 from contracts.vehicle import VehicleParameters
 from sim_worker.vehicle.resistance import resistance_mps2
 
+STEP_BACK_NS = 1_000_000_000
+"""A stamp that lies this far behind the last one is of a clock that has stepped back."""
 _STANDS_MPS = 0.05
 _HOLD_MPS2 = -2.0
 
@@ -35,8 +37,14 @@ class CommandMemory:
         """Whether any command received was itself an estimate."""
 
     def add(self, command: ControlCommand) -> None:
-        """Take a command; older or equal stamps than the latest are ignored."""
+        """Take a command; older or equal stamps than the latest are ignored.
+
+        One from before a clock's step back makes all others forgotten.
+        """
         latest = self._commands[-1] if self._commands else None
+        if latest is not None and command.stamp_ns < latest.stamp_ns - STEP_BACK_NS:
+            self._commands.clear()
+            latest = latest._replace(stamp_ns=command.stamp_ns - 1)
         if latest is not None and command.stamp_ns <= latest.stamp_ns:
             return
         self.estimated = self.estimated or command.estimated

@@ -11,8 +11,10 @@ from contracts.bus import Bus, Mailbox, Received, Request
 from contracts.drive import ControlCommand, VehicleState
 from contracts.errors import one_line
 from contracts.process import ProcessLife
+from contracts.roles import OtherVehicles, UseRoles
 from contracts.setup import WorkerSetup
 from contracts.simulation import ActiveWorld
+from sim_worker.commands import STEP_BACK_NS
 from sim_worker.twin import Mirror
 from sim_worker.world_file import load_world
 
@@ -28,7 +30,8 @@ class MirrorWorker:
     """Feeds a Mirror from messages; a message that cannot be used is logged and passed over.
 
     In lock step a state waits until the commands up to its stamp are there: they come from
-    another process, and results must not depend on who is faster.
+    another process, and results must not depend on who is faster. So it does for the other
+    vehicles: the bus keeps no order between keys.
     """
 
     def __init__(self, setup: WorkerSetup, bus: Bus) -> None:
@@ -38,12 +41,16 @@ class MirrorWorker:
         self._waits = setup.bus.lossless and setup.commands_recorded
         self._held: deque[VehicleState] = deque()
         self._commanded_ns: int | None = None
+        self._waits_for_others = setup.bus.lossless and bool(setup.mirror_cast.others)
+        self._others: deque[OtherVehicles] = deque()
         self._mirror = Mirror(
             setup.vehicle,
             drive_frame=setup.drive_frame,
             window_s=setup.mirror_window_s,
             rate_hz=setup.mirror_rate_hz,
             commands_recorded=setup.commands_recorded,
+            vehicle_id=setup.vehicle_id,
+            cast=setup.mirror_cast,
         )
 
     def handle(self, item: Received | Request) -> None:
@@ -52,13 +59,21 @@ class MirrorWorker:
             message = item.message()
             if isinstance(message, VehicleState):
                 self._held.append(message)
-                self._release(everything=not self._waits)
+                self._release()
+            elif isinstance(message, OtherVehicles):
+                self._others.append(message)
+                self._release()
             elif isinstance(message, ControlCommand):
+                if message.stamp_ns < (self._commanded_ns or 0) - STEP_BACK_NS:
+                    self._release(everything=True)  # no more commands of the old clock will come
                 self._mirror.handle_command(message)
                 self._commanded_ns = message.stamp_ns
-                self._release(everything=not self._waits)
+                self._release()
             elif isinstance(message, ActiveWorld) and isinstance(item, Request):
                 self._change_world(message)
+                item.reply(message)
+            elif isinstance(message, UseRoles) and isinstance(item, Request):
+                self._mirror.set_roles(message)
                 item.reply(message)
         except Exception as error:
             log.exception("message on %s passed over", item.key)
@@ -69,14 +84,21 @@ class MirrorWorker:
         """Handle the states that still wait for commands: none will come."""
         self._release(everything=True)
 
-    def _release(self, *, everything: bool) -> None:
-        while self._held:
-            late = self._commanded_ns is None or self._held[0].stamp_ns > self._commanded_ns
-            if late and not everything:
-                return
-            sample = self._mirror.handle_state(self._held.popleft())
+    def _release(self, *, everything: bool = False) -> None:
+        while self._held and (everything or self._complete(self._held[0].stamp_ns)):
+            state = self._held.popleft()
+            while self._others and self._others[0].stamp_ns <= state.stamp_ns:
+                for other in self._others.popleft().heard:
+                    self._mirror.handle_other(other)
+            sample = self._mirror.handle_state(state)
             if sample is not None:
                 self._bus.publish("mirror", sample, run=self._run_id)
+
+    def _complete(self, stamp_ns: int) -> bool:
+        """Whether all is there that a state must wait for."""
+        commanded = self._commanded_ns is not None and stamp_ns <= self._commanded_ns
+        accompanied = bool(self._others) and stamp_ns <= self._others[-1].stamp_ns
+        return (commanded or not self._waits) and (accompanied or not self._waits_for_others)
 
     def _change_world(self, active: ActiveWorld) -> None:
         world = None
@@ -90,6 +112,8 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     mailbox = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
     worker = MirrorWorker(setup, bus)
     bus.serve("use_world", mailbox, run=setup.run_id, process=setup.process_id)
+    bus.serve("use_roles", mailbox, run=setup.run_id, process=setup.process_id)
+    bus.subscribe("other_vehicles", mailbox, run=setup.run_id)
     bus.subscribe("control", mailbox, vehicle=setup.vehicle_id)
     bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)
     life.ready()

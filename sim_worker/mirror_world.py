@@ -11,25 +11,15 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
+from sim_worker.roles.twin_body import TwinBody
 from sim_worker.stage_model import world_spec
-from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.lag import without_lags
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
-from sim_worker.vehicle.planar import (
-    JOINTS,
-    TIMESTEP_S,
-    base_from_cog,
-    box_centre_from_base_m,
-    check_steering_delay,
-    cog_from_base,
-    vehicle_spec,
-)
+from sim_worker.vehicle.planar import box_centre_from_base_m, vehicle_spec
 from world_gen.export.mjcf import ROAD_USER, VEHICLE
 
 TWIN, SHADOW, GHOST = "twin_", "shadow", "ghost"
-_REFRESH_STEPS = 2
-"""Physics steps between two updates of tyre forces."""
 
 
 class MirrorWorld:
@@ -61,36 +51,15 @@ class MirrorWorld:
             spec.add_exclude(name="own_shadow", bodyname1=TWIN + "chassis", bodyname2=SHADOW)
         self.model = model = spec.compile()
         self.data = mujoco.MjData(model)
-        self._actuators = ids = actuator_ids(model, TWIN)
-        if steering_delay_s is not None:
-            check_steering_delay(steering_delay_s)
-            model.actuator_delay[ids.steer] = steering_delay_s
-        self._steer = ids.steer
-        self._joints = np.array([model.joint(TWIN + name).qposadr[0] for name in JOINTS])
-        self._dofs = np.array([model.joint(TWIN + name).dofadr[0] for name in JOINTS])
-        self._mocap = {name: int(model.body(name).mocapid[0]) for name in (SHADOW, GHOST)}
-        self._state = np.zeros((1, 8))
-        self._tire_command = 0.0
-        self._steps = 0
-        self._actuation = self._fresh_actuation()
-
-    def _fresh_actuation(self) -> Actuation:
-        """Return the actuation of a twin that exerts what its state says, and did before."""
-        return Actuation(
-            self.vehicle,
-            self._actuators,
-            friction=np.array([self.vehicle.friction.value]),
-            ctrl=self.data.ctrl[None],
-            biasprm=self.model.actuator_biasprm[None],
-            forcerange=self.model.actuator_forcerange[None],
-            tick_s=_REFRESH_STEPS * TIMESTEP_S,
-            accel_mps2=self._state[:, 7],
+        self._twin = TwinBody(
+            model, self.data, vehicle, prefix=TWIN, steering_delay_s=steering_delay_s
         )
+        self._mocap = {name: int(model.body(name).mocapid[0]) for name in (SHADOW, GHOST)}
 
     @property
     def history_samples(self) -> int:
         """Return how many past steering commands `seed_twin` takes, one physics step apart."""
-        return int(self.model.actuator_history[self._steer][0])
+        return self._twin.history_samples
 
     def seed_twin(self, state: Array, *, steering_history_rad: Array | None = None) -> None:
         """Put the twin at base_link `state` (8,), the only way it ever teleports.
@@ -102,19 +71,7 @@ class MirrorWorld:
         mocap_pos, mocap_quat = data.mocap_pos.copy(), data.mocap_quat.copy()
         mujoco.mj_resetData(self.model, data)
         data.mocap_pos[:], data.mocap_quat[:] = mocap_pos, mocap_quat
-        limit = self.vehicle.max_tire_angle_rad.value
-        self._state[0] = state
-        self._state[0, 6] = np.clip(state[6], -limit, limit)
-        positions, velocities = cog_from_base(self.vehicle, self._state)
-        data.qpos[self._joints], data.qvel[self._dofs] = positions[0], velocities[0]
-        history = np.full(self.history_samples, self._state[0, 6])
-        if steering_history_rad is not None:
-            history = np.clip(steering_history_rad, -limit, limit)
-        first = int(self.model.actuator_historyadr[self._steer]) + 2 + len(history)
-        data.history[first : first + len(history)] = history
-        self._tire_command = float(history[-1])
-        self._steps = 0
-        self._actuation = self._fresh_actuation()
+        self._twin.seed(state, steering_history_rad=steering_history_rad)
 
     def place(self, name: str, pose: Array) -> None:
         """Put the shadow or the ghost at x, y, yaw (3,)."""
@@ -124,27 +81,14 @@ class MirrorWorld:
 
     def step(self, *, accel_mps2: float, tire_angle_rad: float) -> None:
         """Advance 10 ms under one command."""
-        if self._steps % _REFRESH_STEPS == 0:
-            self._actuation.apply(speed_mps=self._state[:, 3], accel_mps2=np.array([accel_mps2]))
-        self._steps += 1
-        reach = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
-        change = tire_angle_rad - self._tire_command
-        self._tire_command += min(max(change, -reach), reach)
-        self.data.ctrl[self._steer] = self._tire_command
-        before = self._state[0, 3]
+        self._twin.command(accel_mps2=accel_mps2, tire_angle_rad=tire_angle_rad)
         mujoco.mj_step(self.model, self.data)
-        base_from_cog(
-            self.vehicle,
-            self.data.qpos[None, self._joints],
-            self.data.qvel[None, self._dofs],
-            self._state,
-        )
-        self._state[0, 7] = (self._state[0, 3] - before) / TIMESTEP_S
+        self._twin.read()
 
     @property
     def twin_state(self) -> Array:
         """Base_link state (8,) of the twin."""
-        return np.array(self._state[0])
+        return self._twin.state
 
     def measured_pose(self, name: str) -> Array:
         """Return x, y, yaw (3,) of the shadow or the ghost as MuJoCo has it."""

@@ -6,16 +6,21 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.drive import ControlCommand, VehicleState
-from contracts.frames import LocalFrame, target_from_source, wrap_angle
+from contracts.frames import LocalFrame, wrap_angle
+from contracts.roles import MirrorCast, OtherVehicle, UseRoles
 from contracts.simulation import MirrorSample, PlaneState
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from sim_worker.commands import CommandMemory, TwinCommand, estimated_command
+from sim_worker.commands import STEP_BACK_NS, CommandMemory, TwinCommand, estimated_command
 from sim_worker.mirror_world import GHOST, SHADOW, MirrorWorld
+from sim_worker.roles.casting import Casting, FreeTwin
+from sim_worker.roles.member import CastMember
+from sim_worker.roles.told import plane_state
 from sim_worker.seeding import local_state
 from sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
 
 _STEP_NS = round(TIMESTEP_S * 1e9)
+_ALONE = MirrorCast()
 _GRID_TOLERANCE = 0.05
 """Of a sample period: how early a state may be and still count for its instant."""
 
@@ -23,10 +28,11 @@ _GRID_TOLERANCE = 0.05
 class Mirror:
     """Steps the twin along with the measured states of one car; no clock, no bus.
 
-    The twin starts from the measured state, runs on commands alone, and starts anew after each
-    `window_s`, in each new World and where its physics diverged; it never teleports otherwise.
-    States must come in time order; a command counts from its stamp on and should come before the
-    first state after it.
+    The free twin starts from the measured state, runs on commands alone, and starts anew after each
+    `window_s`, in each new World and where its physics diverged; it never teleports otherwise. All
+    gaps are its own. Roles, corrections and other vehicles need a `Cast` beside it, which is there
+    only as long as something asks for it. States must come in time order; a command counts from its
+    stamp on and should come before the first state after it.
     """
 
     def __init__(
@@ -37,19 +43,25 @@ class Mirror:
         window_s: float = 8.0,
         rate_hz: float = 10.0,
         commands_recorded: bool = False,
-        twin_meets_shadow: bool = False,
+        vehicle_id: str = "ego",
+        cast: MirrorCast = _ALONE,
     ) -> None:
         self._vehicle = vehicle
         self._drive_frame = drive_frame
         self._window_ns = round(window_s * 1e9)
         self._period_ns = 1e9 / rate_hz
         self._recorded = commands_recorded
-        self._meets_shadow = twin_meets_shadow
         self._commands = CommandMemory(vehicle, keep_s=MAX_STEERING_DELAY_S + 1.0)
         self._pending: list[tuple[int, World | None]] = []
         self._world_id: str | None = None
         self._frame = drive_frame
         self._scene = self._build(None)
+        self._casting = Casting(
+            CastMember(vehicle_id, vehicle, commands_recorded),
+            cast,
+            drive_frame=drive_frame,
+            commands=self._commands,
+        )
         self._measured: Array | None = None
         self._measured_stamp_ns = 0
         self._seed_stamp_ns = 0
@@ -62,7 +74,6 @@ class Mirror:
         return MirrorWorld(
             world,
             self._vehicle,
-            twin_meets_shadow=self._meets_shadow,
             steering_delay_s=None if self._recorded else 0.0,
         )
 
@@ -75,19 +86,33 @@ class Mirror:
         if self._recorded:
             self._commands.add(command)
 
+    def set_roles(self, use: UseRoles) -> None:
+        """Let roles and correction count from the first state at or after their stamp on."""
+        self._casting.set_roles(use)
+
+    def handle_other(self, other: OtherVehicle) -> None:
+        """Take where another vehicle was measured, and what it was told."""
+        self._casting.take_other(other)
+
     def handle_state(self, state: VehicleState) -> MirrorSample | None:
         """Step the twin up to the state; returns a sample where one is due.
 
-        States without a known heading and out of time order are passed over. Raises ValueError
-        for a state that is not finite.
+        States without a known heading and out of time order are passed over; after a step of the
+        car's clock back by a second or more everything begins anew. Raises ValueError for a state
+        that is not finite.
         """
         if not state.yaw_valid:
             return None
+        if self._measured is not None and (state.stamp_ns < self._measured_stamp_ns - STEP_BACK_NS):
+            # Worlds that were to come by the old clock are due: their time has passed.
+            self._pending = [(state.stamp_ns, world) for _, world in self._pending]
+            self._measured, self._first_stamp_ns, self._last_index = None, None, -1
         if self._measured is not None and state.stamp_ns <= self._measured_stamp_ns:
             return None
         self._change_world(state.stamp_ns)
         measured = local_state(state, self._frame, self._vehicle)
         gap_ns = state.stamp_ns - self._measured_stamp_ns
+        self._casting.before(state, self._free_twin)
         if self._measured is None or gap_ns > self._window_ns:
             self._seed(measured, state.stamp_ns)
         else:
@@ -97,6 +122,7 @@ class Mirror:
         self._scene.place(GHOST, measured[:3])
         if not self._sound():
             self._seed(measured, state.stamp_ns)
+        self._casting.advance(state.stamp_ns)
         sample = self._sample(state, measured) if self._due(state.stamp_ns) else None
         if state.stamp_ns - self._seed_stamp_ns >= self._window_ns:
             self._seed(measured, state.stamp_ns)
@@ -114,6 +140,7 @@ class Mirror:
         self._world_id = world_id
         self._frame = self._drive_frame if world is None else world.frame
         self._scene = self._build(world)
+        self._casting.change_world(world, self._frame)
         self._measured = None
 
     def _seed(self, measured: Array, stamp_ns: int) -> None:
@@ -125,6 +152,7 @@ class Mirror:
         scene.place(GHOST, measured[:3])
         scene.seed_twin(measured, steering_history_rad=history)
         self._seed_stamp_ns, self._steps = stamp_ns, 0
+        self._casting.start_anew(stamp_ns)
         self._independent = self._recorded and history is not None and not self._commands.estimated
 
     def _advance(self, measured: Array, stamp_ns: int) -> None:
@@ -160,6 +188,12 @@ class Mirror:
             return guess
         return command
 
+    def _free_twin(self) -> FreeTwin | None:
+        if self._measured is None:
+            return None
+        stamp_ns = self._seed_stamp_ns + self._steps * _STEP_NS
+        return FreeTwin(self._scene.twin_state, stamp_ns)
+
     def _sound(self) -> bool:
         return bool(np.isfinite(self._scene.twin_state).all())
 
@@ -177,7 +211,7 @@ class Mirror:
         ghost = self._scene.measured_pose(GHOST)
         dx, dy = twin[0] - measured[0], twin[1] - measured[1]
         cos, sin = np.cos(measured[2]), np.sin(measured[2])
-        return MirrorSample(
+        sample = MirrorSample(
             stamp_ns=state.stamp_ns,
             world_id=self._world_id,
             real=self._in_drive_frame(measured[:3], measured[3]),
@@ -191,7 +225,9 @@ class Mirror:
             gap_speed_mps=float(twin[3] - measured[3]),
             since_reset_s=(state.stamp_ns - self._seed_stamp_ns) / 1e9,
             independent=self._independent,
+            twin_yaw_rate_radps=float(twin[5]),
         )
+        return self._casting.told(sample)
 
     def _twin_at(self, stamp_ns: int) -> Array:
         """Return the twin's state (8,), carried on by the part of a step that is left."""
@@ -204,10 +240,4 @@ class Mirror:
         return twin
 
     def _in_drive_frame(self, pose: Array, speed_mps: float) -> PlaneState:
-        there = target_from_source(self._drive_frame, self._frame, pose[None, :2], pose[None, 2])
-        return PlaneState(
-            x_m=float(there.xy_m[0, 0]),
-            y_m=float(there.xy_m[0, 1]),
-            yaw_rad=float(wrap_angle(there.yaw_rad[0])),
-            speed_mps=float(speed_mps),
-        )
+        return plane_state(pose, speed_mps, drive_frame=self._drive_frame, world_frame=self._frame)

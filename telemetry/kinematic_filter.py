@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from contracts.arrays import Array
+from telemetry import motion_noise
 
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
 GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
@@ -22,32 +23,11 @@ _IDENTITY = np.eye(SIZE)
 
 MAX_CURVATURE_PM = 0.25
 """A turning circle of 8 m across: tighter than any passenger car's."""
-GNSS_CORRELATION_S = 30.0
-"""How long the error of a receiver without corrections stays alike: satellites, air, walls."""
 _MAX_STEP_S = 0.05
 _DRIFT_M = 0.03
 _STANDING_CURVATURE_PM = 0.1
 _LEAST_TURN_RAD = 0.002
 _KNOWN_YAW_VAR = 0.15**2
-_JERK_DENSITY = 4.0**2
-"""(m/s³)² s: acceleration wanders by 4 m/s² in one second."""
-_CURVATURE_RATE_PMPS = 0.25
-"""Of a fast turn of the wheel at walking speed; less would make the yaw rate lag by over 0.2 s."""
-_LATERAL_JERK_MPS3 = 5.0
-"""Limits how fast the curvature changes at speed: v² dκ/dt."""
-_SLIP_DENSITY = 0.01**2
-"""rad² / s: the body's direction differs from the path's by the rear tyres' slip."""
-_GYRO_SLIP_DENSITY = 0.0005**2
-"""The same where a gyro tells the body's turning from the path's and the slip is estimated."""
-_GYRO_BIAS_DENSITY = (2e-5) ** 2
-"""(rad/s)² / s: an automotive gyro warms up by 0.01 °/s in a minute."""
-_ACCEL_BIAS_DENSITY = 0.02**2
-"""(m/s²)² / s: the grade of the road changes with the place."""
-_SLIP_RADPMPS2 = (0.004, 0.002)
-"""The rear axle's slip per lateral acceleration, mean and spread over passenger cars: load over
-cornering stiffness (Gillespie 1992, 6-2)."""
-_SCALE_STD = 0.01
-"""Of a wheel's radius against the one its speed was calibrated with."""
 
 
 class KinematicFilter:
@@ -64,11 +44,20 @@ class KinematicFilter:
         self.mean: Array = np.zeros(SIZE)
         self.mean[: CURVATURE + 1] = xy_m[0], xy_m[1], yaw_rad, speed_mps, 0.0, 0.0
         spread = np.zeros(SIZE)
-        spread[: ACCEL_BIAS + 1] = 0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05, 0.01, 0.1
+        spread[: ACCEL_BIAS + 1] = (
+            0.1,
+            0.1,
+            yaw_std_rad,
+            1.0,
+            1.0,
+            0.05,
+            motion_noise.GYRO_BIAS_STD_RADPS,
+            0.1,
+        )
         self.covariance: Array = np.diag(spread * spread)
         self.may_reverse = speed_mps < 0.0
         self._gnss_std_m = 0.0
-        self._slip_density = _SLIP_DENSITY
+        self._slip_density = motion_noise.SLIP_DENSITY
 
     def copy(self) -> KinematicFilter:
         """Return another filter that goes on from the same state."""
@@ -113,7 +102,7 @@ class KinematicFilter:
         jacobian[X, SLIP], jacobian[Y, SLIP] = -by_slip * sin, by_slip * cos
         jacobian[YAW, SPEED : CURVATURE + 1] = curvature * dt, curvature * half, distance
         jacobian[SPEED, ACCEL] = dt
-        fading = math.exp(-dt / GNSS_CORRELATION_S)
+        fading = math.exp(-dt / motion_noise.GNSS_CORRELATION_S)
         jacobian[GNSS_X, GNSS_X] = jacobian[GNSS_Y, GNSS_Y] = fading
         mean = self.mean.copy()
         mean[:5] = (
@@ -122,13 +111,10 @@ class KinematicFilter:
         )  # fmt: skip
         mean[GNSS_X : GNSS_Y + 1] *= fading
         self.mean = mean
-        turning = min(_CURVATURE_RATE_PMPS, _LATERAL_JERK_MPS3 / max(speed * speed, 1e-6))
         covariance = jacobian @ self.covariance @ jacobian.T
         noise = covariance.reshape(-1)[:: SIZE + 1]  # a view of the diagonal
-        noise[YAW : ACCEL_BIAS + 1] += (
-            self._slip_density * min(1.0, abs(speed) / 10.0) * dt, 0.0, _JERK_DENSITY * dt,
-            turning * turning * dt, _GYRO_BIAS_DENSITY * dt, _ACCEL_BIAS_DENSITY * dt,
-        )  # fmt: skip
+        wandering = motion_noise.densities(speed, slip=self._slip_density)
+        noise[YAW : ACCEL_BIAS + 1] += dt * np.array(wandering)
         if self._gnss_std_m:
             noise[GNSS_X : GNSS_Y + 1] += self._gnss_std_m**2 * (1.0 - fading * fading)
         self.covariance = covariance
@@ -155,6 +141,11 @@ class KinematicFilter:
         offset: Array = np.array([cos * forward - sin * left, sin * forward + cos * left])
         return self.mean[:2] + offset
 
+    def know_gyro_bias(self, bias_radps: float, std_radps: float) -> None:
+        """Begin with a gyro's bias that was learnt while the car stood."""
+        self.mean[GYRO_BIAS] = bias_radps
+        self.covariance[GYRO_BIAS, GYRO_BIAS] = std_radps * std_radps
+
     def doubt_position(self, std_m: float) -> None:
         """Make the place unknown within `std_m` and tell it apart from what else is known."""
         self.covariance[:2, :] = 0.0
@@ -162,7 +153,7 @@ class KinematicFilter:
         self.covariance[X, X] = self.covariance[Y, Y] = std_m * std_m
 
     def expect_wander(self, std_m: float) -> None:
-        """Let positions have an error of `std_m` that stays alike over GNSS_CORRELATION_S."""
+        """Let positions have an error of `std_m` that stays alike for half a minute."""
         missing = std_m * std_m - self._gnss_std_m**2
         if missing > 0.0:
             self.covariance[GNSS_X, GNSS_X] += missing
@@ -197,11 +188,13 @@ class KinematicFilter:
         return float(np.hypot(*(xy_m - expected))), math.sqrt(spread)
 
     def correct_position(
-        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool = False
-    ) -> None:
+        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool = False,
+        hold_yaw: bool = False,
+    ) -> None:  # fmt: skip
         """Apply a position (2,) of a sensor at `lever_m` with white noise of `std_m`.
 
         `wander` says that the receiver's own slow error lies on top, as `expect_wander` has it.
+        With `hold_yaw` the yaw stays as it is, and so does what is known of it.
         """
         expected, rows = self._position_rows(lever_m, wander=wander)
         cross = self.covariance @ rows.T
@@ -209,8 +202,13 @@ class KinematicFilter:
         a, d = a + std_m * std_m, d + std_m * std_m
         inverse = np.array([[d, -b], [-b, a]]) / (a * d - b * b)
         gain = cross @ inverse
-        self.mean = self.mean + gain @ (xy_m - expected)
         covariance = self.covariance - gain @ cross.T
+        if hold_yaw:
+            # Any gain but the best one costs (K - K_best) S (K - K_best)': here in the yaw alone.
+            kept = gain[YAW].copy()
+            covariance[YAW, YAW] += kept @ cross[YAW]
+            gain[YAW] = 0.0
+        self.mean = self.mean + gain @ (xy_m - expected)
         self.covariance = 0.5 * (covariance + covariance.T)
         self._limit()
 
@@ -242,7 +240,7 @@ class KinematicFilter:
     def correct_speed(self, speed_mps: float, std_mps: float) -> None:
         """Apply a measured speed, whose scale is estimated."""
         if self.covariance[SPEED_SCALE, SPEED_SCALE] == 0.0:
-            self.covariance[SPEED_SCALE, SPEED_SCALE] = _SCALE_STD**2
+            self.covariance[SPEED_SCALE, SPEED_SCALE] = motion_noise.SPEED_SCALE_STD**2
         row = np.zeros(SIZE)
         row[SPEED], row[SPEED_SCALE] = 1.0 + self.mean[SPEED_SCALE], self.mean[SPEED]
         self.correct(row, speed_mps - self.mean[SPEED] * row[SPEED], std_mps)
@@ -266,9 +264,9 @@ class KinematicFilter:
 
     def _know_slip(self) -> None:
         """Tell the body's heading from the path's: a gyro shows how they part."""
-        self._slip_density = _GYRO_SLIP_DENSITY
+        self._slip_density = motion_noise.GYRO_SLIP_DENSITY
         if self.covariance[SLIP, SLIP] == 0.0:
-            self.mean[SLIP], std = _SLIP_RADPMPS2
+            self.mean[SLIP], std = motion_noise.SLIP_RADPMPS2
             self.covariance[SLIP, SLIP] = std * std
 
     def correct_accel(self, accel_mps2: float, std_mps2: float) -> None:

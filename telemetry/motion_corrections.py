@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 from contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
+from telemetry.gyro import Gyro
 from telemetry.kinematic_filter import SPEED, YAW, KinematicFilter
 from telemetry.measured import Doubt, Measured
 
-_GYRO_STD_RADPS = 0.005
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
 
@@ -22,6 +22,7 @@ class MotionCorrections:
         self._wheelbase_m = wheelbase_m
         self._speed_doubt = Doubt(0.05)
         self._yaw_doubt = Doubt(0.02)
+        self._gyro = Gyro()
 
     def copy(self, measured: Measured) -> MotionCorrections:
         """Return others with the same doubts, which read `measured`."""
@@ -30,7 +31,18 @@ class MotionCorrections:
         other._measured = measured
         other._speed_doubt = self._speed_doubt.copy()
         other._yaw_doubt = self._yaw_doubt.copy()
+        other._gyro = self._gyro.copy()
         return other
+
+    def watch(self, message: Any, *, standing: bool) -> None:
+        """Let the gyro show its noise, and its bias while measured speed says the car stands."""
+        if isinstance(message, ImuSample):
+            standing = standing and self._measured.fresh("speed_mps", message.stamp_ns)
+            self._gyro.take(message.stamp_ns, message.rate_radps[2], standing=standing)
+
+    def begin(self, filter_: KinematicFilter) -> None:
+        """Give a new filter what is known of the sensors already."""
+        filter_.know_gyro_bias(self._gyro.bias_radps, self._gyro.bias_std_radps)
 
     def correct(self, filter_: KinematicFilter, message: Any, *, convergence_rad: float) -> None:
         """Correct a filter already predicted to the sample's stamp.
@@ -41,7 +53,7 @@ class MotionCorrections:
             case SpeedSample(speed_mps=speed):
                 self._correct_speed(filter_, speed)
             case ImuSample(accel_mps2=accel, rate_radps=rate):
-                filter_.correct_yaw_rate(rate[2], _GYRO_STD_RADPS, biased=True)
+                filter_.correct_yaw_rate(rate[2], self._gyro.std_radps, biased=True)
                 filter_.correct_accel(accel[0], 0.5)
             case HeadingSample(yaw_rad=yaw, yaw_rate_radps=yaw_rate):
                 local_yaw = yaw + convergence_rad

@@ -47,10 +47,9 @@ class MotionTrack:
         self._lever = info.body_from_antenna_m or (0.0, 0.0, 0.0)
         self._gate = PositionGate()
         self._measured = Measured(
-            steering_ratio=steering_ratio,
-            steering_offset_rad=steering_offset_rad,
+            steering_ratio=steering_ratio, steering_offset_rad=steering_offset_rad,
             skipped=self._gate.skipped,
-        )
+        )  # fmt: skip
         self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
         self._place: LocalPlace | None = None
         self._start_ns = 0
@@ -101,6 +100,7 @@ class MotionTrack:
         filter_ = self._advance(message.stamp_ns)
         if isinstance(message, SpeedSample):
             self._standing = abs(message.speed_mps) < STANDING_MPS
+        self._corrections.watch(message, standing=self._standing)
         if filter_ is not None:
             self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
         elif isinstance(message, HeadingSample):
@@ -172,11 +172,13 @@ class MotionTrack:
             return
         self._shifts = 0
         yaw_before = filter_.mean[YAW]
+        wheels = self._measured.fresh("speed_mps", self._filter_stamp_ns)
         if abs(filter_.mean[SPEED]) < _CREEPING_MPS and not wander:
             filter_.drift_sideways(xy, std, lever)
-        filter_.correct_position(xy, white, lever, wander=wander)
+        hold = wheels and self._standing
+        filter_.correct_position(xy, white, lever, wander=wander, hold_yaw=hold)
         filter_.limit_turn(yaw_before, moved_m=self._gate.last_step_m)
-        if not self._measured.fresh("speed_mps", self._filter_stamp_ns):
+        if not wheels:
             self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
             if self._standing:
                 filter_.stand()
@@ -225,6 +227,7 @@ class MotionTrack:
             speed_mps=self._measured.speed_mps if measured else self._gate.speed_mps(),
             yaw_std_rad=yaw_std_rad,
         )
+        self._corrections.begin(self._filter)
         self._filter_stamp_ns = stamp_ns
         if self._wanders:
             assert self._fix is not None
@@ -277,12 +280,9 @@ class MotionTrack:
         position = self._position_out(fix)
         if self._filter is None:
             return unmoved_state(
-                self._measured,
-                vehicle_id=self._info.vehicle_id,
-                stamp_ns=stamp_ns,
-                position=position,
-                position_std_m=self._fix.std_m,
-            )
+                self._measured, vehicle_id=self._info.vehicle_id, stamp_ns=stamp_ns,
+                position=position, position_std_m=self._fix.std_m,
+            )  # fmt: skip
         return moving_state(
             self._filter,
             self._measured,

@@ -112,6 +112,7 @@ def drive_blueprint(
                     short,
                     _plot("/comparison/plan", "Plan", last_30_s, legend=True),
                     rrb.TextDocumentView(origin="/scenarios/table", name="Scenarios"),
+                    _plot("/correction", "Correction, m/s²", last_30_s, legend=True),
                     active_tab=0 if detail == "Comparison" else 3,
                 ),
                 row_shares=[1.0, 1.0, 1.0, 1.6],

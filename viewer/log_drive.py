@@ -11,27 +11,13 @@ from contracts.arrays import Array
 from contracts.drive import GnssFix, PlannedTrajectory, VehicleState
 from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, wrap_angle
 from contracts.simulation import MirrorSample, PlaneState
+from viewer.log_roles import GHOST, SHADOW, TWIN, RolesLog, box_of, pose_of
 from viewer.meshes import Colour
 from viewer.rows import Row, static
 
-REAL: Colour = (245, 246, 250)
-TWIN: Colour = (0, 200, 255)
-SHADOW: Colour = (178, 132, 255)
-GHOST: Colour = (255, 120, 200)
 TRAIL: Colour = (126, 132, 144)
 PLAN: Colour = (88, 150, 255)
 LIMIT: Colour = (229, 72, 66)
-
-CARS: dict[str, tuple[Colour, float]] = {
-    "real": (REAL, 0.0),
-    "twin": (TWIN, 0.02),
-    "shadow": (SHADOW, 0.05),
-    "ghost": (GHOST, 0.08),
-}
-"""Colour of each car, and by how many metres its wireframe stands off, so that all are seen."""
-
-CAR_LENGTH_M, CAR_WIDTH_M, CAR_HEIGHT_M, REAR_OVERHANG_M = 4.5, 1.8, 1.5, 0.95
-"""A drawn car; base_link is the rear-axle centre on the ground."""
 
 GAP_LIMITS = {"pos_m": 1.5, "yaw_deg": 5.0, "speed_mps": 1.0}
 """The lines drawn in the gap plots: beyond them a gap is worth a look."""
@@ -50,25 +36,9 @@ FOCUS_TIME_CONSTANT_S = 1.5
 def static_rows() -> list[Row]:
     """Return what never changes: axes, the cars' boxes, the colours of the curves."""
     rows = [static("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)]
-    for name, (colour, margin_m) in CARS.items():
-        half = [
-            CAR_LENGTH_M / 2 + margin_m,
-            CAR_WIDTH_M / 2 + margin_m,
-            CAR_HEIGHT_M / 2 + margin_m,
-        ]
-        centre = [CAR_LENGTH_M / 2 - REAR_OVERHANG_M, 0.0, CAR_HEIGHT_M / 2 + 0.05]
-        rows.append(
-            static(
-                f"world/ego/{name}",
-                rr.Boxes3D(
-                    half_sizes=[half],
-                    centers=[centre],
-                    colors=[colour],
-                    radii=0.04,
-                    fill_mode="solid" if name == "real" else "majorwireframe",
-                ),
-            )
-        )
+    rows += [
+        static(f"world/ego/{name}", box_of(name)) for name in ("real", "twin", "shadow", "ghost")
+    ]
     # Said once for all instants: turned into Rerun's form each time, colours cost most of a row.
     mark, place, fix = (rr.Radius.ui_points(size) for size in (6, 9, 3))
     rows += [
@@ -111,6 +81,7 @@ class DriveLog:
         self._frame = drive_frame
         self._last_ns: dict[str, int] = {}
         self._trail: collections.deque[tuple[int, Array, tuple[float, float]]] = collections.deque()
+        self._roles = RolesLog()
         self._yaw_rad = 0.0
         self._junction: Array | None = None
         self._focus: Array | None = None
@@ -142,7 +113,7 @@ class DriveLog:
         while drive_ns - self._trail[0][0] > TRAIL_S * 1e9 or self._trail[0][0] > drive_ns:
             self._trail.popleft()
         rows = [
-            Row("world/ego/real", drive_ns, _pose(here, self._yaw_rad)),
+            Row("world/ego/real", drive_ns, pose_of(here, self._yaw_rad)),
             Row("world/focus", drive_ns, rr.Transform3D(translation=self._look(here, drive_ns))),
             # From straight above, the car itself is a few pixels.
             Row(
@@ -203,14 +174,11 @@ class DriveLog:
         return [Row("world/plan", drive_ns, rr.LineStrips3D([line]))]
 
     def mirror(self, sample: MirrorSample, drive_ns: int) -> list[Row]:
-        """Return the poses of twin, shadow and ghost, and the gaps to the real car."""
+        """Return who stands where in which role, and the free twin's gaps to the real car."""
         if not self._due("mirror", drive_ns):
             return []
         real, shadow = sample.real, sample.shadow
-        rows = [
-            Row(f"world/ego/{name}", drive_ns, _pose(np.array([car.x_m, car.y_m]), car.yaw_rad))
-            for name, car in (("twin", sample.twin), ("shadow", shadow), ("ghost", sample.ghost))
-        ]
+        rows = self._roles.rows(sample, drive_ns)
         twin_gap = (sample.gap_m, np.degrees(sample.gap_yaw_rad), sample.gap_speed_mps)
         for quantity, twin, other in zip(GAP_LIMITS, twin_gap, _gap(shadow, real), strict=True):
             rows += [
@@ -230,11 +198,4 @@ def _gap(car: PlaneState, real: PlaneState) -> tuple[float, float, float]:
         float(np.hypot(car.x_m - real.x_m, car.y_m - real.y_m)),
         float(np.degrees(wrap_angle(car.yaw_rad - real.yaw_rad))),
         car.speed_mps - real.speed_mps,
-    )
-
-
-def _pose(xy_m: Array, yaw_rad: float) -> rr.Transform3D:
-    return rr.Transform3D(
-        translation=[float(xy_m[0]), float(xy_m[1]), 0.0],
-        quaternion=rr.Quaternion(xyzw=[0.0, 0.0, np.sin(yaw_rad / 2.0), np.cos(yaw_rad / 2.0)]),
     )

@@ -7,8 +7,11 @@ import numpy.typing as npt
 import rerun as rr
 
 from contracts.arrays import Array, Array32
+from contracts.frames import LocalFrame, local_from_geo
+from contracts.side_by_side import Disagreement
 from contracts.simulation import Comparison, PlanComparison, RoundView
-from viewer.log_drive import PLAN, TWIN
+from viewer.log_drive import PLAN
+from viewer.log_roles import TWIN
 from viewer.meshes import Colour
 from viewer.rows import Row, static, table_cell
 
@@ -175,3 +178,16 @@ def rows_of_plan_comparison(comparison: PlanComparison, drive_ns: int) -> list[R
         Row("comparison/plan/ade_m", drive_ns, rr.Scalars(comparison.difference.ade_m)),
         Row("comparison/plan/path_offset_m", drive_ns, rr.Scalars(comparison.path_offset_m)),
     ]
+
+
+def rows_of_disagreement(one: Disagreement, drive_ns: int, frame: LocalFrame) -> list[Row]:
+    """Return a mark where human and ADS begin to disagree; its label says about what."""
+    if one.over:
+        return []
+    place = local_from_geo(frame, one.position.lat_deg, one.position.lon_deg)
+    at = [float(place[0]), float(place[1]), 2.0]
+    mark = rr.Points3D(
+        [at], colors=[CRITICAL], radii=rr.Radius.ui_points(7), labels=[one.kind.replace("_", " ")]
+    )
+    # A place of its own for each: marks stay on the map.
+    return [Row(f"world/disagreements/{one.aspect}_{one.stamp_ns}", drive_ns, mark)]

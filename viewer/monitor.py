@@ -12,12 +12,13 @@ from contracts.codec import read_message
 from contracts.frames import LocalFrame
 from contracts.simulation import ActiveWorld, Event, WorldNotice
 from contracts.world import ATTRIBUTION, World
-from viewer import log_drive, log_scenarios
+from viewer import log_drive, log_roles, log_scenarios
 from viewer.log_drive import DriveLog
 from viewer.log_run import RunLog, rows_of_event
 from viewer.log_scenarios import (
     no_futures,
     rows_of_comparison,
+    rows_of_disagreement,
     rows_of_plan_comparison,
     rows_of_round,
 )
@@ -26,8 +27,8 @@ from viewer.rows import Row
 
 VEHICLE_CHANNELS = ("state", "gnss", "plan", "end")
 RUN_CHANNELS = (
-    "round", "comparison", "plan_comparison", "mirror", "active_world", "world", "worker_status",
-    "progress", "event",
+    "round", "comparison", "plan_comparison", "disagreement", "mirror", "active_world", "world",
+    "worker_status", "progress", "event",
 )  # fmt: skip
 
 _log = logging.getLogger(__name__)
@@ -75,6 +76,7 @@ class Monitor:
             "round": rows_of_round,
             "comparison": rows_of_comparison,
             "plan_comparison": rows_of_plan_comparison,
+            "disagreement": lambda one, ns: rows_of_disagreement(one, ns, self._frame),
             "mirror": self._drive.mirror,
             "active_world": self._active_world,
             "world": self._world,
@@ -87,6 +89,7 @@ class Monitor:
         """Return the rows that come before every message."""
         return [
             *log_drive.static_rows(),
+            *log_roles.static_rows(),
             *log_scenarios.static_rows(),
             *self._run.static_rows(),
             self._run.first_status(),

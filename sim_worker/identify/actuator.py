@@ -14,7 +14,7 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
-from sim_worker.identify.regression import Fit, fit_linear, stretches
+from sim_worker.identify.regression import Fit, fit_linear
 from sim_worker.identify.smoothing import delayed, smoothed
 from sim_worker.motion_record import MotionRecord
 
@@ -23,8 +23,6 @@ MAX_DELAY_S = 0.6
 _GRID_S = 0.02
 _RATE_SHARE = 0.8
 _SLOWEST_MPS = 0.5
-_MODEL_STD_S = 0.001
-"""What a first-order lag and an even grid leave unsaid of delay and lag."""
 
 
 class FollowingFit(NamedTuple):
@@ -56,6 +54,21 @@ def delays() -> Array:
     return np.asarray(np.arange(round(MAX_DELAY_S / _GRID_S) + 1) * _GRID_S, dtype=np.float64)
 
 
+def _blur_s(values: Array, *, period_s: float) -> float:
+    """Return by how much lines drawn between samples blur a signal, as a standard deviation.
+
+    The mean over all instants is a triangle as wide as two samples are apart, and how far they are
+    apart shows in (N,) itself: between them, the slope does not change.
+    """
+    bends = np.abs(np.diff(values, 2))
+    bends = bends[np.isfinite(bends)]
+    if not bends.any():
+        return 0.0
+    share = float(np.mean(bends > 1e-9 * np.max(bends)))
+    apart_s = period_s / share
+    return apart_s / math.sqrt(6.0) if apart_s > 1.5 * period_s else 0.0
+
+
 def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> FollowingFit:
     """Fit how the measured steering follows its command; ValueError saying what it lacks.
 
@@ -72,7 +85,8 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
     angle = smoothed(measured, period_s=period_s, width_s=WIDTH_S)
     rate = smoothed(measured, period_s=period_s, width_s=WIDTH_S, derivative=True)
     # A held command lies half its period later than its stamps say once it is smoothed.
-    asked = smoothed(command, period_s=period_s, width_s=WIDTH_S)
+    blur_s = _blur_s(measured, period_s=period_s)
+    asked = smoothed(command, period_s=period_s, width_s=math.hypot(WIDTH_S, blur_s))
     asked = delayed(asked, period_s=period_s, delay_s=0.5 * period_s)
     asking = np.gradient(asked, period_s)
     driving = np.nan_to_num(np.abs(record.speed_mps), nan=1.0) > _SLOWEST_MPS
@@ -92,7 +106,6 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
         solved = np.linalg.solve(columns.T @ columns + 1e-9 * np.eye(3), columns.T @ dw)
         errors.append(float(np.mean(np.square(dw - columns @ solved))))
     delay_s = best_delay(errors)
-    stretch = stretches(record.time_s[used])
     fit: Fit | None = None
     for _ in range(4):
         due = delayed(asked, period_s=period_s, delay_s=delay_s)[used]
@@ -100,19 +113,22 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
         plain = np.stack([due, np.ones_like(w), -w], axis=1)
         start = np.linalg.lstsq(plain, dw, rcond=None)[0] if fit is None else fit.values[:3]
         columns = np.column_stack([plain, -start[0] * changing])
-        fit = fit_linear(columns, dw, stretch)
+        fit = fit_linear(columns, dw, record.time_s[used])
         delay_s = float(np.clip(delay_s + fit.values[3], 0.0, MAX_DELAY_S))
     assert fit is not None
     follows, rate_ps = float(fit.values[0]), float(fit.values[2])
     lag_s, gain = 1.0 / rate_ps, follows / rate_ps
+    # A blur of s looks like s²/2τ more lag and less delay. It is s on the average alone: how the
+    # samples fall upon the steps of the command repeats, and may make nothing of it or double it.
+    step_half_s = fit.quantile * blur_s**2 / (2.0 * lag_s)
     slope = np.array([1.0 / rate_ps, 0.0, -gain / rate_ps, 0.0])
     gain_std = float(np.sqrt(slope @ fit.covariance @ slope))
     return FollowingFit(
         delay_s=delay_s,
-        delay_half_s=math.hypot(fit.half_width(3), fit.quantile * _MODEL_STD_S),
+        delay_half_s=math.hypot(fit.half_width(3), step_half_s[3]),
         lag_s=lag_s,
-        lag_half_s=math.hypot(fit.half_width(2) * lag_s**2, fit.quantile * _MODEL_STD_S),
+        lag_half_s=math.hypot(fit.half_width(2) * lag_s**2, step_half_s[2]),
         gain=gain,
-        gain_half=fit.quantile * gain_std,
+        gain_half=float(fit.quantile[0]) * gain_std,
         moving_s=moving_s,
     )

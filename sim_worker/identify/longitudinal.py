@@ -3,7 +3,8 @@
 On the road, e a = G_d u⁺ - G_b u⁻ - (c v² + R)/m - g sin(grade), with the effective mass factor e,
 the command u of `accel_delay_s` ago, drive and brake gains G, drag c and rolling resistance R.
 Acceleration is the slope of the measured speed: an accelerometer would feel the body's pitch. In a
-bend it contains what the turned front wheels take, F_yf sin(δ), up to 0.2 m/s² in town.
+bend it contains what the turned front wheels take, F_yf sin(δ), up to 0.2 m/s² in town. What is
+left is noise of the measured speed: over 6 s it averages out as white noise does.
 """
 
 from __future__ import annotations
@@ -16,19 +17,15 @@ from scipy import signal
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from sim_worker.identify.actuator import best_delay, delays
-from sim_worker.identify.regression import Fit, fit_linear, stretches
+from sim_worker.identify.regression import Fit, fit_linear
+from sim_worker.identify.single_track import SLOWEST_MPS, sideways
 from sim_worker.identify.smoothing import delayed, smoothed
 from sim_worker.motion_record import MotionRecord
 from sim_worker.vehicle.parameters import GRAVITY_MPS2
 
 WIDTH_S = 0.1
-_SLOWEST_MPS = 2.0
 DRIVE, BRAKE, DRAG, ROLLING, DELAY = range(5)
 _DRIVES_MPS2 = 0.3
-_MODEL_STD_S = 0.003
-"""Tyres and wheels need some milliseconds to slip: a delay of motion that is not the actuator's."""
-_BRAKE_MODEL_STD = 0.002
-"""Braked wheels slip: measured speed falls a little more than the car's."""
 LEAST_DRIVING_S, LEAST_BRAKING_S, _LEAST_S = 4.0, 3.0, 1.0
 
 
@@ -65,12 +62,23 @@ def _cornering(record: MotionRecord, vehicle: VehicleParameters, speed_mps: Arra
     rate = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S)
     turning = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S, derivative=True)
     base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
-    mass, lateral = vehicle.mass_kg.value, speed_mps * rate
-    tyre = np.arctan2(base * rate, np.maximum(speed_mps, _SLOWEST_MPS))
-    front = rear / base * lateral + vehicle.yaw_inertia_kgm2.value / (mass * base) * turning
-    on_rear = mass * (base - rear) / base / vehicle.rear_cornering_stiffness_npr.value
-    across = rear * rate - on_rear * lateral * speed_mps
-    return np.asarray(front * np.sin(tyre) - rate * across)
+    side = sideways(vehicle, speed_mps=speed_mps, yaw_rate_radps=rate, yaw_accel_radps2=turning,
+                    period_s=period_s)  # fmt: skip
+    ahead = np.arctan2(side.speed_mps + (base - rear) * rate, np.maximum(speed_mps, SLOWEST_MPS))
+    slip = side.front_mps2 * vehicle.mass_kg.value / vehicle.front_cornering_stiffness_npr.value
+    return np.asarray(side.front_mps2 * np.sin(ahead + slip) - rate * side.speed_mps)
+
+
+def _spinning_s(vehicle: VehicleParameters, speed_mps: Array) -> Array:
+    """Return how long (N,) the wheels take to spin up to the slip that carries a force.
+
+    Their inertia times speed over the tyres' slip stiffness, which is about their cornering
+    stiffness (Pacejka 2012, section 8.2): 2 ms in town, and no delay of the actuator.
+    """
+    inertia = (vehicle.wheel_inertia_mass_factor.value - 1.0) * vehicle.mass_kg.value
+    stiffness = vehicle.front_cornering_stiffness_npr.value
+    stiffness += vehicle.rear_cornering_stiffness_npr.value
+    return np.asarray(inertia * speed_mps / stiffness)
 
 
 def fit_longitudinal(
@@ -99,7 +107,7 @@ def fit_longitudinal(
     usable = np.isfinite(speed) & np.isfinite(accel) & np.isfinite(climbing) & ~record.manual
     usable &= np.isfinite(bends)
     # The smoothing must not reach into standstill, where brakes hold rather than slow.
-    usable &= speed > _SLOWEST_MPS
+    usable &= speed > SLOWEST_MPS
     reach = delayed(parts[0] + parts[1], period_s=period_s, delay_s=float(delays()[-1]))
     usable &= np.isfinite(reach) & np.isfinite(parts[0])
     used = np.flatnonzero(usable)
@@ -111,13 +119,19 @@ def fit_longitudinal(
     if min(driving_s, braking_s) < _LEAST_S:
         raise ValueError(too_little(driving_s, braking_s))
     effective = vehicle.wheel_inertia_mass_factor.value
-    target = effective * (accel + bends)[used]
-    target += GRAVITY_MPS2 * climbing[used]
+    target = effective * accel[used] + bends[used] + GRAVITY_MPS2 * climbing[used]
     v = speed[used]
     steady = [-np.square(v), -np.ones_like(v)]
 
+    slopes = [np.gradient(part, period_s) for part in parts]
+    slow_s = _spinning_s(vehicle, v)
+
     def acting(delay_s: float) -> list[Array]:
-        return [delayed(part, period_s=period_s, delay_s=delay_s)[used] for part in parts]
+        return [
+            delayed(part, period_s=period_s, delay_s=delay_s)[used]
+            - slow_s * delayed(slope, period_s=period_s, delay_s=delay_s)[used]
+            for part, slope in zip(parts, slopes, strict=True)
+        ]
 
     errors = []
     for delay_s in delays():
@@ -127,7 +141,6 @@ def fit_longitudinal(
         errors.append(float(np.mean(np.square(target - columns @ solved))))
     delay_s = best_delay(errors)
     mass = vehicle.mass_kg.value
-    slopes = [np.gradient(part, period_s) for part in parts]
     centre = np.array(
         [vehicle.drive_gain.value, vehicle.brake_gain.value, vehicle.drag_npv2.value / mass,
          vehicle.rolling_resistance_n.value / mass, 0.0]
@@ -136,21 +149,18 @@ def fit_longitudinal(
         [np.inf, np.inf, 2.0 * (vehicle.drag_npv2.std or 0.4) / mass,
          2.0 * (vehicle.rolling_resistance_n.std or 130.0) / mass, np.inf]
     )  # fmt: skip
-    stretch = stretches(record.time_s[used])
     gains = centre[:2]
     fit: Fit | None = None
     for _ in range(4):
         changing = [delayed(slope, period_s=period_s, delay_s=delay_s)[used] for slope in slopes]
         moved = -(gains[0] * changing[0] + gains[1] * changing[1])
         columns = np.stack([*acting(delay_s), *steady, moved], axis=1)
-        fit = fit_linear(columns, target, stretch, prior=centre, prior_std=spread)
+        fit = fit_linear(
+            columns, target, record.time_s[used], prior=centre, prior_std=spread, white=True
+        )
         gains = fit.values[:2]
         delay_s = max(delay_s + float(fit.values[DELAY]), 0.0)
     assert fit is not None
     values = fit.values.copy()
     values[DELAY] = delay_s
-    covariance = fit.covariance.copy()
-    covariance[DELAY, DELAY] += _MODEL_STD_S**2
-    covariance[BRAKE, BRAKE] += _BRAKE_MODEL_STD**2
-    fit = fit._replace(values=values, covariance=covariance)
-    return LongitudinalFit(fit, driving_s, braking_s)
+    return LongitudinalFit(fit._replace(values=values), driving_s, braking_s)

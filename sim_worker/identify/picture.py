@@ -48,11 +48,12 @@ def draw_steering(record: MotionRecord, vehicle: VehicleParameters, file: Path) 
     Raises ValueError where the record says nothing of the steering.
     """
     fit = fit_steering(record, vehicle)
-    time_s = record.time_s[fit.used]
-    measured = fit.yaw_rate_radps[fit.used] - fit.fit.values[GYRO_BIAS]
+    used = fit.signals.used
+    time_s = record.time_s[used]
+    measured = fit.signals.yaw_rate_radps[used] - fit.fit.values[GYRO_BIAS]
     explained = measured - fit.fit.residuals
     # A stop between two instants would else be drawn as a line.
-    jumps = np.flatnonzero(np.diff(fit.used) > 1) + 1
+    jumps = np.flatnonzero(np.diff(used) > 1) + 1
     time_s, measured, explained = (
         np.insert(values, jumps, np.nan) for values in (time_s, measured, explained)
     )

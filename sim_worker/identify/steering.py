@@ -1,47 +1,51 @@
 """Steering ratio, offset and understeer gradient from yaw rate, speed and the steering wheel.
 
-A single-track car's rear axle turns with r = v/L tan(w/i + δ0 - K v r - T dr/dt), with steering
-wheel w, ratio i, offset δ0 at the tyre, understeer gradient K (Gillespie 1992, eq. 6-15), and
-T = I_z/L (1/C_f + 1/C_r) for what the tyres need to turn the body. The gyro's bias is estimated
-along, from standstill most of all.
+The model is that of `steering_signals`; the gyro's bias is estimated along, from standstill most
+of all.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
-from sim_worker.identify.regression import Fit, fit_linear, stretches
-from sim_worker.identify.smoothing import smoothed
+from sim_worker.identify.regression import Fit, fit_linear
+from sim_worker.identify.steering_signals import (
+    GYRO_BIAS,
+    INVERSE_RATIO,
+    OFFSET,
+    UNDERSTEER,
+    WIDTH_S,
+    SteeringSignals,
+    steering_signals,
+)
 from sim_worker.motion_record import MotionRecord
 from sim_worker.vehicle.parameters import understeer_gradient
 
-Indices = np.ndarray[Any, np.dtype[np.int64]]
-WIDTH_S = 0.1
-_SLOWEST_MPS = 2.0
-_MAX_LATERAL_MPS2 = 4.0
-"""Beyond it, tyres are no longer linear."""
+__all__ = ["GYRO_BIAS", "INVERSE_RATIO", "OFFSET", "UNDERSTEER", "SteeringFit", "fit_steering"]
+
+_WEAK = 3.0
+"""Priors count with as many times their standard deviation: what the file says carries what the
+driving leaves open, and does not pull at what it tells. Intervals hold for any car, not only on
+the average of cars like the file's."""
 _GYRO_BIAS_STD_RADPS = 0.02
 _OFFSET_STD_RAD = 0.1
-_PLAY_RAD = math.radians(0.6)
+PLAY_RAD = math.radians(0.6)
 """Between steering wheel and tyres: play, friction, twist and the sensor's steps, as a standard
 deviation. On centre it is a good part of the angle, and makes the ratio look too large."""
-INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING, GYRO_BIAS = range(5)
+_PULL_STD_RAD_PER_MPS2 = 0.002
+"""A driver corrects half a degree at the steering wheel for each m/s² without a thought."""
+_LAG_STD_S = 0.05
 
 
 class SteeringFit(NamedTuple):
-    """`fit` of 1/ratio, offset, K, T and gyro bias; what each instant (N,) was and was told."""
+    """`fit` of the parameters that `steering_signals` lists, and what it was fitted to."""
 
     fit: Fit
-    used: Indices
-    """Instants that counted, as indices."""
-    speed_mps: Array
-    yaw_rate_radps: Array
-    wheel_rad: Array
+    signals: SteeringSignals
     hidden_share: float
     """Of the steering wheel's variance, what play may account for."""
 
@@ -81,71 +85,45 @@ def turning_s2(vehicle: VehicleParameters) -> float:
 
 def _inverse_ratio_std(vehicle: VehicleParameters) -> float:
     ratio = vehicle.steering_ratio
-    return 3.0 * (ratio.std or 0.2 * abs(ratio.value)) / ratio.value**2
+    return _WEAK * (ratio.std or 0.2 * abs(ratio.value)) / ratio.value**2
 
 
 def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFit:
     """Fit the steering of a record at even instants; raises ValueError saying what it lacks."""
-    for name, told in (
-        ("wheel_rad", "steering-wheel angle"),
-        ("speed_mps", "speed"),
-        ("yaw_rate_radps", "yaw rate"),
-    ):
-        if not record.has(name):
-            raise ValueError(f"no {told} was measured for half of the time")
-    period_s = float(record.time_s[1])
-    wheel = smoothed(record.wheel_rad, period_s=period_s, width_s=WIDTH_S)
-    speed = smoothed(record.speed_mps, period_s=period_s, width_s=WIDTH_S)
-    rate = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S)
-    turning = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S, derivative=True)
-    known = np.isfinite(wheel) & np.isfinite(speed) & np.isfinite(rate)
-    lateral = speed * rate
-    moving = known & (speed > _SLOWEST_MPS) & (np.abs(lateral) < _MAX_LATERAL_MPS2)
-    standing = known & (np.abs(speed) < 1e-3)
-    if not moving.any():
-        raise ValueError("the car did not drive")
-    used = np.flatnonzero(moving | standing)
-    base = vehicle.wheelbase_m.value
-    per_m = np.where(moving, speed, 0.0)[used] / base
-    w, r, dr, ay = wheel[used], rate[used], turning[used], lateral[used]
-    std = vehicle.wheelbase_m.std or 0.0
+    signals = steering_signals(record, vehicle)
+    used, per_m = signals.used, signals.per_m
+    inverse = 1.0 / vehicle.steering_ratio.value
     centre = np.array(
-        [1.0 / vehicle.steering_ratio.value, vehicle.steering_offset_rad.value,
-         understeer_gradient(vehicle), turning_s2(vehicle), 0.0]
+        [inverse, vehicle.steering_offset_rad.value, understeer_gradient(vehicle),
+         turning_s2(vehicle), 0.0, 0.0, 0.0, 0.0]
     )  # fmt: skip
     spread = np.array(
-        [_inverse_ratio_std(vehicle), _OFFSET_STD_RAD, 1.5 * understeer_std(vehicle),
-         turning_s2(vehicle), _GYRO_BIAS_STD_RADPS]
+        [_inverse_ratio_std(vehicle), _OFFSET_STD_RAD, _WEAK * understeer_std(vehicle),
+         turning_s2(vehicle), _GYRO_BIAS_STD_RADPS, _LAG_STD_S * inverse,
+         _PULL_STD_RAD_PER_MPS2, _PULL_STD_RAD_PER_MPS2]
     )  # fmt: skip
-    stretch = stretches(record.time_s[used])
     # Play lasts: instants within the reach of the smoothing share it.
-    alike = 2.0 * math.sqrt(math.pi) * WIDTH_S / period_s
-    play = _PLAY_RAD / abs(vehicle.steering_ratio.value) * math.sqrt(np.mean(np.square(per_m)))
+    alike = 2.0 * math.sqrt(math.pi) * WIDTH_S / float(record.time_s[1])
+    play = PLAY_RAD / abs(vehicle.steering_ratio.value) * math.sqrt(np.mean(np.square(per_m)))
     values = centre.copy()
     fit: Fit | None = None
     for _ in range(4):
-        tyre = values[0] * w + values[1] - values[2] * ay - values[3] * dr
-        tyre = np.clip(tyre, -1.2, 1.2)
-        slope = per_m * (1.0 + np.square(np.tan(tyre)))
-        columns = np.stack([slope * w, slope, -slope * ay, -slope * dr, np.ones_like(r)], axis=1)
-        model = per_m * np.tan(tyre) + values[4]
-        fit = fit_linear(columns, r - model + columns @ values, stretch, prior=centre,
-                         prior_std=spread, least_std=play * math.sqrt(alike))  # fmt: skip
+        apart, slopes = signals.unexplained(values)
+        fit = fit_linear(slopes.T, apart + values @ slopes, record.time_s[used],
+                         prior=centre, prior_std=spread,
+                         least_std=play * math.sqrt(alike))  # fmt: skip
         moved = np.abs(fit.values - values).max()
         values = fit.values
         if moved < 1e-9:
             break
     assert fit is not None
     # What is measured is wheelbase over ratio: the doubt of the first is the second's too.
+    std = vehicle.wheelbase_m.std or 0.0
     covariance = fit.covariance.copy()
-    covariance[0, 0] += (values[0] * std / base) ** 2
-    weight = np.where(moving, speed, 0.0)[used]
-    varied = float(np.var(w * weight) / np.mean(np.square(weight)))
+    covariance[0, 0] += (values[0] * std / vehicle.wheelbase_m.value) ** 2
+    varied = float(np.var(signals.wheel_rad[used] * per_m) / np.mean(np.square(per_m)))
     return SteeringFit(
         fit=fit._replace(covariance=covariance),
-        used=used,
-        speed_mps=speed,
-        yaw_rate_radps=rate,
-        wheel_rad=wheel,
-        hidden_share=min(_PLAY_RAD**2 / (varied + 1e-12), 0.9),
+        signals=signals,
+        hidden_share=min(PLAY_RAD**2 / (varied + 1e-12), 0.9),
     )

@@ -7,40 +7,34 @@ import itertools
 import numpy as np
 
 from contracts.tuning import SteeringMapBin
-from contracts.vehicle import VehicleParameters
-from sim_worker.identify.regression import fit_linear, stretches
-from sim_worker.identify.smoothing import smoothed
-from sim_worker.identify.steering import GYRO_BIAS, OFFSET, TURNING, UNDERSTEER, SteeringFit
+from sim_worker.identify.regression import fit_linear
+from sim_worker.identify.steering import SteeringFit
 from sim_worker.motion_record import MotionRecord
 
 EDGES_MPS = (2.0, 5.0, 8.0, 11.0, 15.0, 20.0, 30.0, 45.0)
 _LEAST_TYRE_RAD = 0.01
-_LEAST_S = 2.0
+_LEAST_S, _ALIKE_S = 2.0, 0.5
 
 
-def steering_map(
-    record: MotionRecord, fit: SteeringFit, vehicle: VehicleParameters
-) -> tuple[SteeringMapBin, ...]:
+def steering_map(record: MotionRecord, fit: SteeringFit) -> tuple[SteeringMapBin, ...]:
     """Return the ratio in each range of speeds with 2 s of turning at least.
 
     A ratio that falls with speed in spite of the fitted understeer tells of variable-ratio
     steering; `fit` is that of the same `record`.
     """
     period_s = float(record.time_s[1])
-    at, values = fit.used, fit.fit.values
-    turning = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=0.1, derivative=True)[at]
-    speed, rate, wheel = fit.speed_mps[at], fit.yaw_rate_radps[at], fit.wheel_rad[at]
-    moving = np.maximum(speed, EDGES_MPS[0])
-    tyre = np.arctan(vehicle.wheelbase_m.value * (rate - values[GYRO_BIAS]) / moving)
-    tyre += values[UNDERSTEER] * speed * rate + values[TURNING] * turning - values[OFFSET]
+    signals, values = fit.signals, fit.fit.values
+    at = signals.used
+    speed, wheel = signals.speed_mps[at], signals.late_wheel_rad(values)[at]
+    tyre = signals.steered_rad(values)[at]
     bins = []
     for low, high in itertools.pairwise(EDGES_MPS):
         inside = (speed >= low) & (speed < high) & (np.abs(tyre) > _LEAST_TYRE_RAD)
         if inside.sum() * period_s < _LEAST_S:
             continue
-        stretch = stretches(record.time_s[at][inside], length_s=0.5)
+        time_s = record.time_s[at][inside]
         try:
-            line = fit_linear(wheel[inside][:, None], tyre[inside], stretch)
+            line = fit_linear(wheel[inside][:, None], tyre[inside], time_s, length_s=_ALIKE_S)
         except ValueError:
             continue
         inverse, half = float(line.values[0]), line.half_width(0)

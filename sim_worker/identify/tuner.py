@@ -16,7 +16,14 @@ from contracts.frames import LocalFrame
 from contracts.tuning import Identification, ParameterChange, ParameterEstimate, ParameterOrigin
 from contracts.vehicle import Parameter, VehicleParameters
 from sim_worker.identify.acceptance import accepted, in_force, is_acceptable
-from sim_worker.identify.window import UNDERSTEER_NAME, identify
+from sim_worker.identify.steering_signals import (
+    INVERSE_RATIO,
+    OFFSET,
+    UNDERSTEER,
+    steering_signals,
+)
+from sim_worker.identify.step import BendsBefore, Step, bends_before, find_step
+from sim_worker.identify.window import UNDERSTEER_NAME, examine
 from sim_worker.motion_record import MotionRecorder
 from sim_worker.vehicle.parameters import check_vehicle
 
@@ -27,15 +34,18 @@ _STEP_STDS = 4.0
 _MUCH_WIDER = 1.5
 _HALF_OF_95 = 1.96
 _STIFFNESS = "front_cornering_stiffness_npr"
+_STEERING = {"steering_ratio", "steering_offset_rad", UNDERSTEER_NAME}
+_CHECK_NS, _LOOK_BACK_NS = 2_000_000_000, 30_000_000_000
+"""How often, and how far back, bends are compared with those before."""
 
 
 class Tuner:
     """Identifies every `every_s` of drive time from the last `window_s`, and holds what counts.
 
     `handle` takes samples in any order and returns an Identification when one is due; `take` makes
-    its acceptable values count. A parameter that departs from what was identified before is a step:
-    it is named in `step_noticed`, the driving before it is forgotten, and the new value counts as
-    soon as the new driving alone tells it.
+    its acceptable values count. A parameter that departs from what was identified before is a step,
+    looked for in bends every 2 s: it is named in `step_noticed`, the driving before it is
+    forgotten, and the new value counts as soon as the new driving alone tells it.
     """
 
     def __init__(
@@ -59,7 +69,10 @@ class Tuner:
         if frame is not None:
             self._recorder = self._new_recorder(frame)
         self._from_ns: int | None = None
-        self._due_ns = 0
+        self._due_ns = self._check_ns = self._begun_ns = 0
+        self._doubted = False
+        self._bends: BendsBefore | None = None
+        self._known: BendsBefore | None = None
         self._taken: dict[str, ParameterEstimate] = {}
         self._before: dict[str, list[Parameter]] = {}
 
@@ -79,32 +92,71 @@ class Tuner:
         if self._from_ns is None:
             self._from_ns = newest_ns
             self._due_ns = newest_ns + max(self._every_ns, round(_LEAST_S * 1e9))
-        if newest_ns < self._due_ns:
+        if newest_ns >= self._check_ns:
+            self._check_ns = newest_ns + _CHECK_NS
+            step = self._find_step(newest_ns)
+            if step is not None and step.sure:
+                return self._forgotten(step, newest_ns)
+            # A bend that may be of another car must not be averaged with those before.
+            self._doubted = step is not None
+        if newest_ns < self._due_ns or self._doubted:
             return None
         self._due_ns = newest_ns + self._every_ns
         self._from_ns = max(self._from_ns, newest_ns - self._window_ns)
+        told = self._examined(newest_ns)
+        noticed = self._steps(told)
+        if not noticed:
+            return told
+        # What came before the step is of another car.
+        return self._anew(told, noticed, since_ns=newest_ns - self._every_ns)
+
+    def _examined(self, newest_ns: int) -> Identification:
+        assert self._recorder is not None
         record = self._recorder.record(self._from_ns, newest_ns, period_s=_PERIOD_S)
-        told = identify(record, self._given, vehicle_id=self._vehicle_id)
-        told = msgspec.structs.replace(
+        told, steering = examine(record, self._given, vehicle_id=self._vehicle_id)
+        self._bends = None if steering is None else bends_before(steering)
+        return msgspec.structs.replace(
             told,
             estimates=tuple(
                 msgspec.structs.replace(found, prior=in_force(self.vehicle, found.name))
                 for found in told.estimates
             ),
         )
-        noticed = self._steps(told)
-        if not noticed:
-            return told
-        # What came before the step is of another car.
-        self._from_ns = newest_ns - self._every_ns
-        self._due_ns = self._from_ns + round(_LEAST_S * 1e9)
-        for name in noticed:
-            self._taken.pop(name)
+
+    def _find_step(self, newest_ns: int) -> Step | None:
+        if self._known is None or self._recorder is None or self._from_ns is None:
+            return None
+        self._begun_ns = max(self._from_ns, newest_ns - _LOOK_BACK_NS)
+        record = self._recorder.record(self._begun_ns, newest_ns, period_s=_PERIOD_S)
+        if len(record.stamp_ns) < 2:
+            return None
+        try:
+            return find_step(steering_signals(record, self._given), self._known)
+        except ValueError:
+            return None
+
+    def _forgotten(self, step: Step, newest_ns: int) -> Identification:
+        """Return what the driving after a step tells, and go on with that alone."""
+        self._from_ns = min(self._begun_ns + round(step.after_s * 1e9), newest_ns - round(1.1e9))
+        return self._anew(self._examined(newest_ns), _in_words(step), since_ns=self._from_ns)
+
+    def _anew(
+        self, told: Identification, noticed: dict[str, str], *, since_ns: int
+    ) -> Identification:
+        self._from_ns = since_ns
+        self._due_ns = since_ns + round(_LEAST_S * 1e9)
+        names = set(noticed)
+        if names & _STEERING:
+            # One of them cannot be told without the others.
+            names |= _STEERING
+            self._known, self._doubted = None, False
+        for name in names:
+            self._taken.pop(name, None)
         return msgspec.structs.replace(
             told,
             estimates=tuple(
                 msgspec.structs.replace(found, reason="it has just changed: more driving is needed")
-                if found.name in noticed
+                if found.name in names
                 else found
                 for found in told.estimates
             ),
@@ -145,6 +197,10 @@ class Tuner:
                 self._taken[found.name] = found
         for name in names:
             self._before.setdefault(name, []).append(getattr(previous, name))
+        bends, known = self._bends, self._known
+        steered = any(found.name in _STEERING for found in better)
+        if steered and bends is not None and (known is None or not bends.knows_less(known)):
+            self._known = bends
         return changes
 
     def _is_news(self, found: ParameterEstimate) -> bool:
@@ -193,6 +249,8 @@ class Tuner:
         self._before.setdefault(name, []).append(before)
         self._given = msgspec.structs.replace(self._given, **{name: parameter})
         self._taken.pop(UNDERSTEER_NAME if name == _STIFFNESS else name, None)
+        # Bends were told by a car of other given parameters.
+        self._known = None
         return ParameterChange(
             vehicle_id=self._vehicle_id,
             stamp_ns=stamp_ns,
@@ -203,6 +261,22 @@ class Tuner:
             origin=origin,
             pinned=pinned,
         )
+
+
+def _in_words(step: Step) -> dict[str, str]:
+    """Return by name what a step changed, in words."""
+    before, after = step.before, step.after
+    if step.parameter == INVERSE_RATIO:
+        return {
+            "steering_ratio": f"steering_ratio went from {1 / before:.4g} to about {1 / after:.4g}"
+        }
+    name = {OFFSET: "steering_offset_rad", UNDERSTEER: UNDERSTEER_NAME}.get(step.parameter)
+    if name is None:
+        return {
+            UNDERSTEER_NAME: "the tyres' stiffness: the tyre angle that turning needs went from "
+            f"{before:.4g} to about {after:.4g} rad per rad/s²"
+        }
+    return {name: f"{name} went from {before:.4g} to about {after:.4g}"}
 
 
 def _std(found: ParameterEstimate) -> float:

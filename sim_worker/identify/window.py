@@ -22,17 +22,23 @@ from sim_worker.identify.steering import (
     fit_steering,
 )
 from sim_worker.identify.steering_map import steering_map
+from sim_worker.identify.step import TURNING_MPS2
 from sim_worker.motion_record import MotionRecord
 from sim_worker.vehicle.parameters import understeer_gradient
 
 UNDERSTEER_NAME = "understeer_gradient_rad_per_mps2"
-TURNING_MPS2 = 0.5
-"""Sideways acceleration from which the car counts as turning."""
 LEAST_TURNING_S, LEAST_STEERING_S = 5.0, 3.0
 _WIDE_RATIO, _WIDE_OFFSET_RAD, _WIDE_UNDERSTEER, _WIDE_GAIN, _WIDE_DELAY_S = (
-    0.05, 0.005, 0.0006, 0.08, 0.03,
+    0.05, 0.005, 0.001, 0.08, 0.03,
 )  # fmt: skip
 """Half intervals beyond which an estimate is told and not taken."""
+
+
+class Examined(NamedTuple):
+    """What a record tells, and the fit of its steering where it has one."""
+
+    told: Identification
+    steering: SteeringFit | None
 
 
 class _Interval(NamedTuple):
@@ -76,11 +82,23 @@ def identify(
     `grade` (N,) is the road's rise over run; without it, the record's altitude is asked. An
     estimate may be taken where its `reason` is empty. Raises ValueError for less than 1 s.
     """
+    return examine(record, vehicle, vehicle_id=vehicle_id, grade=grade).told
+
+
+def examine(
+    record: MotionRecord,
+    vehicle: VehicleParameters,
+    *,
+    vehicle_id: str,
+    grade: Array | None = None,
+) -> Examined:
+    """Identify as `identify` does, and return the steering's fit along."""
     if len(record.stamp_ns) < 2 or record.time_s[-1] < 1.0:
         raise ValueError(f"{len(record.stamp_ns)} instants are less than a second of driving")
     turned_s = turning_s(record)
     estimates: list[ParameterEstimate] = []
     bins: tuple[SteeringMapBin, ...] = ()
+    fit: SteeringFit | None = None
     try:
         fit = fit_steering(record, vehicle)
     except ValueError as lack:
@@ -89,12 +107,12 @@ def identify(
         ]
     else:
         estimates += _steering(fit, vehicle, turned_s)
-        bins = steering_map(record, fit, vehicle)
+        bins = steering_map(record, fit)
     estimates.append(_wheelbase(record, vehicle, turned_s))
     estimates += _following(record, vehicle)
     along, worked_s = _longitudinal(record, vehicle, grade)
     estimates += along
-    return Identification(
+    told = Identification(
         vehicle_id=vehicle_id,
         from_stamp_ns=int(record.stamp_ns[0]),
         stamp_ns=int(record.stamp_ns[-1]),
@@ -102,6 +120,7 @@ def identify(
         steering_map=bins,
         excited_s=turned_s + worked_s,
     )
+    return Examined(told, fit)
 
 
 def _steering_priors(vehicle: VehicleParameters) -> dict[str, float]:

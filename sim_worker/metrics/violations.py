@@ -36,7 +36,7 @@ def red_light_violations(scene: Scene) -> Measure:
     for line in rules.lines:
         if line.group_id is None or line.control != "signal":
             continue
-        future, time_s = _line_crossings(front, line.ends_m, scene.time_s)
+        future, time_s = line_crossings(front, line.ends_m, scene.time_s)
         colours = _colours(scene, line.group_id, time_s)
         np.add.at(count, future, [colour in _STOPS for colour in colours])
     return scene.measure(count)
@@ -91,7 +91,7 @@ def _colours(scene: Scene, group_id: str, at_s: Array) -> list[SignalColour]:
     return [found[k] for k in part]
 
 
-def _line_crossings(front: Array, ends_m: Array, time_s: Array) -> tuple[Indices, Array]:
+def line_crossings(front: Array, ends_m: Array, time_s: Array) -> tuple[Indices, Array]:
     """Return future (K,) and time (K,) of each crossing of a line, in the direction of travel.
 
     The line runs from left to right as its driver sees it: who crosses comes from its right-hand

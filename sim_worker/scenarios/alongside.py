@@ -10,7 +10,7 @@ import shapely
 
 from contracts.arrays import Array
 from contracts.scenario import ActorPart
-from sim_worker.actors.kinds import KINDS
+from sim_worker.actors.kinds import KINDS, KindTraits
 from sim_worker.overlap import corners
 from sim_worker.planners.path import FrenetPath
 from sim_worker.scenarios.impact import (
@@ -27,7 +27,9 @@ from sim_worker.scenarios.ways import Way
 
 _CLEAR_M, _LANE_HALF_M = 0.3, 1.5
 """What is parked leaves the lane free, and a car's side by so much."""
-_BAY_CLEAR_M = 0.3
+_BAY_CLEAR_M, _PASS_CLEAR_M = 0.3, 0.05
+"""Room on all sides of who is parked: beside a bay, and where the ego drives past. Without it a
+corner that is brushed between two ticks of the search would go unseen."""
 
 
 class Touched(NamedTuple):
@@ -69,7 +71,8 @@ def _out_of_the_way(part: ActorPart, staging: Staging, arc_m: float, beside_m: f
         lateral = beside_m + number * step
         parked = Moving(staging.place.ego.path, 0.0, lateral)
         touch = first_touch(
-            staging.ego, staging.box, parked, KINDS[part.kind], actor_arc_m=np.array([arc_m]),
+            staging.ego, staging.box, parked, _with_room(KINDS[part.kind], _PASS_CLEAR_M),
+            actor_arc_m=np.array([arc_m]),
             ego_arc_m=np.array([staging.start_m]), until_s=staging.scenario.horizon_s,
         )  # fmt: skip
         if not np.isfinite(touch.time_s[0]):
@@ -109,12 +112,19 @@ class _OnPath(NamedTuple):
     touch: Touch
 
 
-def _played(actor: CastActor, staging: Staging) -> _OnPath:
+def _with_room(traits: KindTraits, room_m: float) -> KindTraits:
+    return traits._replace(
+        length_m=traits.length_m + 2 * room_m, width_m=traits.width_m + 2 * room_m
+    )
+
+
+def _played(actor: CastActor, staging: Staging, *, room_m: float = 0.0) -> _OnPath:
     after = actor.acts_after_s if actor.conduct == "stops" else math.inf
     path = staging.place.ego.path
     moving = Moving(path, actor.speed_mps, actor.lateral_m, after, actor.decel_mps2)
     touch = first_touch(
-        staging.ego, staging.box, moving, actor.traits, ego_arc_m=np.array([staging.start_m]),
+        staging.ego, staging.box, moving, _with_room(actor.traits, room_m),
+        ego_arc_m=np.array([staging.start_m]),
         actor_arc_m=np.array([actor.start_on(staging.place.ego)]),
         until_s=staging.scenario.horizon_s,
     )  # fmt: skip
@@ -127,11 +137,8 @@ def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
     One that backs into a bay goes no farther than its way, and needs room for being off it.
     """
     if not staging.place.reverse:
-        return bool(np.isfinite(_played(actor, staging).touch.time_s[0]))
-    way, traits = staging.place.way_named(actor.way), actor.traits
-    wider = traits._replace(
-        length_m=traits.length_m + 2 * _BAY_CLEAR_M, width_m=traits.width_m + 2 * _BAY_CLEAR_M
-    )
+        return bool(np.isfinite(_played(actor, staging, room_m=_PASS_CLEAR_M).touch.time_s[0]))
+    way, wider = staging.place.way_named(actor.way), _with_room(actor.traits, _BAY_CLEAR_M)
     touch = first_touch(
         staging.ego, staging.box, Moving(way.path, 0.0, actor.lateral_m), wider,
         ego_arc_m=np.array([staging.start_m]), actor_arc_m=np.array([actor.start_on(way)]),

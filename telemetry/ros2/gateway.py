@@ -23,9 +23,10 @@ from contracts.towards_vehicle import Authority, VehicleCommand
 from telemetry.logs.foreign_ros import time_base_of
 from telemetry.ros2.inwards import Inwards
 from telemetry.ros2.mapping import Mapping, OutRow, Source
-from telemetry.ros2.outwards import Level, Outwards, is_usable
+from telemetry.ros2.outwards import Level, Outwards
 from telemetry.ros2.safety import VehicleGate
 from telemetry.ros2.sender import RosSender
+from telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
 
 _PORTION = 16
 """So many samples at most between two looks at the orchestrator's words."""
@@ -34,6 +35,7 @@ _MEASURED_WITHIN_NS = 500_000_000
 """A measured steering angle that is older says nothing of now."""
 _INFO_WAITS_NS = 1_500_000_000
 _STATE_EVERY_NS = 20_000_000
+_OBJECTS_EVERY_NS = 100_000_000
 
 log = logging.getLogger("telemetry.ros2")
 
@@ -66,14 +68,18 @@ class Gateway:
         )
         self.held: Counter[str] = Counter()
         """By topic, messages towards the vehicle that were not sent."""
+        self._virtual = VirtualObjects(
+            at_most=mapping.towards_vehicle.max_objects, placed=mapping.placed
+        )
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         self._last_ns: dict[str, int] = {}
         self._told: dict[str, Level] = {}
         self._waiting: list[tuple[int, Request]] = []
         self._inbox, self._words, self._views = Mailbox(2048), Mailbox(64), Mailbox(256)
         self._gate_told = self.gate.state
-        for key in self.inwards.key_expressions():
-            foreign.subscribe(key, self._inbox)
+        self._out.warm_up()
+        for key, history in self.inwards.key_expressions():
+            foreign.subscribe(key, self._inbox, history=history)
         bus.serve("info", self._views, vehicle=vehicle_id)
         self._listen(run_id)
         self._sender.announce(
@@ -103,7 +109,7 @@ class Gateway:
             if item is None:
                 break
             self._pass_on(item)
-        self._hear()
+            self._hear()
         self._answer_info()
         self._diagnose()
 
@@ -144,7 +150,7 @@ class Gateway:
             self._bus.subscribe("authority", self._words, run=run_id)
             if "vehicle_command" in sources:
                 self._bus.subscribe("vehicle_command", self._words, run=run_id)
-        if sources & {"state", "clock"}:
+        if sources & {"state", "clock"} or self._virtual.has_own:
             self._bus.subscribe("state", self._views, vehicle=self._vehicle_id)
         for source, channel in (("twin", "mirror"), ("virtual_objects", "virtual_objects")):
             if source in sources:
@@ -194,13 +200,12 @@ class Gateway:
                 self._send(
                     "clock", lambda _: self._out.clock(state.stamp_ns), every_ns=_STATE_EVERY_NS
                 )
+                if self._virtual.has_own and self._due("virtual objects", _OBJECTS_EVERY_NS):
+                    self._objects(self._virtual.own(state.stamp_ns))
             case MirrorSample() as mirror:
                 self._send("twin", lambda _: self._out.twin(mirror))
             case drive.RoadUsers() as users:
-                if is_usable(users, at_most=self._mapping.towards_vehicle.max_objects):
-                    self._send("virtual_objects", lambda row: self._out.objects(users, row.type))
-                else:
-                    self.held["virtual objects that are too many or not finite"] += 1
+                self._objects(users)
             case Event() as event if event.level != "info":
                 level = 2 if event.level == "error" else 1
                 self._told["event"] = Level("foretwin/event", level, event.text, {})
@@ -213,6 +218,22 @@ class Gateway:
                 values = {"cause": verdict.cause, "confidence": f"{verdict.confidence:.3f}"}
                 self._told["verdict"] = Level("foretwin/verdict", 1, verdict.text, values)
 
+    def _objects(self, users: drive.RoadUsers) -> None:
+        """Send virtual road users together with those that others have said lately."""
+        try:
+            known = self._virtual.take(users, now_ns=self._mono_ns())
+        except UnfitError as why:
+            self.held[str(why)] += 1
+        else:
+            self._send("virtual_objects", lambda row: self._out.objects(known, row.type))
+
+    def _due(self, what: str, every_ns: int) -> bool:
+        now_ns = self._mono_ns()
+        if now_ns - self._last_ns.get(what, now_ns - every_ns) < every_ns:
+            return False
+        self._last_ns[what] = now_ns
+        return True
+
     def _send(
         self, source: Source, payload: Callable[[OutRow], bytes], *, every_ns: int = 0
     ) -> None:
@@ -224,9 +245,8 @@ class Gateway:
                 if self.gate.look(now_ns=now_ns, link_up=self._foreign.connected) != "open":
                     self.held[row.topic] += 1
                     continue
-            if now_ns - self._last_ns.get(row.topic, now_ns - least_ns) < least_ns:
+            if not self._due(row.topic, least_ns):
                 continue
-            self._last_ns[row.topic] = now_ns
             try:
                 self._put(row, payload(row))
             except (ValueError, OverflowError, AssertionError) as error:
@@ -246,19 +266,18 @@ class Gateway:
         info, now_ns = self.info(), self._mono_ns()
         kept = []
         for since_ns, request in self._waiting:
-            if info is not None:
-                request.reply(info)
-            elif now_ns - since_ns > _INFO_WAITS_NS:
-                request.refuse("no sample of the vehicle yet")
-            else:
+            early = now_ns - since_ns <= _INFO_WAITS_NS
+            if early and (info is None or self.inwards.awaits_antenna):
                 kept.append((since_ns, request))
+            elif info is not None:
+                request.reply(info)
+            else:
+                request.refuse("no sample of the vehicle yet")
         self._waiting = kept
 
     def _diagnose(self) -> None:
-        now_ns = self._mono_ns()
-        if now_ns - self._last_ns.get("diagnostics", 0) < _DIAGNOSTICS_NS:
+        if not self._due("diagnostics", _DIAGNOSTICS_NS):
             return
-        self._last_ns["diagnostics"] = now_ns
         levels = list(self._told.values())
         for part, counts in self.report().items():
             well = part in ("in", "sent", "gate") or not any(counts.values())

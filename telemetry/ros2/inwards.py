@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -21,6 +21,13 @@ from telemetry.ros_status import StatusJoiner
 from telemetry.ros_transforms import TransformTree
 
 Samples = list[tuple[str, msgspec.Struct]]
+
+
+class Wanted(NamedTuple):
+    """A key expression, and whether what was said on it before counts as well."""
+
+    key: str
+    history: bool
 
 
 class Inwards:
@@ -50,11 +57,15 @@ class Inwards:
         self.clock_ns: int | None = None
         """The newest /clock of the vehicle's side."""
 
-    def key_expressions(self) -> list[str]:
-        """Return the key expressions to subscribe to; of rmw_zenoh with any type and hash."""
+    def key_expressions(self) -> list[Wanted]:
+        """Return what to subscribe to; of rmw_zenoh with any type and hash."""
         if self._mapping.dialect == "ros2dds":
-            return list(self._by_bridge_key)
-        return [rmw_any_type_key(topic, domain=self._mapping.domain) for topic in self._rows]
+            return [Wanted(key, row.is_latched) for key, row in self._by_bridge_key.items()]
+        domain = self._mapping.domain
+        return [
+            Wanted(rmw_any_type_key(topic, domain=domain), row.is_latched)
+            for topic, row in self._rows.items()
+        ]
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -67,6 +78,11 @@ class Inwards:
         if self._mapping.antenna_m is not None or self._antenna_frame is None:
             return self._mapping.antenna_m
         return self._transforms.place_of(self._antenna_frame, within=BASE_FRAME)
+
+    @property
+    def awaits_antenna(self) -> bool:
+        """Whether transforms that have not come yet may still tell the antenna's place."""
+        return self.antenna_m is None and any(row.type == TF for row in self._rows.values())
 
     def take(self, arrived: Arrived) -> Samples:
         """Return the samples of one message, none where it cannot be used; never raises."""

@@ -1,8 +1,9 @@
 """Which ROS topics become which channels, and back: one TOML file, checked into a frozen struct.
 
 `[[in]]` rows: topic, type, channel, units and axes that differ from ROS's. `[[out]]` rows: topic,
-type, source. Whatever a vehicle's software might obey, that is commands, and any topic outside
-/foretwin/, counts as towards the vehicle: see `OutRow.towards_vehicle`.
+type, source. `[[virtual]]` rows: road users that do not exist. Whatever a vehicle's software might
+obey, that is commands, and any topic outside /foretwin/, counts as towards the vehicle: see
+`OutRow.towards_vehicle`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from contracts.frames import GeoPoint, LocalFrame
 from telemetry.logs.units import ANGLE, SPEED
 from telemetry.ros2.names import Dialect, check_topic, dds_type
 from telemetry.ros2.safety import Limits
+from telemetry.ros2.virtual_objects import PlacedObject
 from telemetry.ros_foreign import FOREIGN
 from telemetry.ros_messages import TOPIC_PREFIX as OWN_PREFIX
 from telemetry.ros_parts import (
@@ -88,6 +90,11 @@ class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
             raise ValueError(f"axes: not of channel {self.channel!r}")
 
     @property
+    def is_latched(self) -> bool:
+        """Whether ROS says it once and keeps it for who comes later (transient local)."""
+        return self.type in (TF, LANELET_ROUTE)
+
+    @property
     def stream(self) -> str:
         """What must come from one topic alone."""
         return FOREIGN[self.type].stream if self.type in FOREIGN else self.type + self.topic
@@ -139,7 +146,7 @@ class Mapping(
     frozen=True,
     kw_only=True,
     forbid_unknown_fields=True,
-    rename={"inwards": "in", "outwards": "out", "map_place": "map"},
+    rename={"inwards": "in", "outwards": "out", "map_place": "map", "placed": "virtual"},
 ):
     """The whole file."""
 
@@ -155,6 +162,8 @@ class Mapping(
     map_place: MapPlace | None = None
     inwards: tuple[InRow, ...] = ()
     outwards: tuple[OutRow, ...] = ()
+    placed: tuple[PlacedObject, ...] = ()
+    """Virtual road users that the gateway itself says."""
     towards_vehicle: TowardsVehicle = TowardsVehicle()
 
     @property
@@ -199,9 +208,10 @@ def parse_mapping(text: str, *, name: str) -> Mapping:
     except ValueError as error:
         raise MappingError(f"{name}: {error}") from error
     seen: dict[str, str] = {}
-    tables: tuple[tuple[str, tuple[InRow | OutRow, ...]], ...] = (
+    tables: tuple[tuple[str, tuple[InRow | OutRow | PlacedObject, ...]], ...] = (
         ("[[in]]", mapping.inwards),
         ("[[out]]", mapping.outwards),
+        ("[[virtual]]", mapping.placed),
     )
     for header, rows in tables:
         for index, row in enumerate(rows):
@@ -224,18 +234,28 @@ def _check_head(mapping: Mapping) -> None:
         raise ValueError(f"antenna_m {mapping.antenna_m}: three finite numbers")
 
 
-def _check_alone(row: InRow | OutRow, seen: dict[str, str], mapping: Mapping) -> None:
-    """Refuse two topics for one stream, one topic twice, and objects without a known `map`."""
-    if isinstance(row, InRow):
-        keys = {f"in {row.topic}": f"topic {row.topic}", row.stream: f"stream {row.stream}"}
+def _check_alone(
+    row: InRow | OutRow | PlacedObject, seen: dict[str, str], mapping: Mapping
+) -> None:
+    """Refuse two topics for one stream, what stands twice, and objects that cannot go out."""
+    if isinstance(row, PlacedObject):
+        if not any(one.source == "virtual_objects" for one in mapping.outwards):
+            raise ValueError('without an [[out]] of source "virtual_objects" it goes nowhere')
+        keys, first = {f"virtual {row.user_id}": f"id {row.user_id!r}"}, row.user_id
+    elif isinstance(row, InRow):
+        keys, first = (
+            {f"in {row.topic}": f"topic {row.topic}", row.stream: f"stream {row.stream}"},
+            row.topic,
+        )
     else:
+        first = row.topic
         keys = {f"out {row.topic}": f"topic {row.topic}"}
         if row.source == "virtual_objects" and row.towards_vehicle and mapping.map_place is None:
             raise ValueError("virtual objects towards the vehicle need [map] lat_deg, lon_deg")
     for key, what in keys.items():
         if key in seen:
             raise ValueError(f"{what} stands twice; first: {seen[key]}")
-        seen[key] = row.topic
+        seen[key] = first
 
 
 def _line_of(text: str, header: str, index: int) -> int:

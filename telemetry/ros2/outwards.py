@@ -44,6 +44,33 @@ class Outwards:
         """Return the rows that carry a source."""
         return [row for row in self._rows if row.source == source]
 
+    def warm_up(self) -> None:
+        """Make what the first message of each type needs: a tenth of a second nobody shall wait."""
+        at = self._drive_frame.origin
+        user = drive.RoadUser(
+            user_id="none", kind="car", position=at, yaw_rad=0.0, speed_mps=0.0, length_m=1.0,
+            width_m=1.0,
+        )  # fmt: skip
+        car = drive.VehicleState(
+            vehicle_id="none", stamp_ns=0, position=at, yaw_rad=0.0, speed_mps=0.0,
+            yaw_rate_radps=0.0, accel_mps2=0.0,
+        )  # fmt: skip
+        command = VehicleCommand(
+            stamp_ns=0, sent_mono_ns=0, tire_angle_rad=0.0, accel_mps2=0.0, speed_mps=0.0
+        )
+        for row in self._rows:
+            match row.source:
+                case "state" | "twin":
+                    self.state(car)
+                case "virtual_objects":
+                    self.objects(drive.RoadUsers(stamp_ns=0, users=(user,)), row.type)
+                case "diagnostics":
+                    self.diagnostics(0, [Level("none", 0, "", {})])
+                case "clock":
+                    self.clock(0)
+                case "vehicle_command":
+                    self.command(command, row.type, stamp_ns=0)
+
     def state(self, message: drive.VehicleState) -> bytes:
         """Return the Odometry of a state."""
         frame = self._map or self._drive_frame
@@ -51,7 +78,7 @@ class Outwards:
         return _cdr(self._framed(odometry), kind)
 
     def twin(self, message: MirrorSample) -> bytes:
-        """Return the Odometry of the twin; its yaw rate is not known and stands as 0."""
+        """Return the Odometry of the twin."""
         twin, frame = message.twin, self._drive_frame
         xy_m = np.array([[twin.x_m, twin.y_m]])
         lat_deg, lon_deg = geo_from_local(frame, xy_m)[0].tolist()
@@ -63,9 +90,9 @@ class Outwards:
                 position=GeoPoint(lat_deg, lon_deg, (self._map or frame).origin.alt_m),
                 yaw_rad=yaw,
                 speed_mps=twin.speed_mps,
-                yaw_rate_radps=0.0,
+                yaw_rate_radps=message.twin_yaw_rate_radps,
                 accel_mps2=0.0,
-                estimated=("yaw_rate_radps", "accel_mps2"),
+                estimated=("accel_mps2",),
             )
         )
 
@@ -114,19 +141,6 @@ class Outwards:
         if self._map is None:
             ros.header.frame_id = DRIVE_FRAME
         return ros
-
-
-def is_usable(message: drive.RoadUsers, *, at_most: int) -> bool:
-    """Whether virtual objects may go towards a vehicle: not too many, every number finite."""
-    numbers = [
-        number
-        for user in message.users
-        for number in (
-            user.position.lat_deg, user.position.lon_deg, user.position.alt_m,
-            user.yaw_rad, user.speed_mps, user.length_m, user.width_m,
-        )
-    ]  # fmt: skip
-    return len(message.users) <= at_most and bool(np.isfinite(numbers).all())
 
 
 def _cdr(ros: Any, kind: str) -> bytes:

@@ -47,9 +47,10 @@ class RosSender:
         self._foreign.declare_alive(token(node))
         for number, row in enumerate(rows, 1):
             entity: EntityKind = "MS" if isinstance(row, InRow) else "MP"
+            qos = QosProfile(transient_local=isinstance(row, InRow) and row.is_latched)
             end = msgspec.structs.replace(
                 node, entity_id=number, entity=entity, topic=row.topic, kind=row.type,
-                type_hash=type_hash(row.type), qos=qos_text(QosProfile()),
+                type_hash=type_hash(row.type), qos=qos_text(qos),
             )  # fmt: skip
             self._foreign.declare_alive(token(end))
 

@@ -70,11 +70,12 @@ class MultiBodyCar:
         """Place base_link at (x_m, y_m)."""
         self._parameters = parameters
         self._model = parameters_vehicle2()
+        self._own_stiffness: float = self._model.tire.p_ky1
         self._cog_m = self._model.b
         self.wheelbase_m: float = self._model.a + self._model.b
         self._state = [0.0] * 29
         self._accel = (0.0, 0.0)
-        self._gives = parameters.steering_compliance_rad_per_mps2 != 0.0
+        self._gives = False
         self._steered_rad = 0.0
         self._steering_queue = [0.0] * max(1, round(parameters.steering_delay_s / STEP_S))
         self._drive_queue = [0.0] * max(1, round(parameters.drive_delay_s / STEP_S))
@@ -87,6 +88,15 @@ class MultiBodyCar:
             speed_mps,
             0.0,
         )
+        self.become(parameters)
+
+    def become(self, parameters: CarParameters) -> None:
+        """Go on as a car of other parameters, as after a change of tyres; delays stay."""
+        if not self._gives:
+            self._steered_rad = self._state[_ANGLE]
+        self._parameters = parameters
+        self._gives = parameters.steering_compliance_rad_per_mps2 != 0.0
+        self._model.tire.p_ky1 = self._own_stiffness * parameters.tyre_stiffness
 
     def _place(self, x: float, y: float, yaw: float, speed: float, angle: float) -> None:
         """Put the centre of gravity at (x, y), rolling; `speed` is the rear axle's."""

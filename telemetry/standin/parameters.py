@@ -24,7 +24,10 @@ class CarParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     drag_npv2: float
     rolling_resistance_n: float
     steering_compliance_rad_per_mps2: float = 0.0
-    """How far sideways acceleration turns the tyres back against the steering wheel: understeer."""
+    """How far sideways acceleration turns the tyres back against the steering wheel: understeer, as
+    from a column that gives or from softer tyres in front."""
+    tyre_stiffness: float = 1.0
+    """Cornering stiffness of all four tyres over CommonRoad's."""
 
 
 class DriverParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from contracts.drive import ControlCommand, VehicleInfo, VehicleState
@@ -127,6 +128,16 @@ class StandinSource:
                 return status(stamp_ns)
             case _:
                 return getattr(self._sensors, channel)(stamp_ns, motion)
+
+    def change_tyres(self, *, softness_rad_per_mps2: float = 0.0, stiffness: float = 1.0) -> None:
+        """Drive on with softer front tyres, or with another stiffness of all four."""
+        self._car.become(
+            msgspec.structs.replace(
+                self._parameters.car,
+                steering_compliance_rad_per_mps2=softness_rad_per_mps2,
+                tyre_stiffness=stiffness,
+            )
+        )
 
     def truth(self, stamp_ns: int) -> VehicleState:
         """Return the true state of base_link, without noise or lag; linear between 10 ms instants.

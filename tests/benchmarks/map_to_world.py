@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from contracts.world import World
-from orchestrator.map_opening import open_map
+from orchestrator.maps.opening import open_map
 from world_gen.build import build_region
 from world_gen.map_index import index_map
 from world_gen.world_store import WorldStore

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 import shapely
 
-from orchestrator.map_opening import open_map
+from orchestrator.maps.opening import open_map
 from tests.benchmarks.measuring import Measurement, UnavailableError
 from world_gen.build import build_world
 from world_gen.buildings import buildings_in_frame

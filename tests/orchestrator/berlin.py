@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from contracts.frames import local_from_geo, local_from_geo_yaw
-from orchestrator.junctions_ahead import PassedJunction
-from orchestrator.map_matching import MapMatcher, Match
-from orchestrator.route import Route
-from orchestrator.route_follower import Progress, RouteFollower
+from orchestrator.way.junctions_ahead import PassedJunction
+from orchestrator.way.map_matching import MapMatcher, Match
+from orchestrator.way.route import Route
+from orchestrator.way.route_follower import Progress, RouteFollower
 from telemetry.estimator import StateEstimator
 from telemetry.logs.opening import open_log
 from world_gen.build_graph import build_road_graph

@@ -14,7 +14,7 @@ from contracts.futures import (
     Trajectory,
     Variant,
 )
-from orchestrator.rounds import RoundDone, RoundOrder
+from orchestrator.rounds.desk import RoundDone, RoundOrder
 from tests.orchestrator.trip import START_NS, states_along, town_world
 
 TIME_S = np.arange(81) * 0.1

@@ -21,8 +21,8 @@ from contracts.world import World
 from orchestrator.conductor import Conductor
 from orchestrator.mission import Mission, MissionSettings
 from orchestrator.plan import DrivePlan
-from orchestrator.results import ResultTables
-from orchestrator.way_ahead import WayAhead
+from orchestrator.record.results import ResultTables
+from orchestrator.way.way_ahead import WayAhead
 from tests.orchestrator.futures_rounds import nobody
 from tests.orchestrator.trip import START_NS, states_along, town, town_line, town_plan, town_world
 from world_gen.world_store import WorldStore

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from orchestrator.sweep_play import PlaySetup, SweepWorker
-from orchestrator.sweep_pool import Task
-from orchestrator.sweep_spec import Loaded, worlds_folder
+from orchestrator.sweep.play import PlaySetup, SweepWorker
+from orchestrator.sweep.pool import Task
+from orchestrator.sweep.spec import Loaded, worlds_folder
 from tests.sim_worker.scenarios.worlds import cross
 from world_gen.world_store import WorldStore
 

@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator import live_loop
 from orchestrator.live_loop import LiveLoop
-from orchestrator.round_pace import Pace
+from orchestrator.rounds.pace import Pace
 
 
 class Clock:
@@ -72,6 +72,7 @@ class Conductor:
         self.started_s: list[float] = []
         self.dropped_s: list[float] = []
         self.watched_s: list[float] = []
+        self.changes_made_s: list[float] = []
 
     @property
     def open_rounds(self) -> tuple[int, ...]:
@@ -89,6 +90,9 @@ class Conductor:
             self.intake.latest = SimpleNamespace(receipt_mono_ns=self._clock.now_s * 1e9)
         else:
             self.intake.end = True
+
+    def make_changes(self) -> None:
+        self.changes_made_s.append(self._clock.now_s - 100)
 
     def watch_telemetry(self, mono_ns: int) -> None:
         self.watched_s.append(mono_ns * 1e-9 - 100)
@@ -218,3 +222,14 @@ def test_something_is_done_each_turn_at_least_every_50_ms(monkeypatch: pytest.Mo
         each_turn=lambda: turns_s.append(clock.now_s),
     ).run()
     assert np.diff([*turns_s, 101.0]).max() < 0.051
+
+
+def test_changes_asked_for_are_looked_at_every_turn(driven: Any) -> None:
+    conductor = driven(states_s=[0.0, 0.3], end_s=1.0)
+    assert np.diff([*conductor.changes_made_s, 1.0]).max() < 0.051
+
+
+def test_changes_are_made_between_rounds_that_follow_one_another(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7)
+    for started_s in conductor.started_s:
+        assert min(abs(made_s - started_s) for made_s in conductor.changes_made_s) < 1e-9

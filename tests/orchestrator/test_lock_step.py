@@ -12,8 +12,9 @@ import pytest
 from contracts.codec import encode
 from contracts.drive import AdvanceReply, DriveEnd, GnssFix, SpeedSample
 from contracts.keys import alive_key
-from contracts.mailbox import Received, Request
+from contracts.mailbox import Mailbox, Received, Request
 from contracts.simulation import MirrorSample, PlaneState
+from contracts.tuning import SetRequest
 from orchestrator import lock_step
 from orchestrator.lock_step import LockStepError, LockStepLoop
 from tests.orchestrator.house import AtOnce, House
@@ -146,6 +147,27 @@ def test_results_do_not_depend_on_who_arrives_first_nor_on_the_number_of_workers
         states.add(msgspec.json.encode(latest.state))
 
     assert (len(hashes), len(states)) == (1, 1)
+
+
+def test_a_change_asked_for_during_a_round_counts_before_the_next_one(houses: Any) -> None:
+    house = houses()
+    add_mirror(house)
+    Car(house, until_s=8.0, channels=("gnss", "speed"))
+    stamps_ns: list[int] = []
+    answers = Mailbox(1)
+
+    def after_third_round(received: Received) -> None:
+        stamps_ns.append(received.message().stamp_ns)
+        if len(stamps_ns) == 3:
+            request = SetRequest(key="role.ego", value="ghost")
+            house.bus.request("set", request, answers, run=house.plan.run_id)
+
+    house.bus.subscribe("round", AtOnce(after_third_round), run=house.plan.run_id)  # type: ignore[arg-type]
+    assert loop(house).run()
+    (change,) = house.conductor.changes.made
+    assert change.asked_stamp_ns == stamps_ns[2]
+    assert change.stamp_ns == stamps_ns[3] + 1
+    assert answers.take().message.done
 
 
 def test_a_vehicle_that_does_not_answer_is_named(houses: Any) -> None:

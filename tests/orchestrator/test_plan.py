@@ -14,7 +14,7 @@ from contracts.errors import UserError
 from contracts.frames import geo_from_local, local_from_geo
 from orchestrator.config import ConfigError, DriveConfig
 from orchestrator.embedded import MAP_FILE
-from orchestrator.map_opening import open_map
+from orchestrator.maps.opening import open_map
 from orchestrator.plan import make_plan, read_inputs
 from tests.orchestrator.trip import NOW, town, town_line, town_plan
 from tests.world_gen.sketch import Sketch

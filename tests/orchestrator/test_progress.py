@@ -10,7 +10,7 @@ import pytest
 from contracts.mailbox import Mailbox
 from contracts.simulation import Event
 from orchestrator.progress import ProgressLine
-from orchestrator.round_pace import Pace
+from orchestrator.rounds.pace import Pace
 from tests.orchestrator.house import House
 
 

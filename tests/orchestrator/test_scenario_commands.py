@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import run
-from orchestrator.map_opening import open_map
+from orchestrator.maps.opening import open_map
 from orchestrator.plan import EMBEDDED_MAP
 from sim_worker.scenarios.drawing import draw_cases
 from sim_worker.scenarios.reading import CATALOGUE, catalogue

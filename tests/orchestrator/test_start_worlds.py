@@ -6,7 +6,7 @@ import pytest
 
 from orchestrator.mission import Mission, MissionSettings
 from orchestrator.start_worlds import junctions_at_start
-from orchestrator.way_ahead import WayAhead
+from orchestrator.way.way_ahead import WayAhead
 from tests.orchestrator.trip import states_along, town, town_line
 
 

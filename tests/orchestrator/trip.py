@@ -26,7 +26,7 @@ from orchestrator.config import DriveConfig
 from orchestrator.instructions import BuildWorld, Instruction, Tell, UseWorld
 from orchestrator.mission import Mission, MissionSettings
 from orchestrator.plan import DriveInputs, DrivePlan, make_plan, read_inputs
-from orchestrator.way_ahead import WayAhead
+from orchestrator.way.way_ahead import WayAhead
 from tests.orchestrator.grid_map import headings
 from world_gen.build import build_world
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample, SteeringSample
+from contracts.frames import GeoPoint, geo_from_local
 from contracts.tuning import Identification, ParameterEstimate
 from sim_worker.motion_record import MotionRecord, MotionRecorder
 from telemetry.standin.parameters import StandinParameters, read_parameters
@@ -18,6 +20,10 @@ from tests.telemetry.standin_drive import FRAME, Drive
 
 PERIOD_S = 0.01
 MINUTE_S = 60.0
+_TOLD = (
+    "x_m", "y_m", "altitude_m", "speed_mps", "yaw_rate_radps", "force_x_mps2", "force_y_mps2",
+    "wheel_rad", "command_accel_mps2", "command_wheel_rad",
+)  # fmt: skip
 
 
 def recorded(samples: Iterable[tuple[str, Any]], *, until_s: float = MINUTE_S) -> MotionRecord:
@@ -78,6 +84,27 @@ def straight_minute(*, speed_mps: float = 33.0, seed: int = 0) -> MotionRecord:
         command_tire_rad=absent,
         manual=np.zeros(count, dtype=np.bool_),
     )
+
+
+def samples_of(record: MotionRecord) -> list[tuple[str, Any]]:
+    """Return the samples that a record would come from: one of each sensor at each instant."""
+    samples: list[tuple[str, Any]] = []
+    for index, stamp in enumerate(record.stamp_ns):
+        ns, at = int(stamp), {name: float(getattr(record, name)[index]) for name in _TOLD}
+        place = geo_from_local(FRAME, np.array([at["x_m"], at["y_m"]]))
+        force = (at["force_x_mps2"], at["force_y_mps2"], 9.81)
+        position = GeoPoint(float(place[0]), float(place[1]), at["altitude_m"])
+        samples += [
+            ("gnss", GnssFix(stamp_ns=ns, position=position, std_m=0.02)),
+            ("speed", SpeedSample(stamp_ns=ns, speed_mps=at["speed_mps"])),
+            ("imu", ImuSample(
+                stamp_ns=ns, accel_mps2=force, rate_radps=(0.0, 0.0, at["yaw_rate_radps"]))),
+            ("steering", SteeringSample(stamp_ns=ns, steering_wheel_rad=at["wheel_rad"])),
+            ("control", ControlCommand(
+                stamp_ns=ns, accel_mps2=at["command_accel_mps2"],
+                steering_wheel_rad=at["command_wheel_rad"])),
+        ]  # fmt: skip
+    return samples
 
 
 def estimate(told: Identification, name: str) -> ParameterEstimate:

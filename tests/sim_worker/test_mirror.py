@@ -109,6 +109,8 @@ def test_without_recorded_commands_the_twin_repeats_the_motion_and_says_so() -> 
     assert not any(sample.independent for sample in samples)
     assert max(sample.gap_m for sample in samples) < 2.0
     assert max(abs(sample.gap_speed_mps) for sample in samples) < 0.1
+    for sample in samples[5:]:
+        assert sample.twin_yaw_rate_radps == pytest.approx(sample.twin.speed_mps / 25.0, abs=0.03)
 
 
 @pytest.mark.parametrize("hz", [10.0, 50.0, 33.3])

@@ -8,7 +8,7 @@ import numpy as np
 
 from contracts.frames import geo_from_local, local_from_geo
 from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
-from orchestrator.route import point_along
+from orchestrator.way.route import point_along
 from telemetry.logs import read_line
 from tests.system.foretwin_command import foretwin
 from world_gen.read_osm import read_map

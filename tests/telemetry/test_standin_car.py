@@ -3,6 +3,7 @@ from __future__ import annotations
 import itertools
 import math
 
+import msgspec
 import pytest
 
 from telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
@@ -63,3 +64,15 @@ def test_steering_waits_for_its_delay() -> None:
     # Until then the tyre only settles on the hidden offset.
     assert abs(before.tire_angle_rad) <= read_parameters().car.steering_offset_rad
     assert after.tire_angle_rad > 0.02
+
+
+def test_softer_front_tyres_turn_the_car_less_from_then_on() -> None:
+    given = read_parameters().car
+    car = MultiBodyCar(given, x_m=0.0, y_m=0.0, yaw_rad=0.0, speed_mps=10.0)
+    firm = drive(car, 3.0, accel=0.2, wheel=0.6)[-1]
+    softness = 0.003
+    car.become(msgspec.structs.replace(given, steering_compliance_rad_per_mps2=softness))
+    soft = drive(car, 3.0, accel=0.2, wheel=0.6)[-1]
+    assert soft.steered_rad == pytest.approx(firm.steered_rad, abs=1e-4)
+    gives = soft.steered_rad - soft.tire_angle_rad
+    assert gives == pytest.approx(softness * soft.accel_y_mps2, rel=0.02)

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contracts.codec import SchemaMismatch
+from contracts.side_by_side import Disagreement
 from contracts.simulation import ActiveWorld, Event, WorldNotice
 from contracts.world import World
 from tests.viewer import scene
@@ -192,3 +193,20 @@ def test_the_start_is_asked_for_when_the_vehicle_first_speaks() -> None:
     assert monitor.handle("state", scene.state_at(3.0))[0].drive_ns == 3_000_000_000
     assert monitor.handle("event", early)[0].drive_ns == 0
     assert asked == [scene.START_NS + 3_000_000_000]
+
+
+def test_where_human_and_ads_disagree_a_mark_stays() -> None:
+    one = Disagreement(
+        vehicle_id="ego", segment=0, aspect="pace", kind="ads_stops",
+        stamp_ns=scene.START_NS + 2_000_000_000, end_stamp_ns=scene.START_NS + 3_000_000_000,
+        over=False, position=scene.DRIVE_FRAME.origin, junction_id=None, route_m=None,
+        lateral_m=0.0, along_m=-9.0, speed_mps=-6.0,
+    )  # fmt: skip
+    monitor = Monitor(
+        drive_frame=scene.DRIVE_FRAME, find_start=lambda _ns: scene.START_NS, title="t",
+        load_world=lambda _id: scene.junction(),
+    )  # fmt: skip
+    (row,) = monitor.handle("disagreement", one)
+    assert row.path.startswith("world/disagreements/pace_")
+    assert row.drive_ns == 2_000_000_000
+    assert monitor.handle("disagreement", msgspec.structs.replace(one, over=True)) == []

@@ -13,7 +13,8 @@ import pytest
 
 from tests.viewer import scene
 from viewer.blueprint import GAP_VIEWS, drive_blueprint
-from viewer.log_drive import LIMIT, TWIN
+from viewer.log_drive import LIMIT
+from viewer.log_roles import TWIN
 from viewer.log_scenarios import CRITICAL
 from viewer.log_world import ROAD
 from viewer.monitor import Monitor

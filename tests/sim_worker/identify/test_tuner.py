@@ -5,15 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 
-from contracts.drive import SteeringSample
+from contracts.drive import ImuSample, SteeringSample
 from contracts.errors import UserError
 from contracts.tuning import Identification
 from sim_worker.identify.tuner import Tuner
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.standin.source import START_STAMP_NS
-from tests.sim_worker.standin_drives import estimate
+from sim_worker.identify.window import UNDERSTEER_NAME
+from sim_worker.vehicle.parameters import load_vehicle, understeer_gradient
+from telemetry.standin.parameters import read_parameters
+from telemetry.standin.source import START_STAMP_NS, StandinSource
+from tests.sim_worker.identify.coverage import own_gradient, random_path
+from tests.sim_worker.standin_drives import estimate, samples_of, straight_minute
 from tests.telemetry.city_drive import city_drive
 
 Sample = tuple[str, Any]
@@ -74,6 +78,75 @@ def test_a_steering_ratio_that_changes_is_noticed_and_identified_anew() -> None:
     assert noticed[0].stamp_ns > START_STAMP_NS + lasts_ns
     assert "just changed" in estimate(noticed[0], "steering_ratio").reason
     assert taken.vehicle.steering_ratio.value == pytest.approx(18.0, rel=0.02)
+
+
+def _later(samples: list[Sample], lasts_ns: int) -> list[Sample]:
+    return [
+        (channel, msgspec.structs.replace(message, stamp_ns=message.stamp_ns + lasts_ns))
+        for channel, message in samples
+    ]
+
+
+def _bends_s(samples: list[Sample], from_ns: int, until_ns: int) -> float:
+    """Return for how long the car turned between two stamps, by its gyro at 100 Hz."""
+    return 0.01 * sum(
+        isinstance(message, ImuSample)
+        and from_ns < message.stamp_ns <= until_ns
+        and abs(message.accel_mps2[1]) > 0.5
+        for _, message in samples
+    )
+
+
+def test_softer_front_tyres_are_noticed_in_seconds_of_bends_and_identified_anew() -> None:
+    """The town twice, the second time with understeer of 0.003 rad/(m/s²), and over hills."""
+    once = city_drive().samples
+    change_ns = once[-1][1].stamp_ns + 10_000_000
+    samples = once + _later(
+        city_drive(compliance=0.003, hill_m=3.0).samples, change_ns - START_STAMP_NS
+    )
+    taken = tuner()
+    told = through(taken, samples)
+    noticed = [found for found in told if found.step_noticed]
+    assert len(noticed) == 1
+    assert noticed[0].step_noticed.startswith(UNDERSTEER_NAME)
+    assert noticed[0].from_stamp_ns > change_ns
+    assert "just changed" in estimate(noticed[0], UNDERSTEER_NAME).reason
+    assert _bends_s(samples, change_ns, noticed[0].stamp_ns) < 6.0
+    after = [found for found in told if found.stamp_ns > noticed[0].stamp_ns]
+    # Nothing of the car before is in it: none of what is taken lies between the two.
+    for found in after:
+        assert found.from_stamp_ns > change_ns
+    assert understeer_gradient(taken.vehicle) == pytest.approx(0.003, rel=0.15)
+
+
+@pytest.mark.judge
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_tyres_changed_in_mid_drive_are_noticed_and_identified_anew(seed: int) -> None:
+    softer, change_s, end_s = 0.0017, 70.0, 150.0
+    random = np.random.default_rng(1000 + seed)
+    parameters = read_parameters()
+    path = random_path(random, parameters, length_m=1500.0)
+    source = StandinSource(path, parameters, vehicle_id="standin", seed=seed, end_s=end_s)
+    change_ns = START_STAMP_NS + round(change_s * 1e9)
+    samples = list(source.advance(change_ns))
+    source.change_tyres(softness_rad_per_mps2=softer)
+    samples += source.advance(START_STAMP_NS + round(end_s * 1e9))
+    taken = tuner()
+    told = through(taken, samples)
+    noticed = [found for found in told if found.step_noticed]
+    assert noticed
+    assert noticed[0].stamp_ns > change_ns
+    assert _bends_s(samples, change_ns, noticed[0].stamp_ns) < 8.0
+    truth = own_gradient() + softer
+    assert understeer_gradient(taken.vehicle) == pytest.approx(truth, abs=0.0005)
+
+
+def test_a_straight_motorway_changes_no_parameter() -> None:
+    recorded, taken = straight_minute(), tuner()
+    told = through(taken, samples_of(recorded))
+    assert told
+    assert taken.vehicle == load_vehicle()
 
 
 def test_what_is_set_by_hand_stays_until_it_is_unpinned() -> None:

@@ -23,6 +23,7 @@ FIX_KEY = (
     "0/sensing/gnss/sensor_msgs::msg::dds_::NavSatFix_/"
     "RIHS01_62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"
 )
+TF_KEY = "0/tf_static/tf2_msgs::msg::dds_::TFMessage_/RIHS01_x"
 STEERING_KEY = "0/vehicle/steering/autoware_vehicle_msgs::msg::dds_::SteeringReport_/"
 CONTROL_KEY = "0/control/cmd/autoware_control_msgs::msg::dds_::Control_/*"
 ODOMETRY_KEY = "0/foretwin/twin/nav_msgs::msg::dds_::Odometry_/*"
@@ -43,6 +44,11 @@ channel = "gnss"
 topic = "/vehicle/steering"
 type = "autoware_vehicle_msgs/msg/SteeringReport"
 channel = "steering"
+
+[[in]]
+topic = "/tf_static"
+type = "tf2_msgs/msg/TFMessage"
+channel = "transforms"
 
 [[out]]
 topic = "/foretwin/twin"
@@ -100,6 +106,15 @@ def steering(stamp_ns: int, angle_rad: float) -> bytes:
     )
 
 
+def antenna_at(forward_m: float, left_m: float, up_m: float) -> bytes:
+    """Return a TFMessage that places the frame `gnss` in base_link."""
+    from telemetry.ros_transforms import transform_message
+
+    place_m = (forward_m, left_m, up_m)
+    message = transform_message(0, parent="base_link", child="gnss", place_m=place_m, yaw_rad=0.0)
+    return bytes(typestore().serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
+
+
 def fix(stamp_ns: int, lat_deg: float, lon_deg: float) -> bytes:
     import numpy as np
 
@@ -130,8 +145,8 @@ class RecordingForeign:
         self.subscribed: list[str] = []
         self.inbox: Mailbox | None = None
 
-    def subscribe(self, key: str, mailbox: Mailbox) -> None:
-        self.subscribed.append(key)
+    def subscribe(self, key: str, mailbox: Mailbox, *, history: bool = False) -> None:
+        self.subscribed.append(f"{key} with history" if history else key)
         self.inbox = mailbox
 
     def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:

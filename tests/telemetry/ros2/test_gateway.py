@@ -19,7 +19,9 @@ from tests.telemetry.ros2.gateway_ground import (
     FIX_KEY,
     FRAME,
     STEERING_KEY,
+    TF_KEY,
     RecordingForeign,
+    antenna_at,
     fix,
     mapping_text,
     steering,
@@ -125,7 +127,7 @@ def test_the_twin_goes_out_as_odometry() -> None:
     mirror = MirrorSample(
         stamp_ns=5 * S, world_id=None, real=car, twin=car, shadow=car, ghost=car, gap_m=0.0,
         gap_along_m=0.0, gap_across_m=0.0, gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=0.0,
-        independent=True,
+        independent=True, twin_yaw_rate_radps=0.3,
     )  # fmt: skip
     ground.bus.publish("mirror", mirror, run="r")
     ground.step()
@@ -135,7 +137,32 @@ def test_the_twin_goes_out_as_odometry() -> None:
     assert (place.x, place.y) == (pytest.approx(100.0, abs=1e-6), pytest.approx(-50.0, abs=1e-6))
     assert yaw_of(odometry.pose.pose.orientation) == pytest.approx(0.5, abs=1e-9)
     assert odometry.twist.twist.linear.x == 7.0
+    assert odometry.twist.twist.angular.z == 0.3
     assert odometry.header.frame_id == "map"
+
+
+def test_what_ros_says_once_is_asked_for_again() -> None:
+    ground = Ground(enabled=False, flag=False)
+    assert "0/tf_static/*/* with history" in ground.foreign.subscribed
+    assert "0/sensing/gnss/*/*" in ground.foreign.subscribed
+    ground.arrive(TF_KEY, antenna_at(1.5, -0.1, 1.8))
+    ground.arrive(FIX_KEY, fix(5 * S, 52.6, 13.5))
+    info = ground.gateway.info()
+    assert info is not None
+    assert info.body_from_antenna_m == pytest.approx((1.5, -0.1, 1.8))
+
+
+def test_real_road_users_never_go_out_as_virtual_ones() -> None:
+    ground = Ground(enabled=True, flag=True)
+    ground.say_everything()
+    user = RoadUser(
+        user_id="r", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=1.0,
+        length_m=4.0, width_m=2.0,
+    )  # fmt: skip
+    ground.bus.publish("virtual_objects", RoadUsers(stamp_ns=6 * S, users=(user,)), run="r")
+    ground.step(50.0)
+    assert len(ground.foreign.on("/perception/objects")) == 1
+    assert ground.gateway.report()["held"]["road users that are not marked as virtual"] == 1
 
 
 @pytest.mark.parametrize(("enabled", "flag"), [(False, False), (True, False), (False, True)])

@@ -24,6 +24,8 @@ from tests.telemetry.ros2.gateway_ground import (
     FIX_KEY,
     ODOMETRY_KEY,
     STEERING_KEY,
+    TF_KEY,
+    antenna_at,
     attached,
     fix,
     gateway_process,
@@ -36,10 +38,12 @@ ODOMETRY_HASH = "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda276
 
 PEER = """
 import json, struct, sys, time, zenoh
+from zenoh import ext
 config = zenoh.Config()
 config.insert_json5("mode", '"client"')
 config.insert_json5("connect/endpoints", json.dumps([sys.argv[1]]))
 config.insert_json5("scouting/multicast/enabled", "false")
+config.insert_json5("timestamping/enabled", "true")
 fix_key, odometry_key, payload = sys.argv[2], sys.argv[3], bytes.fromhex(sys.argv[4])
 with zenoh.open(config) as session:
     zid = session.info.zid()
@@ -55,6 +59,9 @@ with zenoh.open(config) as session:
         "@ros2_lv/0/*/*/*/*/*/*/foretwin/**", lambda s: ends.append(str(s.key_expr)), history=True)
     own = session.liveliness().declare_token(f"@ros2_lv/0/{zid}/0/0/NN/%/%/gnss_driver")
     subscriber = session.declare_subscriber(odometry_key, hear)
+    kept = ext.declare_advanced_publisher(
+        session, sys.argv[5], cache=ext.CacheConfig(1), publisher_detection=True)
+    kept.put(bytes.fromhex(sys.argv[6]), attachment=struct.pack("<qqB16s", 1, 5, 16, bytes(16)))
     print("ready", flush=True)
     seq = 0
     until = time.monotonic() + 30.0
@@ -96,15 +103,20 @@ def test_a_peer_of_rmw_zenoh_talks_to_it_both_ways(tmp_path: Path) -> None:
         bus.subscribe("gnss", inbox, vehicle="ego")
         mapping = mapping_text(enabled=False)
         payload = fix(10**18, 52.51, 13.41).hex()
+        transforms = antenna_at(1.5, -0.1, 1.8).hex()
         with (
+            python(
+                "-c", PEER, endpoint, FIX_KEY, odometry_key, payload, TF_KEY, transforms
+            ) as peer,
             gateway_process(tmp_path, run_endpoint=endpoint, mapping=mapping, flag=False),
-            python("-c", PEER, endpoint, FIX_KEY, odometry_key, payload) as peer,
         ):
             sample = take_until(inbox, lambda item: item.channel == "gnss").message()
             assert isinstance(sample, GnssFix)
             assert (sample.position.lat_deg, sample.stamp_ns) == (52.51, 10**18)
             info = ask(bus, "info", InfoRequest(), vehicle="ego")
             assert info.sends == ("gnss", "steering")
+            # Said once, before the gateway was there, and kept by who said it.
+            assert info.body_from_antenna_m == pytest.approx((1.5, -0.1, 1.8))
             car = PlaneState(1.0, 2.0, 0.0, 3.0)
             mirror = MirrorSample(
                 stamp_ns=10**18, world_id=None, real=car, twin=car, shadow=car, ghost=car,

@@ -1,0 +1,28 @@
+"""The command line of a running drive: what is changed while it goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def set_value(
+    assignment: Annotated[
+        str,
+        typer.Argument(
+            metavar="KEY=VALUE",
+            help="role.ID=all, twin, shadow or ghost; correction=free or follow",
+        ),
+    ],
+    run: Annotated[
+        Path | None,
+        typer.Option(help="id or folder of the run [default: the newest one running]"),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="folder of the runs")] = Path("runs"),
+) -> None:
+    """Change a running drive: the role of a vehicle, the correction of the twins."""
+    from orchestrator.changes.command import set_in_drive
+
+    print(set_in_drive(assignment, run=run, out=out))

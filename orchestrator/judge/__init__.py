@@ -1,0 +1,1 @@
+"""Judging: human beside software, simulation against reality, a recorded drive once more."""

@@ -1,0 +1,101 @@
+"""`foretwin judge`: a recorded drive again, with a corrected map or vehicle: what changes?"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from contracts.errors import UserError
+from orchestrator.config import DriveConfig
+from orchestrator.drive import carry_out
+from orchestrator.judge.difference import difference_lines, difference_of, read_judged
+from orchestrator.plan import EMBEDDED_ROUTE, make_plan, read_inputs
+from orchestrator.record.versions import versions
+
+RECORD, DRIVE = "run.json", "drive.mcap"
+JUDGED = "judged"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JudgeRequest:
+    """What was asked for on the command line."""
+
+    run: Path
+    map_file: Path | None = None
+    vehicle: str | None = None
+    out: Path | None = None
+    as_json: bool = False
+
+
+def judge(request: JudgeRequest) -> int:
+    """Drive a run's recorded drive again in lock step and print what changes; returns 0, or the
+    exit code of the drive that did not come to its end.
+
+    What it is compared with is the run itself where that was in lock step and of this version;
+    else the drive is first driven again as it was, so that nothing but the correction differs.
+    """
+    record = _record(request.run)
+    again = _again(request.run, record, out=request.out or request.run / JUDGED)
+    corrected = msgspec.structs.replace(
+        again,
+        map=again.map if request.map_file is None else str(request.map_file),
+        vehicle=request.vehicle or again.vehicle,
+    )
+    read_inputs(corrected)  # what is wrong with them is told before anything long begins
+    before = request.run
+    if record["config"]["speed"] is not None or record.get("versions") != versions():
+        _say(f"{request.run}: driven again as it was, in lock step, to compare with")
+        code, before = _drive(again)
+        if code:
+            return code
+    _say("driven again with what is corrected")
+    code, after = _drive(corrected)
+    if code:
+        return code
+    found = difference_of(read_judged(before), read_judged(after))
+    if request.as_json:
+        print(json.dumps(found, indent=2, ensure_ascii=False))
+    else:
+        print("\n".join(difference_lines(found)))
+    return 0
+
+
+def _drive(config: DriveConfig) -> tuple[int, Path]:
+    plan = make_plan(read_inputs(config), datetime.datetime.now())
+    return carry_out(plan), plan.folder
+
+
+def _record(run: Path) -> dict[str, Any]:
+    for part in (RECORD, DRIVE):
+        if not (run / part).is_file():
+            raise FileNotFoundError(f"run {run}: no {part} in it")
+    try:
+        record: dict[str, Any] = json.loads((run / RECORD).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise UserError(f"{run / RECORD}: not JSON: {error}") from error
+    if "config" not in record:
+        raise UserError(f"{run / RECORD}: the drive never came to its end (exit: {record['exit']})")
+    return record
+
+
+def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
+    """Return the configuration of a run, for its recorded drive in lock step."""
+    try:
+        was = msgspec.convert(record["config"], DriveConfig)
+    except msgspec.ValidationError as error:
+        raise UserError(f"{run / RECORD}: of another version of foretwin: {error}") from error
+    route = was.route or (str(EMBEDDED_ROUTE) if was.map is None else None)
+    return msgspec.structs.replace(
+        was, log=str(run / DRIVE), source="log", map=record["map"]["file"], route=route,
+        speed=None, view="none", out=str(out), endpoint=None, ros2=None, towards_vehicle=False,
+    ).validate()  # fmt: skip
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,1 @@
+"""The commands on maps and Worlds: fetch, index, list, choose, and write."""

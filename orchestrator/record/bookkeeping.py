@@ -1,0 +1,166 @@
+"""What a drive counts: telemetry received and lost, futures, errors of prediction, latencies."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from contracts.simulation import Comparison, PlanComparison
+from orchestrator.rounds.desk import RoundDone
+
+
+def percentile(values: list[float], q: float) -> float | None:
+    """Return the q-th percentile, None of nothing."""
+    return round(float(np.percentile(values, q)), 3) if values else None
+
+
+@dataclass(slots=True)
+class TelemetryCount:
+    """Samples by key: received, lost (gaps in the sender's numbering), and their age."""
+
+    received: int = 0
+    lost: int = 0
+    by_channel: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    ages_ms: list[float] = field(default_factory=list)
+    _next: dict[str, int] = field(default_factory=dict)
+
+    def take(self, *, key: str, channel: str, seq: int, age_ms: float) -> None:
+        """Count one sample."""
+        expected = self._next.get(key)
+        if expected is not None and seq > expected:
+            self.lost += seq - expected
+        self._next[key] = seq + 1
+        self.received += 1
+        self.by_channel[channel] += 1
+        self.ages_ms.append(age_ms)
+
+    def settle(self, published: dict[str, int]) -> None:
+        """Count what the vehicle says it published and that never came, first samples included."""
+        missing = sum(max(0, sent - self.by_channel[name]) for name, sent in published.items())
+        self.lost = max(self.lost, missing)
+
+    def record(self, skipped_invalid: int) -> dict[str, Any]:
+        """Return the `telemetry` part of run.json."""
+        return {
+            "received": self.received,
+            "lost": self.lost,
+            "skipped_invalid": skipped_invalid,
+            "age_ms_p50": percentile(self.ages_ms, 50),
+            "age_ms_p95": percentile(self.ages_ms, 95),
+        }
+
+
+@dataclass(slots=True)
+class FuturesCount:
+    """Futures of complete rounds, and the hash of all their trajectories in order."""
+
+    rounds: int = 0
+    count: int = 0
+    distinct: int = 0
+    distinct_min: int | None = None
+    sim_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    latencies_ms: list[float] = field(default_factory=list)
+    rounds_of: Counter[int] = field(default_factory=Counter)
+    """Complete rounds by the number of their futures."""
+    _hash: Any = field(default_factory=hashlib.sha256)
+
+    def take(self, done: RoundDone, *, distinct: int) -> str:
+        """Count one round; returns the hash of its trajectories alone."""
+        own = hashlib.sha256()
+        own.update(f"{done.order.stamp_ns}".encode())
+        for result in done.results:
+            own.update(np.ascontiguousarray(result.trajectory.states).tobytes())
+            own.update(np.ascontiguousarray(result.outcome.collided).tobytes())
+            self.sim_seconds += result.sim_seconds
+            self.cpu_seconds += result.cpu_seconds
+        self._hash.update(own.digest())
+        futures = sum(len(result.variant_indices) for result in done.results)
+        self.count += futures
+        self.rounds_of[futures] += 1
+        self.rounds += 1
+        self.distinct += distinct
+        self.distinct_min = (
+            distinct if self.distinct_min is None else min(self.distinct_min, distinct)
+        )
+        self.latencies_ms.append(done.latency_ms)
+        return own.hexdigest()
+
+    def record(self, *, wanted: int, missed: int, spared: int, unseeded: int) -> dict[str, Any]:
+        """Return the `futures` part of run.json; `rounds` counts the complete ones.
+
+        `missed_rounds` were due and late, `unseeded_rounds` had nothing to start from. Since the
+        machine was too slow, `smaller_rounds` had fewer futures than `wanted` and `spared_rounds`
+        were not run.
+        """
+        return {
+            "count": self.count,
+            "wanted_per_round": wanted,
+            "smaller_rounds": sum(n for size, n in self.rounds_of.items() if size < wanted),
+            "rounds_by_futures": {str(size): n for size, n in sorted(self.rounds_of.items())},
+            "distinct": self.distinct,
+            "distinct_min_per_round": self.distinct_min,
+            "missed_rounds": missed,
+            "spared_rounds": spared,
+            "unseeded_rounds": unseeded,
+            "rounds": self.rounds,
+            "sim_seconds": round(self.sim_seconds, 3),
+            "cpu_seconds": round(self.cpu_seconds, 3),
+            "sha256": self._hash.hexdigest(),
+        }
+
+
+@dataclass(slots=True)
+class ComparisonCount:
+    """Mean displacement errors by horizon: nominal future and two baselines on the same data."""
+
+    errors: dict[float, list[tuple[float, float, float]]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
+
+    def take(self, comparison: Comparison) -> None:
+        """Count one comparison."""
+        self.errors[comparison.horizon_s].append(
+            (
+                comparison.nominal.ade_m,
+                comparison.constant_velocity.ade_m,
+                comparison.constant_turn_rate.ade_m,
+            )
+        )
+
+    def record(self, *, independent: bool) -> dict[str, Any]:
+        """Return the `comparison` part of run.json."""
+        means = {f"{h:g}": np.mean(rows, axis=0) for h, rows in sorted(self.errors.items())}
+        return {
+            "ade_m": {h: round(float(m[0]), 4) for h, m in means.items()},
+            "constant_velocity_ade_m": {h: round(float(m[1]), 4) for h, m in means.items()},
+            "constant_turn_rate_ade_m": {h: round(float(m[2]), 4) for h, m in means.items()},
+            "count": {f"{h:g}": len(rows) for h, rows in sorted(self.errors.items())},
+            "independent": independent,
+        }
+
+
+@dataclass(slots=True)
+class PlanCount:
+    """How far the car's own plans lie from the nominal futures and from the route's lane centre."""
+
+    rows: list[tuple[float, float, float]] = field(default_factory=list)
+
+    def take(self, comparison: PlanComparison) -> None:
+        """Count one comparison of plans."""
+        difference = comparison.difference
+        self.rows.append((difference.ade_m, difference.fde_m, comparison.path_offset_m))
+
+    def record(self) -> dict[str, Any] | None:
+        """Return the `plan_comparison` part of run.json, None where the car sent no plans.
+
+        `path_offset_m` is the mean signed distance from the lane centre, positive to the left.
+        """
+        if not self.rows:
+            return None
+        ade, fde, offset = (round(float(v), 4) for v in np.mean(self.rows, axis=0))
+        return {"count": len(self.rows), "ade_m": ade, "fde_m": fde, "path_offset_m": offset}

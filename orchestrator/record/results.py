@@ -1,0 +1,179 @@
+"""The run's tables: Parquet files written by a thread of their own: no disk blocks a drive."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+log = logging.getLogger("results")
+
+_F, _I, _S, _B = pa.float64(), pa.int64(), pa.string(), pa.bool_()
+_ERROR = ("ade_m", "fde_m", "lateral_m", "longitudinal_m", "heading_rad")
+
+_CORRECTION = [(f"correction_{what}", _F) for what in ("along_mps2", "across_mps2", "yaw_radps2")]
+
+
+def _poses(*names: str) -> list[tuple[str, pa.DataType]]:
+    pose = ("x_m", "y_m", "yaw_rad", "speed_mps")
+    return [(f"{name}_{what}", _F) for name in names for what in pose]
+
+
+TABLES: dict[str, pa.Schema] = {
+    "rounds": pa.schema(
+        [
+            ("round_id", _I), ("stamp_ns", _I), ("drive_time_s", _F), ("intersection_id", _S),
+            ("world_id", _S), ("futures", _I), ("distinct", _I), ("collided", _I),
+            ("cruise_speed_mps", _F), ("latency_ms", _F), ("sim_seconds", _F), ("cpu_seconds", _F),
+            ("sha256", _S),
+        ]
+    ),
+    "futures": pa.schema(
+        [
+            ("round_id", _I), ("stamp_ns", _I), ("variant", _I), ("name", _S), ("planner", _S),
+            ("scenario", _S), ("failure", _S), ("remark", _S), ("worker_id", _S), ("valid", _B),
+            ("collided", _B), ("collision_time_s", _F),
+            ("collision_with", _I), ("min_clearance_m", _F), ("progress_m", _F), ("end_x_m", _F),
+            ("end_y_m", _F), ("end_yaw_rad", _F), ("end_speed_mps", _F),
+            ("end_difference_from_nominal_m", _F), ("max_difference_from_nominal_m", _F),
+        ]
+    ),
+    "comparisons": pa.schema(
+        [("round_id", _I), ("stamp_ns", _I), ("intersection_id", _S), ("horizon_s", _F)]
+        + [
+            (f"{who}_{what}", _F)
+            for who in ("nominal", "constant_velocity", "constant_turn_rate")
+            for what in _ERROR
+        ]
+    ),
+    "plan_comparisons": pa.schema(
+        [("round_id", _I), ("stamp_ns", _I), ("plan_stamp_ns", _I), ("horizon_s", _F)]
+        + [(what, _F) for what in _ERROR]
+        + [("path_offset_m", _F)]
+    ),
+    "disagreements": pa.schema(
+        [
+            ("vehicle_id", _S), ("segment", _I), ("aspect", _S), ("kind", _S), ("stamp_ns", _I),
+            ("end_stamp_ns", _I), ("duration_s", _F), ("lat_deg", _F), ("lon_deg", _F),
+            ("junction_id", _S), ("route_m", _F), ("lateral_m", _F), ("along_m", _F),
+            ("speed_mps", _F),
+        ]
+    ),
+    "driven_segments": pa.schema(
+        [
+            ("number", _I), ("control_mode", _S), ("from_stamp_ns", _I), ("to_stamp_ns", _I),
+            ("plans", _I), ("cut", _I), ("too_short", _I), ("lateral_m", _F), ("along_m", _F),
+            ("speed_mps", _F), ("disagreements", _I),
+        ]
+    ),
+    "agreement": pa.schema(
+        [
+            ("round_id", _I), ("stamp_ns", _I), ("drive_time_s", _F), ("intersection_id", _S),
+            ("outcome", _S), ("observable", _S), ("simulated_fails", _S), ("driven_fails", _S),
+            ("gap_along_m", _F), ("gap_across_m", _F),
+            *((f"flip_{direction}_{what}", _F) for direction in ("along", "across", "both")
+              for what in ("factor", "m")),
+            *((f"flip_{direction}_fails", _S) for direction in ("along", "across", "both")),
+        ]
+    ),
+    "mirror": pa.schema(
+        [
+            ("stamp_ns", _I), ("world_id", _S),
+            *_poses("real", "twin", "shadow", "ghost", "free"),
+            ("gap_m", _F), ("gap_along_m", _F), ("gap_across_m", _F), ("gap_yaw_rad", _F),
+            ("gap_speed_mps", _F), ("since_reset_s", _F), ("independent", _B),
+            ("role", _S), *_CORRECTION,
+        ]
+    ),
+    "mirrored": pa.schema(
+        [
+            ("stamp_ns", _I), ("vehicle_id", _S), ("role", _S), *_poses("real", "shown"),
+            *_CORRECTION,
+        ]
+    ),
+    "touches": pa.schema([("stamp_ns", _I), ("one", _S), ("other", _S)]),
+    "changes": pa.schema(
+        [("stamp_ns", _I), ("asked_stamp_ns", _I), ("key", _S), ("before", _S), ("value", _S)]
+    ),
+    "events": pa.schema([("stamp_ns", _I), ("level", _S), ("source", _S), ("text", _S)]),
+}  # fmt: skip
+"""Every table of `results/` with its columns."""
+
+FLUSH_ROWS = 2000
+QUEUE_DEPTH = 4096
+
+
+class ResultTables:
+    """Collects rows and writes them; `add` never raises, and blocks in lock step alone."""
+
+    def __init__(
+        self, folder: Path, metadata: Mapping[str, str], *, lossless: bool = False
+    ) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder = folder
+        self._metadata = {key.encode(): value.encode() for key, value in metadata.items()}
+        self._queue: queue.Queue[tuple[str, Sequence[Mapping[str, Any]]] | None] = queue.Queue(
+            QUEUE_DEPTH
+        )
+        self._lossless = lossless
+        self.dropped = 0
+        self.failed: str | None = None
+        self._thread = threading.Thread(target=self._run, name="results", daemon=True)
+        self._thread.start()
+
+    def add(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Hand over rows for one table of TABLES; what does not fit the queue is counted."""
+        try:
+            self._queue.put((table, rows), block=self._lossless and self._thread.is_alive())
+        except queue.Full:
+            self.dropped += len(rows)
+
+    def close(self, timeout_s: float = 10.0) -> None:
+        """Write everything and close the files."""
+        try:
+            self._queue.put(None, timeout=timeout_s)
+        except queue.Full:
+            return
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        writers = {}
+        pending: dict[str, list[Mapping[str, Any]]] = {name: [] for name in TABLES}
+        try:
+            for name, schema in TABLES.items():
+                writers[name] = pq.ParquetWriter(
+                    self._folder / f"{name}.parquet", schema.with_metadata(self._metadata)
+                )
+            while (item := self._queue.get()) is not None:
+                name, rows = item
+                pending[name].extend(rows)
+                if len(pending[name]) >= FLUSH_ROWS:
+                    _write(writers[name], name, pending[name])
+            for name, rows in pending.items():
+                _write(writers[name], name, rows)
+        except (OSError, pa.ArrowException) as error:
+            self.failed = f"results cannot be written: {error}"
+            log.error("%s", self.failed)
+        finally:
+            for writer in writers.values():
+                try:
+                    writer.close()
+                except (OSError, pa.ArrowException) as error:
+                    self.failed = self.failed or f"results cannot be closed: {error}"
+
+
+def _write(writer: pq.ParquetWriter, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    if rows:
+        writer.write_table(
+            pa.Table.from_pylist(list(rows), schema=TABLES[name]).replace_schema_metadata(
+                writer.schema.metadata
+            )
+        )
+        if isinstance(rows, list):
+            rows.clear()

@@ -1,0 +1,102 @@
+"""The record of a run: `run.json`, written at the start and, complete, at the end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from orchestrator.conductor import Conductor
+from orchestrator.mission import Mission
+from orchestrator.plan import DrivePlan
+from orchestrator.record.bookkeeping import percentile
+from orchestrator.record.versions import versions
+from orchestrator.supervisor import Supervisor
+
+RESERVED_BYTES = 65536
+
+
+def run_record(
+    plan: DrivePlan,
+    conductor: Conductor,
+    mission: Mission,
+    supervisor: Supervisor,
+    *,
+    exit_word: str,
+    wall_s: float,
+    mono_s: float,
+) -> dict[str, Any]:
+    """Return everything that run.json says."""
+    futures = conductor.rounds.futures
+    # Without a word of the mirror, whether commands were recorded decides.
+    independent = conductor.mirror.independent
+    if independent is None:
+        independent = plan.commands_recorded
+    return {
+        "run_id": plan.run_id,
+        "exit": exit_word,
+        "versions": versions(),
+        "map": {
+            "file": str(plan.map_file),
+            "sha256": plan.osm.sha256,
+            "attribution": plan.osm.attribution,
+        },
+        "seed": plan.config.seed,
+        "route_source": plan.route_source,
+        "config": msgspec.to_builtins(plan.config),
+        "intersections": mission.records(mono_s=mono_s),
+        "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
+        "telemetry": conductor.intake.record(),
+        "futures": futures.record(
+            wanted=plan.config.futures,
+            missed=conductor.missed_rounds,
+            spared=conductor.spared_rounds,
+            unseeded=conductor.unseeded_rounds,
+        ),
+        "state_to_result_ms_p50": percentile(futures.latencies_ms, 50),
+        "state_to_result_ms_p95": percentile(futures.latencies_ms, 95),
+        "comparison": conductor.rounds.comparisons.record(independent=independent),
+        "plan_comparison": conductor.rounds.plans.record(),
+        "side_by_side": conductor.human.record(),
+        "agreement": conductor.rounds.windows.record(conductor.intake.start_stamp_ns),
+        "workers": {
+            "started": plan.config.workers,
+            "restarted": supervisor.restarted,
+            "requeued_jobs": conductor.rounds.desk.requeued_jobs,
+            "late_results": conductor.rounds.desk.late_results,
+        },
+        "dropped": {
+            "orchestrator_mailbox": conductor.mailbox.dropped,
+            "result_rows": conductor.tables.dropped,
+            "failed_jobs": conductor.rounds.failed_jobs,
+            "given_up_rounds": conductor.rounds.desk.given_up_rounds,
+        },
+        "troubles": [conductor.tables.failed] if conductor.tables.failed else [],
+        "off_road": [
+            {
+                "reason": stretch.reason,
+                "name": stretch.name,
+                "way_ids": list(stretch.way_ids),
+                "length_m": round(stretch.length_m, 1),
+            }
+            for stretch in mission.off_road_stretches
+        ],
+        "drive_time_s": round(mission.drive_time_s, 3),
+        "wall_s": round(wall_s, 3),
+    }
+
+
+def reserve_record(plan: DrivePlan, file: Path) -> None:
+    """Write a run.json that says that the run goes on, and keeps room on the disk for the last."""
+    begun = json.dumps({"run_id": plan.run_id, "exit": "running", "endpoint": plan.bus.endpoint})
+    file.write_text(begun.ljust(RESERVED_BYTES) + "\n", encoding="utf-8")
+
+
+def write_record(record: dict[str, Any], file: Path) -> None:
+    """Write run.json over the reserved one; works on a full disk. Raises OSError."""
+    data = (json.dumps(record, indent=2, ensure_ascii=False) + "\n").encode()
+    with file.open("r+b" if file.exists() else "wb") as target:
+        target.write(data)
+        target.truncate()

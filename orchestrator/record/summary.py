@@ -1,0 +1,76 @@
+"""What the engineer reads at the end of a drive, told from its record."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from orchestrator.judge.verdict_rows import agreement_lines
+
+DISAGREEMENTS_SHOWN = 12
+BEGINNING_S = 0.5
+"""Where a junction is near so soon, the drive began near it."""
+
+
+def _readiness(junction: dict[str, Any], *, lock_step: bool) -> str:
+    """Say how long before the car came near a World was ready; a drive may begin near one.
+
+    In lock step the drive waits for Worlds, and how long that takes says nothing of the drive.
+    """
+    if lock_step:
+        return "world never came" if junction["built_at_s"] is None else "world ready"
+    before_s = junction["world_ready_before_s"]
+    if before_s < 0.0:
+        return f"world {-before_s:.1f} s late"
+    if junction["within_radius_at_s"] < BEGINNING_S:
+        return "world ready before the drive began"
+    return f"world ready {before_s:.1f} s before the car came near"
+
+
+def side_by_side_lines(found: Any) -> list[str]:
+    """Return what is said of human and ADS: each segment, and where they disagree."""
+    if found is None:
+        return []
+    lines = [
+        f"  {one['control_mode']} for {(one['to_stamp_ns'] - one['from_stamp_ns']) / 1e9:.1f} s: "
+        f"{one['plans']} plans of the ADS, 95 % within {one['lateral_m']:.1f} m across, "
+        f"{one['along_m']:.1f} m along, {one['speed_mps']:.1f} m/s of what was then driven"
+        for one in found["segments"]
+        if one["plans"]
+    ]
+    lines += [
+        f"  {one['drive_time_s']:7.1f} s  {one['kind']} for {one['duration_s']:.1f} s at "
+        f"{one['lat_deg']:.6f}, {one['lon_deg']:.6f} ({one['junction_id'] or 'no junction ahead'})"
+        for one in found["disagreements"][:DISAGREEMENTS_SHOWN]
+    ]
+    more = len(found["disagreements"]) - DISAGREEMENTS_SHOWN
+    return [*lines, f"  and {more} more in results/disagreements.parquet"] if more > 0 else lines
+
+
+def summary_text(record: dict[str, object]) -> str:
+    """Return what the engineer reads at the end of a drive."""
+    futures = record["futures"]
+    assert isinstance(futures, dict)
+    junctions = record["intersections"]
+    assert isinstance(junctions, list)
+    latency = record["state_to_result_ms_p95"]
+    lines = [
+        f"{record['exit']}: {len(junctions)} junctions, {futures['count']} futures in "
+        f"{futures['rounds']} rounds ({futures['missed_rounds']} missed)"
+        + ("" if latency is None else f", state to result p95 {latency:.0f} ms")
+    ]
+    if futures["smaller_rounds"] or futures["spared_rounds"]:
+        sizes = ", ".join(f"{n} of {size}" for size, n in futures["rounds_by_futures"].items())
+        lines.append(
+            f"  machine too slow for {futures['wanted_per_round']} futures in every round: "
+            f"{sizes} futures, {futures['spared_rounds']} rounds spared"
+        )
+    lock_step = record["config"]["speed"] is None  # type: ignore[index]
+    lines += [
+        f"  {junction['arrived_at_s']:7.1f} s  {junction['kind']:11s} "
+        f"{junction['name'] or junction['id']}  {_readiness(junction, lock_step=lock_step)}"
+        for junction in junctions
+    ]
+    lines += side_by_side_lines(record.get("side_by_side"))
+    lines += agreement_lines(record.get("agreement"))  # type: ignore[arg-type]
+    attribution = record["map"]["attribution"]  # type: ignore[index]
+    return "\n".join([*lines, attribution])

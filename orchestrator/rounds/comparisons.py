@@ -1,0 +1,114 @@
+"""Holds the nominal futures until reality has caught up with them, then compares."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from contracts.arrays import Array
+from contracts.drive import VehicleState
+from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, target_from_source
+from contracts.simulation import Comparison
+from orchestrator.config import HORIZONS_S
+from orchestrator.rounds.desk import RoundDone
+from sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
+
+LEAD_NS = 1_000_000_000
+"""How much of the real track before a future's beginning goes into its comparison."""
+KEEP_S = 5.0
+"""How long the real track is kept beyond the longest horizon."""
+
+
+@dataclass(slots=True)
+class ComparisonDesk:
+    """Takes states and rounds in the order of their stamps, gives comparisons as they fall due.
+
+    `truth` positions are those that the vehicle measured: what is compared with is never smoothed
+    with knowledge of the future, so that a live drive and a replay give the same numbers.
+    """
+
+    frame: LocalFrame
+    horizon_s: float
+    _stamps_ns: deque[int] = field(default_factory=deque)
+    _poses: deque[Array] = field(default_factory=deque)
+    _waiting: deque[tuple[NominalTrack, str, int, float]] = field(default_factory=deque)
+
+    @property
+    def horizons_s(self) -> tuple[float, ...]:
+        """The horizons that a future of this length covers."""
+        return tuple(h for h in HORIZONS_S if h <= self.horizon_s + 1e-9)
+
+    def take_state(self, state: VehicleState) -> list[Comparison]:
+        """Add where the car is; return the comparisons that this completes."""
+        if self._stamps_ns and state.stamp_ns < self._stamps_ns[-1] - LEAD_NS:
+            # The vehicle's clock has stepped back: nothing of before can be compared any more.
+            self._stamps_ns.clear()
+            self._poses.clear()
+            self._waiting.clear()
+        if not state.yaw_valid or (self._stamps_ns and state.stamp_ns <= self._stamps_ns[-1]):
+            return []
+        lat, lon = state.position.lat_deg, state.position.lon_deg
+        xy = local_from_geo(self.frame, lat, lon)
+        yaw = float(local_from_geo_yaw(self.frame, state.yaw_rad, lat, lon))
+        self._stamps_ns.append(state.stamp_ns)
+        self._poses.append(np.array([xy[0], xy[1], yaw]))
+        done = []
+        while self._waiting and self._due_ns(self._waiting[0]) <= state.stamp_ns:
+            nominal, junction_id, round_id, _ = self._waiting.popleft()
+            done += self._compare(nominal, junction_id, round_id)
+        self._forget(state.stamp_ns)
+        return done
+
+    def take_round(self, done: RoundDone, world_frame: LocalFrame, seed: VehicleState) -> None:
+        """Add a round's nominal future, the first of its first job."""
+        trajectory = done.results[0].trajectory
+        states = np.asarray(trajectory.states[0], dtype=np.float64)
+        poses = target_from_source(self.frame, world_frame, states[:, :2], states[:, 2])
+        nominal = NominalTrack(
+            stamp_ns=trajectory.stamp_ns,
+            time_s=np.asarray(trajectory.time_s),
+            xy_yaw=np.column_stack([poses.xy_m, poses.yaw_rad]),
+            speed_mps=seed.speed_mps,
+            yaw_rate_radps=seed.yaw_rate_radps,
+        )
+        self._waiting.append(
+            (nominal, done.order.junction_id, done.order.round_id, max(self.horizons_s))
+        )
+
+    def flush(self) -> list[Comparison]:
+        """Return what can still be compared over the horizons that the drive has covered."""
+        done = []
+        while self._waiting:
+            nominal, junction_id, round_id, _ = self._waiting.popleft()
+            done += self._compare(nominal, junction_id, round_id)
+        return done
+
+    def _due_ns(self, waiting: tuple[NominalTrack, str, int, float]) -> int:
+        return waiting[0].stamp_ns + round(waiting[3] * 1e9)
+
+    def _compare(self, nominal: NominalTrack, junction_id: str, round_id: int) -> list[Comparison]:
+        # The same stretch whenever this is called: unwrapping angles from another start would
+        # change their last digits, and a cut log the results before the cut.
+        first = nominal.stamp_ns - LEAD_NS
+        kept = [(s, p) for s, p in zip(self._stamps_ns, self._poses, strict=True) if s >= first]
+        track = ActualTrack(
+            stamps_ns=np.array([stamp for stamp, _ in kept], dtype=np.int64),
+            xy_yaw=np.array([pose for _, pose in kept]),
+        )
+        return compare_nominal(
+            nominal,
+            track,
+            horizons_s=self.horizons_s,
+            round_id=round_id,
+            intersection_id=junction_id,
+        )
+
+    def _forget(self, now_ns: int) -> None:
+        oldest = now_ns - round((self.horizon_s + KEEP_S) * 1e9)
+        if self._waiting:
+            oldest = min(oldest, self._waiting[0][0].stamp_ns - LEAD_NS)
+        while len(self._stamps_ns) > 2 and self._stamps_ns[1] < oldest:
+            self._stamps_ns.popleft()
+            self._poses.popleft()

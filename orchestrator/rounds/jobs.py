@@ -1,0 +1,176 @@
+"""What a round simulates: the mix of futures that fits the way ahead, as jobs for workers."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from contracts.drive import PlannedTrajectory, SignalState, VehicleState
+from contracts.errors import UserError
+from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from contracts.futures import CarPlan, FuturesJob, PathAhead, Variant
+from contracts.scenario import Scenario
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+from orchestrator.config import DriveConfig
+from orchestrator.instructions import RoundIntent
+from orchestrator.intake import Surroundings
+from orchestrator.rounds.fewer_futures import some_of
+from orchestrator.rounds.seen_users import near_car
+from orchestrator.way.way_ahead import PATH_BEHIND_M
+from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.live import LiveScenarios
+from sim_worker.scenarios.reading import catalogue, find_scenario
+from sim_worker.scenarios.roads import RoadNetwork
+from sim_worker.variants import cases_of, plan_variants
+from world_gen.signal_state import LIVE_FOR_S
+
+STEP_S = 0.1
+HEEDLESS_PLANNER = "constant_speed"
+PLAN_FRESH_NS = 1_000_000_000
+"""An older plan of the car is not compared with a new future, nor followed in one."""
+_KEPT_WORLDS = 8
+LEAST_IN_JOB = 16
+"""A job costs about as much as 30 of its futures before the first one: smaller ones save little."""
+
+
+class RoundPlan(NamedTuple):
+    """One round's futures and the jobs that they are cut into."""
+
+    variants: tuple[Variant, ...]
+    jobs: tuple[FuturesJob, ...]
+
+
+def planners_of(planner: str) -> list[str]:
+    """Return who drives the futures in turn: the planner under test, and one that heeds nobody."""
+    return [planner] * 7 + ([HEEDLESS_PLANNER] if planner != HEEDLESS_PLANNER else [])
+
+
+def scenarios_of(config: DriveConfig) -> tuple[Scenario, ...]:
+    """Return the scenarios that a drive's futures take turns with.
+
+    Raises UserError for an unknown one, or one that happens at no junction.
+    """
+    if config.scenarios is None:
+        return tuple(s for s in catalogue().values() if s.where.setting == "junction")
+    found = tuple(find_scenario(name) for name in config.scenarios)
+    for scenario in found:
+        if scenario.where.setting != "junction":
+            raise UserError(
+                f"scenario {scenario.id}: takes place on a {scenario.where.setting}, not at a "
+                "junction ahead of a drive"
+            )
+    return found
+
+
+class RoundPlanner:
+    """Plans rounds: a function of World, intent and what the car says; keeps what is costly."""
+
+    def __init__(self, config: DriveConfig, vehicle: VehicleParameters) -> None:
+        self._config, self._vehicle = config, vehicle
+        self._scenarios = scenarios_of(config)
+        self._known: dict[str, LiveScenarios] = {}
+        self._variants: dict[tuple[str, ...], tuple[Variant, ...]] = {}
+
+    def draw_cases(self) -> None:
+        """Draw the cases of all scenarios: before the drive, not in its first round."""
+        for scenario in self._scenarios:
+            cases_of(scenario, self._config.seed)
+
+    def plan(
+        self,
+        round_id: int,
+        intent: RoundIntent,
+        state: VehicleState,
+        said: Surroundings,
+        world: World,
+        *,
+        start_stamp_ns: int,
+        count: int,
+    ) -> RoundPlan:
+        """Return a round's `count` futures and its jobs."""
+        config = self._config
+        scenarios = self._fitting(world, intent.path)
+        variants = some_of(self._variants_with(scenarios), count, turn=round_id)
+        users = tuple(near_car(said.road_users, state, world.frame).values())
+        signals = _signals(said.signals, state)
+        car_plan = _car_plan(said.plan, state, world.frame)
+        jobs = []
+        for index, mine in enumerate(self._cut(variants)):
+            named = {variant.scenario_id for variant in mine}
+            jobs.append(
+                FuturesJob(
+                    round_id=round_id,
+                    job_index=index,
+                    world_id=intent.world_id,
+                    state=state,
+                    path=intent.path,
+                    variants=mine,
+                    horizon_s=config.horizon_s,
+                    step_s=STEP_S,
+                    seed=config.seed,
+                    cruise_speed_mps=intent.cruise_speed_mps,
+                    scenarios=tuple(s for s in scenarios if s.id in named),
+                    road_users=users,
+                    signals=signals,
+                    drive_time_s=(state.stamp_ns - start_stamp_ns) / 1e9,
+                    car_plan=car_plan,
+                )
+            )
+        return RoundPlan(variants, tuple(jobs))
+
+    def _cut(self, variants: tuple[Variant, ...]) -> list[tuple[Variant, ...]]:
+        """Return the futures of each job: as many jobs as for all, unless that makes them small."""
+        size, count = self._config.futures_per_job, len(variants)
+        for_all = math.ceil(self._config.futures / size)
+        jobs = max(math.ceil(count / size), min(for_all, count // LEAST_IN_JOB))
+        cuts = [count * job // jobs for job in range(jobs + 1)]
+        return [variants[low:high] for low, high in pairwise(cuts)]
+
+    def _variants_with(self, scenarios: tuple[Scenario, ...]) -> tuple[Variant, ...]:
+        key = tuple(scenario.id for scenario in scenarios)
+        if key not in self._variants:
+            config = self._config
+            self._variants[key] = plan_variants(
+                count=config.futures,
+                seed=config.seed,
+                planners=planners_of(config.planner),
+                scenarios=scenarios,
+            )
+        return self._variants[key]
+
+    def _fitting(self, world: World, path: PathAhead) -> tuple[Scenario, ...]:
+        """Return the scenarios that can take place on the way through the junction ahead."""
+        if not self._scenarios:
+            return ()
+        if world.id not in self._known:
+            while len(self._known) >= _KEPT_WORLDS:
+                del self._known[next(iter(self._known))]
+            self._known[world.id] = LiveScenarios(RoadNetwork(world))
+        known = self._known[world.id]
+        on = known.on(FrenetPath(path.xy_m), PATH_BEHIND_M, self._vehicle)
+        passage = on.passage
+        if passage is None:
+            return ()
+        return tuple(s for s in self._scenarios if known.places(s, passage))
+
+
+def _signals(states: tuple[SignalState, ...], state: VehicleState) -> tuple[SignalState, ...]:
+    fresh_ns = LIVE_FOR_S * 1e9
+    return tuple(s for s in states if abs(state.stamp_ns - s.stamp_ns) <= fresh_ns)
+
+
+def _car_plan(
+    plan: PlannedTrajectory | None, state: VehicleState, frame: LocalFrame
+) -> CarPlan | None:
+    if plan is None or abs(state.stamp_ns - plan.stamp_ns) > PLAN_FRESH_NS:
+        return None
+    return CarPlan(
+        time_s=plan.time_from_stamp_s + (plan.stamp_ns - state.stamp_ns) / 1e9,
+        xy_m=np.asarray(local_from_geo(frame, plan.lat_deg, plan.lon_deg)),
+        yaw_rad=np.asarray(local_from_geo_yaw(frame, plan.yaw_rad, plan.lat_deg, plan.lon_deg)),
+        speed_mps=plan.speed_mps,
+    )

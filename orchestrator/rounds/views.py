@@ -1,0 +1,108 @@
+"""A round for those who watch: the fan of futures, and whom the worst of them meet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contracts.arrays import Array, Array32
+from contracts.frames import LocalFrame, target_from_source
+from contracts.futures import Variant
+from contracts.simulation import RoundView
+from orchestrator.record.result_rows import RoundFutures
+from orchestrator.rounds.desk import RoundDone
+
+VIEW_POINTS = 25
+SAFE_CLEARANCE_M = 10.0
+_SHOWN = 16
+"""Of so many futures, the worst first, one sees the road user that they meet."""
+_SHOWN_FROM = 0.3
+_ROAD_USER = 1
+
+
+def round_view(
+    done: RoundDone,
+    futures: RoundFutures,
+    world_frame: LocalFrame,
+    drive_frame: LocalFrame,
+    variants: Sequence[Variant],
+) -> RoundView:
+    """Return a round for those who watch: fewer points, in the drive's frame, with criticality."""
+    count, instants = futures.states.shape[:2]
+    kept = np.unique(np.linspace(0, instants - 1, VIEW_POINTS).round().astype(int))
+
+    def in_drive(xy_m: Array) -> Array32:
+        flat = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
+        moved = target_from_source(drive_frame, world_frame, flat, np.zeros(len(flat))).xy_m
+        return moved.reshape(xy_m.shape).astype(np.float32)
+
+    clearance = np.where(np.isfinite(futures.min_clearance_m), futures.min_clearance_m, np.inf)
+    criticality = np.where(
+        futures.collided, 1.0, np.clip(1.0 - clearance / SAFE_CLEARANCE_M, 0.0, 0.95)
+    )
+    nearest = float(clearance.min()) if count else np.inf
+    met = _met(done, variants, criticality, kept)
+    return RoundView(
+        round_id=done.order.round_id,
+        stamp_ns=done.order.stamp_ns,
+        intersection_id=done.order.junction_id,
+        world_id=done.order.world_id,
+        xy_m=in_drive(futures.states[:, kept, :2]),
+        criticality=criticality.astype(np.float32),
+        nominal_index=0,
+        names=_names(done, variants),
+        collided=int(np.count_nonzero(futures.collided)),
+        min_clearance_m=nearest if np.isfinite(nearest) else None,
+        latency_ms=done.latency_ms,
+        user_xy_m=in_drive(met.tracks_m),
+        touch_xy_m=in_drive(met.touches_m),
+        touch_names=met.touch_names,
+    )
+
+
+def _names(done: RoundDone, variants: Sequence[Variant]) -> tuple[str, ...]:
+    """Return the futures' names; one whose scenario is left out says so."""
+    left_out = [reason for result in done.results for reason in result.left_out]
+    return tuple(
+        f"{variant.name} (left out)" if reason else variant.name
+        for variant, reason in zip(variants, left_out, strict=True)
+    )
+
+
+class _Met(NamedTuple):
+    """In the World's frame: tracks (K, M, 2), places of touches (C, 2) and what happened there."""
+
+    tracks_m: Array
+    touches_m: Array
+    touch_names: tuple[str, ...]
+
+
+def _met(
+    done: RoundDone, variants: Sequence[Variant], criticality: Array, kept: np.ndarray[Any, Any]
+) -> _Met:
+    """Return the nearest road user of each of the worst futures, and where cars touch theirs."""
+    tracks, touches, names = [], [], []
+    worst = {int(i) for i in np.argsort(-criticality, kind="stable")[:_SHOWN]}
+    number = 0
+    for result in done.results:
+        poses, states = result.road_users.poses, result.trajectory.states
+        for place in range(len(result.variant_indices)):
+            shown = number in worst and criticality[number] >= _SHOWN_FROM
+            variant = variants[number]
+            number += 1
+            there = np.flatnonzero(np.isfinite(poses[place, 0, :, 0]))
+            if not len(there):
+                continue
+            away = poses[place][:, there, :2] - states[place, :, None, :2]
+            nearest = there[np.hypot(away[..., 0], away[..., 1]).min(axis=0).argmin()]
+            if shown:
+                tracks.append(poses[place, kept, nearest, :2])
+            if result.outcome.collision_with[place] == _ROAD_USER:
+                time_s = float(result.outcome.collision_time_s[place])
+                instant = int(np.searchsorted(result.trajectory.time_s, time_s))
+                touches.append(poses[place, min(instant, poses.shape[1] - 1), nearest, :2])
+                names.append(variant.scenario_id)
+    found = np.array(tracks, dtype=np.float64).reshape(-1, len(kept), 2)
+    return _Met(found, np.array(touches, dtype=np.float64).reshape(-1, 2), tuple(names))

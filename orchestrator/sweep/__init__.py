@@ -1,0 +1,1 @@
+"""Scenario sweeps offline: what is swept, where, by which workers, and the rows that come of it."""

@@ -1,0 +1,134 @@
+"""The folder of a sweep: what it is of, its plan, and its rows, so that a sweep can go on."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from contracts.errors import UserError
+from orchestrator.record.versions import versions
+from orchestrator.sweep.plan import WorldPlaces
+from orchestrator.sweep.road_users import digest_of
+from orchestrator.sweep.spec import Loaded
+from world_gen.build import GENERATOR_VERSION
+
+SUMMARY, PLAN, ROWS, WORLDS = "sweep.json", "places.msgpack", "rows", "worlds"
+
+
+class FoundPlaces(msgspec.Struct, frozen=True, kw_only=True):
+    """What a sweep found out before it played anything."""
+
+    fingerprint: str
+    worlds: tuple[WorldPlaces, ...]
+    failures: dict[str, str]
+    """Junctions or Worlds of which nothing can be played, and why."""
+
+
+class SweepFolder:
+    """One folder for one sweep; raises UserError where it holds something else."""
+
+    def __init__(self, path: Path, fingerprint: str, *, fresh: bool) -> None:
+        self.path, self.fingerprint = path, fingerprint
+        if path.exists() and not path.is_dir():
+            raise UserError(f"--out {path}: is a file; a sweep writes into a folder")
+        if fresh:
+            _clear(path)
+        self._check()
+        self.worlds_dir.mkdir(parents=True, exist_ok=True)
+
+    @property
+    def worlds_dir(self) -> Path:
+        """Return where Worlds are built."""
+        return built_worlds(self.path)
+
+    @property
+    def rows_dir(self) -> Path:
+        """Return where the rows are."""
+        return self.path / ROWS
+
+    def _check(self) -> None:
+        summary = self.path / SUMMARY
+        if not summary.is_file():
+            if self.path.is_dir() and any(self.path.iterdir()):
+                raise UserError(f"--out {self.path}: holds other files and no sweep")
+            return
+        try:
+            known = msgspec.json.decode(summary.read_bytes()).get("fingerprint")
+        except (msgspec.DecodeError, AttributeError) as error:
+            raise UserError(f"{summary}: is no summary of a sweep: {error}") from error
+        if known != self.fingerprint:
+            raise UserError(
+                f"--out {self.path}: holds a sweep of another spec, map or version; --fresh starts "
+                "anew, another --out keeps both"
+            )
+
+    def begin(self, loaded: Loaded) -> None:
+        """Note what the folder is for, where nothing is there yet."""
+        if not (self.path / SUMMARY).is_file():
+            self.summarise({"complete": False, "spec": loaded.spec})
+
+    def summarise(self, what: dict[str, Any]) -> dict[str, Any]:
+        """Write the summary; returns the whole of it."""
+        whole = {
+            "fingerprint": self.fingerprint,
+            "versions": versions(),
+            **what,
+        }
+        self._write(SUMMARY, msgspec.json.format(msgspec.json.encode(whole), indent=2) + b"\n")
+        return whole
+
+    def save_places(self, found: tuple[WorldPlaces, ...], failures: dict[str, str]) -> FoundPlaces:
+        """Keep where scenarios take place: it need not be found out again."""
+        places = FoundPlaces(fingerprint=self.fingerprint, worlds=found, failures=failures)
+        self._write(PLAN, msgspec.msgpack.encode(places))
+        return places
+
+    def _write(self, name: str, data: bytes) -> None:
+        """Write a file that is whole or not there."""
+        partial = self.path / f"{name}.writing"
+        partial.write_bytes(data)
+        partial.replace(self.path / name)
+
+    def places(self) -> FoundPlaces | None:
+        """Return what was kept, None where there is nothing."""
+        try:
+            kept = msgspec.msgpack.decode((self.path / PLAN).read_bytes(), type=FoundPlaces)
+        except (FileNotFoundError, msgspec.DecodeError):
+            return None
+        return kept if kept.fingerprint == self.fingerprint else None
+
+
+def built_worlds(out: Path) -> Path:
+    """Return where the Worlds of a sweep are built."""
+    return out / WORLDS
+
+
+def fingerprint_of(loaded: Loaded, source: str) -> str:
+    """Return a hash of everything that decides the rows of a sweep."""
+    # How long one waits for a job does not.
+    spec = msgspec.structs.replace(loaded.spec, job_timeout_s=1.0)
+    parts = (
+        spec,
+        loaded.scenarios,
+        loaded.vehicles,
+        loaded.starts,
+        None if loaded.road_users is None else digest_of(loaded.road_users),
+        source,
+        GENERATOR_VERSION,
+        versions(),
+    )
+    return hashlib.sha256(msgspec.json.encode(parts)).hexdigest()
+
+
+def _clear(path: Path) -> None:
+    """Remove what an earlier sweep left in its folder, and nothing else."""
+    if not (path / SUMMARY).is_file():
+        return
+    for name in (SUMMARY, PLAN):
+        (path / name).unlink(missing_ok=True)
+    for name in (ROWS, WORLDS):
+        shutil.rmtree(path / name, ignore_errors=True)

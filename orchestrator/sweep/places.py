@@ -1,0 +1,85 @@
+"""Where the scenarios of a sweep take place: in Worlds, or around a car that was recorded there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contracts.frames import local_from_geo
+from contracts.vehicle import VehicleParameters
+from contracts.world import World
+from orchestrator.sweep.plan import NotPlaced, PlacedHere, WorldPlaces
+from orchestrator.sweep.spec import AS_RECORDED, Loaded
+from sim_worker.planners.path import FrenetPath
+from sim_worker.scenarios.live import LiveScenarios
+from sim_worker.scenarios.placement import places
+from sim_worker.scenarios.roads import RoadNetwork
+
+
+def places_in(world: World, loaded: Loaded) -> WorldPlaces:
+    """Return where the scenarios of a sweep take place in a World, for its first vehicle."""
+    network = RoadNetwork(world)
+    vehicle = next(iter(loaded.vehicles.values()))
+    if loaded.starts:
+        return _places_recorded(network, loaded, vehicle)
+    placed, unplaced = [], []
+    for scenario in loaded.scenarios:
+        found = places(scenario, world, network=network, vehicle=vehicle, most=loaded.spec.places)
+        placed += [
+            PlacedHere(
+                scenario_id=scenario.id, junction_id=place.junction_id, place=place.name,
+                ego=place.ego.name,
+            )
+            for place in found.places
+        ]  # fmt: skip
+        unplaced += [
+            NotPlaced(
+                scenario_id=scenario.id, junction_id=one.junction_id, reason=one.reason,
+                applies=one.applies,
+            )
+            for one in found.unplaced
+        ]  # fmt: skip
+    return WorldPlaces(world_id=world.id, placed=tuple(placed), unplaced=tuple(unplaced))
+
+
+def _places_recorded(
+    network: RoadNetwork, loaded: Loaded, vehicle: VehicleParameters
+) -> WorldPlaces:
+    """Return which scenarios can happen on the ways that a recorded car took from its starts."""
+    world, known = network.world, LiveScenarios(network)
+    placed, unplaced = [], []
+    for number, start in enumerate(loaded.starts):
+        if start.world_id != world.id:
+            continue
+        path = FrenetPath(start.path(world.frame).xy_m)
+        here = local_from_geo(
+            world.frame, start.state.position.lat_deg, start.state.position.lon_deg
+        )
+        arc = path.locate(np.asarray(here)[None])
+        passage = known.on(path, float(arc.arc_m[0]), vehicle).passage
+        for scenario in loaded.scenarios:
+            name = f"round {start.round_id}"
+            if scenario.id == AS_RECORDED:
+                placed.append(
+                    PlacedHere(
+                        scenario_id=scenario.id, junction_id=start.junction_id, place=name,
+                        ego=name, start=number,
+                    )
+                )  # fmt: skip
+                continue
+            found = () if passage is None else known.places(scenario, passage)
+            placed += [
+                PlacedHere(
+                    scenario_id=scenario.id, junction_id=start.junction_id,
+                    place=f"{name}: {place.name}", ego=name, start=number, rank=rank,
+                )
+                for rank, place in enumerate(found[: loaded.spec.places])
+            ]  # fmt: skip
+            if not found:
+                reason = "does not apply on the recorded way"
+                unplaced.append(
+                    NotPlaced(
+                        scenario_id=scenario.id, junction_id=start.junction_id,
+                        reason=f"{name}: {reason}", applies=False,
+                    )
+                )  # fmt: skip
+    return WorldPlaces(world_id=world.id, placed=tuple(placed), unplaced=tuple(unplaced))

@@ -1,0 +1,211 @@
+"""The plan of a sweep: its cells in their one order, cut into jobs.
+
+A pure function of the spec and of where scenarios take place: who computes a job, and with how
+many others, changes nothing about it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+
+import msgspec
+import numpy as np
+
+from contracts.errors import UserError
+from contracts.scenario import FAULTS, Scenario
+from orchestrator.sweep.spec import (
+    AIM_NAMES,
+    AS_RECORDED,
+    FACTORS,
+    FUTURES_PER_JOB,
+    STEP_S,
+    Loaded,
+    SweepSpec,
+)
+from sim_worker.planners.registry import drives_backwards
+from sim_worker.scenarios.drawing import Values, draw_cases
+
+MOST_CELLS = 5_000_000
+BACKWARDS_PLANNER = "reverse_pursuit"
+"""Drives where the ego goes backwards, unless the spec names another that does."""
+
+
+class PlacedHere(msgspec.Struct, frozen=True, kw_only=True):
+    """A place that a scenario has in a World; `ego` names the way that the ego takes."""
+
+    scenario_id: str
+    junction_id: str
+    place: str
+    ego: str
+    start: int | None = None
+    """Of the recorded starts, which; None where the case says where the ego starts."""
+    rank: int = 0
+    """Which of the places that fit the way of a recorded car."""
+
+
+class NotPlaced(msgspec.Struct, frozen=True, kw_only=True):
+    """A junction without a place for a scenario that applies to it, or for a whole one."""
+
+    scenario_id: str
+    junction_id: str
+    reason: str
+    applies: bool
+
+
+class WorldPlaces(msgspec.Struct, frozen=True, kw_only=True):
+    """Where scenarios take place in one World."""
+
+    world_id: str
+    placed: tuple[PlacedHere, ...]
+    unplaced: tuple[NotPlaced, ...]
+
+
+class Cell(msgspec.Struct, frozen=True, kw_only=True):
+    """One future of a sweep; `number` counts all cells in the order of the plan."""
+
+    number: int
+    scenario_id: str
+    junction_id: str
+    place: str
+    start: int | None
+    rank: int
+    case: int
+    values: dict[str, float]
+    parameters: dict[str, float]
+
+
+class SweepJob(msgspec.Struct, frozen=True, kw_only=True):
+    """Cells that one worker plays side by side: of one World, way, vehicle and planner."""
+
+    number: int
+    world_id: str
+    planner: str
+    vehicle: str
+    horizon_s: float
+    cells: tuple[Cell, ...]
+
+
+class SweepPlan(msgspec.Struct, frozen=True, kw_only=True):
+    """All that a sweep will do; `worlds` in the order in which they were looked at."""
+
+    worlds: tuple[WorldPlaces, ...]
+    jobs: tuple[SweepJob, ...]
+
+    @property
+    def cells(self) -> int:
+        """Return how many futures there are."""
+        return sum(len(job.cells) for job in self.jobs)
+
+
+def cases_of(scenario: Scenario, spec: SweepSpec) -> tuple[tuple[int, Values], ...]:
+    """Return the cases of a scenario that a sweep plays, each with its number among all."""
+    if scenario.id == AS_RECORDED:
+        # The car drives as fast as it did.
+        (values,) = draw_cases(scenario)
+        return ((0, {name: v for name, v in values.items() if name.startswith(f"{FAULTS}.")}),)
+    cases = tuple(enumerate(draw_cases(scenario, seed=spec.seed)))
+    if spec.cases == "all" or spec.cases >= len(cases):
+        return cases
+    rng = np.random.default_rng([spec.seed, zlib.crc32(scenario.id.encode())])
+    chosen = sorted(rng.choice(len(cases), size=spec.cases, replace=False).tolist())
+    return tuple(cases[index] for index in chosen)
+
+
+def parameter_sets(spec: SweepSpec) -> tuple[dict[str, float], ...]:
+    """Return the product of all lists of parameters; one empty set where there are none."""
+    names = list(spec.parameters)
+    return tuple(
+        dict(zip(names, values, strict=True))
+        for values in itertools.product(*spec.parameters.values())
+    )
+
+
+def with_parameters(values: Values, parameters: Mapping[str, float]) -> Values:
+    """Return a case's numbers with the faults of a parameter set on top of its own."""
+    changed = dict(values)
+    for name, value in parameters.items():
+        if name not in AIM_NAMES:
+            own = changed[f"faults.{name}"]
+            changed[f"faults.{name}"] = own * value if name in FACTORS else own + value
+    return changed
+
+
+def planners_for(scenario: Scenario, spec: SweepSpec) -> tuple[str, ...]:
+    """Return which of the planners drive a scenario: backwards, only those that can."""
+    able = tuple(name for name in spec.planners if drives_backwards(name) == scenario.ego.reverse)
+    return able or ((BACKWARDS_PLANNER,) if scenario.ego.reverse else ())
+
+
+def horizon_of(scenario: Scenario, spec: SweepSpec) -> float:
+    """Return how long a scenario is played, in whole steps of the results."""
+    wished = scenario.horizon_s if spec.horizon_s is None else spec.horizon_s
+    return round(round(wished / STEP_S) * STEP_S, 6)
+
+
+def plan_sweep(loaded: Loaded, worlds: Sequence[WorldPlaces]) -> SweepPlan:
+    """Return the plan of a sweep over Worlds; UserError where it would have too many cells."""
+    spec = loaded.spec
+    scenarios = {scenario.id: scenario for scenario in loaded.scenarios}
+    cases = {id_: cases_of(scenario, spec) for id_, scenario in scenarios.items()}
+    sets = parameter_sets(spec)
+    count = sum(
+        len(cases[p.scenario_id]) * len(planners_for(scenarios[p.scenario_id], spec))
+        for world in worlds
+        for p in world.placed
+    )
+    count *= len(sets) * len(spec.vehicles)
+    if count > MOST_CELLS:
+        raise UserError(f"the sweep has {count} cells; at most {MOST_CELLS}: take a sample")
+    jobs: list[SweepJob] = []
+    number = 0
+    for world in worlds:
+        for (vehicle, planner, horizon_s), placed in _groups(world, scenarios, spec):
+            cells = (
+                (here, case, with_parameters(values, parameters), parameters)
+                for here in placed
+                for case, values in cases[here.scenario_id]
+                for parameters in sets
+            )
+            for batch in _cut(cells):
+                made = tuple(
+                    Cell(
+                        number=number + i, scenario_id=here.scenario_id,
+                        junction_id=here.junction_id, place=here.place, start=here.start,
+                        rank=here.rank, case=case,
+                        values=values, parameters=parameters,
+                    )
+                    for i, (here, case, values, parameters) in enumerate(batch)
+                )  # fmt: skip
+                number += len(made)
+                jobs.append(
+                    SweepJob(
+                        number=len(jobs), world_id=world.world_id, planner=planner,
+                        vehicle=vehicle, horizon_s=horizon_s, cells=made,
+                    )
+                )  # fmt: skip
+    return SweepPlan(worlds=tuple(worlds), jobs=tuple(jobs))
+
+
+_Cell = tuple[PlacedHere, int, Values, dict[str, float]]
+
+
+def _cut(cells: Iterator[_Cell]) -> Iterator[list[_Cell]]:
+    while batch := list(itertools.islice(cells, FUTURES_PER_JOB)):
+        yield batch
+
+
+def _groups(
+    world: WorldPlaces, scenarios: Mapping[str, Scenario], spec: SweepSpec
+) -> Iterator[tuple[tuple[str, str, float], list[PlacedHere]]]:
+    """Yield who can be played together: places on one way, for one vehicle and planner."""
+    groups: dict[tuple[str, str, str, str, float], list[PlacedHere]] = {}
+    for here in world.placed:
+        scenario = scenarios[here.scenario_id]
+        for vehicle in spec.vehicles:
+            for planner in planners_for(scenario, spec):
+                key = (here.junction_id, here.ego, vehicle, planner, horizon_of(scenario, spec))
+                groups.setdefault(key, []).append(here)
+    for key in sorted(groups):
+        yield (key[2], key[3], key[4]), groups[key]

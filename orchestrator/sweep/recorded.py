@@ -1,0 +1,171 @@
+"""Starts of a sweep from where a real car was, and who was around it: a recorded run."""
+
+from __future__ import annotations
+
+import bisect
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from contracts.arrays import Array
+from contracts.drive import RoadUsers, VehicleState
+from contracts.errors import UserError
+from contracts.frames import LocalFrame, local_from_geo
+from contracts.futures import PathAhead
+from contracts.vehicle import VehicleParameters
+from orchestrator.sweep.road_users import RoadUserMode, among, named_log
+from telemetry.estimator import StateEstimator
+from telemetry.logs import open_log
+from telemetry.logs.road_users import (
+    LONGEST_GAP_S,
+    RoadUserLog,
+    detections_of,
+    log_of_detections,
+)
+
+WORLDS = "worlds"
+_ROUNDS, _DRIVE = Path("results/rounds.parquet"), "drive.mcap"
+_BEFORE_S, _AHEAD_S = 4.0, 30.0
+"""The path is what the car drove from so long before a start to so long after it."""
+_STEP_M, _LEAST_M = 1.0, 20.0
+
+
+class Recorded(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Start where a real car was: the folder of a run of `foretwin drive`, and how often."""
+
+    run: str
+    every_s: float = 2.0
+    road_users: RoadUserMode = "replayed"
+    """Whether others are where they were recorded, go on as a live round predicts, or are not."""
+    road_user_log: str | None = None
+    """Of others, in place of what the car itself detected, by the same clock."""
+    leave_out: tuple[str, ...] = ()
+    """Ids of road users who are not to be there: the car itself, in a log of somebody else's."""
+    longest_gap_s: float = LONGEST_GAP_S
+    """Who is not seen for longer is away until seen again."""
+
+
+class RecordedStart(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the car was as a round began, and the way that it then drove, in degrees."""
+
+    round_id: int
+    drive_time_s: float
+    world_id: str
+    junction_id: str
+    cruise_speed_mps: float
+    state: VehicleState
+    lat_deg: tuple[float, ...]
+    lon_deg: tuple[float, ...]
+
+    def path(self, frame: LocalFrame) -> PathAhead:
+        """Return the way that the car drove in a World's frame; of limits nothing is known."""
+        xy = np.asarray(local_from_geo(frame, np.array(self.lat_deg), np.array(self.lon_deg)))
+        return PathAhead(xy_m=xy, speed_limit_mps=np.full(len(xy), np.inf))
+
+
+class RecordedDrive(NamedTuple):
+    """Where a sweep starts, and who was around then; None where nobody is to be."""
+
+    starts: tuple[RecordedStart, ...]
+    road_users: RoadUserLog | None
+
+
+def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedDrive:
+    """Return starts from a run's folder, one round of every `every_s` seconds, and road users.
+
+    Rounds after which the car hardly moved on are left out. Raises FileNotFoundError for a folder
+    that is none of a run, and UserError where nothing can be started from, or a log of road users
+    does not go with the drive.
+    """
+    run = Path(recorded.run)
+    for part in (_ROUNDS, Path(_DRIVE), Path(WORLDS)):
+        if not (run / part).exists():
+            raise FileNotFoundError(f"recorded.run {run}: no {part} in it")
+    states, said = _states(run / _DRIVE, vehicle, longest_gap_s=recorded.longest_gap_s)
+    starts = _starts(run, states, every_s=recorded.every_s)
+    if recorded.road_users == "none":
+        return RecordedDrive(starts, None)
+    if recorded.road_user_log is not None:
+        path = Path(recorded.road_user_log)
+        said = named_log(path, states, vehicle, recorded.leave_out, recorded.longest_gap_s)
+    else:
+        said = among(said, recorded.leave_out, "the car's detections")
+    return RecordedDrive(starts, said if said.tracks else None)
+
+
+def _starts(run: Path, states: list[VehicleState], *, every_s: float) -> tuple[RecordedStart, ...]:
+    stamps = [state.stamp_ns for state in states]
+    starts: list[RecordedStart] = []
+    next_s = -np.inf
+    for row in _rounds(run / _ROUNDS):
+        place = bisect.bisect_right(stamps, row["stamp_ns"]) - 1
+        if row["drive_time_s"] < next_s or place < 0:
+            continue
+        line = _line(states, stamps, place)
+        if line is None:
+            continue
+        next_s = row["drive_time_s"] + every_s
+        starts.append(
+            RecordedStart(
+                round_id=row["round_id"], drive_time_s=row["drive_time_s"],
+                world_id=row["world_id"], junction_id=row["intersection_id"],
+                cruise_speed_mps=row["cruise_speed_mps"], state=states[place],
+                lat_deg=tuple(line[:, 0].tolist()), lon_deg=tuple(line[:, 1].tolist()),
+            )
+        )  # fmt: skip
+    if not starts:
+        raise UserError(f"recorded.run {run}: no round from which the car drove on")
+    return tuple(starts)
+
+
+def _rounds(file: Path) -> list[dict[str, Any]]:
+    try:
+        rows: list[dict[str, Any]] = pq.read_table(file).to_pylist()
+    except (OSError, pa.ArrowException) as error:
+        raise UserError(f"recorded.run: {file} cannot be read: {error}") from error
+    return sorted(rows, key=lambda row: (row["stamp_ns"], row["round_id"]))
+
+
+def _states(
+    file: Path, vehicle: VehicleParameters, *, longest_gap_s: float
+) -> tuple[list[VehicleState], RoadUserLog]:
+    """Return the states that the drive had, estimated from what was recorded as it was then, and
+    who was detected."""
+    recorded = open_log(file)
+    estimator = StateEstimator(
+        recorded.info,
+        wheelbase_m=vehicle.wheelbase_m.value,
+        steering_ratio=vehicle.steering_ratio.value,
+        steering_offset_rad=vehicle.steering_offset_rad.value,
+    )
+    states, seen = [], []
+    for channel, message in recorded.samples():
+        if isinstance(message, RoadUsers):
+            seen.append(detections_of(message))
+        state = estimator.handle(channel, message)
+        if state is not None:
+            states.append(state)
+    return states, log_of_detections(seen, recorded.declared, longest_gap_s=longest_gap_s)
+
+
+def _line(states: list[VehicleState], stamps: list[int], place: int) -> Array | None:
+    """Return (N, 2) degrees along the way driven around a start, None where that is too short."""
+    now_ns = stamps[place]
+    first = bisect.bisect_left(stamps, now_ns - int(_BEFORE_S * 1e9))
+    last = bisect.bisect_right(stamps, now_ns + int(_AHEAD_S * 1e9))
+    degrees = np.array(
+        [(s.position.lat_deg, s.position.lon_deg) for s in states[first:last]], dtype=np.float64
+    )
+    here = LocalFrame(states[place].position)
+    xy = np.asarray(local_from_geo(here, degrees[:, 0], degrees[:, 1]))
+    kept = [0]
+    for index in range(1, len(xy)):
+        if np.hypot(*(xy[index] - xy[kept[-1]])) >= _STEP_M:
+            kept.append(index)
+    onward = xy[[place - first, *(index for index in kept if index > place - first)]]
+    ahead_m = float(np.hypot(*np.diff(onward, axis=0).T).sum())
+    return degrees[kept] if ahead_m >= _LEAST_M else None

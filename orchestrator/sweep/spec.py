@@ -1,0 +1,237 @@
+"""What a sweep runs over: one TOML file, checked into one frozen struct."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from contracts.errors import UserError
+from contracts.futures import Faults
+from contracts.scenario import Scenario
+from contracts.vehicle import VehicleParameters
+from orchestrator.maps.choice import node_of_id, parse_bbox
+from orchestrator.maps.world_command import MAX_RADIUS_M, MIN_RADIUS_M
+from orchestrator.sweep.recorded import WORLDS, Recorded, RecordedStart, read_drive
+from sim_worker.metrics.table import METRICS
+from sim_worker.planners.registry import check_planner
+from sim_worker.scenarios.reading import catalogue, find_scenario
+from sim_worker.vehicle.parameters import load_vehicle
+from sim_worker.vehicle.planar import TIMESTEP_S
+from telemetry.logs.road_users import RoadUserLog
+
+DEFAULT_METRICS = (
+    "ttc", "pet", "thw", "drac", "required_deceleration", "impact_speed", "delta_v",
+    "max_deceleration", "max_lateral_acceleration", "max_jerk", "comfortable", "off_road_share",
+    "red_light_violations", "right_of_way_violations", "driving_score",
+)  # fmt: skip
+FAULT_NAMES = tuple(field.name for field in msgspec.structs.fields(Faults))
+FACTORS = frozenset({"friction_factor", "steering_gain", "brake_gain"})
+"""Faults that multiply what a case has of its own; the others add to it."""
+AIM_NAMES = ("target_speed_factor", "target_speed_offset_mps", "lateral_shift_m")
+PARAMETERS = (*FAULT_NAMES, *AIM_NAMES)
+_NOT_NEGATIVE = frozenset({
+    "friction_factor", "extra_steering_delay_s", "brake_gain", "perception_delay_s", "lost_from_s",
+    "lost_for_s", "target_speed_factor",
+})  # fmt: skip
+_MAX_EXTRA_DELAY_S = 0.4
+STEP_S = 0.1
+AS_RECORDED = "as_recorded"
+JUST_RECORDED = Scenario(
+    id=AS_RECORDED, title="As recorded", source="the drive",
+    shows="The ego drives on from where the car was, among those who were there.",
+)  # fmt: skip
+FUTURES_PER_JOB = 64
+
+
+class SweepSpec(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Everything that decides the rows of a sweep; paths are relative to where it is started."""
+
+    map: str | None = None
+    worlds: str | None = None
+    """A folder of .world files, in place of a map."""
+    recorded: Recorded | None = None
+    """A recorded drive, in place of both: its Worlds, its states, its ways."""
+    junctions: Literal["all"] | tuple[str, ...] = "all"
+    bbox: str | None = None
+    """W,S,E,N in degrees: only junctions in there."""
+    sample: int | None = None
+    """So many of these junctions, drawn by the seed; None takes all."""
+    radius_m: float = 150.0
+    service_roads: bool = False
+    scenarios: tuple[str, ...] | None = None
+    """Ids of the catalogue or TOML files; None takes the whole catalogue. From where a real car
+    was, `as_recorded` adds nobody to those who were there."""
+    places: int = 1
+    """At most so many places of a scenario at one junction."""
+    cases: Literal["all"] | int = "all"
+    """So many of each scenario's cases, drawn by the seed."""
+    samples: int | None = None
+    """Draws for each combination of listed values; None takes the scenario's own number."""
+    planners: tuple[str, ...] = ("pure_pursuit_idm",)
+    vehicles: tuple[str, ...] = ("bmw_320i",)
+    metrics: tuple[str, ...] = DEFAULT_METRICS
+    parameters: dict[str, tuple[float, ...]] = {}
+    horizon_s: float | None = None
+    """None takes each scenario's own."""
+    control_hz: float = 20.0
+    accidents: bool = True
+    lights_by_plan: bool = True
+    job_timeout_s: float = 600.0
+    """After so long without an answer, a job of up to 64 futures counts as failed."""
+    seed: int = 0
+
+
+class Loaded(msgspec.Struct, frozen=True, kw_only=True):
+    """A spec with all that it names, read and checked."""
+
+    spec: SweepSpec
+    scenarios: tuple[Scenario, ...]
+    vehicles: dict[str, VehicleParameters]
+    starts: tuple[RecordedStart, ...] = ()
+    """Where a recorded car was; without them, egos start where their cases say."""
+    road_users: RoadUserLog | None = None
+    """Who was around the recorded car."""
+
+
+def load_spec(path: Path) -> Loaded:
+    """Read a sweep's TOML file and what it names.
+
+    Raises FileNotFoundError or UserError, in one line that names the file and the field.
+    """
+    if not path.is_file():
+        raise FileNotFoundError(f"sweep {path}: no such file")
+    try:
+        values = msgspec.toml.decode(path.read_bytes())
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: not TOML: {error}") from error
+    try:
+        spec = msgspec.convert(values, SweepSpec)
+    except msgspec.ValidationError as error:
+        known = ", ".join(SweepSpec.__struct_fields__)
+        raise UserError(f"{path}: {error} (known settings: {known})") from error
+    try:
+        return check_spec(spec)
+    except FileNotFoundError as error:
+        raise FileNotFoundError(f"{path}: {error}") from error
+    except ValueError as error:
+        raise UserError(f"{path}: {error}") from error
+
+
+def check_spec(spec: SweepSpec) -> Loaded:
+    """Return a spec with what it names; raises ValueError for the first thing that is wrong."""
+    for holds, text in _checks(spec):
+        if not holds:
+            raise UserError(text)
+    if spec.bbox is not None:
+        parse_bbox("bbox", spec.bbox)
+    if spec.junctions != "all":
+        for name in spec.junctions if spec.map is not None else ():
+            node_of_id(name)
+    for name in spec.planners:
+        check_planner(name)
+    _check_metrics(spec.metrics)
+    _check_parameters(spec.parameters)
+    scenarios = _scenarios(spec)
+    vehicles = {name: load_vehicle(name) for name in spec.vehicles}
+    if spec.recorded is None:
+        return Loaded(spec=spec, scenarios=scenarios, vehicles=vehicles)
+    drive = read_drive(spec.recorded, vehicles[spec.vehicles[0]])
+    return Loaded(
+        spec=spec, scenarios=scenarios, vehicles=vehicles, starts=drive.starts,
+        road_users=drive.road_users,
+    )  # fmt: skip
+
+
+def worlds_folder(spec: SweepSpec) -> Path | None:
+    """Return where the Worlds of a sweep lie already, None where they are built from a map."""
+    if spec.recorded is not None:
+        return Path(spec.recorded.run) / WORLDS
+    return None if spec.worlds is None else Path(spec.worlds)
+
+
+def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
+    sources = [n for n in ("map", "worlds", "recorded") if getattr(spec, n) is not None]
+    steps = 1.0 / (spec.control_hz * TIMESTEP_S) if spec.control_hz > 0.0 else 0.0
+    ticks = STEP_S * spec.control_hz
+    horizon = spec.horizon_s
+    return (
+        (len(sources) == 1,
+         f"exactly one of map, worlds and recorded; got {' and '.join(sources) or 'none'}"),
+        (spec.junctions == "all" or len(spec.junctions) > 0,
+         "junctions: at least one id, or \"all\""),
+        (spec.sample is None or spec.sample >= 1, f"sample {spec.sample}: at least 1"),
+        (MIN_RADIUS_M <= spec.radius_m <= MAX_RADIUS_M,
+         f"radius_m {spec.radius_m:g}: {MIN_RADIUS_M:g} to {MAX_RADIUS_M:g}"),
+        (spec.places >= 1, f"places {spec.places}: at least 1"),
+        (spec.cases == "all" or spec.cases >= 1, f"cases {spec.cases}: at least 1, or \"all\""),
+        (spec.samples is None or spec.samples >= 1, f"samples {spec.samples}: at least 1"),
+        (len(spec.planners) > 0, "planners: at least one name"),
+        (len(set(spec.planners)) == len(spec.planners), "planners: each only once"),
+        (len(spec.vehicles) > 0, "vehicles: at least one name"),
+        (len(set(spec.vehicles)) == len(spec.vehicles), "vehicles: each only once"),
+        (horizon is None or (1.0 <= horizon <= 60.0
+                             and abs(horizon / STEP_S - round(horizon / STEP_S)) < 1e-6),
+         f"horizon_s {horizon}: 1 to 60 seconds, in steps of {STEP_S:g}"),
+        (steps >= 1.0 and abs(steps - round(steps)) < 1e-6,
+         f"control_hz {spec.control_hz:g}: must divide {1.0 / TIMESTEP_S:g} evenly"),
+        (ticks >= 1.0 - 1e-9 and abs(ticks - round(ticks)) < 1e-6,
+         f"control_hz {spec.control_hz:g}: must be a multiple of {1.0 / STEP_S:g}"),
+        (spec.job_timeout_s > 0.0, f"job_timeout_s {spec.job_timeout_s:g}: above 0"),
+        (spec.recorded is None or spec.recorded.every_s > 0.0, "recorded.every_s: above 0"),
+        (spec.recorded is None or spec.recorded.longest_gap_s > 0.0,
+         "recorded.longest_gap_s: above 0"),
+        (spec.seed >= 0, f"seed {spec.seed}: not negative"),
+    )  # fmt: skip
+
+
+def _check_metrics(names: tuple[str, ...]) -> None:
+    known = [n for n, m in METRICS.items() if not m.series and "reference" not in m.needs]
+    for name in names:
+        if name in METRICS and "reference" in METRICS[name].needs:
+            raise UserError(f"metrics: {name} compares with a reference, of which a sweep has none")
+        if name in METRICS and METRICS[name].series:
+            raise UserError(f"metrics: {name} is a series; a row holds single numbers")
+        if name not in METRICS:
+            raise UserError(f"metrics: unknown {name!r}; known: {', '.join(known)}")
+    if len(set(names)) != len(names):
+        raise UserError("metrics: each only once")
+
+
+def _check_parameters(parameters: dict[str, tuple[float, ...]]) -> None:
+    for name, values in parameters.items():
+        if name not in PARAMETERS:
+            raise UserError(f"parameters: unknown {name!r}; known: {', '.join(PARAMETERS)}")
+        if not values or len(set(values)) != len(values):
+            raise UserError(f"parameters.{name}: at least one value, each only once")
+        for value in values:
+            if not math.isfinite(value):
+                raise UserError(f"parameters.{name} {value}: must be finite")
+            if name in _NOT_NEGATIVE and value < 0.0:
+                raise UserError(f"parameters.{name} {value:g}: zero or more")
+            if name == "friction_factor" and value == 0.0:
+                raise UserError("parameters.friction_factor 0: must be above 0")
+            if name == "extra_steering_delay_s" and value > _MAX_EXTRA_DELAY_S:
+                raise UserError(f"parameters.{name} {value:g}: at most {_MAX_EXTRA_DELAY_S:g}")
+
+
+def _scenarios(spec: SweepSpec) -> tuple[Scenario, ...]:
+    if spec.scenarios is None:
+        found = tuple(catalogue().values())
+    else:
+        found = tuple(
+            JUST_RECORDED if name == AS_RECORDED else find_scenario(name) for name in spec.scenarios
+        )
+        if AS_RECORDED in spec.scenarios and spec.recorded is None:
+            raise UserError(f"scenarios: {AS_RECORDED} needs `recorded`")
+    names = [scenario.id for scenario in found]
+    if not names:
+        raise UserError("scenarios: at least one id or file, or none of the setting for all")
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UserError(f"scenarios: {twice[0]} is named twice")
+    if spec.samples is None:
+        return found
+    return tuple(msgspec.structs.replace(s, samples=spec.samples) for s in found)

@@ -1,0 +1,110 @@
+"""What came of a sweep, by scenario and planner."""
+
+from __future__ import annotations
+
+import collections
+import statistics
+from pathlib import Path
+from typing import Any
+
+from orchestrator.sweep.rows import Row
+from orchestrator.sweep.spec import SweepSpec
+
+_SCORE = "metric_driving_score"
+_PLAIN_WIDTH = 120
+
+
+class _Group:
+    def __init__(self) -> None:
+        self.cases = self.placed = self.collided = self.failed = 0
+        self.clearance_m: list[float] = []
+        self.scores: list[float] = []
+        self.reasons: collections.Counter[str] = collections.Counter()
+
+    def add(self, row: Row) -> None:
+        self.cases += 1
+        if row["failure"]:
+            self.failed += 1
+            self.reasons[row["failure"]] += 1
+        if row["left_out"] or row["trajectory_sha256"] is None:
+            return
+        self.placed += 1
+        self.collided += bool(row["collided"])
+        if row["min_clearance_m"] is not None:
+            self.clearance_m.append(row["min_clearance_m"])
+        if row.get(_SCORE) is not None:
+            self.scores.append(row[_SCORE])
+
+
+class Summary:
+    """Counts rows; a case that cannot be played at its place is not placed."""
+
+    def __init__(self, spec: SweepSpec) -> None:
+        self._scored = _SCORE.removeprefix("metric_") in spec.metrics
+        self._groups: dict[tuple[str, str], _Group] = collections.defaultdict(_Group)
+
+    def add(self, row: Row) -> None:
+        """Count one more row."""
+        self._groups[row["scenario"], row["planner"]].add(row)
+
+    def totals(self) -> dict[str, int]:
+        """Return the counts of all rows."""
+        groups = self._groups.values()
+        return {
+            "rows": sum(group.cases for group in groups),
+            "placed": sum(group.placed for group in groups),
+            "collided": sum(group.collided for group in groups),
+            "failed": sum(group.failed for group in groups),
+        }
+
+    def table(self) -> list[dict[str, Any]]:
+        """Return one entry for each scenario and planner."""
+        return [
+            {
+                "scenario": scenario, "planner": planner, "cases": group.cases,
+                "placed": group.placed, "collided": group.collided, "failed": group.failed,
+                "median_clearance_m": _rounded(group.clearance_m, statistics.median),
+                "mean_score": _rounded(group.scores, statistics.fmean) if self._scored else None,
+                "reasons": dict(group.reasons.most_common(3)),
+            }
+            for (scenario, planner), group in sorted(self._groups.items())
+        ]  # fmt: skip
+
+
+def _rounded(values: list[float], reduce: Any) -> float | None:
+    return round(float(reduce(values)), 4) if values else None
+
+
+def print_summary(out: Path, summary: dict[str, Any]) -> None:
+    """Print a sweep's summary as a table."""
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    columns = ("cases", "placed", "collided", "failed", "clearance", "score")
+    table = Table(
+        Column("scenario", no_wrap=True), Column("planner", no_wrap=True),
+        *(Column(name, justify="right", no_wrap=True) for name in columns),
+    )  # fmt: skip
+    for entry in summary["scenarios"]:
+        clearance, score = entry["median_clearance_m"], entry["mean_score"]
+        table.add_row(
+            entry["scenario"], entry["planner"],
+            *(str(entry[name]) for name in columns[:4]),
+            "" if clearance is None else f"{clearance:.2f} m",
+            "" if score is None else f"{score:.3f}",
+        )  # fmt: skip
+    console = Console()
+    if not console.is_terminal:
+        console.width = _PLAIN_WIDTH  # A file or a pipe has no width of its own to keep to.
+    console.print(table)
+    print(
+        f"{out}: {summary['rows']} rows of {summary['worlds']} Worlds, {summary['jobs_played']} of "
+        f"{summary['jobs']} jobs played now in {summary['playing_s']:.1f} s; "
+        f"{len(summary['unplaced'])} unplaced"
+    )
+    for place, reason in summary["failures"].items():
+        print(f"failed: {place}: {reason}")
+    for entry in summary["scenarios"]:
+        for reason, count in entry["reasons"].items():
+            print(f"failed: {count} of {entry['scenario']} by {entry['planner']}: {reason}")
+    print(f"sha256 of the rows: {summary['rows_sha256']}")

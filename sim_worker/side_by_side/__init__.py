@@ -1,0 +1,1 @@
+"""What the driving software planned beside what the human who drove did instead."""

@@ -1,0 +1,38 @@
+"""How much a car's motion and the errors of its sensors wander: the filter's process noise.
+
+Densities are variances per second; spreads are standard deviations before anything is known.
+"""
+
+from __future__ import annotations
+
+_JERK_DENSITY = 4.0**2
+"""(m/s³)² s: acceleration wanders by 4 m/s² in one second."""
+_CURVATURE_RATE_PMPS = 0.25
+"""Of a fast turn of the wheel at walking speed; less would make the yaw rate lag by over 0.2 s."""
+_LATERAL_JERK_MPS3 = 5.0
+"""Limits how fast the curvature changes at speed: v² dκ/dt."""
+SLIP_DENSITY = 0.01**2
+"""rad² / s: the body's direction differs from the path's by the rear tyres' slip."""
+GYRO_SLIP_DENSITY = 0.0005**2
+"""The same where a gyro tells the body's turning from the path's and the slip is estimated."""
+GYRO_BIAS_STD_RADPS = 0.01
+GYRO_BIAS_DENSITY = (2e-5) ** 2
+"""(rad/s)² / s: an automotive gyro warms up by 0.01 °/s in a minute."""
+_ACCEL_BIAS_DENSITY = 0.02**2
+"""(m/s²)² / s: the grade of the road changes with the place."""
+SLIP_RADPMPS2 = (0.004, 0.002)
+"""The rear axle's slip per lateral acceleration, mean and spread over passenger cars: load over
+cornering stiffness (Gillespie 1992, 6-2)."""
+SPEED_SCALE_STD = 0.01
+"""Of a wheel's radius against the one its speed was calibrated with."""
+GNSS_CORRELATION_S = 30.0
+"""How long the error of a receiver without corrections stays alike: satellites, air, walls."""
+
+
+def densities(speed_mps: float, *, slip: float) -> tuple[float, ...]:
+    """Return how much yaw, speed, acceleration, curvature and both inertial biases wander."""
+    turning = min(_CURVATURE_RATE_PMPS, _LATERAL_JERK_MPS3 / max(speed_mps * speed_mps, 1e-6))
+    return (
+        slip * min(1.0, abs(speed_mps) / 10.0), 0.0, _JERK_DENSITY, turning * turning,
+        GYRO_BIAS_DENSITY, _ACCEL_BIAS_DENSITY,
+    )  # fmt: skip

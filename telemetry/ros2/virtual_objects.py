@@ -1,0 +1,143 @@
+"""Road users that are simulated, from whoever says them, as one list towards a driving stack."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from contracts.drive import RoadUser, RoadUserKind, RoadUsers
+from contracts.frames import GeoPoint, LocalFrame, geo_from_local
+
+LIVES_NS = 500_000_000
+"""A road user of which nothing was said for so long is gone."""
+
+
+class UnfitError(ValueError):
+    """Road users that must not go out; the text says why, in few different words."""
+
+
+class PlacedObject(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename={"user_id": "id"}
+):
+    """A virtual road user of the mapping: it stands, or goes to and fro along its yaw."""
+
+    user_id: str
+    kind: RoadUserKind
+    lat_deg: float
+    lon_deg: float
+    alt_m: float = 0.0
+    yaw_deg: float = 0.0
+    """Counter-clockwise from east."""
+    speed_mps: float = 0.0
+    way_m: float = 0.0
+    """From its place to where it turns round."""
+    length_m: float = 4.5
+    width_m: float = 1.8
+
+    def validate(self) -> None:
+        """Raise ValueError naming the key at fault."""
+        if not (abs(self.lat_deg) < 90.0 and abs(self.lon_deg) <= 180.0):
+            raise ValueError(f"lat_deg, lon_deg {self.lat_deg}, {self.lon_deg}: degrees")
+        if not all(map(math.isfinite, (self.alt_m, self.yaw_deg))):
+            raise ValueError("alt_m, yaw_deg: finite numbers")
+        for name in ("length_m", "width_m"):
+            if not 0.0 < getattr(self, name) < 50.0:
+                raise ValueError(f"{name} {getattr(self, name)}: above 0 and below 50")
+        if not (0.0 <= self.speed_mps <= 50.0 and 0.0 <= self.way_m <= 1000.0):
+            raise ValueError("speed_mps 0 to 50 and way_m 0 to 1000")
+        if self.speed_mps > 0.0 and self.way_m == 0.0:
+            raise ValueError("way_m: how far it goes before it turns round")
+
+    def at(self, time_s: float) -> RoadUser:
+        """Return where it is so long after it set out."""
+        driven = self.speed_mps * time_s % (2.0 * self.way_m) if self.way_m else 0.0
+        back = driven > self.way_m
+        user = RoadUser(
+            user_id=self.user_id, kind=self.kind, virtual=True,
+            position=GeoPoint(self.lat_deg, self.lon_deg, self.alt_m),
+            yaw_rad=math.radians(self.yaw_deg), speed_mps=self.speed_mps,
+            length_m=self.length_m, width_m=self.width_m,
+        )  # fmt: skip
+        there = moved(user, 2.0 * self.way_m - driven if back else driven)
+        turned = math.remainder(user.yaw_rad + (math.pi if back else 0.0), math.tau)
+        return msgspec.structs.replace(there, yaw_rad=turned)
+
+
+class _Said(NamedTuple):
+    heard_ns: int
+    stamp_ns: int
+    user: RoadUser
+
+
+class VirtualObjects:
+    """Keeps the last word on each road user, so that several senders do not undo one another."""
+
+    def __init__(self, *, at_most: int, placed: Sequence[PlacedObject] = ()) -> None:
+        """`placed` are there from the first state of the vehicle on."""
+        self._at_most, self._placed = at_most, placed
+        self._begun_ns: int | None = None
+        self._said: dict[str, _Said] = {}
+
+    @property
+    def has_own(self) -> bool:
+        """Whether the mapping itself places any."""
+        return bool(self._placed)
+
+    def own(self, stamp_ns: int) -> RoadUsers:
+        """Return the road users of the mapping at the vehicle's time."""
+        if self._begun_ns is None or stamp_ns < self._begun_ns:
+            self._begun_ns = stamp_ns
+        time_s = (stamp_ns - self._begun_ns) * 1e-9
+        return RoadUsers(stamp_ns=stamp_ns, users=tuple(one.at(time_s) for one in self._placed))
+
+    def take(self, message: RoadUsers, *, now_ns: int) -> RoadUsers:
+        """Return all that are known at the message's stamp; `now_ns` is the host's clock.
+
+        Those of other senders are moved on to the stamp. Raises UnfitError where one is not marked
+        as virtual or not finite, or where they are too many.
+        """
+        if not all(user.virtual for user in message.users):
+            raise UnfitError("road users that are not marked as virtual")
+        if not all(map(_is_finite, message.users)):
+            raise UnfitError("virtual objects that are not finite")
+        fresh = {
+            name: said for name, said in self._said.items() if now_ns - said.heard_ns <= LIVES_NS
+        }
+        fresh |= {
+            user.user_id: _Said(now_ns, message.stamp_ns, user) for user in message.users
+        }  # fmt: skip
+        if len(fresh) > self._at_most:
+            raise UnfitError("virtual objects that are too many")
+        self._said = fresh
+        return RoadUsers(
+            stamp_ns=message.stamp_ns,
+            users=tuple(_at(said, message.stamp_ns) for _, said in sorted(fresh.items())),
+        )
+
+
+def _at(said: _Said, stamp_ns: int) -> RoadUser:
+    older_s = (stamp_ns - said.stamp_ns) * 1e-9
+    if not 0.0 < abs(older_s) < 1.0:
+        return said.user
+    return moved(said.user, said.user.speed_mps * older_s)
+
+
+def moved(user: RoadUser, way_m: float) -> RoadUser:
+    """Return the road user so far ahead along its yaw."""
+    step = way_m * np.array([math.cos(user.yaw_rad), math.sin(user.yaw_rad)])
+    lat_deg, lon_deg = geo_from_local(LocalFrame(user.position), step).tolist()
+    return msgspec.structs.replace(
+        user, position=GeoPoint(lat_deg, lon_deg, user.position.alt_m)
+    )  # fmt: skip
+
+
+def _is_finite(user: RoadUser) -> bool:
+    at = user.position
+    numbers = (
+        at.lat_deg, at.lon_deg, at.alt_m, user.yaw_rad, user.speed_mps, user.length_m, user.width_m,
+    )  # fmt: skip
+    return all(map(math.isfinite, numbers))

@@ -1,0 +1,120 @@
+"""`foretwin judge` as a user runs it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
+from orchestrator.cli import run
+from orchestrator.plan import EMBEDDED_MAP
+from telemetry.logs import open_log
+from telemetry.mcap_file import create
+from tests.system.foretwin_command import environment, foretwin
+
+
+@pytest.mark.parametrize(
+    ("files", "said"),
+    [
+        ({}, "no run.json in it"),
+        ({"run.json": "{}"}, "no drive.mcap in it"),
+        ({"run.json": "nonsense", "drive.mcap": ""}, "not JSON"),
+        ({"run.json": '{"exit": "running"}', "drive.mcap": ""}, "never came to its end"),
+        (
+            {"run.json": '{"config": {"wheels": 4}, "map": {"file": "m"}}', "drive.mcap": ""},
+            "of another version of foretwin",
+        ),
+    ],
+)
+def test_a_folder_that_is_no_run_is_told_in_one_line(
+    files: dict[str, str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    assert run(["judge", str(tmp_path)]) == 2
+    told = capsys.readouterr().err.strip()
+    assert said in told
+    assert "\n" not in told
+
+
+def with_stop_sign() -> str:
+    """The drawn town with a stop sign 8 m before its first junction, which its map forgot."""
+    text = EMBEDDED_MAP.read_text(encoding="utf-8")
+    sign = (
+        '<node id="99003" version="1" lat="45.0" lon="-30.003526"><tag k="highway" v="stop"/>'
+        '<tag k="direction" v="forward"/></node>'
+    )
+    text = text.replace('<node id="5" ', f'{sign}<node id="5" ', 1)
+    return text.replace(
+        '<nd ref="3"/>\n    <nd ref="4"/>', '<nd ref="3"/><nd ref="99003"/><nd ref="4"/>', 1
+    )
+
+
+@pytest.mark.judge
+def test_a_forgotten_stop_sign_changes_the_verdict_of_a_recorded_drive(tmp_path: Path) -> None:
+    driven = foretwin(
+        tmp_path / "runs", "--speed", "max", "--futures", "16", "--rate", "1", "--end", "22",
+        "--workers", "1",
+    )  # fmt: skip
+    assert driven.code == 0, driven.screen
+    assert driven.run is not None
+    corrected = tmp_path / "corrected.osm"
+    corrected.write_text(with_stop_sign(), encoding="utf-8")
+    answers = []
+    for options in (("--map", str(corrected)), ()):
+        done = subprocess.run(
+            [sys.executable, "-m", "orchestrator", "judge", str(driven.run), "--json", *options],
+            env=environment(tmp_path / "cache"), capture_output=True, text=True, timeout=300,
+            check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        answers.append(json.loads(done.stdout))
+    changed, same = answers
+    assert changed["outcomes"]
+    for one in changed["outcomes"]:
+        assert "stop_line" not in one["before"]["observable"]
+        assert one["after"]["driven_fails"] == "stop_line"
+    # Nothing corrected, nothing changes: the recorded drive is the drive.
+    assert same["outcomes"] == []
+    assert same["gap"]["nominal_ade_m"]["before"] == same["gap"]["nominal_ade_m"]["after"]
+
+
+@pytest.mark.judge
+def test_a_disagreement_injected_into_a_recording_is_listed_where_it_is(tmp_path: Path) -> None:
+    """A stand-in's drive, told to be a human's for 15 s, in which the software would have taken
+    the other lane from 6 s to 9 s."""
+    driven = foretwin(
+        tmp_path / "runs", "--speed", "max", "--futures", "4", "--rate", "0.2", "--end", "22",
+        "--workers", "1",
+    )  # fmt: skip
+    assert driven.run is not None, driven.screen
+    log = open_log(driven.run / "drive.mcap")
+    with create(tmp_path / "injected.mcap", info=log.info) as writer:
+        for channel, message in log.samples():
+            at_s = (message.stamp_ns - log.info.start_stamp_ns) / 1e9
+            if isinstance(message, VehicleStatus):
+                mode: ControlMode = "manual" if at_s < 15.0 else "autonomous"
+                message = msgspec.structs.replace(message, control_mode=mode)
+            elif isinstance(message, PlannedTrajectory) and 6.0 <= at_s < 9.0:
+                north = 3.5 / 111_200.0 * np.clip(message.time_from_stamp_s / 3.0, 0.0, 1.0)
+                message = msgspec.structs.replace(message, lat_deg=message.lat_deg + north)
+            writer.add(channel, message)
+    again = foretwin(
+        tmp_path / "again", "--speed", "max", "--futures", "4", "--rate", "0.2", "--workers", "1",
+        "--map", str(EMBEDDED_MAP), "--log", str(tmp_path / "injected.mcap"),
+        "--route", "from-log",
+    )  # fmt: skip
+    assert again.code == 0, again.screen
+    (one,) = again.rows("disagreements")
+    assert one["kind"] == "ads_in_another_lane"
+    assert one["lateral_m"] == pytest.approx(3.4, abs=0.4)
+    assert (one["duration_s"], one["junction_id"]) == (pytest.approx(2.8, abs=0.4), "n4")
+    human, software = again.record()["side_by_side"]["segments"]
+    assert (human["control_mode"], software["control_mode"]) == ("manual", "autonomous")
+    assert software["lateral_m"] < 0.5

@@ -1,0 +1,145 @@
+"""Rows of the tables and what those who watch receive."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
+from orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
+from orchestrator.record.result_rows import (
+    comparison_row,
+    future_rows,
+    plan_row,
+    round_row,
+)
+from orchestrator.record.results import TABLES
+from orchestrator.rounds.views import round_view
+from tests.orchestrator.futures_rounds import round_done, straight, variants
+from tests.orchestrator.trip import START_NS, town_world
+from tests.viewer.scene import drive
+
+FRAME = town_world("n4").frame
+
+
+def test_each_future_is_a_row_with_its_difference_from_the_nominal() -> None:
+    done = round_done(straight(), np.concatenate([straight((0.0, 2.0)), straight(speed_mps=9.0)]))
+    _, rows, distinct = future_rows(done, variants(3))
+
+    assert [row["name"] for row in rows] == ["nominal", "variant 1", "variant 2"]
+    assert [row["worker_id"] for row in rows] == ["w0", "w1", "w1"]
+    ends = [row["end_difference_from_nominal_m"] for row in rows]
+    assert ends == pytest.approx([0.0, 2.0, 8.0], abs=1e-4)
+    assert distinct == 3
+    assert [row["end_speed_mps"] for row in rows] == pytest.approx([10.0, 10.0, 9.0])
+
+
+def test_futures_within_a_hand_of_each_other_are_not_distinct() -> None:
+    near = np.concatenate([straight(), straight((0.0, 0.05)), straight((0.0, 0.5))])
+
+    assert future_rows(round_done(near), variants(3)).distinct == 2
+
+
+def test_a_future_that_diverged_counts_as_no_distinct_one() -> None:
+    wild = np.concatenate([straight(), straight((0.0, 50.0))])
+    done = round_done(wild, outcome={"valid": np.array([True, False])})
+    _, rows, distinct = future_rows(done, variants(2))
+
+    assert distinct == 1
+    assert [row["valid"] for row in rows] == [True, False]
+
+
+def test_what_did_not_happen_is_null_and_not_a_number() -> None:
+    _, (row,), _ = future_rows(round_done(straight()), variants(1))
+
+    assert (row["collision_time_s"], row["min_clearance_m"]) == (None, None)
+    assert row["progress_m"] == 80.0
+
+
+def test_rows_have_the_columns_of_their_tables() -> None:
+    done = round_done(straight())
+    _, (future,), _ = future_rows(done, variants(1))
+    row = round_row(
+        done, start_stamp_ns=START_NS - 10**9, distinct=1, sha256="ab", cruise_speed_mps=9.5
+    )
+    watched = {message.channel: message.message for message in drive(duration_s=1.0)}
+
+    assert set(future) == set(TABLES["futures"].names)
+    assert set(row) == set(TABLES["rounds"].names)
+    assert (row["drive_time_s"], row["futures"]) == (1.0, 1)
+    assert set(comparison_row(watched["comparison"])) == set(TABLES["comparisons"].names)
+    assert set(plan_row(watched["plan_comparison"])) == set(TABLES["plan_comparisons"].names)
+    assert set(mirror_row(watched["mirror"])) == set(TABLES["mirror"].names)
+
+
+def test_a_mirror_row_keeps_who_is_who() -> None:
+    poses = {
+        who: PlaneState(float(n), 0.0, 0.0, 0.0)
+        for n, who in enumerate(("real", "twin", "shadow", "ghost"))
+    }
+    row = mirror_row(
+        MirrorSample(
+            stamp_ns=1, world_id=None, gap_m=1.0, gap_along_m=1.0, gap_across_m=0.0,
+            gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=2.0, independent=False, **poses,
+        )
+    )  # fmt: skip
+
+    assert [row[f"{who}_x_m"] for who in poses] == [0.0, 1.0, 2.0, 3.0]
+    assert (row["role"], row["free_x_m"], row["correction_along_mps2"]) == ("all", None, None)
+
+
+def test_vehicles_beside_and_touches_have_rows_of_their_own() -> None:
+    here = PlaneState(1.0, 2.0, 0.0, 3.0)
+    other = MirroredVehicle(
+        vehicle_id="van", role="twin", real=here, shown=here, length_m=4.5, width_m=1.8,
+        height_m=2.0, rear_overhang_m=0.9,
+        correction=TwinCorrection(along_mps2=0.5, across_mps2=0.0, yaw_radps2=0.0),
+    )  # fmt: skip
+    sample = MirrorSample(
+        stamp_ns=1, world_id=None, gap_m=1.0, gap_along_m=1.0, gap_across_m=0.0,
+        gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=2.0, independent=False, real=here,
+        twin=here, shadow=here, ghost=here, others=(other,), touches=(("ego", "van"),),
+    )  # fmt: skip
+    (row,) = mirrored_rows(sample)
+    assert set(row) == set(TABLES["mirrored"].names)
+    assert (row["role"], row["shown_y_m"], row["correction_along_mps2"]) == ("twin", 2.0, 0.5)
+    assert touch_rows(sample) == [{"stamp_ns": 1, "one": "ego", "other": "van"}]
+    assert {"stamp_ns", "one", "other"} == set(TABLES["touches"].names)
+
+
+def view_of(**outcome: np.ndarray):
+    states = np.concatenate([straight((0.0, float(y))) for y in range(4)])
+    done = round_done(states, outcome=outcome)
+    futures = future_rows(done, variants(4)).futures
+    return round_view(done, futures, FRAME, FRAME, variants(4))
+
+
+def test_criticality_grows_as_clearance_shrinks_and_is_one_in_a_collision() -> None:
+    view = view_of(
+        collided=np.array([False, False, False, True]),
+        min_clearance_m=np.array([math.nan, 20.0, 5.0, 0.0]),
+    )
+
+    assert view.criticality == pytest.approx([0.0, 0.0, 0.5, 1.0])
+    assert (view.collided, view.min_clearance_m) == (1, 0.0)
+
+
+def test_a_near_miss_is_no_collision() -> None:
+    view = view_of(min_clearance_m=np.array([math.nan, 20.0, 5.0, 0.01]))
+
+    assert view.criticality.max() == pytest.approx(0.95)
+    assert view.collided == 0
+
+
+def test_without_anybody_else_there_is_no_clearance() -> None:
+    assert view_of().min_clearance_m is None
+
+
+def test_a_view_has_fewer_points_from_first_to_last() -> None:
+    view = view_of()
+
+    assert view.xy_m.shape == (4, 25, 2)
+    assert view.xy_m[0, 0] == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert view.xy_m[0, -1] == pytest.approx([80.0, 0.0], abs=1e-3)

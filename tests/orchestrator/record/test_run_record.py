@@ -1,0 +1,157 @@
+"""run.json: the keys that were promised, valid JSON whatever happened, and its last line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestrator.record.run_record import run_record, versions, write_record
+from orchestrator.record.summary import summary_text
+from orchestrator.supervisor import FreshInterpreter, Supervisor
+from tests.orchestrator.house import House
+
+PROMISED = {
+    "run_id", "exit", "versions", "map", "seed", "route_source", "config", "intersections",
+    "telemetry", "futures", "state_to_result_ms_p50", "state_to_result_ms_p95", "comparison",
+    "workers", "dropped",
+}  # fmt: skip
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Iterator[House]:
+    made = House(tmp_path)
+    yield made
+    made.tables.close()
+
+
+def record_of(house: House) -> dict[str, Any]:
+    return run_record(
+        house.plan,
+        house.conductor,
+        house.mission,
+        Supervisor(FreshInterpreter(house.plan.processes_dir)),
+        exit_word="completed",
+        wall_s=12.3456,
+        mono_s=1000.0,
+    )
+
+
+def test_the_promised_keys_are_there_and_filled_by_a_drive(house: House) -> None:
+    house.drive(200, round_every=5)
+    house.end()
+    record = record_of(house)
+
+    assert set(record) >= PROMISED
+    assert record["map"]["sha256"] == house.plan.osm.sha256
+    assert (record["route_source"], record["seed"]) == ("given", 0)
+    (junction,) = record["intersections"]
+    assert set(junction) >= {
+        "id", "kind", "lat", "lon", "arrived_at_s", "built_at_s", "world_ready_before_s",
+        "rounds", "futures",
+    }  # fmt: skip
+    assert set(record["telemetry"]) >= {
+        "received", "lost", "skipped_invalid", "age_ms_p50", "age_ms_p95",
+    }  # fmt: skip
+    assert set(record["futures"]) >= {
+        "count", "distinct", "missed_rounds", "rounds", "sim_seconds", "cpu_seconds", "sha256",
+    }  # fmt: skip
+    assert set(record["comparison"]["ade_m"]) == {"1", "2", "4", "8"}
+    assert set(record["comparison"]) >= {
+        "ade_m", "constant_velocity_ade_m", "constant_turn_rate_ade_m", "independent",
+    }  # fmt: skip
+    assert record["workers"]["started"] == 2
+    assert record["telemetry"]["received"] == 200
+    assert record["state_to_result_ms_p50"] <= record["state_to_result_ms_p95"]
+    assert record["wall_s"] == 12.346
+
+
+@pytest.mark.parametrize("length", [0, 1, 100])
+def test_the_record_is_json_whatever_came_of_the_drive(house: House, length: int) -> None:
+    if length:
+        house.workers[0].diverges = house.workers[1].diverges = True
+        house.drive(length, round_every=5)
+        house.end()
+    text = json.dumps(record_of(house), allow_nan=False)
+
+    assert set(json.loads(text)) >= PROMISED
+
+
+def test_the_stand_ins_commands_are_its_own_and_so_is_the_judgement(house: House) -> None:
+    assert record_of(house)["comparison"]["independent"] is True
+    house.conductor.mirror.independent = False
+    assert record_of(house)["comparison"]["independent"] is False
+
+
+def test_a_record_replaces_what_was_there(tmp_path: Path) -> None:
+    file = tmp_path / "run.json"
+    file.write_text("x" * 100_000)
+    write_record({"run_id": "r", "name": "Straße"}, file)
+
+    assert json.loads(file.read_text(encoding="utf-8")) == {"run_id": "r", "name": "Straße"}
+    assert [p.name for p in tmp_path.iterdir()] == ["run.json"]
+
+
+def test_versions_name_what_decides_results() -> None:
+    assert set(versions()) >= {"python", "mujoco", "eclipse-zenoh", "numpy"}
+
+
+def test_the_summary_names_every_junction_and_the_maps_source(house: House) -> None:
+    house.drive(200, round_every=5)
+    house.end()
+    text = summary_text(record_of(house))
+
+    assert text.splitlines()[0].startswith("completed: 1 junctions, ")
+    assert "Mill Lane" in text
+    assert text.splitlines()[-1] == house.plan.osm.attribution
+
+
+@pytest.mark.parametrize(
+    ("before_s", "within_at_s", "said"),
+    [
+        (0.008, 0.1, "world ready before the drive began"),
+        (17.82, 20.1, "world ready 17.8 s before the car came near"),
+        (-2.34, 0.1, "world 2.3 s late"),
+        (-2.34, 20.1, "world 2.3 s late"),
+    ],
+)
+def test_the_summary_says_when_a_world_was_ready(
+    house: House, before_s: float, within_at_s: float, said: str
+) -> None:
+    house.drive(200, round_every=5)
+    house.end()
+    record = record_of(house)
+    record["intersections"][0] |= {
+        "world_ready_before_s": before_s, "within_radius_at_s": within_at_s,
+    }  # fmt: skip
+
+    assert said in summary_text(record)
+
+
+def test_a_drive_in_lock_step_waits_for_its_worlds_and_is_never_late(house: House) -> None:
+    house.drive(200, round_every=5)
+    house.end()
+    record = record_of(house)
+    record["config"]["speed"] = None
+    record["intersections"][0]["world_ready_before_s"] = -2.34
+    assert "Mill Lane  world ready\n" in summary_text(record)
+    record["intersections"][0]["built_at_s"] = None
+    assert "Mill Lane  world never came\n" in summary_text(record)
+
+
+def test_the_summary_owns_up_to_what_a_slow_machine_left_out(house: House) -> None:
+    house.drive(200, round_every=5)
+    house.end()
+    record = record_of(house)
+    assert "too slow" not in summary_text(record)
+    record["futures"] |= {
+        "smaller_rounds": 12, "spared_rounds": 3, "rounds_by_futures": {"3": 12, "6": 2},
+    }  # fmt: skip
+
+    assert (
+        "too slow for 6 futures in every round: 12 of 3, 2 of 6 futures, 3 rounds spared"
+        in summary_text(record)
+    )

@@ -1,0 +1,138 @@
+"""The nominal future against what the car did, once reality has caught up."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contracts.drive import VehicleState
+from contracts.frames import GeoPoint, LocalFrame
+from contracts.simulation import Comparison
+from orchestrator.rounds.comparisons import ComparisonDesk
+from tests.orchestrator.futures_rounds import round_done, straight
+from tests.orchestrator.trip import START_NS, states_along
+
+DRIVE = LocalFrame(GeoPoint(52.5, 13.4))
+WORLD = LocalFrame(GeoPoint(52.503, 13.405))
+
+
+def car(frame: LocalFrame, *, length_m: float = 200.0, heading_rad: float = 0.0) -> list:
+    """States of a car that drives straight on at 10 m/s, from 2 s before the round."""
+    ahead = np.array([np.cos(heading_rad), np.sin(heading_rad)])
+    return states_along(frame, np.outer([-20.0, length_m], ahead), start_s=-2.0)
+
+
+def compared(
+    states: list[VehicleState], done: object, *, world: LocalFrame = DRIVE, flush: bool = True
+) -> dict[float, Comparison]:
+    desk = ComparisonDesk(DRIVE, 8.0)
+    found = []
+    for state in states:
+        found += desk.take_state(state)
+        if state.stamp_ns == START_NS:
+            desk.take_round(done, world, state)  # type: ignore[arg-type]
+    if flush:
+        found += desk.flush()
+    return {c.horizon_s: c for c in found}
+
+
+def test_a_future_that_came_true_has_no_error() -> None:
+    found = compared(car(DRIVE), round_done(straight()), flush=False)
+
+    assert set(found) == {1.0, 2.0, 4.0, 8.0}
+    for comparison in found.values():
+        assert comparison.nominal.ade_m == pytest.approx(0.0, abs=1e-4)
+        assert comparison.nominal.heading_rad == pytest.approx(0.0, abs=1e-5)
+        assert comparison.constant_velocity.fde_m == pytest.approx(0.0, abs=1e-4)
+        assert comparison.intersection_id == "n4"
+
+
+@given(heading=st.floats(-3.1, 3.1))
+def test_a_future_a_metre_to_the_left_is_a_metre_off_whatever_the_heading(heading: float) -> None:
+    left = (-float(np.sin(heading)), float(np.cos(heading)))
+    done = round_done(straight(left, yaw_rad=heading))
+    found = compared(car(DRIVE, heading_rad=heading), done)
+
+    for comparison in found.values():
+        assert comparison.nominal.lateral_m == pytest.approx(1.0, abs=1e-3)
+        assert comparison.nominal.longitudinal_m == pytest.approx(0.0, abs=1e-3)
+        assert comparison.nominal.ade_m == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_future_that_is_too_fast_ends_ahead() -> None:
+    found = compared(car(DRIVE), round_done(straight(speed_mps=11.0)))
+
+    assert found[4.0].nominal.longitudinal_m == pytest.approx(4.0, abs=1e-3)
+    assert found[8.0].nominal.fde_m == pytest.approx(8.0, abs=1e-3)
+    assert found[4.0].nominal.lateral_m == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_worlds_frame_makes_no_difference() -> None:
+    """The future lies in its World's frame, the car's track in that of the drive."""
+    found = compared(car(WORLD), round_done(straight()), world=WORLD)
+
+    assert found[8.0].nominal.ade_m == pytest.approx(0.0, abs=1e-3)
+
+
+def test_nothing_is_compared_before_the_longest_horizon_has_passed() -> None:
+    nearly = [s for s in car(DRIVE) if s.stamp_ns < START_NS + 7_950_000_000]
+
+    assert compared(nearly, round_done(straight()), flush=False) == {}
+    assert set(compared(car(DRIVE), round_done(straight()), flush=False)) == {1.0, 2.0, 4.0, 8.0}
+
+
+def test_at_the_end_the_horizons_that_were_covered_count() -> None:
+    short = [s for s in car(DRIVE) if s.stamp_ns <= START_NS + 5_000_000_000]
+
+    assert set(compared(short, round_done(straight()))) == {1.0, 2.0, 4.0}
+
+
+def test_nothing_is_said_across_a_hole_in_the_track() -> None:
+    holed = [s for s in car(DRIVE) if not 2.5e9 < s.stamp_ns - START_NS < 4.6e9]
+
+    assert set(compared(holed, round_done(straight()))) == {1.0, 2.0}
+
+
+def test_a_short_future_is_compared_over_its_own_horizons() -> None:
+    desk = ComparisonDesk(DRIVE, 4.0)
+
+    assert desk.horizons_s == (1.0, 2.0, 4.0)
+
+
+def test_positions_without_a_heading_are_no_truth() -> None:
+    blind = states_along(DRIVE, np.array([[-20.0, 0.0], [200.0, 0.0]]), yaw_valid=False)
+
+    assert compared(blind, round_done(straight())) == {}
+
+
+def test_a_comparison_looks_no_further_than_its_horizon() -> None:
+    """Cut later or not, the log gives the same numbers to the last bit."""
+    whole = car(DRIVE, length_m=400.0)
+    cut = [s for s in whole if s.stamp_ns <= START_NS + 8_000_000_000]
+
+    assert compared(whole, round_done(straight())) == compared(cut, round_done(straight()))
+
+
+def test_the_track_is_forgotten_when_nobody_needs_it() -> None:
+    desk = ComparisonDesk(DRIVE, 8.0)
+    for state in states_along(DRIVE, np.array([[0.0, 0.0], [1000.0, 0.0]])):
+        desk.take_state(state)
+
+    assert len(desk._stamps_ns) < 10 * 15
+
+
+def test_after_the_clock_has_stepped_back_comparisons_go_on() -> None:
+    desk = ComparisonDesk(DRIVE, 8.0)
+    hour_ns = 3600 * 10**9
+    for state in car(DRIVE)[:10]:
+        later = msgspec.structs.replace(state, stamp_ns=state.stamp_ns + hour_ns)
+        assert desk.take_state(later) == []
+    found = []
+    for state in car(DRIVE):
+        found += desk.take_state(state)
+        if state.stamp_ns == START_NS:
+            desk.take_round(round_done(straight()), DRIVE, state)
+    assert {comparison.horizon_s for comparison in found} == {1.0, 2.0, 4.0, 8.0}

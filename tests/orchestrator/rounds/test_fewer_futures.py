@@ -1,0 +1,72 @@
+"""Rounds of fewer futures take turns with all that were planned."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from contracts.futures import Variant
+from orchestrator.rounds.fewer_futures import some_of
+from sim_worker.scenarios.reading import catalogue
+from sim_worker.variants import plan_variants
+
+ALL = plan_variants(
+    count=64, seed=0, planners=["pure_pursuit_idm"], scenarios=tuple(catalogue().values())[:12]
+)
+
+
+def happening(variants: tuple[Variant, ...]) -> int:
+    return sum(bool(variant.scenario_id) for variant in variants)
+
+
+@given(count=st.integers(1, 64), turn=st.integers(0, 10_000))
+def test_the_nominal_future_comes_first_and_none_twice(count: int, turn: int) -> None:
+    some = some_of(ALL, count, turn=turn)
+
+    assert some[0] is ALL[0]
+    assert len(some) == count
+    indices = [variant.index for variant in some]
+    assert indices == sorted(set(indices))
+
+
+@given(count=st.integers(2, 64), turn=st.integers(0, 10_000))
+def test_scenarios_and_faults_keep_their_shares(count: int, turn: int) -> None:
+    share = happening(ALL) / 63 * (count - 1)
+
+    assert happening(some_of(ALL, count, turn=turn)) == pytest.approx(share, abs=0.51)
+
+
+@pytest.mark.parametrize("count", [8, 16, 32, 48])
+def test_speeds_stay_spread_over_their_whole_range(count: int) -> None:
+    for turn in range(8):
+        for kind in (True, False):
+            all_speeds = sorted(
+                v.target_speed_factor for v in ALL[1:] if bool(v.scenario_id) is kind
+            )
+            speeds = sorted(
+                v.target_speed_factor
+                for v in some_of(ALL, count, turn=turn)[1:]
+                if bool(v.scenario_id) is kind
+            )
+            stratum = math.ceil(len(all_speeds) / len(speeds))
+            for place, speed in enumerate(speeds):
+                expected = all_speeds[len(all_speeds) * place // len(speeds) :][:stratum]
+                assert expected[0] <= speed <= expected[-1]
+
+
+@pytest.mark.parametrize("count", [16, 32, 48])
+def test_all_have_come_after_a_few_turns(count: int) -> None:
+    turns = math.ceil(63 / (count - 1)) + 1
+    come = {v.index for turn in range(turns) for v in some_of(ALL, count, turn=turn)}
+
+    assert come == set(range(64))
+
+
+def test_as_many_as_there_are_is_all_of_them() -> None:
+    assert some_of(ALL, 64, turn=3) == ALL
+    assert some_of(ALL, 65, turn=3) == ALL
+    with pytest.raises(ValueError, match="0 futures: at least 1"):
+        some_of(ALL, 0, turn=0)

@@ -1,0 +1,153 @@
+"""How many futures a round runs, and how often: a function of how long rounds before it took."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orchestrator.rounds.pace import (
+    CALM_PERIODS,
+    LATE_ROUNDS,
+    Pace,
+    RoundPace,
+    RoundTime,
+    next_pace,
+    paces_between,
+)
+
+PERIOD_S = 0.5
+PACES = paces_between(64, 16)
+ALL, THREE_QUARTERS, HALF, QUARTER, SECOND, FOURTH = PACES
+
+Load = Callable[[int, int], float]
+"""Seconds of round k with n futures."""
+
+
+def drive(load: Load, rounds: int, *, least: int = 16) -> list[Pace]:
+    """Paces of the rounds of a drive."""
+    pace = RoundPace(most=64, least=least, period_s=PERIOD_S)
+    paces = []
+    for number in range(rounds):
+        paces.append(pace.now)
+        pace.take(pace.now, load(number, pace.now.futures))
+    return paces
+
+
+@st.composite
+def steady_loads(draw: st.DrawFn, *, give_or_take: float = 0.1) -> Load:
+    """A cost of so much for each round and each future, give or take a share of it."""
+    fixed_s = draw(st.floats(0.0, 2.0))
+    each_s = draw(st.floats(0.0, 0.1))
+    jitter = draw(st.lists(st.floats(-give_or_take, give_or_take), min_size=1, max_size=50))
+    return lambda number, n: (fixed_s + each_s * n) * (1.0 + jitter[number % len(jitter)])
+
+
+def test_paces_fall_from_all_futures_to_fewer_and_then_to_fewer_rounds() -> None:
+    assert paces_between(64, 16) == (
+        Pace(64), Pace(48), Pace(32), Pace(16), Pace(16, 2), Pace(16, 4),
+    )  # fmt: skip
+    assert paces_between(64, 40) == (Pace(64), Pace(48), Pace(40), Pace(40, 2), Pace(40, 4))
+    assert paces_between(3, 1) == (Pace(3), Pace(2), Pace(1), Pace(1, 2), Pace(1, 4))
+    assert paces_between(64, 64) == (Pace(64),)
+
+
+def test_a_machine_that_keeps_up_runs_all() -> None:
+    assert drive(lambda _, n: 0.004 * n, 100) == [ALL] * 100
+
+
+def test_a_machine_half_as_fast_as_need_be_runs_half() -> None:
+    assert drive(lambda _, n: 0.0125 * n, 100) == [ALL] * 2 + [HALF] * 98
+
+
+def test_where_a_round_costs_much_before_its_first_future_it_takes_two_steps() -> None:
+    assert drive(lambda _, n: 0.4 + 0.004 * n, 100) == [ALL] * 2 + [HALF] * 2 + [QUARTER] * 96
+
+
+def test_where_the_least_futures_are_too_many_rounds_become_rare() -> None:
+    paces = drive(lambda _, n: 0.5 + 0.01 * n, 100)
+    assert paces == [ALL] * 2 + [QUARTER] * 2 + [SECOND] * 96
+
+
+def test_one_late_round_alone_changes_nothing() -> None:
+    assert drive(lambda number, _: 2.0 if number % 5 == 3 else 0.1, 100) == [ALL] * 100
+
+
+def test_with_room_to_spare_all_are_run_again_and_every_fall_makes_it_wait_longer() -> None:
+    paces = drive(lambda number, n: 1.5 if number in range(20, 60) else 0.002 * n, 300)
+    changes = [n for n in range(1, 300) if paces[n] != paces[n - 1]]
+
+    assert [paces[n] for n in changes] == [
+        QUARTER,
+        FOURTH,
+        SECOND,
+        QUARTER,
+        HALF,
+        THREE_QUARTERS,
+        ALL,
+    ]
+    assert changes[2] - 60 >= 3 * CALM_PERIODS // FOURTH.one_of - LATE_ROUNDS
+    assert changes[5] - changes[4] == 3 * CALM_PERIODS
+
+
+def test_a_round_that_was_given_up_counts_as_endless() -> None:
+    pace = RoundPace(most=64, least=16, period_s=PERIOD_S)
+
+    assert not pace.take(ALL, math.inf)
+    assert pace.take(ALL, math.inf)
+    assert pace.now == FOURTH
+    assert pace.slowed
+
+
+@given(most=st.integers(1, 500), share=st.floats(0.0, 1.0))
+def test_paces_lie_between_the_least_and_all(most: int, share: float) -> None:
+    least = max(1, round(share * most))
+    paces = paces_between(most, least)
+
+    assert paces[0] == Pace(most)
+    assert min(pace.futures for pace in paces) == least
+    assert all(a.futures_per_period > b.futures_per_period for a, b in pairwise(paces))
+
+
+@given(
+    st.lists(
+        st.builds(RoundTime, st.sampled_from(PACES), st.floats(0.0, 20.0) | st.just(math.inf)),
+        max_size=100,
+    )
+)
+def test_whatever_happened_the_next_round_has_one_of_the_paces(history: list[RoundTime]) -> None:
+    assert next_pace(history, PACES, period_s=PERIOD_S) in PACES
+
+
+@settings(max_examples=50)
+@given(steady_loads(give_or_take=0.0))
+def test_under_a_constant_load_paces_fall_to_what_fits_and_stay(load: Load) -> None:
+    paces = drive(load, 80)
+    ranks = [PACES.index(pace) for pace in paces]
+
+    assert ranks == sorted(ranks)
+    assert len(set(ranks[12:])) == 1
+    assert paces[-1] == PACES[-1] or load(0, paces[-1].futures) <= PERIOD_S * paces[-1].one_of
+
+
+@settings(max_examples=20)
+@given(steady_loads())
+def test_under_a_load_that_varies_by_a_tenth_paces_come_to_rest(load: Load) -> None:
+    assert len(set(drive(load, 320)[200:])) == 1
+
+
+@settings(max_examples=20)
+@given(steady_loads(), steady_loads())
+def test_after_a_change_of_load_paces_come_to_rest_again(before: Load, after: Load) -> None:
+    paces = drive(lambda number, n: (before if number < 100 else after)(number, n), 500)
+
+    assert len(set(paces[400:])) == 1
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.6, 100.0])
+def test_where_all_are_wanted_all_are_run(seconds: float) -> None:
+    assert drive(lambda *_: seconds, 50, least=64) == [ALL] * 50

@@ -1,0 +1,142 @@
+"""A round is cut into jobs that together hold every variant once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contracts.simulation import Event
+from orchestrator.rounds.jobs import planners_of
+from orchestrator.rounds.pace import Pace
+from tests.orchestrator.house import House
+
+
+@pytest.mark.parametrize(("futures", "size"), [(6, 3), (7, 3), (1, 32), (64, 32)])
+def test_every_variant_is_in_one_job(futures: int, size: int, tmp_path: Path) -> None:
+    house = House(tmp_path, futures=futures, futures_per_job=size)
+    house.drive(20)
+    assert house.conductor.start_round()
+    jobs = []
+    while requests := house.workers[0].take() + house.workers[1].take():
+        for request in requests:
+            jobs.append(request.message())
+            house.workers[0].answer_one(request)
+        house.settle()
+    house.tables.close()
+
+    indices = sorted(v.index for job in jobs for v in job.variants)
+    assert indices == list(range(futures))
+    assert max(len(job.variants) for job in jobs) <= size
+    (first,) = (job for job in jobs if job.job_index == 0)
+    assert first.variants[0].name == "nominal"
+    assert len({(job.state.stamp_ns, job.cruise_speed_mps, job.seed) for job in jobs}) == 1
+    assert house.conductor.rounds.futures.count == futures
+
+
+def test_rounds_differ_by_their_state_and_not_by_their_variants(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    seen = []
+    for until in (20, 40):
+        house.drive(until)
+        assert house.conductor.start_round()
+        seen.append(house.workers[0].take()[0])
+        house.workers[0].answer_one(seen[-1])
+        house.work()
+    house.tables.close()
+    early, late = (request.message() for request in seen)
+
+    assert early.variants == late.variants
+    assert late.state.stamp_ns - early.state.stamp_ns == 2_000_000_000
+    assert (early.round_id, late.round_id) == (0, 1)
+    moved = late.path.xy_m[0] - early.path.xy_m[0]
+    assert np.hypot(*moved) == pytest.approx(20.0, abs=2.0)
+
+
+def test_one_future_in_eight_is_driven_by_somebody_heedless() -> None:
+    assert Counter(planners_of("pure_pursuit_idm")) == {
+        "pure_pursuit_idm": 7, "constant_speed": 1,
+    }  # fmt: skip
+    assert set(planners_of("constant_speed")) == {"constant_speed"}
+
+
+def test_speed_of_simulation_is_known_of_each_worker(tmp_path: Path) -> None:
+    house = House(tmp_path)
+    house.drive(20)
+    assert house.conductor.start_round()
+    house.work()
+    house.tables.close()
+
+    assert house.conductor.rounds.rtf == {"w0": pytest.approx(80.0), "w1": pytest.approx(80.0)}
+
+
+@pytest.mark.parametrize(("count", "jobs"), [(64, 2), (48, 2), (32, 2), (16, 1)])
+def test_a_smaller_round_is_cut_into_jobs_of_one_size(
+    count: int, jobs: int, tmp_path: Path
+) -> None:
+    house = House(tmp_path, futures=64, futures_per_job=32)
+    house.conductor.rounds.pace.now = Pace(count)
+    house.drive(20)
+    assert house.conductor.start_round()
+    asked = [r.message() for worker in house.workers for r in worker.take()]
+    house.tables.close()
+
+    assert [len(job.variants) for job in asked] == [count // jobs] * jobs
+
+
+def test_late_rounds_make_the_next_ones_smaller_and_say_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_ns = [10**9]
+    monkeypatch.setattr("time.monotonic_ns", lambda: now_ns[0])
+    house = House(tmp_path, futures=64, futures_per_job=32, least_futures=16, rate_hz=2.0)
+    house.drive(20)
+    told: list[Event] = []
+    house.conductor.events.on_event = told.append
+    sizes = []
+    for seconds in (0.1, 0.7, 0.7, 0.7, 0.7):
+        assert house.conductor.start_round()
+        now_ns[0] += round(seconds * 1e9)
+        house.work()
+        (view,) = house.watched("round")
+        sizes.append(len(view.names))
+    house.end()
+
+    assert sizes == [64, 64, 64, 32, 32]
+    assert [(event.level, event.text) for event in told] == [
+        (
+            "warning",
+            "32 of 64 futures from now on: the machine is too slow for all at 2 Hz",
+        ),
+        ("info", "16 of 64 futures from now on: the machine is too slow for all at 2 Hz"),
+    ]
+    record = house.conductor.rounds.futures.record(wanted=64, missed=0, spared=0, unseeded=0)
+    assert (record["smaller_rounds"], record["rounds_by_futures"]) == (2, {"32": 2, "64": 3})
+
+
+def test_in_lock_step_late_rounds_change_nothing(tmp_path: Path) -> None:
+    house = House(tmp_path, speed=None, rate_hz=50.0, least_futures=1)
+    house.drive(40, round_every=1)
+    house.end()
+
+    assert house.conductor.rounds.futures.rounds_of.keys() == {6}
+
+
+def test_who_acts_for_a_planner_is_said_once_for_each(tmp_path: Path) -> None:
+    house = House(tmp_path, planner="remote", futures=16, futures_per_job=8)
+    house.drive(20)
+    told: list[Event] = []
+    house.conductor.events.on_event = told.append
+    for worker in house.workers:
+        worker.remark = "fallback 'pure_pursuit_idm' acted from 0 s on: no answer within 1 s"
+    for _ in range(3):
+        assert house.conductor.start_round()
+        house.work()
+    house.end()
+
+    assert [(event.level, event.text[:40]) for event in told] == [
+        ("warning", "a future driven by remote: fallback 'pur"),
+        ("warning", "a future driven by constant_speed: fallb"),
+    ]

@@ -1,0 +1,60 @@
+"""Those who watch see whom the worst futures meet, and where."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from contracts.futures import RoadUserTracks, Variant
+from orchestrator.record.result_rows import future_rows
+from orchestrator.rounds.desk import RoundDone
+from orchestrator.rounds.views import round_view
+from tests.orchestrator.futures_rounds import TIME_S, round_done, straight
+from tests.orchestrator.trip import town_world
+
+FRAME = town_world("n4").frame
+VARIANTS = tuple(Variant(index=i, name=str(i), scenario_id="scp") for i in range(3))
+
+
+def meeting(*users_xy: tuple[float, float]) -> RoundDone:
+    """Three futures that drive east along y = 0, 1, 2; road users stand at the same places in
+    each, and the last future touches the first of them after 4 s."""
+    states = np.concatenate([straight((0.0, float(y))) for y in range(3)])
+    done = round_done(
+        states,
+        outcome={
+            "collided": np.array([False, False, True]),
+            "collision_with": np.array([0, 0, 1]),
+            "collision_time_s": np.array([np.nan, np.nan, 4.0]),
+            "min_clearance_m": np.array([20.0, 3.0, 0.0]),
+        },
+    )
+    poses = np.zeros((3, len(TIME_S), len(users_xy), 3), dtype=np.float32)
+    poses[..., :2] = np.asarray(users_xy).reshape(-1, 2)
+    tracks = RoadUserTracks(
+        poses=poses,
+        speed_mps=poses[..., 0],
+        size_m=np.ones((3, len(users_xy), 2), dtype=np.float32),
+        kinds=np.zeros((3, len(users_xy))),
+        kind_names=("car",),
+    )
+    result = msgspec.structs.replace(done.results[0], road_users=tracks)
+    return RoundDone(order=done.order, results=(result,), latency_ms=100.0, seconds=0.1)
+
+
+def test_the_nearest_road_user_of_critical_futures_is_shown_and_where_it_is_touched() -> None:
+    done = meeting((40.0, 2.0), (30.0, 60.0))
+    view = round_view(done, future_rows(done, VARIANTS).futures, FRAME, FRAME, VARIANTS)
+    # The first future keeps 20 m from everybody: nobody is shown for it.
+    assert view.user_xy_m.shape == (2, 25, 2)
+    assert view.user_xy_m[:, 0] == pytest.approx(np.array([[40.0, 2.0]] * 2), abs=1e-3)
+    assert view.touch_xy_m == pytest.approx(np.array([[40.0, 2.0]]), abs=1e-3)
+    assert view.touch_names == ("scp",)
+
+
+def test_without_road_users_there_is_nobody_to_show() -> None:
+    done = meeting()
+    view = round_view(done, future_rows(done, VARIANTS).futures, FRAME, FRAME, VARIANTS)
+    assert view.user_xy_m.shape == (0, 25, 2)
+    assert view.touch_xy_m.shape == (0, 2)

@@ -1,0 +1,107 @@
+"""The plan of a sweep: which cells there are, in which order, and how they are cut into jobs."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator.sweep.plan import (
+    PlacedHere,
+    WorldPlaces,
+    cases_of,
+    parameter_sets,
+    plan_sweep,
+    planners_for,
+    with_parameters,
+)
+from orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, SweepSpec, check_spec
+from sim_worker.scenarios.reading import catalogue
+
+
+def _loaded(**settings: object) -> Loaded:
+    return check_spec(SweepSpec(map="town.osm", **settings))  # type: ignore[arg-type]
+
+
+def _places(loaded: Loaded, worlds: int = 2) -> tuple[WorldPlaces, ...]:
+    return tuple(
+        WorldPlaces(
+            world_id=f"w{number}",
+            placed=tuple(
+                PlacedHere(
+                    scenario_id=scenario.id, junction_id=f"n{number}", place=f"c1/{scenario.id}",
+                    ego="c1" if scenario.ego.turn == "straight" else "c2",
+                )
+                for scenario in loaded.scenarios
+            ),
+            unplaced=(),
+        )
+        for number in range(worlds)
+    )  # fmt: skip
+
+
+def test_every_combination_is_a_cell_and_each_job_is_of_one_kind() -> None:
+    loaded = _loaded(
+        scenarios=("scp", "ccftap", "lead_stopping"),
+        planners=("constant_speed", "pure_pursuit_idm"),
+        vehicles=("bmw_320i", "vw_vanagon"),
+        parameters={"friction_factor": (1.0, 0.5), "target_speed_factor": (0.9, 1.0, 1.1)},
+    )
+    plan = plan_sweep(loaded, _places(loaded))
+    cases = sum(len(cases_of(scenario, loaded.spec)) for scenario in loaded.scenarios)
+    assert plan.cells == 2 * cases * 2 * 2 * 6
+    cells = [cell for job in plan.jobs for cell in job.cells]
+    assert [cell.number for cell in cells] == list(range(len(cells)))
+    assert [job.number for job in plan.jobs] == list(range(len(plan.jobs)))
+    assert all(0 < len(job.cells) <= FUTURES_PER_JOB for job in plan.jobs)
+    seen = {
+        (job.world_id, job.planner, job.vehicle, cell.scenario_id, cell.case,
+         tuple(cell.parameters.items()))
+        for job in plan.jobs for cell in job.cells
+    }  # fmt: skip
+    assert len(seen) == len(cells)
+    for job in plan.jobs:
+        turns = {catalogue()[cell.scenario_id].ego.turn for cell in job.cells}
+        assert len(turns) == 1
+
+
+def test_the_same_places_give_the_same_plan() -> None:
+    loaded = _loaded(scenarios=("scp", "cpta"), cases=3, seed=7)
+    assert plan_sweep(loaded, _places(loaded)) == plan_sweep(loaded, _places(loaded))
+
+
+@given(st.integers(1, 12), st.integers(0, 1000))
+def test_so_many_cases_are_drawn_as_are_wished_for(wished: int, seed: int) -> None:
+    scenario = catalogue()["ccftap"]
+    spec = SweepSpec(map="a.osm", cases=wished, seed=seed)
+    chosen = cases_of(scenario, spec)
+    everything = dict(cases_of(scenario, SweepSpec(map="a.osm", seed=seed)))
+    assert len(chosen) == min(wished, len(everything))
+    assert [number for number, _ in chosen] == sorted({number for number, _ in chosen})
+    assert all(everything[number] == values for number, values in chosen)
+
+
+def test_parameters_come_on_top_of_what_a_case_has() -> None:
+    case = {
+        "faults.friction_factor": 0.5, "faults.perception_delay_s": 0.2, "ego.speed_mps": 8.0,
+    }  # fmt: skip
+    changed = with_parameters(
+        case,
+        {"friction_factor": 0.5, "perception_delay_s": 0.1, "target_speed_factor": 1.1},
+    )
+    assert changed == {
+        "faults.friction_factor": 0.25, "faults.perception_delay_s": 0.2 + 0.1,
+        "ego.speed_mps": 8.0,
+    }  # fmt: skip
+    assert case["faults.friction_factor"] == 0.5
+
+
+def test_without_parameters_there_is_one_set() -> None:
+    assert parameter_sets(SweepSpec(map="a.osm")) == ({},)
+
+
+def test_only_planners_that_can_drive_backwards_do() -> None:
+    both = SweepSpec(map="a.osm", planners=("pure_pursuit_idm", "reverse_pursuit"))
+    forwards = SweepSpec(map="a.osm", planners=("pure_pursuit_idm",))
+    bay, crossing = catalogue()["reversing_parking"], catalogue()["scp"]
+    assert planners_for(bay, both) == planners_for(bay, forwards) == ("reverse_pursuit",)
+    assert planners_for(crossing, both) == ("pure_pursuit_idm",)
