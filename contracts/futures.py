@@ -146,6 +146,8 @@ class FuturesJob(msgspec.Struct, frozen=True, kw_only=True):
     """What to measure besides the outcome, by the names of the table of metrics."""
     accidents: bool = False
     """Whether collisions with road users are run on as two bodies in motion."""
+    vehicle_version: int = 0
+    """Which of a run's sets of parameters the car has; 0 is the vehicle file's."""
 
 
 class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
@@ -226,3 +228,5 @@ class FuturesResult(msgspec.Struct, frozen=True, kw_only=True):
     sim_seconds: float
     cpu_seconds: float
     wall_seconds: float
+    vehicle_version: int = 0
+    """The parameters that simulated it; see FuturesJob."""

@@ -99,6 +99,8 @@ CHANNELS: dict[str, Channel] = {
              REQUEST, "the mirror's World", simulation.ActiveWorld),
         _row("use_vehicle", f"{_RUN}/worker/{{process}}/use_vehicle", tuning.UseVehicle, None,
              REQUEST, "parameters from now on", tuning.UseVehicle),
+        _row("tune", f"{_RUN}/worker/{{process}}/tune", tuning.TuneRequest, None, REQUEST,
+             "lock step: weigh what was sent", tuning.TuneReply),
         _row("use_roles", f"{_RUN}/worker/{{process}}/use_roles", roles.UseRoles, None, REQUEST,
              "the mirror's roles", roles.UseRoles),
         _row("set", f"{_RUN}/set", tuning.SetRequest, None, REQUEST, "change a running drive",

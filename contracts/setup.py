@@ -88,6 +88,13 @@ class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
     """Loaded before the first job: those of other packages live in processes of their own."""
 
 
+class TuningSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Identifies `vehicle` from its driving and watches its gap to reality, in `drive_frame`."""
+
+    vehicle: VehicleParameters
+    drive_frame: LocalFrame
+
+
 class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Builds Worlds from one map into one folder, through a cache shared between runs.
 

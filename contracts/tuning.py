@@ -10,8 +10,10 @@ from typing import Literal
 
 import msgspec
 
+from contracts.gap import GapAlarm, GapSample, Verdict
 from contracts.vehicle import VehicleParameters
 
+UNDERSTEER_GRADIENT = "understeer_gradient_rad_per_mps2"
 ParameterOrigin = Literal["file", "identified", "set", "rolled_back"]
 
 
@@ -76,6 +78,26 @@ class UseVehicle(msgspec.Struct, frozen=True, kw_only=True):
     vehicle: VehicleParameters
     version: int
     """Counts the sets of parameters of a run; jobs say with which they were simulated."""
+    changes: tuple[ParameterChange, ...] = ()
+    """Against the version before; for a process that has just come up, all that a hand has set."""
+    pinned: tuple[str, ...] = ()
+    """Parameters that stay as they are, whatever is identified."""
+
+
+class TuneRequest(msgspec.Struct, frozen=True, kw_only=True):
+    """Lock step: weigh everything sent so far, samples by channel and states, then reply."""
+
+    published: dict[str, int]
+    states: int
+
+
+class TuneReply(msgspec.Struct, frozen=True, kw_only=True):
+    """Lock step: what follows from everything sent so far, each kind in time order."""
+
+    identifications: tuple[Identification, ...] = ()
+    gaps: tuple[GapSample, ...] = ()
+    alarms: tuple[GapAlarm, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
 
 
 class SetRequest(msgspec.Struct, frozen=True, kw_only=True):

@@ -64,6 +64,10 @@ def drive(
     planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the variants [default: 0]")] = None,
     vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
+    tuning: Annotated[
+        str | None,
+        typer.Option(help="parameters from the driving: off, report, apply [default: report]"),
+    ] = None,
     view: Annotated[
         str | None, typer.Option(help="auto, native, web or none [default: auto]")
     ] = None,
@@ -88,8 +92,8 @@ def drive(
             "map": map_file, "route": route, "log": log, "source": source, "start_s": start,
             "end_s": end, "speed": speed, "workers": workers, "futures": futures,
             "least_futures": least_futures, "rate_hz": rate, "horizon_s": horizon,
-            "planner": planner, "seed": seed, "vehicle": vehicle, "view": view, "out": out,
-            "ros2": ros2, "towards_vehicle": towards_vehicle or None,
+            "planner": planner, "seed": seed, "vehicle": vehicle, "tuning": tuning, "view": view,
+            "out": out, "ros2": ros2, "towards_vehicle": towards_vehicle or None,
         },
     )  # fmt: skip
     raise typer.Exit(run_drive(settings))

@@ -73,8 +73,12 @@ def gap(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="table and verdicts as JSON")] = False,
     out: Annotated[Path | None, typer.Option(help="folder for plots")] = None,
+    declaration: Annotated[
+        Path | None,
+        typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml"),
+    ] = None,
 ) -> None:
     """Measure how far the model leaves a recorded drive, and say which of the two is wrong."""
     from orchestrator.gap_command import report_gap
 
-    report_gap(recording, vehicle=vehicle, as_json=as_json, out=out)
+    report_gap(recording, vehicle=vehicle, as_json=as_json, out=out, declaration=declaration)

@@ -13,7 +13,8 @@ def set_value(
         str,
         typer.Argument(
             metavar="KEY=VALUE",
-            help="role.ID=all, twin, shadow or ghost; correction=free or follow",
+            help="role.ID=all, twin, shadow or ghost; correction=free or follow; "
+            "vehicle.NAME=a number, pin, unpin or rollback",
         ),
     ],
     run: Annotated[
@@ -22,7 +23,7 @@ def set_value(
     ] = None,
     out: Annotated[Path, typer.Option(help="folder of the runs")] = Path("runs"),
 ) -> None:
-    """Change a running drive: the role of a vehicle, the correction of the twins."""
+    """Change a running drive: a vehicle's role, the twins' correction, the car's parameters."""
     from orchestrator.changes.command import set_in_drive
 
     print(set_in_drive(assignment, run=run, out=out))

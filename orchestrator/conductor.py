@@ -8,8 +8,6 @@ from __future__ import annotations
 import logging
 import time
 
-import msgspec
-
 from contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
 from contracts.codec import SchemaMismatch
 from contracts.drive import VehicleInfo
@@ -26,15 +24,17 @@ from orchestrator.mirror_desk import MirrorDesk
 from orchestrator.mission import Mission
 from orchestrator.plan import DrivePlan
 from orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
+from orchestrator.questions import Questions
 from orchestrator.record.results import ResultTables
 from orchestrator.rounds.runner import RoundRunner
+from orchestrator.tuning.by_hand import VehicleHandler
+from orchestrator.tuning.link import FINDINGS, TuningLink
 from orchestrator.vehicles_beside import VehiclesBeside
 from orchestrator.world_desk import WorldDesk
 
 log = logging.getLogger(ORCHESTRATOR)
 
 MAILBOX_DEPTH = 16384
-ANSWER_TIMEOUT_S = 10.0
 
 
 class Conductor:
@@ -54,22 +54,13 @@ class Conductor:
         )
         self.tell = self.events.tell
         self.worlds = WorldDesk(
-            plan,
-            bus,
-            self.mailbox,
-            on_ready=self._world_ready,
-            on_failed=self._world_failed,
+            plan, bus, self.mailbox, on_ready=self._world_ready, on_failed=self._world_failed,
             tell=self.tell,
-        )
+        )  # fmt: skip
         self.rounds = RoundRunner(
-            plan,
-            bus,
-            self.mailbox,
-            tables,
-            world_of=self.worlds.world,
+            plan, bus, self.mailbox, tables, world_of=self.worlds.world, tell=self.tell,
             on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
-            tell=self.tell,
-        )
+        )  # fmt: skip
         self.human = HumanDesk(plan, bus, tables, self.intake, mission, tell=self.tell)
         self.alive: set[str] = set()
         self.missed_rounds = 0
@@ -77,17 +68,21 @@ class Conductor:
         """Rounds that were not due since the machine is too slow for them."""
         self.unseeded_rounds = 0
         """Rounds that no machine could have run: no heading known yet, or no road ahead."""
-        self.unanswered = 0
-        """Questions put by `ask` that are not answered yet: in lock step nothing goes on before."""
+        self.questions = Questions(bus, self.mailbox, run_id=plan.run_id, alive=self.alive)
         self.mirror = MirrorDesk(tables, self.tell)
         self.roles = RolesInForce(
             plan.config.roles,
             plan.config.correction,
-            tell=lambda message: self.ask(MIRROR, "use_roles", message),
+            tell=lambda message: self.questions.ask(MIRROR, "use_roles", message),
         )
+        self.tuning = TuningLink(
+            plan, bus, self.mailbox, tables, events=self.events, intake=self.intake,
+            rounds=self.rounds, alive=self.alive,
+        )  # fmt: skip
         self.changes = ChangeDesk(
-            {"role": RoleHandler(self.roles), "correction": CorrectionHandler(self.roles)}
-        )
+            {"role": RoleHandler(self.roles), "correction": CorrectionHandler(self.roles),
+             "vehicle": VehicleHandler(self.tuning.parameters)}
+        )  # fmt: skip
         self.beside = VehiclesBeside(
             plan, publish=lambda message: bus.publish("other_vehicles", message, run=plan.run_id)
         )
@@ -105,6 +100,7 @@ class Conductor:
                 self.bus.subscribe(channel, self.mailbox, vehicle=one)
         for channel in ("mirror", "event"):
             self.bus.subscribe(channel, self.mailbox, run=run)
+        self.tuning.join()
         self.bus.serve("set", self.mailbox, run=run)
         self.bus.watch_alive(alive_key(run=run, process="*"), self.mailbox)
 
@@ -130,6 +126,8 @@ class Conductor:
                 self.mirror.take(item.message())
             case Received(channel="event"):
                 self.events.heard(item.message())
+            case Received(channel=channel) if channel in FINDINGS:
+                self.tuning.heard(item)
             case Received():
                 self.take_telemetry(item)
             case Reply(channel="job"):
@@ -141,7 +139,11 @@ class Conductor:
             case Reply(channel="prepare"):
                 self.worlds.prepare_reply(item)
             case Reply(channel="use_world" | "use_roles"):
-                self.unanswered -= 1
+                self.questions.answered()
+            case Reply(channel="use_vehicle" | "tune"):
+                process_id = self.tuning.reply(item)
+                if process_id in self.alive and process_id not in self.rounds.desk.workers:
+                    self._worker_up(process_id)
             case Request(channel="set"):
                 self.changes.take(item, stamp_ns=self.intake.now_stamp_ns)
             case Alive():
@@ -226,7 +228,7 @@ class Conductor:
         self._world_untold = False
         active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns + 1, world_id=self._active_world)
         self.bus.publish("active_world", active, run=self.plan.run_id)
-        self.ask(MIRROR, "use_world", active)
+        self.questions.ask(MIRROR, "use_world", active)
 
     def _world_ready(self, junction_id: str, world: World) -> None:
         self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
@@ -239,28 +241,15 @@ class Conductor:
 
     def make_changes(self) -> None:
         """Make what `foretwin set` asked for; between rounds, and from the next state on."""
-        if not self.changes.waiting or self.rounds.desk.open_rounds:
+        if self.rounds.desk.open_rounds:
             return
         stamp_ns, start_ns = self.intake.now_stamp_ns + 1, self.intake.start_stamp_ns
         for change in self.changes.make(stamp_ns=stamp_ns, start_stamp_ns=start_ns):
             self.tell(Tell("info", f"set {change.text}"))
             self.tables.add("changes", [change.row()])
+        self.tuning.hand_over()
 
     # Processes.
-
-    def ask(self, process_id: str, channel: str, message: msgspec.Struct) -> None:
-        """Ask a process, where it is alive; see `unanswered`."""
-        if process_id not in self.alive:
-            return
-        self.unanswered += 1
-        self.bus.request(
-            channel,
-            message,
-            self.mailbox,
-            timeout_s=ANSWER_TIMEOUT_S,
-            run=self.plan.run_id,
-            process=process_id,
-        )
 
     def _alive(self, item: Alive) -> None:
         process_id = process_of_alive_key(item.key)
@@ -273,22 +262,29 @@ class Conductor:
 
     def _process_up(self, process_id: str) -> None:
         self.alive.add(process_id)
-        if process_id.startswith("w"):
-            self.rounds.desk.worker_up(process_id)
-            for world_id in self.mission.worlds_ahead():
-                self.worlds.prepare(process_id, world_id)
-            self.rounds.give_out()
-        elif process_id == MIRROR:
+        if not self.tuning.process_up(process_id):
+            self._worker_up(process_id)
+        if process_id == MIRROR:
             self._world_untold = True
             self.announce_world()
             self.roles.announce(self.intake.now_stamp_ns)
         elif process_id == BUILDER:
             self.worlds.builder_up()
 
+    def _worker_up(self, process_id: str) -> None:
+        """Give a worker that has the parameters in force its Worlds, and jobs."""
+        if not process_id.startswith("w"):
+            return
+        self.rounds.desk.worker_up(process_id)
+        for world_id in self.mission.worlds_ahead():
+            self.worlds.prepare(process_id, world_id)
+        self.rounds.give_out()
+
     def _process_down(self, process_id: str) -> None:
         if process_id not in self.alive:
             return
         self.alive.discard(process_id)
+        self.tuning.process_down(process_id)
         log.info("lost %s", process_id)
         if process_id.startswith("w"):
             self.rounds.desk.worker_down(process_id)

@@ -13,6 +13,7 @@ from contracts.errors import UserError
 from contracts.roles import Correction, FollowLimits, Role
 
 View = Literal["auto", "native", "web", "none"]
+Tuning = Literal["off", "report", "apply"]
 Source = Literal["auto", "log", "standin", "live"]
 
 HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
@@ -86,6 +87,10 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Of the car itself, as the drive begins: all is twin, shadow and ghost at once."""
     correction: Correction = "free"
     """Whether twins are drawn towards reality (follow) as the drive begins; see docs/roles.md."""
+    tuning: Tuning = "report"
+    """Whether the driving is asked for the vehicle's parameters and the model's gap, and whether
+    what is found counts (apply) or is only told: a simulation that nobody has asked to change
+    stays that of the vehicle file."""
     follow: FollowLimits = FollowLimits()
     """How hard a twin that follows may be drawn."""
     vehicles: tuple[VehicleBeside, ...] = ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +14,8 @@ from contracts.errors import UserError
 from contracts.frames import LocalFrame
 from contracts.gap import GapAlarm, GapSample, Verdict
 from contracts.vehicle import VehicleParameters
+from orchestrator.gap_text import table_lines, verdict_lines
+from orchestrator.progress_bar import progress_bar
 from sim_worker.gap.errors import GapMeter, GapRow, gap_table
 from sim_worker.gap.free_run import FreeRunner
 from sim_worker.gap.limits import GapLimits
@@ -21,8 +24,10 @@ from sim_worker.gap.verdict import Judge, without_manual_commands
 from sim_worker.motion_record import MotionRecorder
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.estimator import StateEstimator
-from telemetry.logs.log import Log
+from telemetry.logs.log import Log, Sample
 from telemetry.logs.opening import open_log
+
+_SECOND_NS = 1_000_000_000
 
 
 class GapReport(NamedTuple):
@@ -37,16 +42,32 @@ class GapReport(NamedTuple):
     """Samples that the reader refused, by reason."""
 
 
-def gap_of(log: Log, vehicle: VehicleParameters) -> GapReport:
+def gap_of(log: Log, vehicle: VehicleParameters, *, name: str, progress: bool = False) -> GapReport:
     """Replay a drive through the estimator, the model and the judge.
 
-    Raises UserError for a drive without a position or without motion.
+    `name` is what errors call the drive; with `progress` a bar runs over its seconds. Raises
+    UserError for a drive without a position or without motion.
     """
     messages = list(log.samples())
     first = next((m for _, m in messages if isinstance(m, GnssFix)), None)
     if first is None:
-        raise UserError(f"{log.info.source or log.info.vehicle_id}: no position in the drive")
-    frame = LocalFrame(first.position)
+        raise UserError(f"{name}: no position in the drive, so there is no motion to compare with")
+    stamps = [message.stamp_ns for _, message in messages]  # type: ignore[attr-defined]
+    seconds = (stamps[-1] - stamps[0]) // _SECOND_NS
+    if not progress:
+        return _measured(log, messages, vehicle, LocalFrame(first.position), name, lambda _: None)
+    with progress_bar(seconds, "seconds") as (advance, _):
+        return _measured(log, messages, vehicle, LocalFrame(first.position), name, advance)
+
+
+def _measured(
+    log: Log,
+    messages: list[Sample],
+    vehicle: VehicleParameters,
+    frame: LocalFrame,
+    name: str,
+    advance: Callable[[str], None],
+) -> GapReport:
     estimator = StateEstimator(
         log.info,
         wheelbase_m=vehicle.wheelbase_m.value,
@@ -57,7 +78,13 @@ def gap_of(log: Log, vehicle: VehicleParameters) -> GapReport:
     recorder = MotionRecorder(frame=frame, keep_s=1e6, depth=len(messages) + 1)
     states: list[VehicleState] = []
     verdicts: list[Verdict] = []
+    next_ns: int | None = None
     for channel, message in messages:
+        stamp_ns: int = message.stamp_ns  # type: ignore[attr-defined]
+        next_ns = stamp_ns + _SECOND_NS if next_ns is None else next_ns
+        while stamp_ns >= next_ns:
+            next_ns += _SECOND_NS
+            advance(Path(name).name)
         recorder.handle(channel, message)
         verdict = judge.handle(channel, message)
         if verdict is not None:
@@ -70,26 +97,35 @@ def gap_of(log: Log, vehicle: VehicleParameters) -> GapReport:
     meter = GapMeter(FreeRunner(vehicle), vehicle_id=log.info.vehicle_id)
     samples = meter.samples(record, motion)
     if not samples:
-        raise UserError(
-            f"{log.info.source or log.info.vehicle_id}: the heading is never known for a second"
-        )
+        raise UserError(f"{name}: the heading is never known for a second, so no run can begin")
     limits = GapLimits()
     alarms = [alarm for sample in samples for alarm in limits.handle(sample)]
     refused = {reason: count for reason, count in log.skipped.items() if count}
     return GapReport(log.info, samples, gap_table(samples), alarms, verdicts, refused)
 
 
-def report_gap(recording: Path, *, vehicle: str | None, as_json: bool, out: Path | None) -> None:
+def report_gap(
+    recording: Path,
+    *,
+    vehicle: str | None,
+    as_json: bool,
+    out: Path | None,
+    declaration: Path | None = None,
+) -> None:
     """Print the gap of a recorded drive; with `out` also write its plots there."""
-    report = gap_of(open_log(recording), load_vehicle(vehicle))
+    parameters = load_vehicle(vehicle)
+    if out is not None and out.exists() and not out.is_dir():
+        raise UserError(f"{out}: is no folder")
+    log = open_log(recording, declaration=declaration)
+    report = gap_of(log, parameters, name=str(recording), progress=True)
     plots: list[Path] = []
     if out is not None:
         from orchestrator.gap_plots import write_plots
 
-        if out.exists() and not out.is_dir():
-            raise UserError(f"{out}: is no folder")
         out.mkdir(parents=True, exist_ok=True)
-        plots = write_plots(report.samples, out)
+        plots = write_plots(
+            report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
+        )
     if as_json:
         print(json.dumps(as_object(report), indent=2))
         return
@@ -102,7 +138,7 @@ def as_object(report: GapReport) -> dict[str, Any]:
     """Return the report as JSON has it: rows, verdicts with evidence, alarms, refused samples."""
     return {
         "vehicle_id": report.info.vehicle_id,
-        "independent": all(row.independent for row in report.rows),
+        "independent": _commanded(report),
         "rows": [row._asdict() for row in report.rows],
         "verdicts": [msgspec.to_builtins(verdict) for verdict in report.verdicts],
         "alarms": [msgspec.to_builtins(alarm) for alarm in report.alarms],
@@ -110,43 +146,18 @@ def as_object(report: GapReport) -> dict[str, Any]:
     }
 
 
+def _commanded(report: GapReport) -> bool:
+    return all(row.independent for row in report.rows)
+
+
 def _lines(report: GapReport) -> list[str]:
-    lines = [
-        "gap of the model left to itself, RMS (95th percentile)",
-        f"{'horizon':>7}  {'manoeuvre':<12} {'runs':>5}  {'along m':>15}  {'across m':>15}  "
-        f"{'heading °':>13}  {'yaw rate °/s':>13}  {'speed m/s':>13}  {'accel m/s²':>13}",
-    ]
-    for row in report.rows:
-        cells = []
-        for name, scale, width in (
-            ("along_m", 1.0, 15), ("across_m", 1.0, 15), ("yaw_rad", 57.29578, 13),
-            ("yaw_rate_radps", 57.29578, 13), ("speed_mps", 1.0, 13), ("accel_mps2", 1.0, 13),
-        ):  # fmt: skip
-            text = f"{scale * row.rms[name]:.2f} ({scale * row.p95[name]:.2f})"
-            cells.append(f"{text:>{width}}")
-        lines.append(
-            f"{row.horizon_s:>5g} s  {row.manoeuvre:<12} {row.runs:>5}  " + "  ".join(cells)
-        )
-    if not all(row.independent for row in report.rows):
-        lines.append("commands were not recorded: estimated from the motion they are compared with")
-    start_ns = report.info.start_stamp_ns
+    lines = list(table_lines(report.rows))
     if report.refused:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(report.refused.items()))
         lines.append(f"refused: {left}")
-    raised = sum(alarm.over for alarm in report.alarms)
-    lines.append(f"alarms: {raised}")
-    if not report.verdicts:
-        lines.append("verdict: none: nothing shows that the car or the model departs")
-    for verdict in report.verdicts:
-        at_s = (verdict.stamp_ns - start_ns) * 1e-9
-        who = verdict.culprit if verdict.culprit != "vehicle" else "real vehicle"
-        lines.append(
-            f"verdict at {at_s:.1f} s: {who}, {verdict.cause} "
-            f"(confidence {verdict.confidence:.2f}): {verdict.text}"
+    start_ns = report.info.start_stamp_ns
+    return lines + list(
+        verdict_lines(
+            report.verdicts, report.alarms, start_ns=start_ns, commanded=_commanded(report)
         )
-        lines += [
-            f"  {one.name}: {one.value:.4g} ± {one.std:.2g}, expected {one.expected:.4g}: "
-            f"{one.text}"
-            for one in verdict.evidence
-        ]
-    return lines
+    )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from contracts.gap import GapSample
+from contracts.gap import GapSample, Verdict
 from sim_worker.gap.errors import gap_table
 
 _PANELS = (
@@ -19,10 +19,14 @@ _PANELS = (
 )
 
 
-def write_plots(samples: Sequence[GapSample], folder: Path) -> list[Path]:
-    """Write gap_over_time.png and gap_by_horizon.png into `folder`; returns what was written."""
+def write_plots(
+    samples: Sequence[GapSample], verdicts: Sequence[Verdict], folder: Path, *, start_ns: int
+) -> list[Path]:
+    """Write gap_over_time.png and gap_by_horizon.png into `folder`; returns what was written.
+
+    Times are those since `start_ns`; a verdict is a line where it fell and a band since when.
+    """
     over_time = Figure(figsize=(10, 9), layout="constrained")
-    start_ns = min(sample.stamp_ns for sample in samples)
     horizons = sorted({sample.horizon_s for sample in samples})
     axes = over_time.subplots(len(_PANELS), 1, sharex=True)
     for axis, (name, label, scale) in zip(axes, _PANELS, strict=True):
@@ -31,8 +35,18 @@ def write_plots(samples: Sequence[GapSample], folder: Path) -> list[Path]:
             time_s = [(one.stamp_ns - start_ns) * 1e-9 for one in rows]
             values = [scale * getattr(one, name) for one in rows]
             axis.plot(time_s, values, label=f"{horizon:g} s", linewidth=1.0)
+        for verdict in verdicts:
+            at_s = (verdict.stamp_ns - start_ns) * 1e-9
+            axis.axvspan((verdict.since_stamp_ns - start_ns) * 1e-9, at_s, color="0.85")
+            axis.axvline(at_s, color="0.4", linewidth=0.8)
         axis.set_ylabel(label)
         axis.grid(visible=True, alpha=0.3)
+    for verdict in verdicts:
+        axes[0].annotate(
+            f"{verdict.culprit}: {verdict.cause}", ((verdict.stamp_ns - start_ns) * 1e-9, 1.0),
+            xycoords=("data", "axes fraction"), xytext=(3, -10), textcoords="offset points",
+            fontsize=8,
+        )  # fmt: skip
     axes[0].legend(title="after", ncols=len(horizons))
     axes[0].set_title("model minus reality")
     axes[-1].set_xlabel("drive time, s")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any, NamedTuple
 
+import msgspec
+
 from contracts.bus import Received
 from contracts.codec import SchemaMismatch
 from contracts.drive import (
@@ -59,7 +61,7 @@ class Intake:
         self.refused = 0
         self.watch = TelemetryWatch()
         self._pace = pace
-        self._vehicle = vehicle
+        self._vehicle = self._vehicle_at_start = vehicle
         self._estimator: StateEstimator | None = None
 
     def take_info(self, info: VehicleInfo) -> None:
@@ -71,6 +73,10 @@ class Intake:
             steering_ratio=self._vehicle.steering_ratio.value,
             steering_offset_rad=self._vehicle.steering_offset_rad.value,
         )
+
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Turn steering wheels into tyres with these parameters from now on."""
+        self._vehicle = vehicle
 
     def take(self, item: Received) -> VehicleState | None:
         """Take one sample; returns the new state where it gives one.
@@ -103,9 +109,22 @@ class Intake:
         received_ns = self._drive_ns(item.received_mono_ns)
         state = self._estimator.handle(item.channel, message, received_ns=received_ns)
         if state is not None:
+            state = self._with_tire_angle(state)
             self.latest = LatestState(state, item.received_mono_ns)
             self.states += 1
         return state
+
+    def _with_tire_angle(self, state: VehicleState) -> VehicleState:
+        """Return the state with the tyre angle that the parameters in force give it.
+
+        The estimator keeps those that it began with: its motion hardly hangs on them.
+        """
+        wheel = state.steering_wheel_rad
+        if self._vehicle is self._vehicle_at_start or wheel is None:
+            return state
+        if state.tire_angle_rad != _tire_angle_rad(wheel, self._vehicle_at_start):
+            return state  # measured, or from the motion
+        return msgspec.structs.replace(state, tire_angle_rad=_tire_angle_rad(wheel, self._vehicle))
 
     def _drive_ns(self, mono_ns: int) -> int | None:
         """Return our monotonic clock at the vehicle's pace, None in lock step."""
@@ -153,3 +172,7 @@ class Intake:
         """Samples refused so far: by the source's reader, by the estimator, by the codec."""
         by_estimator = sum(self._estimator.skipped.values()) if self._estimator else 0
         return by_estimator + self.refused + (self.end.skipped_invalid if self.end else 0)
+
+
+def _tire_angle_rad(wheel_rad: float, vehicle: VehicleParameters) -> float:
+    return wheel_rad / vehicle.steering_ratio.value + vehicle.steering_offset_rad.value

@@ -67,7 +67,9 @@ class LiveLoop:
             else:
                 conductor.watch_telemetry(round(now_s * 1e9))
             fresh = conductor.intake.states > seen
-            if now_s >= next_due_s and (fresh or now_s >= next_due_s + 0.5 * self._period_s):
+            due = fresh or now_s >= next_due_s + 0.5 * self._period_s
+            # New parameters take workers a few milliseconds; no round may be half of one kind.
+            if now_s >= next_due_s and due and conductor.tuning.parameters.settled:
                 # A machine that was asleep does not catch up on rounds; the grid stays.
                 one_of = conductor.rounds.pace.now.one_of
                 left_out = int((now_s - next_due_s) / (one_of * self._period_s))
@@ -95,7 +97,7 @@ class LiveLoop:
             return True
         # Where the machine is too slow, one round follows the other without a turn between.
         conductor.make_changes()
-        if not conductor.start_round():
+        if not (conductor.tuning.parameters.settled and conductor.start_round()):
             return False
         self._started_s = now_s
         return True

@@ -47,6 +47,7 @@ class LockStepLoop:
         conductor = self._conductor
         assert conductor.intake.info is not None
         config = conductor.plan.config
+        parameters, questions = conductor.tuning.parameters, conductor.questions
         period_ns = round(1e9 / config.rate_hz)
         until_ns = conductor.intake.start_stamp_ns + round(config.start_s * 1e9)
         while True:
@@ -59,14 +60,20 @@ class LockStepLoop:
                 conductor.take_telemetry(sample)
             self._wait("worlds", lambda: not conductor.worlds.building)
             conductor.announce_world()
-            self._wait("the mirror", lambda: not conductor.unanswered)
+            self._wait("the mirror", lambda: not conductor.questions.unanswered)
+            self._wait("tuning", lambda: not conductor.tuning.weighing)
+            conductor.tuning.take_weighed()
             conductor.make_changes()
-            self._wait("changes", lambda: not conductor.unanswered)
+            self._wait("changes", lambda: not questions.unanswered and parameters.settled)
+            # Weighed while the round and the next step go on; counts from the step after.
+            conductor.tuning.weigh(advanced.published)
             if not advanced.ended and conductor.start_round():
                 self._wait("the round", lambda: not conductor.rounds.desk.open_rounds)
             if self._stop():
                 return False
             if advanced.ended:
+                self._wait("tuning", lambda: not conductor.tuning.weighing)
+                conductor.tuning.take_weighed()
                 self._wait_for_end()
                 return True
             until_ns += period_ns

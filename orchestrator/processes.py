@@ -13,6 +13,7 @@ from contracts.setup import (
     ReplaySetup,
     Ros2Setup,
     StandinSetup,
+    TuningSetup,
     ViewerSetup,
     WorkerSetup,
 )
@@ -22,6 +23,7 @@ from orchestrator.rounds.jobs import planners_of
 ORCHESTRATOR = "orchestrator"
 BUILDER = "builder"
 MIRROR = "mirror"
+TUNING = "tuning"
 VEHICLE = "vehicle"
 
 WhenDead = Literal["restart", "report", "end_drive"]
@@ -79,6 +81,18 @@ def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
         ),
         planners=() if process_id == MIRROR else tuple(planners_of(plan.config.planner)),
     )
+
+
+def _tuning(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return TuningSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        vehicle=plan.vehicle,
+        drive_frame=plan.drive_frame,
+    )
+
+
+def _tunes(plan: DrivePlan) -> bool:
+    return plan.config.tuning != "off"
 
 
 def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
@@ -160,6 +174,8 @@ PROCESSES: tuple[ProcessRow, ...] = (
     ProcessRow(BUILDER, "orchestrator.world_builder", _always, _one, "restart", _builder, 10),
     ProcessRow("w", "sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker),
     ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
+    # Not started again: it would begin without the driving that it has seen.
+    ProcessRow(TUNING, "sim_worker.tuning_process", _tunes, _one, "report", _tuning, 15),
     ProcessRow("recorder", "telemetry.recorder", _always, _one, "report", _recorder),
     ProcessRow("viewer", "viewer", _always, _one, "report", _viewer, 10),
     ProcessRow(VEHICLE, "telemetry.replay", _source_is("log"), _one, "end_drive", _replay),

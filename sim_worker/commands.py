@@ -36,6 +36,10 @@ class CommandMemory:
         self.estimated = False
         """Whether any command received was itself an estimate."""
 
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Turn steering wheels into tyres with these parameters in commands yet to come."""
+        self._vehicle = vehicle
+
     def add(self, command: ControlCommand) -> None:
         """Take a command; older or equal stamps than the latest are ignored.
 

@@ -76,6 +76,7 @@ def run_job(
         sim_seconds=len(job.variants) * job.horizon_s,
         cpu_seconds=time.process_time() - cpu_start,
         wall_seconds=time.perf_counter() - wall_start,
+        vehicle_version=job.vehicle_version,
     )
 
 

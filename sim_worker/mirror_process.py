@@ -14,6 +14,7 @@ from contracts.process import ProcessLife
 from contracts.roles import OtherVehicles, UseRoles
 from contracts.setup import WorkerSetup
 from contracts.simulation import ActiveWorld
+from contracts.tuning import UseVehicle
 from sim_worker.commands import STEP_BACK_NS
 from sim_worker.twin import Mirror
 from sim_worker.world_file import load_world
@@ -72,6 +73,9 @@ class MirrorWorker:
             elif isinstance(message, ActiveWorld) and isinstance(item, Request):
                 self._change_world(message)
                 item.reply(message)
+            elif isinstance(message, UseVehicle) and isinstance(item, Request):
+                self._mirror.use_vehicle(message.vehicle, from_stamp_ns=message.stamp_ns)
+                item.reply(message)
             elif isinstance(message, UseRoles) and isinstance(item, Request):
                 self._mirror.set_roles(message)
                 item.reply(message)
@@ -112,6 +116,7 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     mailbox = Mailbox(_DEPTH, when_full="block" if setup.bus.lossless else "drop_oldest")
     worker = MirrorWorker(setup, bus)
     bus.serve("use_world", mailbox, run=setup.run_id, process=setup.process_id)
+    bus.serve("use_vehicle", mailbox, run=setup.run_id, process=setup.process_id)
     bus.serve("use_roles", mailbox, run=setup.run_id, process=setup.process_id)
     bus.subscribe("other_vehicles", mailbox, run=setup.run_id)
     bus.subscribe("control", mailbox, vehicle=setup.vehicle_id)

@@ -12,7 +12,7 @@ from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from sim_worker.roles.twin_body import TwinBody
-from sim_worker.stage_model import world_spec
+from sim_worker.stage_model import change_vehicle, world_spec
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.lag import without_lags
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
@@ -40,6 +40,7 @@ class MirrorWorld:
         """Compile; `steering_delay_s` replaces the vehicle's, whose lags then do not count."""
         silence_step_clock()
         log_mujoco_warnings()
+        self._steering_delay_s = steering_delay_s
         if steering_delay_s is not None:
             vehicle = without_lags(vehicle)
         self.vehicle = vehicle
@@ -55,6 +56,14 @@ class MirrorWorld:
             model, self.data, vehicle, prefix=TWIN, steering_delay_s=steering_delay_s
         )
         self._mocap = {name: int(model.body(name).mocapid[0]) for name in (SHADOW, GHOST)}
+
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Go on from here with a twin of other parameters; nobody is moved."""
+        if self._steering_delay_s is not None:
+            vehicle = without_lags(vehicle)
+        self.vehicle = vehicle
+        change_vehicle(self.model, vehicle, prefix=TWIN)
+        self._twin.use_vehicle(vehicle, steering_delay_s=self._steering_delay_s)
 
     @property
     def history_samples(self) -> int:

@@ -14,7 +14,7 @@ from contracts.world import World
 from sim_worker import compiled
 from sim_worker.nearness import NearStatics
 from sim_worker.physics import Physics
-from sim_worker.stage_model import PREFIX, compile_stage, world_spec
+from sim_worker.stage_model import PREFIX, change_vehicle, compile_stage, world_spec
 from sim_worker.vehicle.actuation import Actuation, actuator_ids
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
@@ -30,6 +30,7 @@ _MAX_SPEED_MPS, _MAX_SLIDE_MPS, _MAX_YAW_RATE_RADPS = 25.0, 5.0, 3.0
 """Within these, a car cannot come from beyond the reach of `NearStatics` in a tick."""
 _SLACK_M = 0.2
 """What it may go farther by accelerating."""
+_OUTLINE = ("length_m", "width_m", "rear_overhang_m")
 _SANE = np.full((8, 1), np.inf)
 _SANE[[3, 5], 0] = 200.0, 50.0
 """Bounds of a state's columns: beyond them, a simulation has diverged."""
@@ -77,6 +78,7 @@ class Stage:
         self.timestep_s = TIMESTEP_S
         self.model = compile_stage(world_spec(world), vehicle)
         """Of the World, with one vehicle in it."""
+        self._threads = threads
         self._physics = Physics(self.model, vehicle, nsim=nsim, threads=threads)
         self._bind()
         self._bound_reach()
@@ -85,6 +87,15 @@ class Stage:
         # Columns that lie together in memory: each is read far more often than a row.
         self._states = np.zeros((8, nsim)).T
         self._live = self._states[:0]
+
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Change the vehicle's parameters; seed anew afterwards. Takes a few milliseconds."""
+        before, self.vehicle = self.vehicle, vehicle
+        change_vehicle(self.model, vehicle)
+        self._physics = Physics(self.model, vehicle, nsim=self.nsim, threads=self._threads)
+        self._count = 0
+        if any(getattr(before, name) != getattr(vehicle, name) for name in _OUTLINE):
+            self._bound_reach()
 
     def _bind(self) -> None:
         model = self.model

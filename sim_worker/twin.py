@@ -53,6 +53,7 @@ class Mirror:
         self._recorded = commands_recorded
         self._commands = CommandMemory(vehicle, keep_s=MAX_STEERING_DELAY_S + 1.0)
         self._pending: list[tuple[int, World | None]] = []
+        self._pending_vehicles: list[tuple[int, VehicleParameters]] = []
         self._world_id: str | None = None
         self._frame = drive_frame
         self._scene = self._build(None)
@@ -80,6 +81,10 @@ class Mirror:
     def set_world(self, world: World | None, *, from_stamp_ns: int = 0) -> None:
         """Use `world`, or open ground, from the first state at or after `from_stamp_ns` on."""
         self._pending.append((from_stamp_ns, world))
+
+    def use_vehicle(self, vehicle: VehicleParameters, *, from_stamp_ns: int = 0) -> None:
+        """Give the twin these parameters from the first state at or after `from_stamp_ns` on."""
+        self._pending_vehicles.append((from_stamp_ns, vehicle))
 
     def handle_command(self, command: ControlCommand) -> None:
         """Take a command of the car; ignored where none are expected."""
@@ -109,6 +114,7 @@ class Mirror:
             self._measured, self._first_stamp_ns, self._last_index = None, None, -1
         if self._measured is not None and state.stamp_ns <= self._measured_stamp_ns:
             return None
+        self._change_vehicle(state.stamp_ns)
         self._change_world(state.stamp_ns)
         measured = local_state(state, self._frame, self._vehicle)
         gap_ns = state.stamp_ns - self._measured_stamp_ns
@@ -127,6 +133,16 @@ class Mirror:
         if state.stamp_ns - self._seed_stamp_ns >= self._window_ns:
             self._seed(measured, state.stamp_ns)
         return sample
+
+    def _change_vehicle(self, stamp_ns: int) -> None:
+        due = [vehicle for stamp, vehicle in self._pending_vehicles if stamp <= stamp_ns]
+        if not due:
+            return
+        self._pending_vehicles = [one for one in self._pending_vehicles if one[0] > stamp_ns]
+        self._vehicle = due[-1]
+        self._commands.use_vehicle(self._vehicle)
+        self._scene.use_vehicle(self._vehicle)
+        self._casting.use_vehicle(self._vehicle)
 
     def _change_world(self, stamp_ns: int) -> None:
         due = [world for stamp, world in self._pending if stamp <= stamp_ns]

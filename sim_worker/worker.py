@@ -20,6 +20,7 @@ from contracts.futures import FuturesJob, FuturesResult
 from contracts.process import ProcessLife
 from contracts.setup import WorkerSetup
 from contracts.simulation import PrepareReply, PrepareRequest
+from contracts.tuning import UseVehicle
 from contracts.vehicle import VehicleParameters
 from sim_worker.futures import run_job
 from sim_worker.planners.registry import load_planner
@@ -77,6 +78,12 @@ class StageCache:
             self._stages.popitem(last=False)
         return prepared
 
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Change the parameters of the vehicle on every stage; Worlds stay compiled."""
+        self._vehicle = vehicle
+        for prepared in self._stages.values():
+            prepared.stage.use_vehicle(vehicle)
+
     def __len__(self) -> int:
         return len(self._stages)
 
@@ -85,7 +92,7 @@ class StageCache:
 
 
 class FuturesWorker:
-    """Answers `prepare` and `job`; a question that cannot be answered is refused with one line."""
+    """Answers `prepare`, `use_vehicle`, `job`; what cannot be answered is refused in one line."""
 
     def __init__(self, setup: WorkerSetup) -> None:
         self._id = setup.process_id
@@ -95,8 +102,10 @@ class FuturesWorker:
             control_hz=setup.control_hz,
             threads=setup.threads,
         )
+        self._version = 0
         self._answers: dict[str, Callable[[msgspec.Struct], msgspec.Struct]] = {
             "prepare": self._prepare,
+            "use_vehicle": self._use_vehicle,
             "job": self._job,
         }
 
@@ -121,8 +130,19 @@ class FuturesWorker:
             seconds=time.perf_counter() - start,
         )
 
+    def _use_vehicle(self, question: msgspec.Struct) -> UseVehicle:
+        assert isinstance(question, UseVehicle)
+        self._stages.use_vehicle(question.vehicle)
+        self._version = question.version
+        return question
+
     def _job(self, question: msgspec.Struct) -> FuturesResult:
         assert isinstance(question, FuturesJob)
+        if question.vehicle_version != self._version:
+            raise ValueError(
+                f"job for version {question.vehicle_version} of the vehicle's parameters at a "
+                f"worker with version {self._version}"
+            )
         prepared = self._stages.get(question.world_id)
         return run_job(
             question,
@@ -147,6 +167,7 @@ def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     mailbox = Mailbox(64)
     ids = {"run": setup.run_id, "process": setup.process_id}
     bus.serve("prepare", mailbox, **ids)
+    bus.serve("use_vehicle", mailbox, **ids)
     bus.serve("job", mailbox, **ids)
     remote = load_planner("remote")
     assert isinstance(remote, RemotePlanner)

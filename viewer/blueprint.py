@@ -10,17 +10,24 @@ import rerun.blueprint as rrb
 from viewer.rows import TIMELINE
 
 MainView = Literal["Intersection", "Chase", "Map"]
+DetailView = Literal["Comparison", "Scenarios", "Reality", "Parameters"]
+DETAIL_VIEWS: tuple[str, ...] = get_args(DetailView)
 MAIN_VIEWS: tuple[str, ...] = get_args(MainView)
 GAP_VIEWS = {
     "pos_m": "Position gap, m",
     "yaw_deg": "Heading gap, deg",
     "speed_mps": "Speed gap, m/s",
 }
+PARAMETER_VIEWS = {
+    "steering_ratio": "Steering ratio",
+    "drive_gain": "Drive gain",
+    "brake_gain": "Brake gain",
+}
 BACKGROUND = (16, 18, 24)
 
 
 def drive_blueprint(
-    *, main: MainView = "Intersection", detail: Literal["Comparison", "Scenarios"] = "Comparison"
+    *, main: MainView = "Intersection", detail: DetailView = "Comparison"
 ) -> rrb.Blueprint:
     """Return the layout with `main` on top on the left and `detail` below the gap plots.
 
@@ -30,6 +37,11 @@ def drive_blueprint(
     last_30_s = rrb.VisibleTimeRange(
         TIMELINE,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-30.0),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+    all_along = rrb.VisibleTimeRange(
+        TIMELINE,
+        start=rrb.TimeRangeBoundary.infinite(),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
     intersection = rrb.Spatial3DView(
@@ -87,6 +99,25 @@ def drive_blueprint(
         _plot("/comparison/ade_m/2", "ADE at 2 s, m", last_30_s, legend=False),
         name="Short horizons",
     )
+    reality = rrb.Vertical(
+        rrb.Horizontal(
+            _plot("/reality/across_m", "Across after 2 s, m", all_along, legend=True),
+            _plot("/reality/yaw_deg", "Heading after 2 s, deg", all_along, legend=False),
+        ),
+        rrb.TextDocumentView(origin="/reality/verdict", name="Verdict"),
+        name="Reality",
+    )
+    parameters = rrb.Vertical(
+        rrb.Horizontal(
+            *(
+                _plot(f"/parameters/{name}", title, all_along, legend=False)
+                for name, title in PARAMETER_VIEWS.items()
+            )
+        ),
+        rrb.TextDocumentView(origin="/parameters/table", name="Table"),
+        name="Parameters",
+    )
+    details = ("Comparison", "Short", "Plan", "Scenarios", "Correction", "Reality", "Parameters")
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(
@@ -113,7 +144,9 @@ def drive_blueprint(
                     _plot("/comparison/plan", "Plan", last_30_s, legend=True),
                     rrb.TextDocumentView(origin="/scenarios/table", name="Scenarios"),
                     _plot("/correction", "Correction, m/s²", last_30_s, legend=True),
-                    active_tab=0 if detail == "Comparison" else 3,
+                    reality,
+                    parameters,
+                    active_tab=details.index(detail),
                 ),
                 row_shares=[1.0, 1.0, 1.0, 1.6],
             ),

@@ -12,7 +12,7 @@ from contracts.codec import read_message
 from contracts.frames import LocalFrame
 from contracts.simulation import ActiveWorld, Event, WorldNotice
 from contracts.world import ATTRIBUTION, World
-from viewer import log_drive, log_roles, log_scenarios
+from viewer import log_drive, log_roles, log_scenarios, log_tuning
 from viewer.log_drive import DriveLog
 from viewer.log_run import RunLog, rows_of_event
 from viewer.log_scenarios import (
@@ -22,13 +22,14 @@ from viewer.log_scenarios import (
     rows_of_plan_comparison,
     rows_of_round,
 )
+from viewer.log_tuning import TuningLog
 from viewer.log_world import rows_of_world, world_centre
 from viewer.rows import Row
 
 VEHICLE_CHANNELS = ("state", "gnss", "plan", "end")
 RUN_CHANNELS = (
     "round", "comparison", "plan_comparison", "disagreement", "mirror", "active_world", "world",
-    "worker_status", "progress", "event",
+    "worker_status", "progress", "event", "gap", "verdict", "identification", "parameter",
 )  # fmt: skip
 
 _log = logging.getLogger(__name__)
@@ -66,6 +67,7 @@ class Monitor:
         self._load_world = load_world
         self._drive = DriveLog(drive_frame)
         self._run = RunLog(title, attribution)
+        self._tuning = TuningLog()
         self._centres: dict[str, Array] = {}
         self._now_ns = 0
         self._handlers: dict[str, Callable[[Any, int], list[Row]]] = {
@@ -83,6 +85,10 @@ class Monitor:
             "worker_status": self._run.worker,
             "progress": self._run.progress,
             "event": rows_of_event,
+            "gap": self._tuning.gap,
+            "verdict": self._tuning.verdict,
+            "identification": self._tuning.identification,
+            "parameter": self._tuning.parameter,
         }
 
     def opening(self) -> list[Row]:
@@ -91,6 +97,8 @@ class Monitor:
             *log_drive.static_rows(),
             *log_roles.static_rows(),
             *log_scenarios.static_rows(),
+            *log_tuning.static_rows(),
+            *self._tuning.opening(),
             *self._run.static_rows(),
             self._run.first_status(),
         ]

@@ -8,12 +8,12 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from rerun.experimental import ViewerClient
 
-from viewer.blueprint import MAIN_VIEWS, MainView, drive_blueprint
+from viewer.blueprint import DETAIL_VIEWS, MAIN_VIEWS, DetailView, MainView, drive_blueprint
 from viewer.live_viewer import (
     NoViewerError,
     address,
@@ -47,7 +47,7 @@ def take_picture(
     *,
     at_s: float | None = None,
     main: MainView = "Intersection",
-    detail: Literal["Comparison", "Scenarios"] = "Comparison",
+    detail: DetailView = "Comparison",
     size: tuple[int, int] = SIZE,
 ) -> Picture:
     """Render `recording` at drive time `at_s` (None: its end) with today's layout.
@@ -82,7 +82,7 @@ def render_recording(
     *,
     at_s: float | None = None,
     main: MainView = "Intersection",
-    detail: Literal["Comparison", "Scenarios"] = "Comparison",
+    detail: DetailView = "Comparison",
     size: tuple[int, int] = SIZE,
 ) -> None:
     """Write the window of `take_picture` to `out` as PNG."""
@@ -142,7 +142,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("out", type=Path, metavar="OUT.png")
     parser.add_argument("--at", type=float, metavar="S", help="drive time; default: the end")
     parser.add_argument("--main", choices=MAIN_VIEWS, default="Intersection")
-    parser.add_argument("--detail", choices=("Comparison", "Scenarios"), default="Comparison")
+    parser.add_argument("--detail", choices=DETAIL_VIEWS, default="Comparison")
     parser.add_argument("--size", metavar="WxH", default=f"{SIZE[0]}x{SIZE[1]}")
     given = parser.parse_args(arguments)
     try:

@@ -108,6 +108,7 @@ def round_row(
         "sim_seconds": sum(r.sim_seconds for r in done.results),
         "cpu_seconds": sum(r.cpu_seconds for r in done.results),
         "sha256": sha256,
+        "vehicle_version": done.results[0].vehicle_version,
     }
 
 

@@ -31,7 +31,7 @@ TABLES: dict[str, pa.Schema] = {
             ("round_id", _I), ("stamp_ns", _I), ("drive_time_s", _F), ("intersection_id", _S),
             ("world_id", _S), ("futures", _I), ("distinct", _I), ("collided", _I),
             ("cruise_speed_mps", _F), ("latency_ms", _F), ("sim_seconds", _F), ("cpu_seconds", _F),
-            ("sha256", _S),
+            ("sha256", _S), ("vehicle_version", _I),
         ]
     ),
     "futures": pa.schema(
@@ -100,6 +100,34 @@ TABLES: dict[str, pa.Schema] = {
     "touches": pa.schema([("stamp_ns", _I), ("one", _S), ("other", _S)]),
     "changes": pa.schema(
         [("stamp_ns", _I), ("asked_stamp_ns", _I), ("key", _S), ("before", _S), ("value", _S)]
+    ),
+    "parameters": pa.schema(
+        [
+            ("version", _I), ("stamp_ns", _I), ("name", _S), ("before", _F), ("value", _F),
+            ("std", _F), ("origin", _S), ("pinned", _B),
+        ]
+    ),
+    "identifications": pa.schema(
+        [
+            ("stamp_ns", _I), ("from_stamp_ns", _I), ("name", _S), ("value", _F), ("low", _F),
+            ("high", _F), ("prior", _F), ("reason", _S), ("taken", _B),
+        ]
+    ),
+    "gaps": pa.schema(
+        [("stamp_ns", _I), ("horizon_s", _F), ("manoeuvre", _S)]
+        + [
+            (what, _F)
+            for what in (
+                "along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2",
+            )
+        ]
+        + [("independent", _B)]
+    ),
+    "verdicts": pa.schema(
+        [
+            ("stamp_ns", _I), ("since_stamp_ns", _I), ("culprit", _S), ("cause", _S), ("text", _S),
+            ("evidence", _S), ("confidence", _F),
+        ]
     ),
     "events": pa.schema([("stamp_ns", _I), ("level", _S), ("source", _S), ("text", _S)]),
 }  # fmt: skip

@@ -49,6 +49,7 @@ def run_record(
         "intersections": mission.records(mono_s=mono_s),
         "changes": conductor.changes.record(conductor.intake.start_stamp_ns),
         "telemetry": conductor.intake.record(),
+        "tuning": conductor.tuning.record(),
         "futures": futures.record(
             wanted=plan.config.futures,
             missed=conductor.missed_rounds,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from orchestrator.judge.verdict_rows import agreement_lines
+from orchestrator.tuning.words import summary_lines
 
 DISAGREEMENTS_SHOWN = 12
 BEGINNING_S = 0.5
@@ -72,5 +73,6 @@ def summary_text(record: dict[str, object]) -> str:
     ]
     lines += side_by_side_lines(record.get("side_by_side"))
     lines += agreement_lines(record.get("agreement"))  # type: ignore[arg-type]
+    lines += summary_lines(record["tuning"])  # type: ignore[arg-type]
     attribution = record["map"]["attribution"]  # type: ignore[index]
     return "\n".join([*lines, attribution])

@@ -71,9 +71,14 @@ class RoundPlanner:
 
     def __init__(self, config: DriveConfig, vehicle: VehicleParameters) -> None:
         self._config, self._vehicle = config, vehicle
+        self._vehicle_version = 0
         self._scenarios = scenarios_of(config)
         self._known: dict[str, LiveScenarios] = {}
         self._variants: dict[tuple[str, ...], tuple[Variant, ...]] = {}
+
+    def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
+        """Plan for these parameters from now on."""
+        self._vehicle, self._vehicle_version = vehicle, version
 
     def draw_cases(self) -> None:
         """Draw the cases of all scenarios: before the drive, not in its first round."""
@@ -118,6 +123,7 @@ class RoundPlanner:
                     signals=signals,
                     drive_time_s=(state.stamp_ns - start_stamp_ns) / 1e9,
                     car_plan=car_plan,
+                    vehicle_version=self._vehicle_version,
                 )
             )
         return RoundPlan(variants, tuple(jobs))

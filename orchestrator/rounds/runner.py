@@ -11,6 +11,7 @@ from contracts.bus import Bus, Mailbox, Reply
 from contracts.drive import PlannedTrajectory, VehicleState
 from contracts.futures import Variant
 from contracts.simulation import Comparison
+from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from orchestrator.instructions import RoundIntent, Tell
 from orchestrator.intake import LatestState, Surroundings
@@ -131,6 +132,10 @@ class RoundRunner:
             )
         )
         self.give_out()
+
+    def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
+        """Plan rounds for these parameters from now on, which workers have as `version`."""
+        self._planner.use_vehicle(vehicle, version)
 
     def drop(self) -> None:
         """Give up the open rounds: they take too long."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from sim_worker.vehicle.lag import without_lags
 
 HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")
+"""Of a sample; a row has `position_m` too, how far apart both are."""
 
 
 class GapRow(NamedTuple):
@@ -60,12 +61,36 @@ class GapMeter:
         """
         stride = max(1, round(every_s / PERIOD_S))
         known = motion.known
-        found: list[GapSample] = []
-        steps = [round(horizon / PERIOD_S) for horizon in horizons_s]
-        starts = np.arange(from_index, len(known) - min(steps), stride)
+        shortest = round(min(horizons_s) / PERIOD_S)
+        starts = np.arange(from_index, len(known) - shortest, stride)
         starts = starts[known[starts]] if len(starts) else starts
+        wanted = [(row, horizon) for row in range(len(starts)) for horizon in horizons_s]
+        return self._measure(record, motion, starts, wanted)
+
+    def latest(
+        self, record: MotionRecord, motion: MeasuredMotion, *, horizons_s: Sequence[float]
+    ) -> list[GapSample]:
+        """Return the gap at the record's last instant after each horizon, all in one batch."""
+        last = len(motion.known) - 1
+        fitting = [h for h in horizons_s if round(h / PERIOD_S) <= last]
+        starts = np.array([last - round(horizon / PERIOD_S) for horizon in fitting], dtype=np.intp)
+        if not motion.known[starts].all():
+            fitting = [h for h, start in zip(fitting, starts, strict=True) if motion.known[start]]
+            starts = starts[motion.known[starts]]
+        return self._measure(record, motion, starts, list(enumerate(fitting)))
+
+    def _measure(
+        self,
+        record: MotionRecord,
+        motion: MeasuredMotion,
+        starts: np.ndarray[Any, np.dtype[np.intp]],
+        wanted: Sequence[tuple[int, float]],
+    ) -> list[GapSample]:
+        """Run from each of `starts`; return the gap of each (row, horizon) wanted."""
         if not len(starts):
             return []
+        known = motion.known
+        found: list[GapSample] = []
         vehicle, runner = self._runner.vehicle, self._runner
         signals = steering_signals(record, vehicle)
         recorded = np.isfinite(signals.commanded_rad) & np.isfinite(record.command_accel_mps2)
@@ -85,40 +110,41 @@ class GapMeter:
         chosen = {name: values[starts] for name, values in motion._asdict().items()}
         begin = start_states(vehicle, **chosen, tire_rad=tire[starts])
         begin[:, :2] -= begin[:, :2]  # near the origin, where numbers are exact
+        steps = round(max(horizon for _, horizon in wanted) / PERIOD_S)
         runs = runner.run(
-            states=begin, starts=starts, steps=max(steps), accel_mps2=accel, tire_rad=steer,
+            states=begin, starts=starts, steps=steps, accel_mps2=accel, tire_rad=steer,
             delayed=independent,
         )  # fmt: skip
-        for row, start in enumerate(starts):
-            for horizon, count in zip(horizons_s, steps, strict=True):
-                end = int(start) + count
-                if end >= len(known) or not known[start : end + 1].all():
-                    continue
-                real = MeasuredMotion(*(column[end] for column in motion))
-                model = runs[row, count]
-                dx = model[0] + motion.x_m[start] - real.x_m
-                dy = model[1] + motion.y_m[start] - real.y_m
-                cos, sin = np.cos(real.yaw_rad), np.sin(real.yaw_rad)
-                stretch = slice(int(start), end + 1)
-                found.append(
-                    GapSample(
-                        vehicle_id=self._vehicle_id,
-                        stamp_ns=int(record.stamp_ns[end]),
-                        horizon_s=horizon,
-                        manoeuvre=manoeuvre_of(
-                            speed_mps=motion.speed_mps[stretch],
-                            yaw_rate_radps=motion.yaw_rate_radps[stretch],
-                            accel_mps2=motion.accel_mps2[stretch],
-                        ),
-                        along_m=float(cos * dx + sin * dy),
-                        across_m=float(cos * dy - sin * dx),
-                        yaw_rad=float(wrap_angle(model[2] - real.yaw_rad)),
-                        yaw_rate_radps=float(model[5] - real.yaw_rate_radps),
-                        speed_mps=float(model[3] - real.speed_mps),
-                        accel_mps2=float(model[7] - real.accel_mps2),
-                        independent=independent,
-                    )
+        for row, horizon in wanted:
+            start, count = int(starts[row]), round(horizon / PERIOD_S)
+            end = start + count
+            if end >= len(known) or not known[start : end + 1].all():
+                continue
+            real = MeasuredMotion(*(column[end] for column in motion))
+            model = runs[row, count]
+            dx = model[0] + motion.x_m[start] - real.x_m
+            dy = model[1] + motion.y_m[start] - real.y_m
+            cos, sin = np.cos(real.yaw_rad), np.sin(real.yaw_rad)
+            stretch = slice(start, end + 1)
+            found.append(
+                GapSample(
+                    vehicle_id=self._vehicle_id,
+                    stamp_ns=int(record.stamp_ns[end]),
+                    horizon_s=horizon,
+                    manoeuvre=manoeuvre_of(
+                        speed_mps=motion.speed_mps[stretch],
+                        yaw_rate_radps=motion.yaw_rate_radps[stretch],
+                        accel_mps2=motion.accel_mps2[stretch],
+                    ),
+                    along_m=float(cos * dx + sin * dy),
+                    across_m=float(cos * dy - sin * dx),
+                    yaw_rad=float(wrap_angle(model[2] - real.yaw_rad)),
+                    yaw_rate_radps=float(model[5] - real.yaw_rate_radps),
+                    speed_mps=float(model[3] - real.speed_mps),
+                    accel_mps2=float(model[7] - real.accel_mps2),
+                    independent=independent,
                 )
+            )
         return sorted(found, key=lambda sample: sample.stamp_ns)
 
 
@@ -131,6 +157,7 @@ def gap_table(samples: Sequence[GapSample]) -> list[GapRow]:
     for horizon, manoeuvre in sorted(groups, key=lambda key: (key[0], MANOEUVRES.index(key[1]))):
         group = groups[horizon, manoeuvre]
         values = {name: np.array([getattr(one, name) for one in group]) for name in QUANTITIES}
+        values["position_m"] = np.hypot(values["along_m"], values["across_m"])
         rows.append(
             GapRow(
                 horizon_s=horizon,

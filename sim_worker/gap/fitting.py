@@ -1,4 +1,9 @@
-"""Straight lines through pairs of signals, with honest deviations, delays and saturation."""
+"""Straight lines through pairs of signals, with honest deviations, delays and saturation.
+
+Of seconds, many times a second. `sim_worker.identify` fits lines to minutes: its deviations take
+four stretches of three seconds at least and ten times as long, and its actuators follow with a lag,
+where here a pure delay must be found even if command and answer differ in sign, or 57 times.
+"""
 
 from __future__ import annotations
 
@@ -63,24 +68,35 @@ def follower(
 
     None where too little is known of both.
     """
-    best: tuple[float, Line, int] | None = None
     most = min(round(longest_s / PERIOD_S), len(x) // 2)
-    for shift in range(0, most + 1):
-        late = x[: len(x) - shift]
-        # The same instants for each delay, else the longest would win by having fewest.
-        at = slice(most - shift, None)
-        asked, done = late[at], y[most:]
-        known = np.isfinite(asked) & np.isfinite(done)
-        seconds = float(known.sum()) * PERIOD_S
-        line = line_through(asked[known], done[known], independent=seconds / together_s)
-        if line is not None and (best is None or line.residual < best[0]):
-            best = line.residual, line, shift
-    if best is None:
+    count = len(x) - most
+    if count < 3:
         return None
-    _, line, shift = best
-    asked, done = x[most - shift : len(x) - shift], y[most:]
-    known = np.isfinite(asked) & np.isfinite(done)
+    # The same instants for each delay, else the longest would win by having fewest.
+    done = y[most:]
+    late = np.lib.stride_tricks.sliding_window_view(x, count)[::-1]
+    known = np.isfinite(late) & np.isfinite(done)
+    seen = known.sum(axis=1)
+    shift = int(np.argmin(_residuals(np.where(known, late, 0.0), np.where(known, done, 0.0), seen)))
+    known, asked = known[shift], late[shift]
+    seconds = float(seen[shift]) * PERIOD_S
+    line = line_through(asked[known], done[known], independent=seconds / together_s)
+    if line is None:
+        return None
     return Follower(line, shift * PERIOD_S, _plateau(asked[known], done[known], line))
+
+
+def _residuals(x: Array, y: Array, count: Array) -> Array:
+    """Return the mean square (S,) that a line leaves of y in each row (S, N), 0 where unknown."""
+    n = np.maximum(count, 1.0)
+    mean_x, mean_y = x.sum(axis=1) / n, y.sum(axis=1) / n
+    xx = np.einsum("ij,ij->i", x, x) / n - mean_x**2
+    xy = np.einsum("ij,ij->i", x, y) / n - mean_x * mean_y
+    yy = np.einsum("ij,ij->i", y, y) / n - mean_y**2
+    left = yy - np.where(xx > 1e-18, xy**2 / np.maximum(xx, 1e-18), 0.0)
+    return np.asarray(
+        np.where((count >= 3) & (xx > 1e-18), left * n / np.maximum(n - 2, 1), np.inf)
+    )
 
 
 def _plateau(x: Array, y: Array, line: Line) -> float:

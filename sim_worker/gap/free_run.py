@@ -14,6 +14,7 @@ from sim_worker.stage import Controls, Stage
 from sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
 from sim_worker.vehicle.resistance import resistance_mps2
 
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
 _TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1
 _SPEED_GAIN_PS = 4.0
 
@@ -59,29 +60,30 @@ class FreeRunner:
         accel_mps2: Array,
         tire_rad: Array,
         hold_speed_mps: Array | None = None,
-        delayed: bool = True,
+        delayed: bool | Flags = True,
     ) -> Array:
         """Return (K, steps + 1, 8) states, K runs from `states` (K, 8) at grid indices `starts`.
 
-        `accel_mps2` and `tire_rad` (N,) are commands on the grid. With `hold_speed_mps` (N,) the
-        model follows that speed instead of accelerations; with `delayed` false the tyres follow
-        at once, as measured angles must. Gaps in commands hold what was before.
+        `accel_mps2` and `tire_rad` (N,) are commands on the grid. Where `hold_speed_mps` (N,) is
+        known the model follows that speed instead of accelerations; where `delayed`, for all or
+        for each run (K,), is false the tyres follow at once, as measured angles must. Gaps in
+        commands hold what was before.
         """
         accel, tire = _filled(accel_mps2), _filled(tire_rad)
         last = len(tire) - 1
+        late = np.broadcast_to(np.asarray(delayed), len(starts))
         parts = []
         for first in range(0, len(starts), self._stage.nsim):
             chunk = slice(first, first + self._stage.nsim)
             at, begin = starts[chunk], states[chunk]
             back = np.arange(-2 * _TICKS_BACK + 1, 1) // 2
             history = tire[np.clip(at[:, None] - 1 + back, 0, last)]
+            waits = late[chunk]
             self._stage.seed(
                 begin,
-                steering_delay_s=np.full(
-                    len(at), self.vehicle.steering_delay_s.value if delayed else 0.0
-                ),
+                steering_delay_s=np.where(waits, self.vehicle.steering_delay_s.value, 0.0),
                 friction_factor=np.ones(len(at)),
-                steering_history_rad=history if delayed else None,
+                steering_history_rad=np.where(waits[:, None], history, begin[:, 6:7]),
             )
             seen = [self._stage.states.copy()]
             for step in range(steps):
@@ -90,8 +92,9 @@ class FreeRunner:
                 if hold_speed_mps is not None:
                     later = np.minimum(now + 1, last)
                     behind = hold_speed_mps[now] - self._stage.states[:, 3]
-                    pushed = (hold_speed_mps[later] - hold_speed_mps[now]) / PERIOD_S
-                    pushed = np.nan_to_num(pushed + _SPEED_GAIN_PS * behind)
+                    follows = (hold_speed_mps[later] - hold_speed_mps[now]) / PERIOD_S
+                    follows += _SPEED_GAIN_PS * behind
+                    pushed = np.where(np.isfinite(follows), follows, pushed)
                 self._stage.step(Controls(pushed, tire[now]))
                 seen.append(self._stage.states.copy())
             parts.append(np.stack(seen, axis=1))

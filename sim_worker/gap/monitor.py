@@ -19,13 +19,16 @@ from sim_worker.motion_record import MotionRecorder
 
 _SECOND_NS = 1_000_000_000
 _STATE = "state"
+_SHORT_S, _LONG_EVERY = 2.0, 4
+"""Longer runs overlap by most of their length: every fourth says the same at half the cost."""
 
 
 class GapMonitor:
     """Watches one vehicle: pure, its time is that of the messages, bounded whatever comes.
 
     `handle` takes every sample under its channel, and the estimated VehicleStates under "state".
-    Once a second of driving the model runs freely over each horizon that ends now.
+    Once a second of driving the model runs freely over each short horizon that ends now, every
+    four seconds over the long ones too.
     """
 
     def __init__(
@@ -37,6 +40,7 @@ class GapMonitor:
         horizons_s: Sequence[float] = HORIZONS_S,
         limits_per_s: Mapping[str, float] = LIMITS_PER_S,
     ) -> None:
+        self._vehicle_id = info.vehicle_id
         self._frame = frame
         self._horizons_s = tuple(sorted(horizons_s))
         self._judge = Judge(info, vehicle, frame=frame)
@@ -46,11 +50,17 @@ class GapMonitor:
         self._recorder = MotionRecorder(frame=frame, keep_s=keep_s, depth=4000)
         self._states: deque[VehicleState] = deque(maxlen=round(keep_s * 120.0))
         self._next_ns: int | None = None
+        self._measured = 0
 
     @property
     def judge(self) -> Judge:
         """Who weighs the signals."""
         return self._judge
+
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Compare with a model of other parameters from now on."""
+        self._meter = GapMeter(FreeRunner(vehicle), vehicle_id=self._vehicle_id)
+        self._judge.use_vehicle(vehicle)
 
     def handle(self, channel: str, message: Any) -> list[GapSample | GapAlarm | Verdict]:
         """Take one message; return what follows from it, in time order."""
@@ -77,20 +87,21 @@ class GapMonitor:
     def _measure(self, now_ns: int) -> list[GapSample | GapAlarm | Verdict]:
         """Run the model over each horizon that ends at the newest state."""
         first_ns = self._states[0].stamp_ns
+        self._measured += 1
+        horizons = [
+            horizon
+            for horizon in self._horizons_s
+            if now_ns - round(horizon * 1e9) >= first_ns
+            and (horizon <= _SHORT_S or self._measured % _LONG_EVERY == 0)
+        ]
+        if not horizons:
+            return []
+        # One second more before the start: what the delayed steering was told.
+        from_ns = now_ns - round(horizons[-1] * 1e9) - _SECOND_NS
+        record = without_manual_commands(self._recorder.record(from_ns, now_ns))
+        motion = motion_on_grid(self._states, record.stamp_ns, frame=self._frame)
         told: list[GapSample | GapAlarm | Verdict] = []
-        for horizon in self._horizons_s:
-            from_ns = now_ns - round(horizon * 1e9)
-            if from_ns < first_ns:
-                break
-            # One second more before the start: what the delayed steering was told.
-            record = self._recorder.record(from_ns - _SECOND_NS, now_ns)
-            record = without_manual_commands(record)
-            motion = motion_on_grid(self._states, record.stamp_ns, frame=self._frame)
-            samples = self._meter.samples(
-                record, motion, horizons_s=(horizon,), from_index=round(1e9 / 2e7),
-                every_s=2.0 * horizon,
-            )  # fmt: skip
-            for sample in samples:
-                told.append(sample)
-                told.extend(self._limits.handle(sample))
+        for sample in self._meter.latest(record, motion, horizons_s=horizons):
+            told.append(sample)
+            told.extend(self._limits.handle(sample))
         return told

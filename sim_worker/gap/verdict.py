@@ -12,12 +12,17 @@ from contracts.drive import GnssFix, VehicleInfo
 from contracts.frames import LocalFrame
 from contracts.gap import Verdict
 from contracts.vehicle import VehicleParameters
+from sim_worker.gap.change import began_ns
 from sim_worker.gap.consistency import Consistency, consistency_of
-from sim_worker.gap.findings import Finding, findings_of
+from sim_worker.gap.finding import Finding
+from sim_worker.gap.findings import findings_of
 from sim_worker.gap.free_run import FreeRunner
+from sim_worker.gap.pairs import Pairs, pairs_of
+from sim_worker.gap.push import PushTest
 from sim_worker.motion_record import MotionRecord, MotionRecorder
 
-WINDOW_S, EVERY_S = 6.0, 0.5
+WINDOW_S, RECENT_S, EVERY_S = 6.0, 3.0, 0.2
+_EVERY_NS = round(EVERY_S * 1e9)
 _LATEST_S = 0.1
 """Samples of slower channels may still be on their way."""
 _IN_A_ROW = 2
@@ -30,8 +35,8 @@ _FORGOTTEN_S = 10.0
 class Judge:
     """Takes a vehicle's samples and says, where it is sure, who departs from the commands.
 
-    Pure: time is that of the samples. A verdict takes two findings of the same kind half a
-    second apart, and is given once as long as it holds.
+    Pure: time is that of the samples. A verdict takes two findings in a row, 0.2 s apart, that
+    accuse the same, and is given once as long as it holds.
     """
 
     def __init__(self, info: VehicleInfo, vehicle: VehicleParameters, *, frame: LocalFrame) -> None:
@@ -41,7 +46,8 @@ class Judge:
         self._recorder = MotionRecorder(frame=frame, keep_s=WINDOW_S + 4.0, depth=4000)
         self._runner = FreeRunner(vehicle)
         self._first_ns: int | None = None
-        self._next_ns = 0
+        self._done = 0
+        self._push = PushTest()
         self._pending: tuple[str, str, int, int] | None = None
         self._fixes: deque[tuple[int, float]] = deque(maxlen=40)
         self._told: dict[tuple[str, str], int] = {}
@@ -52,6 +58,12 @@ class Judge:
     def recorder(self) -> MotionRecorder:
         """The samples that are kept."""
         return self._recorder
+
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Judge a model of other parameters from now on; what was about to be said is forgotten."""
+        self._runner = FreeRunner(vehicle)
+        self._push = PushTest()
+        self._pending = None
 
     def handle(self, channel: str, message: Any) -> Verdict | None:
         """Take one sample; return a verdict where one is due."""
@@ -69,18 +81,26 @@ class Judge:
             return None
         if self._first_ns is None:
             self._first_ns = newest
-        if newest < self._next_ns:
+        due = (newest - round(_LATEST_S * 1e9) - self._first_ns) // _EVERY_NS
+        if due <= self._done:
             return None
-        self._next_ns = newest + round(EVERY_S * 1e9)
-        to_ns = newest - round(_LATEST_S * 1e9)
+        self._done = due
+        to_ns = self._first_ns + due * _EVERY_NS
         from_ns = max(self._first_ns, to_ns - round(WINDOW_S * 1e9))
         if to_ns - from_ns < 1.5e9:
             return None
         record = without_manual_commands(self._recorder.record(from_ns, to_ns))
-        self.latest = consistency_of(
+        pairs = pairs_of(
             record, self._runner, antenna_ahead_m=self._ahead_m, precise_positions=self._precise()
         )
-        return self._weigh(findings_of(self.latest), from_ns, to_ns)
+        self.latest = consistency_of(pairs)
+        pushed = self._push.handle(pairs.pushes)
+        found = _found_in(pairs, self.latest)
+        if found is None:
+            # A departure that has just begun is a small part of the whole stretch.
+            recent = pairs.latest(RECENT_S)
+            found = _found_in(recent, consistency_of(recent))
+        return self._weigh(found or pushed, to_ns)
 
     def _precise(self) -> bool:
         """Whether positions are dense and good enough to judge other sensors by."""
@@ -90,7 +110,7 @@ class Judge:
         apart_s = float(np.median(np.diff(table[:, 0]))) * 1e-9
         return apart_s <= _DENSE_S and float(np.median(table[:, 1])) <= _PRECISE_M
 
-    def _weigh(self, found: Finding | None, from_ns: int, to_ns: int) -> Verdict | None:
+    def _weigh(self, found: Finding | None, to_ns: int) -> Verdict | None:
         for key, seen_ns in list(self._told.items()):
             if to_ns - seen_ns > _FORGOTTEN_S * 1e9:
                 del self._told[key]
@@ -103,7 +123,7 @@ class Judge:
             return None
         before = self._pending
         if before is None or before[0] != found.culprit:
-            self._pending = (*key, 1, from_ns)
+            self._pending = (*key, 1, found.since_ns)
         else:
             self._pending = (*key, before[2] + 1, before[3])
         if self._pending[2] < _IN_A_ROW:
@@ -120,6 +140,13 @@ class Judge:
             evidence=found.evidence,
             confidence=_confidence(found),
         )
+
+
+def _found_in(pairs: Pairs, seen: Consistency) -> Finding | None:
+    found = findings_of(seen)
+    if found is None:
+        return None
+    return found._replace(since_ns=began_ns(pairs, seen, found.evidence[0].name))
 
 
 def _confidence(found: Finding) -> float:

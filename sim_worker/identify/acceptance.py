@@ -8,12 +8,17 @@ from collections.abc import Collection
 import msgspec
 
 from contracts.errors import UserError
-from contracts.tuning import Identification, ParameterChange, ParameterEstimate
+from contracts.tuning import (
+    UNDERSTEER_GRADIENT,
+    Identification,
+    ParameterChange,
+    ParameterEstimate,
+)
 from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.identify.window import UNDERSTEER_NAME
 from sim_worker.vehicle.parameters import check_vehicle, understeer_gradient
+from sim_worker.vehicle.plausible import PLAUSIBLE
 
-_HALF_OF_95 = 1.96
+HALF_OF_95 = 1.96
 _STIFFNESS = "front_cornering_stiffness_npr"
 
 
@@ -47,7 +52,7 @@ def accepted(
     """Return `vehicle` with what may be taken of `told`, and each change.
 
     An understeer gradient becomes the front axle's cornering stiffness, `pinned` under either
-    name. What would make no vehicle (a negative drag) is passed over.
+    name. What would make no vehicle (a negative drag), or an implausible one, is passed over.
     """
     changes: list[ParameterChange] = []
     for estimate in told.estimates:
@@ -56,9 +61,9 @@ def accepted(
         assert estimate.value is not None
         assert estimate.low is not None
         assert estimate.high is not None
-        std = (estimate.high - estimate.low) / (2.0 * _HALF_OF_95)
+        std = (estimate.high - estimate.low) / (2.0 * HALF_OF_95)
         name, value = estimate.name, estimate.value
-        if name == UNDERSTEER_NAME:
+        if name == UNDERSTEER_GRADIENT:
             if _STIFFNESS in pinned:
                 continue
             try:
@@ -68,6 +73,9 @@ def accepted(
                 continue
             name, value, std = _STIFFNESS, stiffness, abs(stiffness - softer)
         before = getattr(vehicle, name).value
+        low, high = PLAUSIBLE[name]
+        if not low <= value <= high:
+            continue
         changed = msgspec.structs.replace(
             vehicle, **{name: Parameter(value, std, f"{source}, {told.excited_s:.0f} s")}
         )
@@ -100,7 +108,7 @@ def vehicle_toml(vehicle: VehicleParameters) -> str:
 
 def in_force(vehicle: VehicleParameters, name: str) -> float:
     """Return the value of a parameter, derived ones included; UserError for another name."""
-    if name == UNDERSTEER_NAME:
+    if name == UNDERSTEER_GRADIENT:
         return understeer_gradient(vehicle)
     parameter = getattr(vehicle, name, None)
     if not isinstance(parameter, Parameter):

@@ -11,11 +11,16 @@ from typing import Any
 import msgspec
 
 from contracts.drive import GnssFix
-from contracts.errors import UserError
 from contracts.frames import LocalFrame
-from contracts.tuning import Identification, ParameterChange, ParameterEstimate, ParameterOrigin
+from contracts.tuning import (
+    UNDERSTEER_GRADIENT,
+    Identification,
+    ParameterChange,
+    ParameterOrigin,
+)
 from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.identify.acceptance import accepted, in_force, is_acceptable
+from sim_worker.identify.acceptance import in_force, is_acceptable
+from sim_worker.identify.parameters_in_force import STIFFNESS, ParametersInForce, std_of
 from sim_worker.identify.steering_signals import (
     INVERSE_RATIO,
     OFFSET,
@@ -23,23 +28,19 @@ from sim_worker.identify.steering_signals import (
     steering_signals,
 )
 from sim_worker.identify.step import BendsBefore, Step, bends_before, find_step
-from sim_worker.identify.window import UNDERSTEER_NAME, examine
+from sim_worker.identify.window import examine
 from sim_worker.motion_record import MotionRecorder
-from sim_worker.vehicle.parameters import check_vehicle
 
 _PERIOD_S = 0.01
 _LEAST_S = 20.0
 _STEP_STDS = 4.0
 """Between two intervals' middles, over their common standard deviation: chance is one in 16,000."""
-_MUCH_WIDER = 1.5
-_HALF_OF_95 = 1.96
-_STIFFNESS = "front_cornering_stiffness_npr"
-_STEERING = {"steering_ratio", "steering_offset_rad", UNDERSTEER_NAME}
+_STEERING = {"steering_ratio", "steering_offset_rad", UNDERSTEER_GRADIENT}
 _CHECK_NS, _LOOK_BACK_NS = 2_000_000_000, 30_000_000_000
 """How often, and how far back, bends are compared with those before."""
 
 
-class Tuner:
+class Tuner(ParametersInForce):
     """Identifies every `every_s` of drive time from the last `window_s`, and holds what counts.
 
     `handle` takes samples in any order and returns an Identification when one is due; `take` makes
@@ -58,12 +59,7 @@ class Tuner:
         every_s: float = 10.0,
     ) -> None:
         """Without a `frame`, samples count from the first position on, around which it is laid."""
-        self.vehicle = vehicle
-        """The parameters in force."""
-        # Windows overlap: what one has told must not weigh as a prior in the next.
-        self._given = vehicle
-        self.pinned: set[str] = set()
-        self._vehicle_id = vehicle_id
+        super().__init__(vehicle=vehicle, vehicle_id=vehicle_id)
         self._window_ns, self._every_ns = round(window_s * 1e9), round(every_s * 1e9)
         self._recorder: MotionRecorder | None = None
         if frame is not None:
@@ -73,8 +69,6 @@ class Tuner:
         self._doubted = False
         self._bends: BendsBefore | None = None
         self._known: BendsBefore | None = None
-        self._taken: dict[str, ParameterEstimate] = {}
-        self._before: dict[str, list[Parameter]] = {}
 
     def _new_recorder(self, frame: LocalFrame) -> MotionRecorder:
         return MotionRecorder(frame=frame, keep_s=self._window_ns * 1e-9 + 5.0)
@@ -172,95 +166,28 @@ class Tuner:
             assert found.value is not None
             assert before.value is not None
             apart = abs(found.value - before.value)
-            if apart > _STEP_STDS * math.hypot(_std(found), _std(before)):
+            if apart > _STEP_STDS * math.hypot(std_of(found), std_of(before)):
                 noticed[found.name] = (
                     f"{found.name} went from {before.value:.4g} to {found.value:.4g} or beyond"
                 )
         return noticed
 
-    def _is_pinned(self, name: str) -> bool:
-        return name in self.pinned or (name == UNDERSTEER_NAME and _STIFFNESS in self.pinned)
-
     def take(self, told: Identification) -> tuple[ParameterChange, ...]:
-        """Let what `told` says count, save where it is pinned or known better; the changes."""
-        better = [
-            found
-            for found in told.estimates
-            if is_acceptable(found) and not self._is_pinned(found.name) and self._is_news(found)
-        ]
-        chosen = msgspec.structs.replace(told, estimates=tuple(better))
-        previous = self.vehicle
-        self.vehicle, changes = accepted(chosen, self.vehicle)
-        names = {change.name for change in changes}
-        for found in better:
-            if found.name in names or (found.name == UNDERSTEER_NAME and _STIFFNESS in names):
-                self._taken[found.name] = found
-        for name in names:
-            self._before.setdefault(name, []).append(getattr(previous, name))
+        """Let what `told` says count; later bends are compared with those that it is of."""
+        changes = super().take(told)
         bends, known = self._bends, self._known
-        steered = any(found.name in _STEERING for found in better)
+        steered = any(change.name in _STEERING or change.name == STIFFNESS for change in changes)
         if steered and bends is not None and (known is None or not bends.knows_less(known)):
             self._known = bends
         return changes
 
-    def _is_news(self, found: ParameterEstimate) -> bool:
-        before = self._taken.get(found.name)
-        return before is None or _std(found) <= _MUCH_WIDER * _std(before)
-
-    def set(self, name: str, value: float, *, stamp_ns: int) -> ParameterChange:
-        """Set a parameter by hand and pin it; UserError for a name or value that is none."""
-        in_force(self.vehicle, name)
-        if name == UNDERSTEER_NAME:
-            raise UserError(f"{name} follows from the stiffnesses: set {_STIFFNESS}")
-        change = self._replace(name, Parameter(value, None, "set by hand"), "set", stamp_ns, True)
-        self.pinned.add(name)
-        return change
-
-    def pin(self, name: str) -> None:
-        """Keep a parameter as it is, whatever is identified; UserError for another name."""
-        in_force(self.vehicle, name)
-        self.pinned.add(name)
-
-    def unpin(self, name: str) -> None:
-        """Let a parameter be identified again; UserError for another name."""
-        in_force(self.vehicle, name)
-        self.pinned.discard(name)
-
-    def rollback(self, name: str, *, stamp_ns: int) -> ParameterChange:
-        """Go back to the value before the last change, and pin it; UserError where none is."""
-        in_force(self.vehicle, name)
-        history = self._before.get(name)
-        if not history:
-            raise UserError(f"{name} has not changed: there is nothing to roll back to")
-        earlier = history[-1]
-        change = self._replace(name, earlier, "rolled_back", stamp_ns, True)
-        del self._before[name][-2:]
-        self.pinned.add(name)
-        return change
-
     def _replace(
         self, name: str, parameter: Parameter, origin: ParameterOrigin, stamp_ns: int, pinned: bool
     ) -> ParameterChange:
-        before: Parameter = getattr(self.vehicle, name)
-        try:
-            self.vehicle = check_vehicle(msgspec.structs.replace(self.vehicle, **{name: parameter}))
-        except ValueError as error:
-            raise UserError(str(error)) from error
-        self._before.setdefault(name, []).append(before)
-        self._given = msgspec.structs.replace(self._given, **{name: parameter})
-        self._taken.pop(UNDERSTEER_NAME if name == _STIFFNESS else name, None)
+        change = super()._replace(name, parameter, origin, stamp_ns, pinned)
         # Bends were told by a car of other given parameters.
         self._known = None
-        return ParameterChange(
-            vehicle_id=self._vehicle_id,
-            stamp_ns=stamp_ns,
-            name=name,
-            before=before.value,
-            value=parameter.value,
-            std=parameter.std,
-            origin=origin,
-            pinned=pinned,
-        )
+        return change
 
 
 def _in_words(step: Step) -> dict[str, str]:
@@ -270,16 +197,10 @@ def _in_words(step: Step) -> dict[str, str]:
         return {
             "steering_ratio": f"steering_ratio went from {1 / before:.4g} to about {1 / after:.4g}"
         }
-    name = {OFFSET: "steering_offset_rad", UNDERSTEER: UNDERSTEER_NAME}.get(step.parameter)
+    name = {OFFSET: "steering_offset_rad", UNDERSTEER: UNDERSTEER_GRADIENT}.get(step.parameter)
     if name is None:
         return {
-            UNDERSTEER_NAME: "the tyres' stiffness: the tyre angle that turning needs went from "
-            f"{before:.4g} to about {after:.4g} rad per rad/s²"
+            UNDERSTEER_GRADIENT: "the tyres' stiffness: the tyre angle that turning needs went "
+            f"from {before:.4g} to about {after:.4g} rad per rad/s²"
         }
     return {name: f"{name} went from {before:.4g} to about {after:.4g}"}
-
-
-def _std(found: ParameterEstimate) -> float:
-    assert found.high is not None
-    assert found.low is not None
-    return (found.high - found.low) / (2.0 * _HALF_OF_95)

@@ -9,7 +9,12 @@ import msgspec
 import numpy as np
 
 from contracts.arrays import Array
-from contracts.tuning import Identification, ParameterEstimate, SteeringMapBin
+from contracts.tuning import (
+    UNDERSTEER_GRADIENT,
+    Identification,
+    ParameterEstimate,
+    SteeringMapBin,
+)
 from contracts.vehicle import Parameter, VehicleParameters
 from sim_worker.identify import longitudinal
 from sim_worker.identify.actuator import fit_following
@@ -26,7 +31,7 @@ from sim_worker.identify.step import TURNING_MPS2
 from sim_worker.motion_record import MotionRecord
 from sim_worker.vehicle.parameters import understeer_gradient
 
-UNDERSTEER_NAME = "understeer_gradient_rad_per_mps2"
+UNDERSTEER_NAME = UNDERSTEER_GRADIENT
 LEAST_TURNING_S, LEAST_STEERING_S = 5.0, 3.0
 _WIDE_RATIO, _WIDE_OFFSET_RAD, _WIDE_UNDERSTEER, _WIDE_GAIN, _WIDE_DELAY_S = (
     0.05, 0.005, 0.001, 0.08, 0.03,

@@ -51,9 +51,14 @@ class Cast:
         """Since the last `forget_touches`."""
         self.stamp_ns: int | None = None
 
-    def carried_to(self, world: World | None, frame: LocalFrame) -> Cast:
-        """Return the same vehicles in another World, in the same places and roles."""
-        new = Cast(world, frame, self._crew, limits=self._limits)
+    def carried_to(
+        self, world: World | None, frame: LocalFrame, *, crew: Sequence[CastMember] | None = None
+    ) -> Cast:
+        """Return the same vehicles in another World, in the same places and roles.
+
+        `crew` are the same with other parameters.
+        """
+        new = Cast(world, frame, crew or self._crew, limits=self._limits)
         new.correction, new.stamp_ns, new.touches = self.correction, self.stamp_ns, self.touches
         for name, old in self.members.items():
             member = new.members[name]

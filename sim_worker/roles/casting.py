@@ -12,6 +12,7 @@ from contracts.drive import VehicleState
 from contracts.frames import LocalFrame
 from contracts.roles import Correction, MirrorCast, OtherVehicle, Role, UseRoles
 from contracts.simulation import MirrorSample
+from contracts.vehicle import VehicleParameters
 from contracts.world import World
 from sim_worker.commands import STEP_BACK_NS, CommandMemory
 from sim_worker.roles.cast import Cast
@@ -92,6 +93,13 @@ class Casting:
         self._world, self._frame = world, frame
         if self._cast is not None:
             self._cast = self._cast.carried_to(world, frame)
+
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Go on with other parameters of the car."""
+        car, *others = self._crew
+        self._crew = (car._replace(vehicle=vehicle), *others)
+        if self._cast is not None:
+            self._cast = self._cast.carried_to(self._world, self._frame, crew=self._crew)
 
     def before(self, state: VehicleState, free_twin: Callable[[], FreeTwin | None]) -> None:
         """Make the changes that are due at a state of the car, and take the state."""

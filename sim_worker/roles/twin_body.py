@@ -49,6 +49,18 @@ class TwinBody:
         self._steps = 0
         self._actuation = self._fresh_actuation()
 
+    def use_vehicle(
+        self, vehicle: VehicleParameters, *, steering_delay_s: float | None = None
+    ) -> None:
+        """Go on from here with other parameters, which the model has already."""
+        self._vehicle = vehicle
+        if steering_delay_s is not None:
+            self._model.actuator_delay[self._steer] = steering_delay_s
+        wheels = self._data.qvel[self._dofs[3]]
+        self._write()
+        self._data.qvel[self._dofs[3]] = wheels
+        self._actuation = self._fresh_actuation()
+
     def _fresh_actuation(self) -> Actuation:
         """Return the actuation of a twin that exerts what its state says, and did before."""
         return Actuation(

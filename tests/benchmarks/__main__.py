@@ -35,6 +35,7 @@ BENCHMARKS = (
     "state_to_result",
     "metrics_64x80x10",
     "estimator_bad_network",
+    "tuning_cost",
     "help_startup",
 )
 """Each is a module of this package with a function `measure() -> Measurement`."""

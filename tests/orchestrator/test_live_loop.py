@@ -58,6 +58,7 @@ class Conductor:
         rate_hz: float = 2.0,
         handling: Callable[[float], None] = lambda _: None,
         one_of: int = 1,
+        settled_s: float = 0.0,
     ) -> None:
         self._clock = clock
         self._round_s = round_s
@@ -66,6 +67,8 @@ class Conductor:
         self.plan = SimpleNamespace(config=SimpleNamespace(rate_hz=rate_hz, speed=1.0))
         self.mailbox = Mailbox(clock, [(100 + s, "state") for s in states_s] + [(100 + end_s, "z")])
         self.intake = SimpleNamespace(states=0, latest=None, end=None)
+        self._settled_s = settled_s
+        self.tuning = SimpleNamespace(parameters=self)
         pace = SimpleNamespace(now=Pace(64, one_of))
         self.rounds = SimpleNamespace(desk=self, drop=self.drop, pace=pace)
         self.missed_rounds = self.spared_rounds = 0
@@ -78,6 +81,10 @@ class Conductor:
     def open_rounds(self) -> tuple[int, ...]:
         still = self._open_until_s is not None and self._clock.now_s < self._open_until_s
         return (len(self.started_s),) if still else ()
+
+    @property
+    def settled(self) -> bool:
+        return self._clock.now_s >= 100.0 + self._settled_s
 
     def drop(self) -> None:
         self.dropped_s.append(self._clock.now_s - 100)
@@ -127,6 +134,13 @@ def test_rounds_start_on_the_grid(driven: Any) -> None:
     for number, started_s in enumerate(conductor.started_s):
         assert started_s == pytest.approx(0.5 * number, abs=0.021)
     assert conductor.missed_rounds == 0
+
+
+def test_no_round_starts_while_workers_take_new_parameters(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 5.0), end_s=5.0, settled_s=1.3)
+
+    assert conductor.started_s[0] == pytest.approx(1.3, abs=0.03)
+    assert conductor.started_s[1] == pytest.approx(1.5, abs=0.03)
 
 
 def test_a_round_waits_for_a_fresh_state_but_not_for_long(driven: Any) -> None:

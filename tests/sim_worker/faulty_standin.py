@@ -174,10 +174,10 @@ def _wrap_entry(source: StandinSource, entry: Entry) -> None:
     car = source._car
     whole, ticks = car.step, [0]
 
-    def step(*, accel_mps2: float, steering_wheel_rad: float) -> None:
+    def step(*, accel_mps2: float, steering_wheel_rad: float, grade: float = 0.0) -> None:
         accel, wheel = entry(accel_mps2, steering_wheel_rad, ticks[0])
         ticks[0] += 1
-        whole(accel_mps2=accel, steering_wheel_rad=wheel)
+        whole(accel_mps2=accel, steering_wheel_rad=wheel, grade=grade)
 
     car.step = step  # type: ignore[method-assign]
 

@@ -208,3 +208,27 @@ def test_a_standing_car_has_a_standing_twin() -> None:
     track = [state_at(3.0, 4.0, 0.3, 0.0, stamp_ns=k * 20_000_000) for k in range(400)]
     samples = _samples(mirror, track)
     assert max(sample.gap_m for sample in samples) < 1e-3
+
+
+def test_a_twin_goes_on_with_other_parameters_from_where_it_is() -> None:
+    """A third of the ratio makes it turn three times as much; it does not jump there."""
+    quick = altered(CAR, steering_ratio=16.0 / 3.0, wheelbase_m=2.9, cog_from_rear_axle_m=1.5)
+    mirror = Mirror(CAR, drive_frame=FRAME, window_s=60.0, commands_recorded=True)
+    samples = []
+    for k in range(201):
+        stamp_ns = k * 20_000_000
+        if k == 100:
+            mirror.use_vehicle(quick, from_stamp_ns=stamp_ns)
+        mirror.handle_command(
+            ControlCommand(stamp_ns=stamp_ns, accel_mps2=0.0, steering_wheel_rad=0.32)
+        )
+        state = state_at(-50 + 0.16 * k, -1.5, 0.0, 8.0, stamp_ns=stamp_ns)
+        sample = mirror.handle_state(state)
+        samples += [] if sample is None else [sample]
+    way = np.array([(one.twin.x_m, one.twin.y_m, one.twin.yaw_rad) for one in samples])
+    steps = np.diff(way, axis=0)
+    moved = np.hypot(steps[:, 0], steps[:, 1])
+    assert moved == pytest.approx(0.8, abs=0.03)
+    before, after = steps[15:19, 2].mean(), steps[-4:, 2].mean()
+    assert after / before == pytest.approx(3.0 * CAR.wheelbase_m.value / 2.9, rel=0.1)
+    assert np.abs(np.diff(steps[:, 2])).max() < 0.8 * (after - before)

@@ -6,7 +6,7 @@ import pytest
 from sim_worker.stage import Controls, Stage
 from sim_worker.vehicle.clock import silence_step_clock
 from sim_worker.vehicle.parameters import load_vehicle
-from tests.sim_worker.driving import drive, seed, states
+from tests.sim_worker.driving import altered, drive, seed, states
 from tests.sim_worker.places import box, crossroads
 
 CAR = load_vehicle()
@@ -120,6 +120,30 @@ def test_a_wall_stops_the_car_and_is_felt() -> None:
     front = CAR.length_m.value - CAR.rear_overhang_m.value
     assert stage.states[0, 0] + front < 28.2
     assert stage.states[1, 0] > 45.0
+
+
+def test_a_vehicle_changed_in_place_is_as_one_compiled_with_it() -> None:
+    """Every number of the model, and where contacts are looked for."""
+    vehicle = altered(
+        CAR, mass_kg=1500.0, yaw_inertia_kgm2=2500.0, wheelbase_m=2.9, cog_from_rear_axle_m=1.5,
+        steering_delay_s=0.2, steering_lag_s=0.1, max_tire_angle_rad=0.5, length_m=4.9,
+        width_m=1.9, height_m=1.7, rear_overhang_m=1.1,
+    )  # fmt: skip
+    world = crossroads(buildings=(box(30.0, 0.0, 2.0, 10.0),))
+    changed, anew = Stage(world, CAR, nsim=2), Stage(world, vehicle, nsim=2)
+    changed.use_vehicle(vehicle)
+    names = [name for name in dir(anew.model) if not name.startswith("_")]
+    arrays = [name for name in names if isinstance(getattr(anew.model, name), np.ndarray)]
+    assert len(arrays) > 200
+    for name in arrays:
+        assert np.array_equal(getattr(changed.model, name), getattr(anew.model, name)), name
+    assert changed.model.stat.meaninertia == anew.model.stat.meaninertia
+    runs = []
+    for stage in (changed, anew):
+        seed(stage, states(2, speed=8.0), delay=0.2)
+        runs.append(drive(stage, 120, tire=0.01, accel=0.5))
+        assert stage.states[:, 0].max() < 30.0
+    assert np.array_equal(runs[0], runs[1])
 
 
 def test_the_control_rate_must_fit_the_physics() -> None:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus, ask
@@ -19,12 +20,14 @@ from contracts.memory_bus import MemoryBus
 from contracts.process import ProcessLife
 from contracts.setup import BusSetup, WorkerSetup, write_setup
 from contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
+from contracts.tuning import UseVehicle
 from sim_worker.futures import result_digest, run_job
 from sim_worker.mirror_process import serve_mirror
 from sim_worker.stage import Stage
 from sim_worker.variants import plan_variants
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.worker import StageCache, serve_futures
+from tests.sim_worker.driving import altered
 from tests.sim_worker.places import FRAME, crossroads, job, state_at
 
 CAR = load_vehicle()
@@ -88,9 +91,24 @@ def test_a_question_that_cannot_be_answered_is_refused_and_the_worker_goes_on(
     assert ask(served, "prepare", PrepareRequest(world_id="crossroads"), **IDS).seconds < 10.0
 
 
-def test_the_cache_keeps_the_worlds_used_last(folder: Path) -> None:
-    import msgspec
+def test_a_worker_goes_on_with_other_parameters_and_says_with_which(served: MemoryBus) -> None:
+    """As a worker started with them would, to the bit, in a World that it holds compiled."""
+    heavy = altered(CAR, mass_kg=1500.0, wheelbase_m=2.9, steering_lag_s=0.1)
+    variants = plan_variants(count=4, seed=0, planners=["pure_pursuit_idm"])
+    before = job(variants, horizon_s=2.0)
+    after = msgspec.structs.replace(before, vehicle_version=1)
+    first = ask(served, "job", before, **IDS)
+    with pytest.raises(TimeoutError, match=r"job for version 1 .* at a worker with version 0"):
+        ask(served, "job", after, **IDS)
+    use = UseVehicle(stamp_ns=0, vehicle=heavy, version=1)
+    assert ask(served, "use_vehicle", use, **IDS) == use
+    second = ask(served, "job", after, **IDS)
+    assert (first.vehicle_version, second.vehicle_version) == (0, 1)
+    anew = run_job(after, Stage(crossroads(), heavy, nsim=32))
+    assert result_digest(second) == result_digest(anew) != result_digest(first)
 
+
+def test_the_cache_keeps_the_worlds_used_last(folder: Path) -> None:
     for name in "abc":
         world = msgspec.structs.replace(crossroads(), id=name)
         write_message(world, folder / f"{name}.world")

@@ -47,7 +47,12 @@ def foretwin(out: Path, *arguments: str, timeout_s: float = 240.0) -> Finished:
 
 @contextmanager
 def started(out: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards."""
+    """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards.
+
+    Without tuning unless it is asked for: a tenth of a core in each of these drives.
+    """
+    if "--tuning" not in arguments:
+        arguments = (*arguments, "--tuning", "off")
     process = subprocess.Popen(
         [sys.executable, "-m", "orchestrator", "drive", "--view", "none", "--out", str(out),
          *arguments],

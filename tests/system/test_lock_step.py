@@ -19,9 +19,12 @@ def drives(tmp_path_factory: pytest.TempPathFactory) -> Drives:
     """The same drive with one worker and with two."""
     folder = tmp_path_factory.mktemp("drives")
     one, two = (
-        foretwin(folder / f"runs{workers}", *SMALL, "--end", "9", "--workers", str(workers))
+        foretwin(
+            folder / f"runs{workers}", *SMALL, "--end", "9", "--workers", str(workers),
+            "--tuning", "report",
+        )
         for workers in (1, 2)
-    )
+    )  # fmt: skip
     assert (one.code, two.code) == (0, 0), one.screen + two.screen
     return one, two
 
@@ -31,8 +34,10 @@ def test_one_worker_and_two_give_the_same_results(drives: Drives) -> None:
     assert one["futures"]["count"] >= 36 * 3
     assert one["futures"]["sha256"] == two["futures"]["sha256"]
     assert one["futures"]["missed_rounds"] == 0
-    for table in ("comparisons", "plan_comparisons", "mirror"):
+    for table in ("comparisons", "plan_comparisons", "mirror", "gaps", "events"):
         assert drives[0].rows(table) == drives[1].rows(table)
+    assert one["tuning"] == two["tuning"]
+    assert one["tuning"]["gap"]["samples"] >= 6
 
 
 def test_a_shifted_plan_is_reported_by_its_shift(drives: Drives, tmp_path: Path) -> None:

@@ -77,9 +77,9 @@ def test_a_change_counts_from_the_next_state_and_is_told_kept_and_answered(house
     assert mirror.told[-1] == UseRoles(
         stamp_ns=now_ns + 1, roles={"ego": "shadow"}, correction="free"
     )
-    assert house.conductor.unanswered == 1
+    assert house.conductor.questions.unanswered == 1
     house.settle()
-    assert house.conductor.unanswered == 0
+    assert house.conductor.questions.unanswered == 0
     assert "set role.ego: all -> shadow" in [event.text for event in house.watched("event")]
     (kept,) = house.conductor.changes.record(START_NS)
     assert kept == {
@@ -112,7 +112,7 @@ def test_a_change_waits_for_the_round_that_runs(house: House) -> None:
         ("correction", "yes", "correction=yes: must be correction=free or correction=follow"),
         ("correction.ego", "free",
          "correction.ego=free: must be correction=free or correction=follow"),
-        ("speed", "3", "speed: unknown key; can be set: role.ID, correction"),
+        ("speed", "3", "speed: unknown key; can be set: role.ID, correction, vehicle.NAME"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_set_is_refused_in_one_line(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample
@@ -40,6 +42,66 @@ def verdicts_of(
     return told
 
 
+class Case(NamedTuple):
+    """One fault on one way: what was said first, and after how much excitation (NaN: nothing)."""
+
+    fault: str
+    seed: int
+    said: Verdict | None
+    excited_s: float
+
+    @property
+    def right(self) -> bool:
+        return self.said is not None and self.said.culprit == culprit_of(self.fault)
+
+    @property
+    def named(self) -> bool:
+        return self.right and self.said is not None and self.said.cause in NAMES[self.fault]
+
+    @property
+    def in_time(self) -> bool:
+        return self.right and self.excited_s <= IN_TIME_S
+
+
+IN_TIME_S = 3.0
+NAMES = {
+    "slow_steering": {"steering_delay"},
+    "steering_gain": {"steering_gain"},
+    "saturated_steering": {"saturated_steering", "steering_gain"},
+    "saturated_brake": {"saturated_brake", "brake_gain"},
+    "low_drive": {"drive_gain"},
+    "brake_fade": {"brake_gain", "saturated_brake"},
+    "steering_read_in_degrees": {"steering_in_degrees"},
+    "steering_commanded_in_degrees": {"steering_in_degrees"},
+    "steering_sign": {"steering_sign"},
+    "offset_steering_sensor": {"offset_sensor"},
+    "offset_gyro": {"gyro_sensor"},
+    "scaled_gyro": {"gyro_sensor"},
+    "scaled_speed": {"speed_sensor"},
+    "offset_speed": {"speed_sensor"},
+    "wheelbase": {"steering_ratio"},  # whose text says "or wheelbase": motion does not tell them
+    "steering_ratio": {"steering_ratio"},
+    "steering_limit": {"steering_limit"},
+    "steering_offset": {"steering_offset"},
+    "inertia": {"inertia"},
+    "friction": {"friction", "cornering_stiffness"},
+    "cornering_stiffness": {"cornering_stiffness"},
+    "drag": {"drag"},
+    "drive_gain": {"drive_gain"},
+    "brake_gain": {"brake_gain"},
+    "steering_delay": {"steering_delay"},
+}
+"""Causes that describe each fault; two where a few seconds cannot tell them apart."""
+
+
+def judged(fault: str, *, seed: int) -> Case:
+    """Return what is said first of a drive with a fault."""
+    told = verdicts_of(fault, seed=seed)
+    said = told[0] if told else None
+    late_s = float("nan") if said is None else excited_s(fault, said, seed=seed)
+    return Case(fault, seed, said, late_s)
+
+
 def culprit_of(fault: str) -> str:
     return "vehicle" if fault in CAR_FAULTS else "model"
 
@@ -47,23 +109,33 @@ def culprit_of(fault: str) -> str:
 _FAST_MPS, _SLIDES_MPS2 = 6.0, 1.2
 _PUSHES = {"drive_gain", "low_drive"}
 _BRAKES = {"brake_gain", "brake_fade", "saturated_brake"}
+_FADED_MPS = 0.4
+"""Deceleration summed over time that costs a fading brake a fifth of what it does."""
 
 
 def excited_s(fault: str, verdict: Verdict, *, seed: int, end_s: float = DURATION_S) -> float:
     """Return how long the car had been doing what the fault shows in, when the verdict fell.
 
-    Steering and turning sensors: the wheel is turned by 0.15 rad, as the fault-free sensor has
-    it; drive and brake: commands beyond 0.5 m/s² while it rolls (0.9 where 0.7 is the most);
-    drag: above 6 m/s;
-    friction: a lateral acceleration beyond what the slippery model carries.
+    Counted are seconds of rolling (above 0.5 m/s) in which the quantity that the fault touches is
+    excited:
+    - steering, and sensors of steering, speed and turning, and a model that turns otherwise: the
+      steering wheel is turned by 0.15 rad (9°, 0.01 rad at the tyres), as a sensor without the
+      fault has it;
+    - drive, brake: the command is beyond 0.5 m/s²; of a brake that does 0.7 m/s² at most, beyond
+      0.7, and of one that fades, beyond 0.5 once a fifth is lost (two of the standard deviations
+      that a vehicle file gives its gain: before, it is a brake like others);
+    - drag: above 6 m/s;
+    - friction: a lateral acceleration beyond the 1.2 m/s² that the slippery model carries.
     """
     clean = drive_of(seed, fault if culprit_of(fault) == "vehicle" else None, end_s=end_s)
-    seconds, speed_mps = 0.0, 0.0
+    seconds, speed_mps, braked_mps = 0.0, 0.0, 0.0
     for _, message in clean.samples:
         if getattr(message, "stamp_ns", 0) > verdict.stamp_ns:
             break
         if isinstance(message, SpeedSample):
             speed_mps = message.speed_mps
+        if isinstance(message, ControlCommand):
+            braked_mps += 0.02 * max(-message.accel_mps2, 0.0)
         if speed_mps < 0.5:
             continue
         if fault == "drag":
@@ -75,9 +147,9 @@ def excited_s(fault: str, verdict: Verdict, *, seed: int, end_s: float = DURATIO
             seconds += 0.01 * slides
         elif fault in _PUSHES | _BRAKES:
             sign = -1.0 if fault in _BRAKES else 1.0
-            # A brake that does at most 0.7 m/s² is one like others below.
-            least = 0.9 if fault == "saturated_brake" else 0.5
-            if isinstance(message, ControlCommand) and sign * message.accel_mps2 > least:
+            least = 0.7 if fault == "saturated_brake" else 0.5
+            shows = fault != "brake_fade" or braked_mps > _FADED_MPS
+            if isinstance(message, ControlCommand) and shows and sign * message.accel_mps2 > least:
                 seconds += 0.02
         elif isinstance(message, SteeringSample):
             wheel = message.steering_wheel_rad or 0.0

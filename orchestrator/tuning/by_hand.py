@@ -1,0 +1,57 @@
+"""`foretwin set vehicle.NAME=VALUE`: parameters set by hand, pinned, unpinned and rolled back."""
+
+from __future__ import annotations
+
+from contracts.errors import UserError
+from orchestrator.changes.desk import Made, RefusedError
+from orchestrator.tuning.parameter_desk import ParameterDesk
+from sim_worker.identify.acceptance import in_force
+
+_WORDS = ("pin", "unpin", "rollback")
+
+
+class VehicleHandler:
+    """Makes the changes `vehicle.NAME`."""
+
+    keys = "vehicle.NAME"
+
+    def __init__(self, desk: ParameterDesk) -> None:
+        self._desk = desk
+
+    def check(self, name: str, value: str) -> None:
+        """Raise RefusedError for an unknown parameter, a word or a number that cannot be."""
+        parameters = self._desk.in_force
+        try:
+            if value == "rollback":
+                parameters.check_rollback(name)
+            elif value in _WORDS:
+                in_force(parameters.vehicle, name)
+            else:
+                parameters.check_set(name, _number(name, value))
+        except UserError as refused:
+            raise RefusedError(f"vehicle.{name}={value}: {refused}") from refused
+
+    def make(self, name: str, value: str, *, stamp_ns: int) -> Made:
+        """Let the parameter count from `stamp_ns` on; raises RefusedError where it cannot."""
+        self.check(name, value)
+        parameters = self._desk.in_force
+        before = in_force(parameters.vehicle, name)
+        if value == "pin":
+            parameters.pin(name)
+            return Made(f"{before:.6g}", f"{before:.6g}, pinned")
+        if value == "unpin":
+            parameters.unpin(name)
+            return Made(f"{before:.6g}", f"{before:.6g}, not pinned")
+        if value == "rollback":
+            change = parameters.rollback(name, stamp_ns=stamp_ns)
+        else:
+            change = parameters.set(name, _number(name, value), stamp_ns=stamp_ns)
+        self._desk.note([change])
+        return Made(f"{before:.6g}", f"{change.value:.6g}, pinned")
+
+
+def _number(name: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise UserError(f"must be a number, {', '.join(_WORDS[:-1])} or {_WORDS[-1]}") from None

@@ -1,0 +1,144 @@
+"""What the driving says of the vehicle: kept in tables, told in words, counted for the record."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from contracts.gap import GapAlarm, GapSample, Verdict
+from contracts.tuning import Identification, ParameterEstimate, TuneReply
+from contracts.vehicle import VehicleParameters
+from orchestrator.instructions import Tell
+from orchestrator.record.results import ResultTables
+from orchestrator.tuning.parameter_desk import departs
+from orchestrator.tuning.words import alarm_text, found_text, verdict_text
+from sim_worker.identify.acceptance import in_force, is_acceptable
+
+HORIZON_S = 2.0
+"""The horizon whose gap is told; the tables hold all."""
+_SQUARES = ("along_m", "across_m", "yaw_rad", "speed_mps")
+
+
+class Findings:
+    """Takes what the process `tuning` says, in the order in which it says it."""
+
+    def __init__(
+        self,
+        tables: ResultTables,
+        *,
+        tell: Callable[[Tell], None],
+        start_stamp_ns: Callable[[], int],
+        vehicle: Callable[[], VehicleParameters],
+        on_identification: Callable[[Identification], None],
+    ) -> None:
+        self._tables = tables
+        self._tell = tell
+        self._start_stamp_ns = start_stamp_ns
+        self._vehicle = vehicle
+        self._on_identification = on_identification
+        self._latest: dict[str, ParameterEstimate] = {}
+        self._told: dict[str, float] = {}
+        self._gaps: dict[str, list[tuple[float, ...]]] = defaultdict(list)
+        self._alarms = 0
+        self._verdicts: list[Verdict] = []
+        self._independent = True
+
+    def take(self, found: Identification | GapSample | GapAlarm | Verdict) -> None:
+        """Keep and tell one finding."""
+        match found:
+            case Identification():
+                self._identification(found)
+            case GapSample():
+                self._tables.add("gaps", [_row(found)])
+                self._independent = self._independent and found.independent
+                if abs(found.horizon_s - HORIZON_S) < 1e-9:
+                    self._gaps[found.manoeuvre].append(
+                        tuple(getattr(found, name) ** 2 for name in _SQUARES)
+                    )
+            case GapAlarm():
+                self._alarms += found.over
+                self._tell(Tell("warning" if found.over else "info", alarm_text(found)))
+            case Verdict():
+                self._verdicts.append(found)
+                row = _row(found)
+                row["evidence"] = "; ".join(
+                    f"{one.name} {one.value:.4g} ± {one.std:.2g}, expected {one.expected:.4g}"
+                    for one in found.evidence
+                )
+                self._tables.add("verdicts", [row])
+                self._tell(Tell("warning", verdict_text(found)))
+
+    def take_all(self, reply: TuneReply) -> None:
+        """Keep and tell what one lock step has brought."""
+        for kind in (reply.identifications, reply.gaps, reply.alarms, reply.verdicts):
+            for found in kind:
+                self.take(found)
+
+    def _identification(self, told: Identification) -> None:
+        self._tables.add(
+            "identifications",
+            [
+                {"stamp_ns": told.stamp_ns, "from_stamp_ns": told.from_stamp_ns,
+                 "taken": is_acceptable(found), **msgspec.to_builtins(found)}
+                for found in told.estimates
+            ],
+        )  # fmt: skip
+        self._latest |= {found.name: found for found in told.estimates}
+        if told.step_noticed:
+            self._tell(Tell("warning", f"the vehicle has changed: {told.step_noticed}"))
+        self._on_identification(told)
+        for found in told.estimates:
+            counts = in_force(self._vehicle(), found.name)
+            if departs(found, counts) and self._told.get(found.name) != counts:
+                self._told[found.name] = counts
+                self._tell(Tell("info", found_text(found, counts)))
+
+    def record(self) -> dict[str, Any]:
+        """Return the `gap`, `verdicts` and `parameters` of run.json."""
+        return {
+            "gap": {
+                "horizon_s": HORIZON_S,
+                "independent": self._independent,
+                "samples": sum(map(len, self._gaps.values())),
+                "alarms": self._alarms,
+                "rms": {
+                    "all": _rms([row for rows in self._gaps.values() for row in rows]),
+                    **{name: _rms(rows) for name, rows in sorted(self._gaps.items())},
+                },
+            },
+            "verdicts": [
+                {
+                    "drive_time_s": round((one.stamp_ns - self._start_stamp_ns()) / 1e9, 2),
+                    **{k: v for k, v in msgspec.to_builtins(one).items() if k != "vehicle_id"},
+                }
+                for one in self._verdicts
+            ],
+            "parameters": [
+                {
+                    "name": one.name, "in_use": in_force(self._vehicle(), one.name),
+                    "identified": one.value, "low": one.low, "high": one.high,
+                    "departs": departs(one, in_force(self._vehicle(), one.name)),
+                    "reason": one.reason,
+                }
+                for one in self._latest.values()
+            ],
+        }  # fmt: skip
+
+
+def _row(found: GapSample | Verdict) -> dict[str, Any]:
+    row: dict[str, Any] = msgspec.to_builtins(found)
+    del row["vehicle_id"]
+    return row
+
+
+def _rms(rows: list[tuple[float, ...]]) -> dict[str, float] | None:
+    if not rows:
+        return None
+    return {
+        name: round(math.sqrt(sum(row[index] for row in rows) / len(rows)), 4)
+        for index, name in enumerate(_SQUARES)
+    }

@@ -1,0 +1,155 @@
+"""The orchestrator's side of tuning: findings in, parameters out to all that simulate."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from contracts.bus import Bus, Mailbox, Received, Reply
+from contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
+from orchestrator.events import EventDesk
+from orchestrator.instructions import Tell
+from orchestrator.intake import Intake
+from orchestrator.plan import DrivePlan
+from orchestrator.processes import MIRROR, TUNING
+from orchestrator.record.results import ResultTables
+from orchestrator.rounds.runner import RoundRunner
+from orchestrator.tuning.findings import Findings
+from orchestrator.tuning.parameter_desk import ParameterDesk, change_row, change_text
+
+FINDINGS = ("identification", "gap", "gap_alarm", "verdict")
+"""Channels of the process `tuning`; in lock step its answers bring the same, in order."""
+USE_TIMEOUT_S = 30.0
+TUNE_TIMEOUT_S = 120.0
+
+
+class TuningLink:
+    """Carries findings to their desks and parameters to workers, mirror and tuning."""
+
+    def __init__(
+        self,
+        plan: DrivePlan,
+        bus: Bus,
+        mailbox: Mailbox,
+        tables: ResultTables,
+        *,
+        events: EventDesk,
+        intake: Intake,
+        rounds: RoundRunner,
+        alive: Collection[str],
+    ) -> None:
+        self._plan, self._bus, self._mailbox, self._tables = plan, bus, mailbox, tables
+        self._events, self._intake, self._rounds, self._alive = events, intake, rounds, alive
+        self.parameters = ParameterDesk(
+            plan.vehicle, vehicle_id=plan.config.vehicle_id, ask=self._ask
+        )
+        self.findings = Findings(
+            tables,
+            tell=events.tell,
+            start_stamp_ns=lambda: intake.start_stamp_ns,
+            vehicle=lambda: self.parameters.in_force.vehicle,
+            on_identification=self._identified,
+        )
+        self.weighing = False
+        """Lock step: whether the process is at the samples of the step before."""
+        self._weighed: TuneReply | None = None
+
+    def join(self) -> None:
+        """Hear what the process finds."""
+        if not self._plan.config.lock_step:
+            for channel in FINDINGS:
+                self._bus.subscribe(channel, self._mailbox, run=self._plan.run_id)
+
+    def heard(self, item: Received) -> None:
+        """Take one finding as it comes."""
+        self.findings.take(item.message())
+
+    def reply(self, item: Reply) -> str:
+        """Take an answer; returns the id of a process that has just got its parameters, or ""."""
+        if item.channel == "tune":
+            self.weighing = False
+            self._weighed = item.message
+            if item.message is None and TUNING in self._alive:
+                self._events.tell(Tell("error", f"{TUNING}: {item.error}"))
+            return ""
+        process_id: str = item.tag
+        if item.message is None and process_id in self._alive:
+            text = f"{process_id} did not take the vehicle's parameters: {item.error}"
+            self._events.tell(Tell("error", text))
+        self.parameters.answered(process_id)
+        return process_id
+
+    def hand_over(self) -> None:
+        """Let what was identified or set count from the next state on; between rounds alone."""
+        if not self.parameters.waiting:
+            return
+        simulating = [name for name in sorted(self._alive) if self._simulates(name)]
+        changes = self.parameters.hand_over(
+            simulating, watcher=TUNING, stamp_ns=self._intake.now_stamp_ns + 1
+        )
+        if not changes:
+            return
+        version, vehicle = self.parameters.version, self.parameters.in_force.vehicle
+        self._rounds.use_vehicle(vehicle, version)
+        self._intake.use_vehicle(vehicle)
+        for change in changes:
+            self._events.tell(Tell("info", f"parameters {version}: {change_text(change)}"))
+            self._bus.publish("parameter", change, run=self._plan.run_id)
+        self._tables.add("parameters", [change_row(one, version=version) for one in changes])
+
+    def process_up(self, process_id: str) -> bool:
+        """Tell a process what counts; returns whether its answer must be waited for."""
+        return self._simulates(process_id) and self.parameters.tell(process_id)
+
+    def process_down(self, process_id: str) -> None:
+        """Wait no more for a process that is gone."""
+        self.parameters.answered(process_id)
+        if process_id == TUNING:
+            self.weighing = False
+
+    def weigh(self, published: dict[str, int]) -> None:
+        """Lock step: let the process weigh all samples published and states sent so far."""
+        if TUNING not in self._alive:
+            return
+        self.weighing = True
+        self._bus.request(
+            "tune",
+            TuneRequest(published=published, states=self._intake.states),
+            self._mailbox,
+            timeout_s=TUNE_TIMEOUT_S,
+            run=self._plan.run_id,
+            process=TUNING,
+        )
+
+    def take_weighed(self) -> None:
+        """Lock step: take what the last answer has brought."""
+        weighed, self._weighed = self._weighed, None
+        if weighed is not None:
+            self.findings.take_all(weighed)
+
+    def record(self) -> dict[str, object]:
+        """Return the `tuning` of run.json."""
+        return {
+            "mode": self._plan.config.tuning,
+            "version": self.parameters.version,
+            "changes": self.parameters.rows(),
+            "pinned": sorted(self.parameters.in_force.pinned),
+            **self.findings.record(),
+        }
+
+    def _identified(self, told: Identification) -> None:
+        if self._plan.config.tuning == "apply":
+            self.parameters.apply(told)
+
+    def _simulates(self, process_id: str) -> bool:
+        return process_id in (MIRROR, TUNING) or process_id.startswith("w")
+
+    def _ask(self, process_id: str, message: UseVehicle) -> None:
+        self._bus.request(
+            "use_vehicle",
+            message,
+            self._mailbox,
+            tag=process_id,
+            timeout_s=USE_TIMEOUT_S,
+            run=self._plan.run_id,
+            process=process_id,
+        )

@@ -1,0 +1,83 @@
+"""Findings in the engineer's words: one line each."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from contracts.gap import GapAlarm, Verdict
+from contracts.tuning import ParameterEstimate
+
+_QUANTITIES = {
+    "along_m": ("position along", "m", 1.0),
+    "across_m": ("position across", "m", 1.0),
+    "yaw_rad": ("heading", "°", math.degrees(1.0)),
+    "speed_mps": ("speed", "m/s", 1.0),
+}
+_HOW = {"identified": "identified", "set": "set by hand", "rolled_back": "rolled back"}
+_EACH_ITS_LINE = 3
+_CULPRITS = {
+    "vehicle": "the vehicle", "model": "the model", "both": "vehicle and model",
+    "none": "neither", "undecided": "undecided",
+}  # fmt: skip
+
+
+def alarm_text(alarm: GapAlarm) -> str:
+    """Return what a GapAlarm says."""
+    name, unit, scale = _QUANTITIES.get(alarm.quantity, (alarm.quantity, "", 1.0))
+    limit = f"limit {scale * alarm.limit:.2g} {unit}"
+    if alarm.over:
+        return f"gap: {name} off by {scale * alarm.value:+.2f} {unit} ({alarm.manoeuvre}, {limit})"
+    return f"gap: {name} within its limit again ({scale * alarm.value:+.2f} {unit}, {limit})"
+
+
+def verdict_text(verdict: Verdict) -> str:
+    """Return what a Verdict says."""
+    who = _CULPRITS[verdict.culprit]
+    return f"verdict: {who}, {verdict.cause} ({verdict.confidence:.2f}): {verdict.text}"
+
+
+def found_text(found: ParameterEstimate, counts: float) -> str:
+    """Return an estimate that departs from the value that counts."""
+    return (
+        f"{found.name}: the driving says {found.value:.5g} ({found.low:.5g} to {found.high:.5g}), "
+        f"in use is {counts:.5g}"
+    )
+
+
+def summary_lines(tuning: dict[str, Any]) -> list[str]:
+    """Return what the end of a drive says of gap, verdicts and parameters, from its record."""
+    lines = []
+    gap, rms = tuning["gap"], tuning["gap"]["rms"]["all"]
+    if rms is not None:
+        alarms = f"{gap['alarms']} alarms" if gap["alarms"] != 1 else "1 alarm"
+        lines.append(
+            f"  gap of the model after {gap['horizon_s']:g} s (RMS): {rms['along_m']:.2f} m along, "
+            f"{rms['across_m']:.2f} m across, {math.degrees(rms['yaw_rad']):.1f}°, "
+            f"{rms['speed_mps']:.2f} m/s; {alarms}"
+            + ("" if gap["independent"] else "; commands estimated from the motion")
+        )
+    lines += [
+        f"  verdict at {verdict['drive_time_s']:.1f} s: {_CULPRITS[verdict['culprit']]}, "
+        f"{verdict['cause']}: {verdict['text']}"
+        for verdict in tuning["verdicts"]
+    ]
+    if rms is not None and not tuning["verdicts"]:
+        lines.append("  verdict: nothing shows that vehicle or model departs")
+    first: dict[str, float] = {}
+    last = {change["name"]: change for change in tuning["changes"]}
+    for change in tuning["changes"]:
+        first.setdefault(change["name"], change["before"])
+    lines += [
+        f"  {name} {first[name]:.5g} -> {change['value']:.5g} ({_HOW[change['origin']]})"
+        for name, change in last.items()
+    ]
+    apart = [one for one in tuning["parameters"] if one["departs"]]
+    if len(apart) > _EACH_ITS_LINE:
+        told = ", ".join(f"{one['name']} {one['identified']:.4g}" for one in apart)
+        return [*lines, f"  the driving says other than the vehicle in use: {told}"]
+    return lines + [
+        f"  {one['name']}: the driving says {one['identified']:.5g} ({one['low']:.5g} to "
+        f"{one['high']:.5g}), in use is {one['in_use']:.5g}"
+        for one in apart
+    ]

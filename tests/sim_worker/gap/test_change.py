@@ -1,0 +1,79 @@
+"""Since when a departure has been there, and what a sequential test makes of blocks of pushing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contracts.arrays import Array
+from sim_worker.gap.change import change_index
+from sim_worker.gap.finding import Finding
+from sim_worker.gap.push import PushBlocks, PushTest
+
+BLOCK_NS = 200_000_000
+
+
+@settings(max_examples=30)
+@given(begin=st.integers(5, 250), seed=st.integers(0, 5))
+def test_a_departure_began_where_it_first_shows(begin: int, seed: int) -> None:
+    noise = np.random.default_rng(seed).normal(0.0, 0.05, 300)
+    step = np.where(np.arange(300) >= begin, 1.0, 0.0)
+    assert change_index((noise + step) ** 2) == pytest.approx(begin, abs=2)
+
+
+def test_what_has_departed_all_along_began_with_the_stretch() -> None:
+    assert change_index(np.ones(50)) == 0
+    assert change_index(np.zeros(50)) == 0
+
+
+def blocks(asked: Array, car: Array, model: Array, *, first: int = 1) -> PushBlocks:
+    stamps = (first + np.arange(len(asked), dtype=np.float64)) * BLOCK_NS
+    return PushBlocks(stamps, asked, car, model, np.full(len(asked), 8.0), np.full(len(asked), 0.2))
+
+
+def first_of(every: PushBlocks) -> tuple[int, Finding] | None:
+    """Return how many blocks it took, given one by one, and what was found."""
+    test = PushTest()
+    for count in range(1, len(every.stamp_ns) + 1):
+        # The latest two each time, as overlapping stretches give them.
+        found = test.handle(PushBlocks(*(column[max(count - 2, 0) : count] for column in every)))
+        if found is not None:
+            return count, found
+    return None
+
+
+def test_a_brake_that_weakens_is_accused_with_the_block_where_it_began() -> None:
+    asked = np.tile([-1.5] * 10 + [0.0] * 10 + [1.0] * 10, 2)
+    weak = np.where(np.arange(60) >= 30, 0.4, 1.0)
+    told = first_of(blocks(asked, np.where(asked < 0.0, weak * asked, asked), asked))
+    assert told is not None
+    count, found = told
+    assert 32 <= count <= 36
+    assert (found.culprit, found.cause) == ("vehicle", "brake_gain")
+    assert found.since_ns == pytest.approx(30 * BLOCK_NS, abs=BLOCK_NS)
+
+
+def test_a_brake_that_stops_at_a_plateau_is_told_from_a_weak_one() -> None:
+    asked = np.concatenate([[0.0], -np.linspace(0.3, 3.0, 40)])
+    told = first_of(blocks(asked, np.maximum(asked, -1.0), asked))
+    assert told is not None
+    assert (told[1].culprit, told[1].cause) == ("vehicle", "saturated_brake")
+    assert "beyond 1.0 m/s²" in told[1].text
+
+
+def test_brakings_apart_are_counted_together_and_nothing_is_made_of_gains_within_tolerance() -> (
+    None
+):
+    once = [-1.2, -1.2] + [0.0] * 100
+    asked = np.array(once * 6)
+    assert first_of(blocks(asked, 0.45 * asked, asked)) is not None
+    assert first_of(blocks(asked, 0.9 * asked, 1.05 * asked)) is None
+
+
+def test_drag_is_told_from_a_weak_drive_by_what_happens_while_nothing_is_asked() -> None:
+    asked = np.tile([0.0] * 5 + [1.0] * 5, 4)
+    told = first_of(blocks(asked, asked, asked - 0.9))
+    assert told is not None
+    assert (told[1].culprit, told[1].cause) == ("model", "drag")
