@@ -1,8 +1,9 @@
 """The inner part of a control tick, compiled by numba: the same formulas, car by car.
 
 A numpy call costs as much for 64 cars as for one: at 50 ticks a second, some 150 calls took
-longer than the physics. Here is nothing but arithmetic on arrays
-that others own; what it means is told where it is called.
+longer than the physics. Here is nothing but arithmetic on arrays that others own; what it means
+is told where it is called. All is compiled at import, for one signature and no other: nobody
+waits for a compiler in the middle of a drive.
 """
 
 from __future__ import annotations
@@ -13,20 +14,46 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
 from contracts.arrays import Array
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-
-def _compiled(function: _Function) -> _Function:
-    # Without fast-math: the same order of operations gives the same bits on every machine.
-    found: _Function = numba.njit(cache=True, error_model="numpy")(function)
-    return found
+types: Any = numba.types  # whose annotations are incomplete
+_REAL, _WHOLE = types.float64, types.intp
+_OUT, _OUT_ROWS = _REAL[:], _REAL[:, :]
 
 
-@_compiled
+def _given(dimensions: int, layout: str = "A") -> Any:
+    # Whatever numpy hands over: slices, and what a message holds, read-only and anywhere.
+    return types.Array(_REAL, dimensions, layout, readonly=True, aligned=False)
+
+
+_IN, _IN_ROWS = _given(1), _given(2)
+_LINE, _TABLE = _given(1, "C"), _given(2, "C")
+"""Read in order, as `np.ascontiguousarray` leaves them."""
+
+
+def _compiled(returns: Any, *arguments: Any) -> Callable[[_Function], _Function]:
+    """Compile for these types, or take it from the cache: `__pycache__` beside this file, else the
+    user's cache folder, or `NUMBA_CACHE_DIR`; where none can be written, for this process alone."""
+
+    def compiled(function: _Function) -> _Function:
+        # Without fast-math: the same order of operations gives the same bits on every machine.
+        def compile_it(cache: bool) -> _Function:
+            jit = numba.njit(returns(*arguments), cache=cache, error_model="numpy")
+            found: _Function = jit(function)
+            return found
+
+        try:
+            return compile_it(cache=True)
+        except (RuntimeError, OSError):
+            return compile_it(cache=False)
+
+    return compiled
+
+
+@_compiled(types.void, _IN_ROWS, _IN, _TABLE, _TABLE, _REAL, _WHOLE, _OUT_ROWS)
 def locate(
     xy: Array, near_arc_m: Array, nodes: Array, segments: Array,
     first_arc_m: float, either: int, found: Array,
@@ -55,7 +82,10 @@ def locate(
         found[1, car] = dx * segments[3, node] + dy * segments[5, node]
 
 
-@_compiled
+@_compiled(
+    types.void, _IN_ROWS, _IN_ROWS, _IN, _IN, _IN, _IN, _TABLE, _REAL, _REAL, _REAL, _REAL,
+    types.UniTuple(_REAL, 8), _OUT, _OUT,
+)  # fmt: skip
 def curve(
     states: Array, heading: Array, arc_m: Array, offset_m: Array, desired_offset_m: Array,
     speed_factor: Array, table: Array, first_arc_m: float, wheelbase_m: float,
@@ -110,7 +140,7 @@ def curve(
         angle[car] = wanted
 
 
-@_compiled
+@_compiled(types.void, _IN_ROWS, _IN, _IN, _IN, _REAL, _OUT)
 def free_road(
     states: Array, wished_mps: Array, wished_mps2: Array, exponent: Array, comfort_mps2: float,
     accel: Array,
@@ -126,7 +156,10 @@ def free_road(
         accel[car] = min(accel[car], free)
 
 
-@_compiled
+@_compiled(
+    types.void, _IN, _IN, _IN, _IN, _IN_ROWS, _IN_ROWS, _IN_ROWS, types.UniTuple(_REAL, 5), _IN,
+    _OUT_ROWS, _OUT_ROWS, _OUT_ROWS, _OUT_ROWS, _OUT, _OUT,
+)  # fmt: skip
 def forces(
     accel: Array, speed: Array, grip_square: Array, least_square: Array, transfer: Array,
     axles_kg: Array, stiffness: Array, constants: tuple[float, ...], gear: Array,
@@ -153,7 +186,7 @@ def forces(
         along_high[car] = drive + brake
 
 
-@_compiled
+@_compiled(types.void, _IN, _OUT, _REAL, _OUT_ROWS)
 def ramp(angle: Array, command: Array, step_rad: float, steer: Array) -> None:
     """Fill `steer` (steps, S) from the last `command` (S,) towards `angle`, and keep the end."""
     for car in range(len(command)):
@@ -165,7 +198,7 @@ def ramp(angle: Array, command: Array, step_rad: float, steer: Array) -> None:
         command[car] = steer[-1, car]
 
 
-@_compiled
+@_compiled(types.void, _IN_ROWS, _REAL, _REAL, _OUT_ROWS, _OUT_ROWS)
 def read_base(joints: Array, rear_m: float, tick_s: float, states: Array, heading: Array) -> None:
     """Fill base_link `states` (8, S), and `heading` (2, S), from joints (8, S)."""
     for car in range(states.shape[1]):
@@ -183,8 +216,8 @@ def read_base(joints: Array, rear_m: float, tick_s: float, states: Array, headin
         heading[0, car], heading[1, car] = cos, sin
 
 
-@_compiled
-def all_sane(states: Array, most: npt.NDArray[np.float64]) -> bool:
+@_compiled(types.boolean, _IN_ROWS, _IN)
+def all_sane(states: Array, most: Array) -> bool:
     """Whether no column of `states` (8, S) is beyond its bound (8,)."""
     for column in range(states.shape[0]):
         for car in range(states.shape[1]):
@@ -193,7 +226,7 @@ def all_sane(states: Array, most: npt.NDArray[np.float64]) -> bool:
     return True
 
 
-@_compiled
+@_compiled(types.void, _TABLE, _TABLE, _LINE, _LINE, _OUT_ROWS)
 def cheapest_walks(x: Array, y: Array, to_x: Array, to_y: Array, found: Array) -> None:
     """Fill `found` (2, S) with Fréchet and warping distances of curves (S, N) from (M,) points."""
     columns = len(to_x)

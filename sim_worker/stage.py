@@ -214,9 +214,10 @@ class Stage:
         """Advance one control tick."""
         columns = self._live.T
         self._actuation.apply(speed_mps=columns[3], accel_mps2=controls.accel_mps2)
+        angle = np.asarray(controls.tire_angle_rad, dtype=np.float64)
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
         rate = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
-        compiled.ramp(controls.tire_angle_rad, self._tire_command, rate, self._steer_controls)
+        compiled.ramp(angle, self._tire_command, rate, self._steer_controls)
         self._advance(self._controls)
         rear = self.vehicle.cog_from_rear_axle_m.value
         compiled.read_base(self._motion_now, rear, self.control_dt_s, columns, self._heading)

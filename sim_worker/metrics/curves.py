@@ -31,8 +31,8 @@ def warping_distance(curves: Array, reference: Array) -> Array:
 def _cheapest_walks(curves: Array, reference: Array) -> Array:
     """Return (2, S): the greatest distance, and the sum, of the walks along the pairs of points
     that never go back and have the least of it."""
-    x, y = (np.ascontiguousarray(curves[..., k]) for k in range(2))
-    to_x, to_y = (np.ascontiguousarray(reference[:, k]) for k in range(2))
+    x, y = (np.ascontiguousarray(curves[..., k], dtype=np.float64) for k in range(2))
+    to_x, to_y = (np.ascontiguousarray(reference[:, k], dtype=np.float64) for k in range(2))
     found = np.empty((2, len(x)))
     compiled.cheapest_walks(x, y, to_x, to_y, found)
     return found

@@ -196,16 +196,15 @@ class FrenetPath:
         With `near_arc_m` (S,) only its surroundings are searched, `within_m` on either side, so
         that a path that crosses itself is followed rather than jumped along.
         """
-        xy = np.asarray(xy_m).T
+        xy = np.asarray(xy_m, dtype=np.float64).T
         if near_arc_m is None:
             end = max(2, int(np.searchsorted(self.arc_m, upto_arc_m, side="right")))
             node = self._nearest(xy_m, end)
         else:
             either = min(math.ceil(within_m / SPACING_M), self._last // 2)
             found = np.empty((2, xy.shape[1]))
-            compiled.locate(
-                xy, near_arc_m, self._nodes, self._segments, self.first_arc_m, either, found
-            )
+            near = np.asarray(near_arc_m, dtype=np.float64)
+            compiled.locate(xy, near, self._nodes, self._segments, self.first_arc_m, either, found)
             return FrenetPoint(found[0], found[1])
         # The node's own tangent decides between the segment before and the one after.
         nodes = self._nodes.take(node, axis=1)

@@ -71,8 +71,9 @@ class PurePursuitIdm:
         target speed the improved form of Treiber and Kesting (2013), Traffic Flow Dynamics, eq.
         11.22, which approaches the comfortable deceleration.
         """
-        speed = np.maximum(view.states[:, 3], 0.0)
-        states, path, vehicle = view.states.T, view.path, view.vehicle
+        path, vehicle = view.path, view.vehicle
+        states = np.asarray(view.states, dtype=np.float64).T
+        speed = np.maximum(states[3], 0.0)
         heading = view.heading
         if heading is None:
             heading = np.array([np.cos(states[2]), np.sin(states[2])])
@@ -80,10 +81,10 @@ class PurePursuitIdm:
         compiled.curve(
             states,
             heading,
-            view.arc_m,
-            view.offset_m,
-            view.desired_offset_m,
-            view.speed_factor,
+            np.asarray(view.arc_m, dtype=np.float64),
+            np.asarray(view.offset_m, dtype=np.float64),
+            np.asarray(view.desired_offset_m, dtype=np.float64),
+            np.asarray(view.speed_factor, dtype=np.float64),
             path.with_curve_speeds(LATERAL_ACCEL_MPS2, COMFORT_DECEL_MPS2),
             path.first_arc_m,
             vehicle.wheelbase_m.value,
@@ -116,12 +117,12 @@ class PurePursuitIdm:
             or known.target_speed_mps is not target
             or known.speed_factor is not factor
         ):
-            start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(factor, 0.3), 2.0)
+            start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(factor, 0.3, dtype=np.float64), 2.0)
             stand = target < 0.05
             known = self._wished = _Wishes(
                 target,
                 factor,
-                speed_mps=np.maximum(target, 0.1),
+                speed_mps=np.maximum(target, 0.1, dtype=np.float64),
                 accel_mps2=start,
                 exponent=-start * EXPONENT / COMFORT_DECEL_MPS2,
                 stand=stand if stand.any() else None,

@@ -74,7 +74,7 @@ class Actuation:
         self._lateral_low = forcerange[:, tyres, 0].T
         self._lateral_high = forcerange[:, tyres, 1].T
         self._along_low, self._along_high = forcerange[:, ids.drive].T
-        mass = self._mass = vehicle.mass_kg.value
+        mass = vehicle.mass_kg.value
         wheelbase = vehicle.wheelbase_m.value
         rear = vehicle.cog_from_rear_axle_m.value
         axles = mass / wheelbase * np.array([[rear], [wheelbase - rear]])
@@ -95,8 +95,9 @@ class Actuation:
         self._brake_gain = vehicle.brake_gain.value / effective
         self._max_drive = vehicle.max_drive_accel_mps2.value
         self._max_brake = vehicle.max_brake_decel_mps2.value
-        self._drag = vehicle.drag_npv2.value / effective
-        self._rolling = vehicle.rolling_resistance_n.value / effective + _TINY_N
+        drag = vehicle.drag_npv2.value / effective
+        rolling = vehicle.rolling_resistance_n.value / effective + _TINY_N
+        self._constants = tuple(map(float, (mass, rolling, drag, _TINY_KG, _MIN_SPEED_MPS)))
         self._friction = np.array(friction, dtype=np.float64)
         self._gear: Array | None = None
         if backwards is not None and backwards.any():
@@ -118,8 +119,6 @@ class Actuation:
             self._least = np.maximum(-grip, -self._max_brake * self._brake_gain)
         self._grip_square = np.square(grip)
         self._least_square = self._grip_square * _MIN_LATERAL_SHARE**2
-        lightest = self._axles_kg - np.abs(self._transfer_kgpmps2) * grip
-        self._may_lift = bool(lightest.min() < _TINY_KG)
 
     def restart(self, rows: npt.NDArray[np.intp], *, friction: Array, accel_mps2: Array) -> None:
         """Let the vehicles of `rows` (K,) begin anew with `accel_mps2` (K,) on `friction` (K,)."""
@@ -134,7 +133,7 @@ class Actuation:
         Forces along the road are divided by the effective mass factor instead of adding wheel
         inertia to the chassis, which would add it sideways too.
         """
-        accel = self._carried_out(accel_mps2)
+        accel = self._carried_out(np.asarray(accel_mps2, dtype=np.float64))
         compiled.forces(
             accel,
             speed_mps,
@@ -143,7 +142,7 @@ class Actuation:
             self._transfer_kgpmps2,
             self._axles_kg,
             self._stiffness_prkg,
-            (self._mass, self._rolling, self._drag, _TINY_KG, _MIN_SPEED_MPS),
+            self._constants,
             self._ways,
             self._damping,
             self._lateral_low,
