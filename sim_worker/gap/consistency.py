@@ -98,7 +98,7 @@ def _turn_rates(pairs: Pairs) -> Line | None:
     known = np.isfinite(course) & np.isfinite(gyro)
     course, gyro = course[known], gyro[known]
     seconds = len(course) * _EVERY * PERIOD_S
-    if seconds <= 1.5:
+    if seconds < 1.2:
         return None
     independent = max(seconds / 0.4, 2.0)
     # The course is by far the noisier: over it the gyro's gain would come out too small.
@@ -108,9 +108,14 @@ def _turn_rates(pairs: Pairs) -> Line | None:
         gain_std, offset_std = line.gain_std * gain**2, line.offset_std * gain
         offset = -line.offset * gain
         return line._replace(gain=gain, gain_std=gain_std, offset=offset, offset_std=offset_std)
+    # The slower the car, the less its positions say of its course.
+    weight = pairs.ground_mps[::_EVERY][known] ** 2
+    weight /= np.sum(weight)
     apart = gyro - course
-    std = float(np.std(apart))
-    return Line(1.0, np.inf, float(np.mean(apart)), std / np.sqrt(independent), std, 0.0)
+    offset = float(np.sum(weight * apart))
+    std = float(np.sqrt(np.sum(weight * (apart - offset) ** 2)))
+    heard = independent / (len(weight) * float(np.sum(weight**2)))
+    return Line(1.0, np.inf, offset, std / np.sqrt(heard), std, 0.0)
 
 
 def _missing(pairs: Pairs) -> float:

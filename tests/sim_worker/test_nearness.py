@@ -61,8 +61,8 @@ def test_places_outside_the_grid_and_no_places_at_all_are_far() -> None:
     )
 
 
-def _always(states: Array) -> Any:
-    return np.ones(len(states), dtype=bool)
+def _always(columns: Array) -> Any:
+    return np.ones(columns.shape[1], dtype=bool)
 
 
 @pytest.mark.parametrize("planner", ["pure_pursuit_idm", "constant_speed"])

@@ -107,6 +107,8 @@ def culprit_of(fault: str) -> str:
 
 
 _FAST_MPS, _SLIDES_MPS2 = 6.0, 1.2
+_COURSE_MPS = 2.5
+_ROLLS = {"offset_gyro", "scaled_speed", "offset_speed"}
 _PUSHES = {"drive_gain", "low_drive"}
 _BRAKES = {"brake_gain", "brake_fade", "saturated_brake"}
 _FADED_MPS = 0.4
@@ -118,16 +120,17 @@ def excited_s(fault: str, verdict: Verdict, *, seed: int, end_s: float = DURATIO
 
     Counted are seconds of rolling (above 0.5 m/s) in which the quantity that the fault touches is
     excited:
-    - steering, and sensors of steering, speed and turning, and a model that turns otherwise: the
-      steering wheel is turned by 0.15 rad (9°, 0.01 rad at the tyres), as a sensor without the
-      fault has it;
+    - steering and its sensor, a gyro's scale, and a model that turns otherwise: the steering wheel
+      is turned by 0.15 rad (9°, 0.01 rad at the tyres), as a sensor without the fault has it;
+    - a speed sensor, and a gyro's offset: above 2.5 m/s, where positions tell speed and course;
     - drive, brake: the command is beyond 0.5 m/s²; of a brake that does 0.7 m/s² at most, beyond
       0.7, and of one that fades, beyond 0.5 once a fifth is lost (two of the standard deviations
       that a vehicle file gives its gain: before, it is a brake like others);
     - drag: above 6 m/s;
     - friction: a lateral acceleration beyond the 1.2 m/s² that the slippery model carries.
     """
-    clean = drive_of(seed, fault if culprit_of(fault) == "vehicle" else None, end_s=end_s)
+    faulty = culprit_of(fault) == "vehicle" and fault not in _ROLLS
+    clean = drive_of(seed, fault if faulty else None, end_s=end_s)
     seconds, speed_mps, braked_mps = 0.0, 0.0, 0.0
     for _, message in clean.samples:
         if getattr(message, "stamp_ns", 0) > verdict.stamp_ns:
@@ -138,8 +141,9 @@ def excited_s(fault: str, verdict: Verdict, *, seed: int, end_s: float = DURATIO
             braked_mps += 0.02 * max(-message.accel_mps2, 0.0)
         if speed_mps < 0.5:
             continue
-        if fault == "drag":
-            seconds += 0.02 * (isinstance(message, SpeedSample) and speed_mps > _FAST_MPS)
+        if fault == "drag" or fault in _ROLLS:
+            least_mps = _FAST_MPS if fault == "drag" else _COURSE_MPS
+            seconds += 0.02 * (isinstance(message, SpeedSample) and speed_mps > least_mps)
         elif fault == "friction":
             slides = isinstance(message, ImuSample) and (
                 abs(message.rate_radps[2]) * speed_mps > _SLIDES_MPS2
