@@ -11,6 +11,7 @@ import numpy.typing as npt
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
+from sim_worker import compiled
 from sim_worker.nearness import NearStatics
 from sim_worker.physics import Physics
 from sim_worker.stage_model import PREFIX, change_vehicle, compile_stage, world_spec
@@ -20,7 +21,6 @@ from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
 from sim_worker.vehicle.planar import (
     JOINTS,
     TIMESTEP_S,
-    BaseFromCog,
     box_centre_from_base_m,
     check_steering_delay,
     cog_from_base,
@@ -157,10 +157,6 @@ class Stage:
         self._physics.delay[rows, self._actuators.steer] = steering_delay_s
         self._controls = np.zeros((count, self.steps_per_tick, self.model.nu))
         self._steer_controls = self._controls[:, :, self._actuators.steer].T
-        rate = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
-        reach = rate * np.arange(1.0, self.steps_per_tick + 1)
-        self._reach = np.repeat(reach[:, None], count, axis=1)
-        self._reach_back = -self._reach
         self._actuation = Actuation(
             self.vehicle,
             self._actuators,
@@ -178,9 +174,7 @@ class Stage:
         """Whether contacts were looked for in any simulation during the last tick."""
         self._live = self._states[rows]
         self._motion_now = self._physics.motion[rows].T
-        self._motion = np.empty((8, count))
-        self._base = BaseFromCog(self.vehicle, self._motion, self._live.T)
-        self._base.heading[:] = np.cos(start[:, 2]), np.sin(start[:, 2])
+        self._heading = np.array([np.cos(start[:, 2]), np.sin(start[:, 2])])
         self._sane = np.repeat(_SANE, count, axis=1)
 
     def reseed(
@@ -195,7 +189,7 @@ class Stage:
         check_steering_delay(steering_delay_s)
         self._physics.reset(rows)
         start = self._place(rows, states)
-        self._base.heading[:, rows] = np.cos(start[:, 2]), np.sin(start[:, 2])
+        self._heading[:, rows] = np.cos(start[:, 2]), np.sin(start[:, 2])
         self._tire_command[rows] = start[:, 6]
         self._physics.history[rows, self._steer_history] = start[:, 6:7]
         self._physics.delay[rows, self._actuators.steer] = steering_delay_s
@@ -219,20 +213,14 @@ class Stage:
     def step(self, controls: Controls) -> None:
         """Advance one control tick."""
         columns = self._live.T
-        speed, accel = columns[3], columns[7]
-        self._actuation.apply(speed_mps=speed, accel_mps2=controls.accel_mps2)
+        self._actuation.apply(speed_mps=columns[3], accel_mps2=controls.accel_mps2)
+        angle = np.asarray(controls.tire_angle_rad, dtype=np.float64)
         # The road wheels turn no faster than their rate limit: spread the command over the tick.
-        change = controls.tire_angle_rad - self._tire_command
-        ramp = np.minimum(change, self._reach)
-        np.maximum(ramp, self._reach_back, out=ramp)
-        np.add(ramp, self._tire_command, out=self._steer_controls)
-        np.copyto(self._tire_command, self._steer_controls[-1])
+        rate = self.vehicle.max_tire_rate_radps.value * TIMESTEP_S
+        compiled.ramp(angle, self._tire_command, rate, self._steer_controls)
         self._advance(self._controls)
-        np.negative(speed, out=accel)
-        np.copyto(self._motion, self._motion_now)
-        self._base.read()
-        accel += speed
-        accel /= self.control_dt_s
+        rear = self.vehicle.cog_from_rear_axle_m.value
+        compiled.read_base(self._motion_now, rear, self.control_dt_s, columns, self._heading)
 
     def _advance(self, per_step: Array) -> None:
         if self.looked:
@@ -254,7 +242,7 @@ class Stage:
 
         `columns` (8, S) are those of the states.
         """
-        centre = self._base.heading * self._centre_ahead_m
+        centre = self._heading * self._centre_ahead_m
         centre += columns[:2]
         near = self._near_statics.at(centre)
         slow = np.abs(columns[3:6]) < self._bounds
@@ -270,7 +258,7 @@ class Stage:
     @property
     def heading(self) -> Array:
         """(2, S) cosine and sine of their yaw; live as well."""
-        return self._base.heading
+        return self._heading
 
     def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""
@@ -278,8 +266,7 @@ class Stage:
 
     def any_diverged(self) -> bool:
         """Whether there is such a simulation."""
-        sane = self._is_sane()
-        return bool(np.count_nonzero(sane) < sane.size)
+        return not compiled.all_sane(self._live.T, _SANE[:, 0])
 
     def _is_sane(self) -> npt.NDArray[np.bool_]:
         return np.abs(self._live.T) < self._sane

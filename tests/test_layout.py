@@ -16,7 +16,9 @@ LIMIT_LINES = 300
 
 MACHINE_PATH = re.compile(r"(?<![\w.~-])/(?:work|root|home)(?=/|\b)")
 INDEX_ADDRESS = re.compile(r"pypi" + r"\.org|pythonhosted|index-url|simple/\s*$", re.MULTILINE)
-HEAVY = ("mujoco", "rerun", "numpy", "zenoh", "pyarrow", "matplotlib", "scipy", "osmium")
+HEAVY = (
+    "mujoco", "rerun", "numpy", "numba", "zenoh", "pyarrow", "matplotlib", "scipy", "osmium",
+)  # fmt: skip
 
 
 def tracked_files() -> list[Path]:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from contracts.arrays import Array
+from sim_worker import compiled
 
 SPACING_M = 1.0
 """Between nodes. As it is one metre, an arc length less that of the first node is a place."""
@@ -70,7 +71,7 @@ class FrenetPath:
         self.length_m = float(arc[-1])
 
         before, after = int(before_m / SPACING_M), int((self.length_m + _AFTER_M) / SPACING_M)
-        self._first_arc = -before * SPACING_M
+        self.first_arc_m = -before * SPACING_M
         self.arc_m: Array = np.arange(-before, after + 1, dtype=np.float64) * SPACING_M
         """(M,) arc length of the nodes."""
         self._x = _prolonged(self.arc_m, arc, points[:, 0])
@@ -109,18 +110,6 @@ class FrenetPath:
         return np.column_stack([self._x, self._y, self._heading])
 
     @functools.cached_property
-    def _windows(self) -> dict[int, Array]:
-        return {}
-
-    def _windows_of(self, width: int) -> Array:
-        """(M - width + 1, 2, width) x and y of the nodes from each on, for the search near one."""
-        if width not in self._windows:
-            views = np.lib.stride_tricks.sliding_window_view(self._nodes[:2], width, axis=1)
-            # A copy, whose rows are taken together faster than those of a view.
-            self._windows[width] = views.transpose(1, 0, 2).copy()
-        return self._windows[width]
-
-    @functools.cached_property
     def curvature_pm(self) -> Array:
         """(M,) curvature at the nodes in 1/m, positive to the left, smoothed over 4 m."""
         k = _SMOOTH_NODES
@@ -133,14 +122,15 @@ class FrenetPath:
         √(a_lat / |κ|) at every node, lowered so that a deceleration of `decel_mps2` suffices to
         reach what lies ahead.
         """
-        return np.asarray(self._curve_speeds(lateral_accel_mps2, decel_mps2)[len(self._nodes)])
+        return np.asarray(self.with_curve_speeds(lateral_accel_mps2, decel_mps2)[len(self._nodes)])
 
     @functools.cached_property
     def _profiles(self) -> dict[tuple[float, float], Array]:
         return {}
 
-    def _curve_speeds(self, lateral_accel_mps2: float, decel_mps2: float) -> Array:
-        """Return (10, M) the nodes with the speeds that curves allow there, and their steps."""
+    def with_curve_speeds(self, lateral_accel_mps2: float, decel_mps2: float) -> Array:
+        """Return (10, M) x, y, the unit vector to the left and the speed that curves allow, at the
+        nodes, then the steps of these to the next node."""
         key = (lateral_accel_mps2, decel_mps2)
         if key not in self._profiles:
             square = lateral_accel_mps2 / np.maximum(np.abs(self.curvature_pm), 1e-6)
@@ -152,7 +142,7 @@ class FrenetPath:
 
     def place(self, arc_m: Array) -> NodePlace:
         """Return where arc lengths of any shape lie among the nodes, clipped to the path."""
-        place = arc_m - self._first_arc
+        place = arc_m - self.first_arc_m
         np.maximum(place, 0.0, out=place)
         np.minimum(place, self._last - 1e-9, out=place)
         node = place.astype(np.intp)
@@ -164,25 +154,6 @@ class FrenetPath:
         node, share = self.place(arc_m)
         low = values[node]
         return np.asarray(low + share * (values[node + 1] - low))
-
-    def goal_and_speed(
-        self, arc_m: Array, offset_m: Array, *, lateral_accel_mps2: float, decel_mps2: float
-    ) -> tuple[Array, Array]:
-        """Return points (2, S) at the first row of arc lengths (2, S) and at offsets to the left,
-        and the `speed_profile` (S,) at the second row: one look-up for both.
-
-        No arc length may lie before the path's first node.
-        """
-        share = arc_m - self._first_arc
-        node = share.astype(np.intp)
-        share -= node
-        # From the last node on, there are no more steps: clipping the nodes is enough.
-        table = self._curve_speeds(lateral_accel_mps2, decel_mps2)
-        found = _between(table, NodePlace(node, share))
-        goal, left = found[:2, 0], found[2:4, 0]
-        left *= offset_m
-        goal += left
-        return goal, found[4, 1]
 
     def point_of(self, place: NodePlace, offset_m: Array | float = 0.0) -> Array:
         """Return positions (2, …), x and y, at places and offsets to the left."""
@@ -225,20 +196,16 @@ class FrenetPath:
         With `near_arc_m` (S,) only its surroundings are searched, `within_m` on either side, so
         that a path that crosses itself is followed rather than jumped along.
         """
-        xy = np.asarray(xy_m).T
+        xy = np.asarray(xy_m, dtype=np.float64).T
         if near_arc_m is None:
             end = max(2, int(np.searchsorted(self.arc_m, upto_arc_m, side="right")))
             node = self._nearest(xy_m, end)
         else:
             either = min(math.ceil(within_m / SPACING_M), self._last // 2)
-            first = near_arc_m - (self._first_arc + either)
-            np.maximum(first, 0.0, out=first)
-            np.minimum(first, self._last - 2 * either, out=first)
-            node = first.astype(np.intp)
-            away = self._windows_of(2 * either + 1).take(node, axis=0)
-            away -= xy.T[:, :, None]
-            away *= away
-            node += np.add(away[:, 0], away[:, 1]).argmin(axis=1)
+            found = np.empty((2, xy.shape[1]))
+            near = np.asarray(near_arc_m, dtype=np.float64)
+            compiled.locate(xy, near, self._nodes, self._segments, self.first_arc_m, either, found)
+            return FrenetPoint(found[0], found[1])
         # The node's own tangent decides between the segment before and the one after.
         nodes = self._nodes.take(node, axis=1)
         turned = (xy - nodes[:2]) * nodes[:1:-1]

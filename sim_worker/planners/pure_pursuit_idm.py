@@ -8,14 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from contracts.arrays import Array
+from sim_worker import compiled
+from sim_worker.planners import tracking
 from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import (
-    aside_m,
-    front_from_base_m,
-    lookahead_m,
-    steer_towards,
-    turning_speed,
-)
+from sim_worker.planners.tracking import front_from_base_m
 from sim_worker.vehicle.resistance import resistance_mps2
 
 MAX_ACCEL_MPS2 = 1.5
@@ -34,6 +30,18 @@ LINE_DECEL_MPS2 = 4.0
 _CURVE_TIME_S = 0.5
 _HOLD_SPEED_MPS = 0.3
 _HOLD_MPS2 = -2.0
+
+
+_TRACKING = (
+    tracking.LOOKAHEAD_TIME_S,
+    tracking.MIN_LOOKAHEAD_M,
+    tracking.KEPT_M,
+    tracking.LOOKAHEAD_ASIDE,
+    tracking.MAX_LATERAL_ACCEL_MPS2,
+    tracking.MAX_TURN_RAD,
+    TURNING_ACCEL_MPS2,
+    _CURVE_TIME_S,
+)
 
 
 class _Wishes(NamedTuple):
@@ -57,22 +65,41 @@ class PurePursuitIdm:
         self._wished: _Wishes | None = None
 
     def plan(self, view: PlannerView) -> PlannerOutput:
-        """Answer one control tick."""
-        speed = np.maximum(view.states[:, 3], 0.0)
-        # Where to steer for, and where the speed is looked up.
-        arcs = np.empty((2, len(speed)))
-        arcs[0] = lookahead_m(speed, aside_m(view))
-        np.multiply(speed, _CURVE_TIME_S, out=arcs[1])
-        arcs += view.arc_m
-        goal, allowed = view.path.goal_and_speed(
-            arcs,
-            view.desired_offset_m,
-            lateral_accel_mps2=LATERAL_ACCEL_MPS2,
-            decel_mps2=COMFORT_DECEL_MPS2,
+        """Answer one control tick.
+
+        Free-road acceleration: Treiber, Hennecke, Helbing (2000), Phys. Rev. E 62, eq. 2; above the
+        target speed the improved form of Treiber and Kesting (2013), Traffic Flow Dynamics, eq.
+        11.22, which approaches the comfortable deceleration.
+        """
+        path, vehicle = view.path, view.vehicle
+        states = np.asarray(view.states, dtype=np.float64).T
+        speed = np.maximum(states[3], 0.0)
+        heading = view.heading
+        if heading is None:
+            heading = np.array([np.cos(states[2]), np.sin(states[2])])
+        accel, angle = np.empty(len(speed)), np.empty(len(speed))
+        compiled.curve(
+            states,
+            heading,
+            np.asarray(view.arc_m, dtype=np.float64),
+            np.asarray(view.offset_m, dtype=np.float64),
+            np.asarray(view.desired_offset_m, dtype=np.float64),
+            np.asarray(view.speed_factor, dtype=np.float64),
+            path.with_curve_speeds(LATERAL_ACCEL_MPS2, COMFORT_DECEL_MPS2),
+            path.first_arc_m,
+            vehicle.wheelbase_m.value,
+            vehicle.max_tire_angle_rad.value,
+            vehicle.max_tire_rate_radps.value,
+            _TRACKING,
+            accel,
+            angle,
         )
-        angle = steer_towards(view, goal.T)
-        accel = self._curves(view, speed, angle, allowed)
-        np.minimum(accel, self._free(view, speed), out=accel)
+        wishes = self._wishes(view)
+        compiled.free_road(
+            states, wishes.speed_mps, wishes.accel_mps2, wishes.exponent, COMFORT_DECEL_MPS2, accel
+        )
+        if wishes.stand is not None:
+            accel = np.where(wishes.stand, np.minimum(accel, -COMFORT_DECEL_MPS2), accel)
         if view.stop_arc_m is not None or np.count_nonzero(view.lead_gap_m < np.inf):
             accel -= self._interaction(view, speed)
         np.maximum(accel, -MAX_DECEL_MPS2, out=accel)
@@ -82,27 +109,6 @@ class PurePursuitIdm:
             command = np.where(slow & (accel <= 0.0), _HOLD_MPS2, command)
         return PlannerOutput(command, angle)
 
-    def _free(self, view: PlannerView, speed: Array) -> Array:
-        """Free-road acceleration; above the target speed it approaches the comfortable one.
-
-        Treiber, Hennecke, Helbing (2000), Phys. Rev. E 62, eq. 2; above the target speed the
-        improved form of Treiber and Kesting (2013), Traffic Flow Dynamics, eq. 11.22.
-        """
-        wishes = self._wishes(view)
-        ratio = speed / wishes.speed_mps
-        below = np.minimum(ratio, 1.0)
-        below *= below
-        below *= below
-        np.subtract(1.0, below, out=below)
-        below *= wishes.accel_mps2
-        # At the target speed either is zero, and so they add up.
-        above = np.maximum(ratio, 1.0, out=ratio)
-        np.power(above, wishes.exponent, out=above)
-        above -= 1.0
-        above *= COMFORT_DECEL_MPS2
-        above += below
-        return above if wishes.stand is None else np.where(wishes.stand, -COMFORT_DECEL_MPS2, above)
-
     def _wishes(self, view: PlannerView) -> _Wishes:
         """Return what drivers want; mostly, that stays the same from tick to tick."""
         known, target, factor = self._wished, view.target_speed_mps, view.speed_factor
@@ -111,26 +117,17 @@ class PurePursuitIdm:
             or known.target_speed_mps is not target
             or known.speed_factor is not factor
         ):
-            start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(factor, 0.3), 2.0)
+            start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(factor, 0.3, dtype=np.float64), 2.0)
             stand = target < 0.05
             known = self._wished = _Wishes(
                 target,
                 factor,
-                speed_mps=np.maximum(target, 0.1),
+                speed_mps=np.maximum(target, 0.1, dtype=np.float64),
                 accel_mps2=start,
                 exponent=-start * EXPONENT / COMFORT_DECEL_MPS2,
                 stand=stand if stand.any() else None,
             )
         return known
-
-    def _curves(self, view: PlannerView, speed: Array, angle: Array, profile_mps: Array) -> Array:
-        """Acceleration that follows the speed profile of the curves ahead and of the wheels."""
-        allowed = profile_mps * view.speed_factor
-        turning = turning_speed(view, angle, lateral_accel_mps2=TURNING_ACCEL_MPS2)
-        np.minimum(allowed, turning, out=allowed)
-        allowed -= speed
-        allowed /= _CURVE_TIME_S
-        return allowed
 
     def _interaction(self, view: PlannerView, speed: Array) -> Array:
         """IDM deceleration for what is ahead: a (s* / s)², s* = s0 + v T + v Δv / (2 √(a b))."""

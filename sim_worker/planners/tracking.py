@@ -12,12 +12,12 @@ from sim_worker.planners.base import PlannerView
 
 MIN_LOOKAHEAD_M = 4.0
 LOOKAHEAD_TIME_S = 0.6
-_KEPT_M, _LOOKAHEAD_ASIDE = 0.2, 2.0
+KEPT_M, LOOKAHEAD_ASIDE = 0.2, 2.0
 """From this far beside its line, a car looks farther ahead by so many times the excess: with the
 nearest goal, wheels that turn slowly would swing from side to side for ever."""
 MAX_LATERAL_ACCEL_MPS2 = 7.0
 """No more is steered for, so that wheels at speed need little time to come back."""
-_MAX_TURN_RAD = 0.4
+MAX_TURN_RAD = 0.4
 """How far the car may turn while its wheels are on their way to the wanted angle."""
 
 
@@ -41,9 +41,9 @@ def lookahead_m(speed_mps: Array, aside_m: Array) -> Array:
     """Return how far ahead goals lie for cars so far beside their lines, each (S,)."""
     lookahead = LOOKAHEAD_TIME_S * speed_mps
     np.maximum(lookahead, MIN_LOOKAHEAD_M, out=lookahead)
-    more = aside_m - _KEPT_M
+    more = aside_m - KEPT_M
     np.maximum(more, 0.0, out=more)
-    more *= _LOOKAHEAD_ASIDE
+    more *= LOOKAHEAD_ASIDE
     lookahead += more
     return lookahead
 
@@ -99,7 +99,7 @@ def turning_speed(view: PlannerView, tire_angle_rad: Array, *, lateral_accel_mps
     turned += 1e-6 * rate
     # What the car turns by at 1 m/s until then.
     turned *= bend
-    np.divide(_MAX_TURN_RAD * wheelbase * rate, turned, out=turned)
+    np.divide(MAX_TURN_RAD * wheelbase * rate, turned, out=turned)
     np.divide(lateral_accel_mps2 * wheelbase, bend, out=bend)
     np.sqrt(bend, out=bend)
     return np.minimum(bend, turned, out=bend)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
+from sim_worker import compiled
 from sim_worker.vehicle.lag import ForceLag, lags_of_force
 from sim_worker.vehicle.parameters import GRAVITY_MPS2
 from sim_worker.vehicle.planar import DRIVE, STEER, TYRE_FRONT, TYRE_REAR
@@ -73,7 +74,7 @@ class Actuation:
         self._lateral_low = forcerange[:, tyres, 0].T
         self._lateral_high = forcerange[:, tyres, 1].T
         self._along_low, self._along_high = forcerange[:, ids.drive].T
-        mass = self._mass = vehicle.mass_kg.value
+        mass = vehicle.mass_kg.value
         wheelbase = vehicle.wheelbase_m.value
         rear = vehicle.cog_from_rear_axle_m.value
         axles = mass / wheelbase * np.array([[rear], [wheelbase - rear]])
@@ -94,12 +95,14 @@ class Actuation:
         self._brake_gain = vehicle.brake_gain.value / effective
         self._max_drive = vehicle.max_drive_accel_mps2.value
         self._max_brake = vehicle.max_brake_decel_mps2.value
-        self._drag = vehicle.drag_npv2.value / effective
-        self._rolling = vehicle.rolling_resistance_n.value / effective + _TINY_N
+        drag = vehicle.drag_npv2.value / effective
+        rolling = vehicle.rolling_resistance_n.value / effective + _TINY_N
+        self._constants = tuple(map(float, (mass, rolling, drag, _TINY_KG, _MIN_SPEED_MPS)))
         self._friction = np.array(friction, dtype=np.float64)
         self._gear: Array | None = None
         if backwards is not None and backwards.any():
             self._gear = np.where(backwards, -1.0, 1.0)
+        self._ways = np.ones(count) if self._gear is None else self._gear
         self._lag: ForceLag | None = None
         if tick_s is not None and lags_of_force(vehicle):
             start = np.zeros(count) if accel_mps2 is None else accel_mps2
@@ -116,8 +119,6 @@ class Actuation:
             self._least = np.maximum(-grip, -self._max_brake * self._brake_gain)
         self._grip_square = np.square(grip)
         self._least_square = self._grip_square * _MIN_LATERAL_SHARE**2
-        lightest = self._axles_kg - np.abs(self._transfer_kgpmps2) * grip
-        self._may_lift = bool(lightest.min() < _TINY_KG)
 
     def restart(self, rows: npt.NDArray[np.intp], *, friction: Array, accel_mps2: Array) -> None:
         """Let the vehicles of `rows` (K,) begin anew with `accel_mps2` (K,) on `friction` (K,)."""
@@ -132,35 +133,24 @@ class Actuation:
         Forces along the road are divided by the effective mass factor instead of adding wheel
         inertia to the chassis, which would add it sideways too.
         """
-        accel = self._carried_out(accel_mps2)
-        # The friction circle: what is left across the road.
-        across = np.square(accel)
-        np.subtract(self._grip_square, across, out=across)
-        np.maximum(across, self._least_square, out=across)
-        np.sqrt(across, out=across)
-        axles = self._transfer_kgpmps2 * (accel if self._gear is None else accel * self._gear)
-        axles += self._axles_kg
-        if self._may_lift:
-            np.maximum(axles, _TINY_KG, out=axles)
-        speed = np.abs(speed_mps)
-        slow = np.maximum(speed, _MIN_SPEED_MPS)
-        np.divide(self._stiffness_prkg * axles, slow, out=self._damping)
-        axles *= across
-        self._lateral_high[...] = axles
-        np.negative(axles, out=self._lateral_low)
-        force = self._mass * accel
-        drive = np.maximum(force, 0.0)
-        brake = drive - force
-        brake += self._rolling
-        if self._gear is not None:
-            drive *= self._gear
-        if self._drag:
-            speed *= speed_mps
-            speed *= self._drag
-            drive -= speed
-        self._drive_n[...] = drive
-        np.subtract(drive, brake, out=self._along_low)
-        np.add(drive, brake, out=self._along_high)
+        accel = self._carried_out(np.asarray(accel_mps2, dtype=np.float64))
+        compiled.forces(
+            accel,
+            speed_mps,
+            self._grip_square,
+            self._least_square,
+            self._transfer_kgpmps2,
+            self._axles_kg,
+            self._stiffness_prkg,
+            self._constants,
+            self._ways,
+            self._damping,
+            self._lateral_low,
+            self._lateral_high,
+            np.atleast_2d(self._drive_n),
+            self._along_low,
+            self._along_high,
+        )
 
     def _carried_out(self, command_mps2: Array) -> Array:
         """Return the acceleration (S,) by the tyres that a command leads to now."""
