@@ -175,7 +175,6 @@ class Stage:
         self._live = self._states[rows]
         self._motion_now = self._physics.motion[rows].T
         self._heading = np.array([np.cos(start[:, 2]), np.sin(start[:, 2])])
-        self._sane = np.repeat(_SANE, count, axis=1)
 
     def reseed(
         self,
@@ -262,11 +261,8 @@ class Stage:
 
     def diverged(self) -> npt.NDArray[np.bool_]:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""
-        return np.asarray(~self._is_sane().all(axis=0))
+        return np.asarray(~(np.abs(self._live.T) < _SANE).all(axis=0))
 
     def any_diverged(self) -> bool:
         """Whether there is such a simulation."""
         return not compiled.all_sane(self._live.T, _SANE[:, 0])
-
-    def _is_sane(self) -> npt.NDArray[np.bool_]:
-        return np.abs(self._live.T) < self._sane

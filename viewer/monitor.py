@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -151,8 +151,3 @@ class Monitor:
         rows = self._show_world(active.world_id, drive_ns)
         self._drive.look_at(self._centres.get(active.world_id))
         return rows
-
-
-def handled_channels() -> Iterable[str]:
-    """Return every channel `Monitor.handle` knows."""
-    return (*VEHICLE_CHANNELS, *RUN_CHANNELS)

@@ -173,37 +173,13 @@ def base_from_cog(
     vehicle: VehicleParameters, positions: Array, velocities: Array, out: Array
 ) -> Array:
     """Fill columns 0 to 6 of base_link states `out` (S, 8) from joints (S, 4); returns `out`."""
-    BaseFromCog(vehicle, np.concatenate([positions.T, velocities.T]), out.T).read()
+    rear = vehicle.cog_from_rear_axle_m.value
+    columns, place, motion = out.T, positions.T, velocities.T
+    ahead = np.array([np.cos(place[2]), np.sin(place[2])])
+    columns[:2] = place[:2] - rear * ahead
+    columns[2:7:4] = place[2:]
+    columns[3] = np.add(*(ahead * motion[:2]))
+    across = ahead[::-1] * motion[:2]
+    columns[4] = across[1] - across[0] - rear * motion[2]
+    columns[5] = motion[2]
     return out
-
-
-class BaseFromCog:
-    """Turns joints of S vehicles into base_link states, tick by tick in the same arrays.
-
-    `joints` (8, S) are positions and velocities as of `cog_from_base`; of `states` (8, S), rows 0
-    to 6 are filled. `heading` (2, S) is the cosine and sine of the yaw that was read last.
-    """
-
-    def __init__(self, vehicle: VehicleParameters, joints: Array, states: Array) -> None:
-        self._rear_m = vehicle.cog_from_rear_axle_m.value
-        self.heading: Array = np.empty((2, joints.shape[1]))
-        # To cut arrays costs as much as to add their numbers: it is done here, once.
-        self._cos, self._sin = self.heading
-        self._across = self.heading[::-1]
-        self._cog, self._angles, self._yaw = joints[:2], joints[2:4], joints[2]
-        self._velocity, self._yaw_rate = joints[4:6], joints[6]
-        self._base, self._base_angles = states[:2], states[2:7:4]
-        self._u, self._v, self._r = states[3:6]
-
-    def read(self) -> None:
-        """Fill the states from what the joints are now."""
-        np.cos(self._yaw, out=self._cos)
-        np.sin(self._yaw, out=self._sin)
-        np.subtract(self._cog, self._rear_m * self.heading, out=self._base)
-        self._base_angles[...] = self._angles
-        ahead_x, ahead_y = self.heading * self._velocity
-        np.add(ahead_x, ahead_y, out=self._u)
-        left_x, left_y = self._across * self._velocity
-        np.subtract(left_y, left_x, out=self._v)
-        self._v -= self._rear_m * self._yaw_rate
-        self._r[...] = self._yaw_rate
