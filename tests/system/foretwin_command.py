@@ -40,7 +40,7 @@ def environment(cache: Path) -> dict[str, str]:
     return os.environ | {"XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(REPOSITORY)}
 
 
-def foretwin(out: Path, *arguments: str, timeout_s: float = 240.0) -> Finished:
+def foretwin(out: Path, *arguments: str, timeout_s: float = 280.0) -> Finished:
     """Run `foretwin drive` to its end."""
     with started(out, *arguments) as process:
         screen, _ = process.communicate(timeout=timeout_s)
