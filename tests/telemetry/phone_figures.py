@@ -24,6 +24,7 @@ from telemetry.standin.path import DrivenPath
 from telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.telemetry.city_drive import antenna_xy, phone_positions, xy_of
 from tests.telemetry.standin_drive import FRAME, Drive
+from tests.telemetry.town_map import Leg, MapSeer
 
 DURATION_S = 600.0
 STD_M = {"3 m on each axis": 3.0, "3 m in the plane (2.1 m on each axis)": 3.0 / math.sqrt(2.0)}
@@ -44,16 +45,24 @@ class Errors(NamedTuple):
     yaw_std_rad: Array
 
 
-@functools.cache
-def town_drive(seed: int, duration_s: float = DURATION_S) -> Drive:
-    """Return a drive through streets, turns and stops drawn at random."""
+class Streets(NamedTuple):
+    """A way (N, 2) through a town, the speed wished along it (N,), and its legs."""
+
+    xy_m: Array
+    wish_mps: Array
+    legs: list[Leg]
+
+
+def town_streets(seed: int, duration_s: float = DURATION_S) -> Streets:
+    """Return streets, turns and stops drawn at random."""
     random = np.random.default_rng(seed)
-    xy, wish = [np.zeros(2)], [12.0]
+    xy, wish, legs = [np.zeros(2)], [12.0], []
     yaw = 0.0
     while len(xy) < duration_s * _MEANDER_MPS:
         turn = float(random.choice([-1.0, 1.0]) * random.choice([0.3, math.pi / 4, math.pi / 2]))
         radius = random.uniform(10.0, 35.0) if abs(turn) > 1.0 else random.uniform(40.0, 80.0)
         straight_m, stops = random.uniform(60.0, 220.0), random.random() < 0.3
+        legs.append(Leg(straight_m, turn, radius))
         for length, curvature in (
             (straight_m, 0.0),
             (abs(turn) * radius, turn / abs(turn) / radius),
@@ -66,17 +75,24 @@ def town_drive(seed: int, duration_s: float = DURATION_S) -> Drive:
                 wish.append(12.0)
             if stops and curvature == 0.0:
                 wish[-3] = 0.0
-    geo = geo_from_local(FRAME, np.array(xy))
+    return Streets(np.array(xy), np.array(wish), legs)
+
+
+@functools.cache
+def town_drive(seed: int, duration_s: float = DURATION_S) -> Drive:
+    """Return a drive through `town_streets`."""
+    streets = town_streets(seed, duration_s)
+    geo = geo_from_local(FRAME, streets.xy_m)
     parameters = read_parameters()
-    path = DrivenPath(geo[:, 0], geo[:, 1], np.array(wish), driver=parameters.driver)
+    path = DrivenPath(geo[:, 0], geo[:, 1], streets.wish_mps, driver=parameters.driver)
     source = StandinSource(path, parameters, vehicle_id="standin", seed=seed)
     samples = source.advance(START_STAMP_NS + round(duration_s * 1e9))
     heard = ("gnss", "imu", "speed", "steering")
     return Drive(source, [sample for sample in samples if sample[0] in heard])
 
 
-def estimated(drive: Drive, *, seed: int, std_m: float) -> Errors:
-    """Return the errors twice a second, from samples in their order."""
+def estimated(drive: Drive, *, seed: int, std_m: float, roads: MapSeer | None = None) -> Errors:
+    """Return the errors ten times a second, from samples in their order; `roads` knows a map."""
     track = MotionTrack(
         drive.source.info, wheelbase_m=drive.source.wheelbase_m, steering_ratio=15.3
     )
@@ -85,8 +101,11 @@ def estimated(drive: Drive, *, seed: int, std_m: float) -> Errors:
         track.take(channel, message)
         if not track.started or message.stamp_ns < due_ns:
             continue
-        due_ns = message.stamp_ns + 500_000_000
+        due_ns = message.stamp_ns + 100_000_000
         state, truth = track.state(message.stamp_ns), drive.source.truth(message.stamp_ns)
+        line = None if roads is None else roads.line(state)
+        if line is not None:
+            track.take("map", line)
         rows.append((
             (message.stamp_ns - START_STAMP_NS) * 1e-9,
             float(np.hypot(*(xy_of(state) - xy_of(truth)))),
