@@ -7,6 +7,7 @@ beside the road's direction, or where its position is better than any map.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from contracts.arrays import Array
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
 from orchestrator.way.map_matching import Match
-from orchestrator.way.road_index import EdgeKey, RoadIndex, key_of, legality
+from orchestrator.way.road_index import EdgeKey, NearEdge, key_of, legality
 from orchestrator.way.route import Route
 from telemetry.map_aid import RoadLine
 from world_gen.cross_section import cross_section
@@ -49,14 +50,20 @@ class _Side(NamedTuple):
 class RoadLines:
     """Offers lines to the estimator; about one for every 5 m driven."""
 
-    def __init__(self, graph: RoadGraph, index: RoadIndex) -> None:
+    def __init__(self, graph: RoadGraph) -> None:
         self._graph = graph
-        self._index = index
         self._sides: dict[EdgeKey, _Side] = {}
         self._offered_xy: Array | None = None
 
     def near(
-        self, state: VehicleState, xy_m: Array, match: Match, route: Route, s_m: float
+        self,
+        state: VehicleState,
+        xy_m: Array,
+        match: Match,
+        route: Route,
+        s_m: float,
+        *,
+        roads_near: Sequence[NearEdge],
     ) -> RoadLine | None:
         """Return the line at a state's place `xy_m` (2,) in the graph's frame, None in doubt."""
         std_m = state.position_std_m
@@ -76,7 +83,9 @@ class RoadLines:
         off_m = match.lateral_m - side.left_m
         if course is None or abs(off_m) > _SURE * math.hypot(std_m, side.spread_m):
             return None
-        if self._another_road(xy_m, std_m, course, {e.edge.index for e in _around(route, place)}):
+        known = {e.edge.index for e in route.edges[max(0, place - 2) : place + 3]}
+        others = [near for near in roads_near if near.directed_edge.edge.index not in known]
+        if self._another_road(others, std_m, course):
             return None
         self._offered_xy = xy_m
         left = np.array([-math.sin(course), math.cos(course)])
@@ -99,25 +108,18 @@ class RoadLines:
             self._sides[key] = _side_of(self._graph, directed)
         return self._sides[key]
 
-    def _another_road(self, xy_m: Array, std_m: float, course_rad: float, known: set[int]) -> bool:
-        """Whether the car may be on a road that runs alike and is none of the `known` edges."""
-        reach_m = _SURE * math.hypot(std_m, MAP_STD_M) + 6.0
-        for near in self._index.near(xy_m, reach_m):
+    def _another_road(self, others: Sequence[NearEdge], std_m: float, course_rad: float) -> bool:
+        """Whether the car may be on one of these instead, which runs alike beside it."""
+        for near in others:
             directed = near.directed_edge
-            if directed.edge.index in known or not directed.allowed:
-                continue
-            if not 0.0 < near.s_m < directed.edge.length_m - 1e-6:
-                continue  # it begins or ends here, before or behind the car
             if abs(math.remainder(near.heading_rad - course_rad, math.tau)) > _LIKE_RAD:
                 continue
+            if not directed.allowed or not 0.0 < near.s_m < directed.edge.length_m - 1e-6:
+                continue  # the wrong way, or it begins or ends before or behind the car
             side = self._side(directed)
             if abs(near.lateral_m - side.left_m) < _SURE * math.hypot(std_m, side.spread_m):
                 return True
         return False
-
-
-def _around(route: Route, place: int) -> tuple[DirectedEdge, ...]:
-    return route.edges[max(0, place - 2) : place + 3]
 
 
 def _straight(route: Route, place: int, s_m: float) -> float | None:

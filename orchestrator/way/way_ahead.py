@@ -53,7 +53,7 @@ class WayAhead:
         self._graph = graph
         self._matcher = MapMatcher(graph, index=index)
         self._follower = RouteFollower(graph, junctions, routes, index=index)
-        self._lines = RoadLines(graph, index)
+        self._lines = RoadLines(graph)
         self._pace = DrivingPace()
         self._cruise = CruiseSpeed()
         self._given = bool(routes)
@@ -86,7 +86,10 @@ class WayAhead:
         if self._match is None or self._progress is None or not state.yaw_valid:
             return None
         xy = local_from_geo(self._graph.frame, state.position.lat_deg, state.position.lon_deg)
-        return self._lines.near(state, xy, self._match, self._follower.route, self._progress.s_m)
+        return self._lines.near(
+            state, xy, self._match, self._follower.route, self._progress.s_m,
+            roads_near=self._matcher.roads_near,
+        )  # fmt: skip
 
     @property
     def s_m(self) -> float:

@@ -1,9 +1,10 @@
 """What ten minutes with a telephone's positions give, beside what any filter could make of them.
 
-    python -m tests.telemetry.phone_figures [SEEDS]
+    python -m tests.telemetry.phone_figures [SEEDS [map]]
 
-prints a table; each of the SEEDS (6) takes about half a minute of CPU. Errors of positions are
-alike over 30 s and come once a second; 3 m may be meant on each axis or in the plane.
+prints a table; each of the SEEDS (6) takes about a minute of CPU. Errors of positions are alike
+over 30 s and come once a second; 3 m may be meant on each axis or in the plane. `map` prints alone
+what they give with a map of the way, whose streets lie beside where they really are.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from telemetry.standin.path import DrivenPath
 from telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.telemetry.city_drive import antenna_xy, phone_positions, xy_of
 from tests.telemetry.standin_drive import FRAME, Drive
-from tests.telemetry.town_map import Leg, MapSeer
+from tests.telemetry.town_map import Leg, MapSeer, seer
 
 DURATION_S = 600.0
 STD_M = {"3 m on each axis": 3.0, "3 m in the plane (2.1 m on each axis)": 3.0 / math.sqrt(2.0)}
@@ -32,6 +33,8 @@ WINDOWS_S = {"30 s": (25, 35), "1 min": (50, 70), "2 min": (110, 130), "5 min": 
              "10 min": (560, 600)}  # fmt: skip
 GYRO_BIAS_STD_RADPS = 2e-4
 """What two seconds of standing leave unknown of a gyro with 0.002 rad/s of white noise."""
+MAP_ERRORS_M = (1.0, 2.0)
+"""How far beside its place a map has each street: one standard deviation."""
 _MEANDER_MPS = 9.5
 
 
@@ -158,10 +161,35 @@ def _between(errors: list[Errors], window_s: tuple[int, int]) -> Errors:
     return Errors(*np.concatenate(cut, axis=1))
 
 
+def _print_with_map(drives: list[Drive], seeds: range) -> None:
+    for error_m in MAP_ERRORS_M:
+        print(f"3 m on each axis, with a map whose streets are off by {error_m:.0f} m:")
+        found = [mapped(drives[k % 2], 1 + k % 2, seed=k, error_m=error_m) for k in seeds]
+        for label, window_s in WINDOWS_S.items():
+            at = _between(found, window_s)
+            within = np.mean(at.position_m < 2.448 * at.position_std_m)
+            print(
+                f"  after {label:6s} position p95 {np.percentile(at.position_m, 95):4.1f} m "
+                f"heading p95 {np.degrees(np.percentile(at.yaw_rad, 95)):4.2f} deg; "
+                f"says {2.448 * at.position_std_m.mean():4.1f} m "
+                f"{1.96 * np.degrees(at.yaw_std_rad.mean()):4.2f} deg; within {within:.2f}",
+                flush=True,
+            )
+
+
+def mapped(drive: Drive, streets: int, *, seed: int, error_m: float) -> Errors:
+    """Return the errors of `town_drive(streets)` with a map, found on it without a route."""
+    roads = seer(town_streets(streets).legs, seed=seed, error_m=error_m)
+    return estimated(drive, seed=100 + seed, std_m=3.0, roads=roads)
+
+
 def main(arguments: list[str]) -> int:
-    """Print the table: 95 % of positions and headings after so long, and the bounds' 95 %."""
+    """Print 95 % of positions and headings after so long, with and without a map, and bounds."""
     seeds = range(int(arguments[0]) if arguments else 6)
     drives = [town_drive(1), town_drive(2)]
+    _print_with_map(drives, seeds)
+    if arguments[1:] == ["map"]:
+        return 0
     for name, std_m in STD_M.items():
         print(f"{name}, {len(seeds)} seeds on two drives:")
         found = [estimated(drives[k % 2], seed=100 + k, std_m=std_m) for k in seeds]
