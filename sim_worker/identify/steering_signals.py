@@ -27,7 +27,7 @@ Indices = np.ndarray[Any, np.dtype[np.int64]]
 WIDTH_S = 0.1
 ALIKE_S = 2.0 * math.sqrt(math.pi) * WIDTH_S
 """For so long, smoothed white noise says one thing only."""
-_LEAST_STOOD = 3.0
+_LEAST_STOOD = 4.0
 _MAX_LATERAL_MPS2 = 4.0
 """Beyond it, tyres are no longer linear."""
 _LEAST_FEED = 0.2
@@ -92,10 +92,11 @@ class SteeringSignals(NamedTuple):
 
 
 def _mean(values: Array, *, alike: float) -> tuple[float, float]:
+    """Return mean and its std, as wide as Student's of so few that are not `alike`."""
     count = len(values) / alike
     if count < _LEAST_STOOD:
         return 0.0, math.inf
-    return float(np.mean(values)), float(np.std(values) / math.sqrt(count - 1.0))
+    return float(np.mean(values)), float(np.std(values) / math.sqrt(count - 3.0))
 
 
 def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> SteeringSignals:
