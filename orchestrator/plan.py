@@ -21,6 +21,7 @@ from orchestrator.config import ConfigError, DriveConfig, VehicleBeside
 from orchestrator.doctor import has_display
 from orchestrator.endpoints import free_endpoint
 from orchestrator.maps.opening import Clip, open_map
+from orchestrator.ros2_mapping import read_ros2
 from orchestrator.rounds.jobs import scenarios_of
 from orchestrator.way.line_matching import match_line
 from orchestrator.way.road_index import RoadIndex
@@ -29,7 +30,7 @@ from orchestrator.way.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import check_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line
-from telemetry.ros2.mapping import MappingFile, read_mapping
+from telemetry.ros2.mapping import MappingFile
 from telemetry.standin.parameters import read_parameters
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
@@ -132,7 +133,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
     if config.standin_parameters is not None:
         read_parameters(Path(config.standin_parameters))
-    ros2 = read_mapping(Path(config.ros2)) if config.ros2 else None
+    ros2 = read_ros2(config)
     map_file = Path(config.map) if config.map else EMBEDDED_MAP
     source = config.resolved_source
     info, positions, log_file = None, None, None

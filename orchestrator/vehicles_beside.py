@@ -16,14 +16,13 @@ from contracts.codec import SchemaMismatch
 from contracts.drive import (
     ControlCommand,
     RoadUser,
-    RoadUserKind,
     RoadUsers,
     VehicleInfo,
     VehicleState,
 )
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo, wrap_angle
 from contracts.roles import OtherVehicle, OtherVehicles, Role
-from contracts.vehicle import VehicleParameters
+from contracts.vehicle import VehicleParameters, kind_by_length
 from orchestrator.intake import Surroundings
 from orchestrator.plan import Beside, DrivePlan
 from sim_worker.vehicle.planar import box_centre_from_base_m
@@ -36,7 +35,6 @@ PERIOD_NS = 18_000_000
 FRESH_NS = 500_000_000
 SAME_WITHIN_M = 2.0
 """A detection whose centre is so near to that of a vehicle with telemetry of its own is it."""
-_VAN_M, _LORRY_M = 5.2, 7.0
 
 
 def estimator_of(info: VehicleInfo, vehicle: VehicleParameters) -> StateEstimator:
@@ -194,13 +192,10 @@ def _moved(position: GeoPoint, yaw_rad: float, ahead_m: float) -> GeoPoint:
 def road_user(state: VehicleState, vehicle: VehicleParameters) -> RoadUser:
     """Return a vehicle as the road user that futures meet."""
     length_m = vehicle.length_m.value
-    kind: RoadUserKind = "car"
-    if length_m > _VAN_M:
-        kind = "van" if length_m < _LORRY_M else "lorry"
     ahead_m = box_centre_from_base_m(vehicle)
     return RoadUser(
         user_id=state.vehicle_id,
-        kind=kind,
+        kind=kind_by_length(length_m),
         position=_moved(state.position, state.yaw_rad, ahead_m),
         yaw_rad=state.yaw_rad,
         speed_mps=state.speed_mps,

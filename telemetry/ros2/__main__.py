@@ -28,6 +28,7 @@ def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
             vehicle_id=setup.vehicle_id,
             drive_frame=setup.drive_frame,
             flag_on=setup.towards_vehicle,
+            car=setup.vehicle,
         )
         life.ready()
         while not life.over:
