@@ -10,10 +10,11 @@ import time
 
 from contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
 from contracts.codec import SchemaMismatch
-from contracts.drive import VehicleInfo
+from contracts.drive import InfoRequest, VehicleInfo
 from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key, vehicle_of_key
 from contracts.simulation import ActiveWorld
 from contracts.world import World
+from orchestrator.beside.vehicles import VehiclesBeside
 from orchestrator.changes.desk import ChangeDesk
 from orchestrator.changes.roles import CorrectionHandler, RoleHandler, RolesInForce
 from orchestrator.events import EventDesk
@@ -29,7 +30,6 @@ from orchestrator.record.results import ResultTables
 from orchestrator.rounds.runner import RoundRunner
 from orchestrator.tuning.by_hand import VehicleHandler
 from orchestrator.tuning.link import FINDINGS, TuningLink
-from orchestrator.vehicles_beside import VehiclesBeside
 from orchestrator.world_desk import WorldDesk
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -84,7 +84,12 @@ class Conductor:
              "vehicle": VehicleHandler(self.tuning.parameters)}
         )  # fmt: skip
         self.beside = VehiclesBeside(
-            plan, publish=lambda message: bus.publish("other_vehicles", message, run=plan.run_id)
+            plan,
+            publish=lambda message: bus.publish("other_vehicles", message, run=plan.run_id),
+            ask_info=lambda name: bus.request(
+                "info", InfoRequest(), self.mailbox, tag=name, vehicle=name
+            ),
+            tell=self.tell,
         )
         self._active_world: str | None = None
         self._world_untold = False
@@ -138,6 +143,8 @@ class Conductor:
                 )
             case Reply(channel="prepare"):
                 self.worlds.prepare_reply(item)
+            case Reply(channel="info"):
+                self.beside.take_info(item.tag, item.message)
             case Reply(channel="use_world" | "use_roles"):
                 self.questions.answered()
             case Reply(channel="use_vehicle" | "tune"):

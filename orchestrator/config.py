@@ -40,6 +40,8 @@ class VehicleBeside(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """Seconds of the log that have passed as the car's drive begins; None: by UTC, where both logs
     have it, else none."""
     live: bool = False
+    ros2: str | None = None
+    """A mapping in TOML, or `autoware`: how a live vehicle's own ROS 2 topics are read."""
     seen_as: str | None = None
 
     def trouble(self) -> str | None:
@@ -50,6 +52,8 @@ class VehicleBeside(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
             return "role all is the car's alone; must be twin, shadow or ghost"
         if (self.log is not None) + self.live + (self.seen_as is not None) != 1:
             return "needs exactly one of log = FILE, live = true, seen_as = ID"
+        if self.ros2 is not None and not self.live:
+            return "ros2 = MAPPING needs live = true: its topics are the vehicle's telemetry"
         return None
 
 

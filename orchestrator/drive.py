@@ -262,6 +262,7 @@ class _Drive:
         while (item := conductor.mailbox.take()) is not None:
             conductor.handle(item)
         conductor.changes.refuse_all("the drive is over")
+        conductor.beside.close()
         conductor.tables.close()
         if conductor.tables.failed:
             line.say(f"error: {conductor.tables.failed}")

@@ -21,7 +21,7 @@ from orchestrator.config import ConfigError, DriveConfig, VehicleBeside
 from orchestrator.doctor import has_display
 from orchestrator.endpoints import free_endpoint
 from orchestrator.maps.opening import Clip, open_map
-from orchestrator.ros2_mapping import read_ros2
+from orchestrator.ros2_mapping import read_ros2, read_ros2_beside
 from orchestrator.rounds.jobs import scenarios_of
 from orchestrator.way.line_matching import match_line
 from orchestrator.way.road_index import RoadIndex
@@ -54,6 +54,8 @@ class Beside(NamedTuple):
     config: VehicleBeside
     vehicle: VehicleParameters
     commands_recorded: bool
+    ros2: MappingFile | None = None
+    """How its own ROS 2 topics are read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,7 +205,8 @@ def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
 def _read_beside(config: VehicleBeside, own: VehicleParameters) -> Beside:
     vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
     if config.log is None:
-        return Beside(config, vehicle, commands_recorded=config.live)
+        ros2 = read_ros2_beside(config)
+        return Beside(config, vehicle, commands_recorded=config.live, ros2=ros2)
     file = Path(config.log)
     if not file.exists():
         raise FileNotFoundError(f"recorded drive {file} of {config.id}: no such file or folder")

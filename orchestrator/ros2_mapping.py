@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orchestrator.config import DriveConfig
+from orchestrator.config import DriveConfig, VehicleBeside
 from telemetry.ros2.mapping import MappingError, MappingFile, read_mapping
 
 
@@ -24,4 +24,17 @@ def read_ros2(config: DriveConfig) -> MappingFile | None:
             raise MappingError(f"{where}: not in the drive's [[vehicles]], which are {known}")
         if beside[name].seen_as is not None:
             raise MappingError(f"{where}: the car detects it itself; nothing of that comes back")
+    return read
+
+
+def read_ros2_beside(config: VehicleBeside) -> MappingFile | None:
+    """Return the mapping of a vehicle beside the car, None where it speaks no ROS 2.
+
+    Raises MappingError or FileNotFoundError, one line.
+    """
+    if config.ros2 is None:
+        return None
+    read = read_mapping(Path(config.ros2))
+    if not read.mapping.inwards:
+        raise MappingError(f"{read.name}: no [[in]]: nothing of {config.id} would be heard")
     return read

@@ -228,6 +228,13 @@ def parse_mapping(text: str, *, name: str) -> Mapping:
     return mapping
 
 
+def listening_only(mapping: Mapping) -> Mapping:
+    """Return a mapping by which nothing goes out."""
+    return msgspec.structs.replace(
+        mapping, outwards=(), placed=(), mirrored=Mirrored(), towards_vehicle=TowardsVehicle()
+    )
+
+
 def _check_head(mapping: Mapping) -> None:
     if not 0 <= mapping.domain <= 232:
         raise ValueError(f"domain {mapping.domain}: 0 to 232")
