@@ -10,7 +10,7 @@ import time
 
 from contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
 from contracts.codec import SchemaMismatch
-from contracts.drive import InfoRequest, VehicleInfo
+from contracts.drive import VehicleInfo
 from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key, vehicle_of_key
 from contracts.simulation import ActiveWorld
 from contracts.world import World
@@ -28,6 +28,7 @@ from orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
 from orchestrator.questions import Questions
 from orchestrator.record.results import ResultTables
 from orchestrator.rounds.runner import RoundRunner
+from orchestrator.route_desk import RouteDesk
 from orchestrator.tuning.by_hand import VehicleHandler
 from orchestrator.tuning.link import FINDINGS, TuningLink
 from orchestrator.world_desk import WorldDesk
@@ -83,14 +84,8 @@ class Conductor:
             {"role": RoleHandler(self.roles), "correction": CorrectionHandler(self.roles),
              "vehicle": VehicleHandler(self.tuning.parameters)}
         )  # fmt: skip
-        self.beside = VehiclesBeside(
-            plan,
-            publish=lambda message: bus.publish("other_vehicles", message, run=plan.run_id),
-            ask_info=lambda name: bus.request(
-                "info", InfoRequest(), self.mailbox, tag=name, vehicle=name
-            ),
-            tell=self.tell,
-        )
+        self.beside = VehiclesBeside(plan, bus, self.mailbox, tell=self.tell)
+        self.route = RouteDesk(plan, use=mission.give_route, tell=self.tell)
         self._active_world: str | None = None
         self._world_untold = False
 
@@ -103,6 +98,7 @@ class Conductor:
         for one in (vehicle, *live):
             for channel in TELEMETRY_CHANNELS:
                 self.bus.subscribe(channel, self.mailbox, vehicle=one)
+        self.route.join(self.bus, self.mailbox)
         for channel in ("mirror", "event"):
             self.bus.subscribe(channel, self.mailbox, run=run)
         self.tuning.join()
@@ -131,6 +127,8 @@ class Conductor:
                 self.mirror.take(item.message())
             case Received(channel="event"):
                 self.events.heard(item.message())
+            case Received(channel="route"):
+                self.route.take(item)
             case Received(channel=channel) if channel in FINDINGS:
                 self.tuning.heard(item)
             case Received():
@@ -176,6 +174,7 @@ class Conductor:
         self.watch_telemetry(item.received_mono_ns)
         self.beside.keep_up_with(state, self.intake.road_users)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
+        self.route.keep_up_with(state, self.intake.plan)
         self.rounds.take_state(state)
         self.rounds.windows.take(self.intake.surroundings, state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))

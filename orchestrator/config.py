@@ -66,7 +66,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     map: str | None = None
     route: str | None = None
-    """A GPX or GeoJSON file, or `from-log`; None predicts the route from the road graph."""
+    """A GPX or GeoJSON file, `from-log`, or `live`: to the goal that the live car says it has; None
+    predicts the route from the road graph."""
     log: str | None = None
     source: Source = "auto"
     start_s: float = 0.0
@@ -146,6 +147,10 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             (
                 self.route != "from-log" or self.log is not None,
                 "--route from-log needs --log FILE",
+            ),
+            (
+                self.route != "live" or self.source == "live",
+                "--route live needs --source live: a car that says where it drives to",
             ),
             (
                 self.ros2 is None or self.source == "live",

@@ -263,6 +263,7 @@ class _Drive:
             conductor.handle(item)
         conductor.changes.refuse_all("the drive is over")
         conductor.beside.close()
+        conductor.route.close()
         conductor.tables.close()
         if conductor.tables.failed:
             line.say(f"error: {conductor.tables.failed}")

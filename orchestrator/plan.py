@@ -232,6 +232,8 @@ def _bounds_text(graph: RoadGraph) -> str:
 
 def _given_line(config: DriveConfig, positions: Array | None) -> Array | None:
     """Return the line (N, 2) of degrees that the route shall follow; None: it is predicted."""
+    if config.route == "live":
+        return None
     if config.route == "from-log":
         return positions
     route_file = config.route
@@ -247,7 +249,7 @@ def _routes(
 ) -> tuple[tuple[Route, ...], str]:
     """Return the given routes, none where the route is predicted, and where they came from."""
     if given is None:
-        return (), "predicted"
+        return (), "live" if config.route == "live" else "predicted"
     from_log = config.route == "from-log"
     what = f"from-log of {config.log}" if from_log else config.route or EMBEDDED_ROUTE
     source = "from-log" if from_log else "given"

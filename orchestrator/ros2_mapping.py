@@ -6,6 +6,7 @@ from pathlib import Path
 
 from orchestrator.config import DriveConfig, VehicleBeside
 from telemetry.ros2.mapping import MappingError, MappingFile, read_mapping
+from telemetry.ros_parts import LANELET_ROUTE
 
 
 def read_ros2(config: DriveConfig) -> MappingFile | None:
@@ -16,6 +17,11 @@ def read_ros2(config: DriveConfig) -> MappingFile | None:
     if config.ros2 is None:
         return None
     read = read_mapping(Path(config.ros2))
+    if config.route == "live":
+        if not any(row.type == LANELET_ROUTE for row in read.mapping.inwards):
+            raise MappingError(f"{read.name}: --route live needs an [[in]] of type {LANELET_ROUTE}")
+        if read.mapping.map_place is None:
+            raise MappingError(f"{read.name}: --route live needs [map] lat_deg, lon_deg")
     beside = {one.id: one for one in config.vehicles}
     for name in read.mapping.mirrored.vehicles:
         where = f"{read.name}: [mirrored] vehicles {name!r}"

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.bus import Received
-from contracts.drive import RoadUser, RoadUsers, VehicleInfo, VehicleState
+from contracts.bus import Bus, Mailbox, Received
+from contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleInfo, VehicleState
 from contracts.frames import local_from_geo
 from contracts.roles import OtherVehicles, Role
 from contracts.vehicle import VehicleParameters, kind_by_length
@@ -49,20 +49,20 @@ class VehiclesBeside:
     def __init__(
         self,
         plan: DrivePlan,
+        bus: Bus,
+        mailbox: Mailbox,
         *,
-        publish: Callable[[OtherVehicles], None],
-        ask_info: Callable[[str], None],
         tell: Callable[[Tell], None],
     ) -> None:
-        """`ask_info` asks a vehicle on the bus what it is; `take_info` takes the answer."""
+        """What a vehicle answers that was asked what it is lands in `mailbox`, for `take_info`."""
+        self._bus, self._mailbox, self._run_id = bus, mailbox, plan.run_id
         self._crew = crew = plan.beside
         self._sources: dict[str, Source] = {}
         self._waits = plan.config.lock_step
-        self._ask_info, self._tell = ask_info, tell
+        self._tell = tell
         self._vehicles = {one.config.id: one.vehicle for one in crew}
         self._seen_as = {one.config.seen_as for one in crew}
         self._frame = plan.drive_frame
-        self._publish = publish
         self._latest: dict[str, VehicleState] = {}
         self._detected_ns: int | None = None
 
@@ -85,6 +85,9 @@ class VehiclesBeside:
         if config.seen_as is not None:
             return DetectedBeside(config.id, config.seen_as, vehicle)
         return LiveBeside(config.id, vehicle, ask_info=self._ask_info, tell=self._tell)
+
+    def _ask_info(self, vehicle_id: str) -> None:
+        self._bus.request("info", InfoRequest(), self._mailbox, tag=vehicle_id, vehicle=vehicle_id)
 
     def take_sample(self, vehicle_id: str, item: Received) -> None:
         """Take a sample of a vehicle on the bus."""
@@ -110,7 +113,8 @@ class VehiclesBeside:
         heard = [one for s in self._sources.values() for one in s.states_until(own)]
         heard.sort(key=lambda one: (one.state.stamp_ns, one.state.vehicle_id))
         self._latest |= {one.state.vehicle_id: one.state for one in heard}
-        self._publish(OtherVehicles(stamp_ns=own.stamp_ns, heard=tuple(heard)))
+        message = OtherVehicles(stamp_ns=own.stamp_ns, heard=tuple(heard))
+        self._bus.publish("other_vehicles", message, run=self._run_id)
 
     def among(
         self, said: Surroundings, own: VehicleState, roles: Mapping[str, Role]

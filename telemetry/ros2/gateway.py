@@ -38,6 +38,7 @@ _MEASURED_WITHIN_NS = 500_000_000
 """A measured steering angle that is older says nothing of now."""
 _STATE_EVERY_NS = 20_000_000
 _OBJECTS_EVERY_NS = 100_000_000
+_ROUTE_EVERY_NS = 1_000_000_000
 
 log = logging.getLogger("telemetry.ros2")
 
@@ -120,6 +121,8 @@ class Gateway:
                 break
             self._pass_on(item)
             self._hear()
+        if self.inwards.route is not None and self._due("route", _ROUTE_EVERY_NS):
+            self._bus.publish("route", self.inwards.route, vehicle=self._vehicle_id)
         self.introduction.answer(now_ns=self._mono_ns())
         self._diagnose()
 

@@ -59,18 +59,32 @@ def own(t_s: float, x_m: float = 0.0) -> VehicleState:
     )  # fmt: skip
 
 
+class HearingBus(MemoryBus):
+    """Keeps what is passed on, and who was asked what it is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.heard: list[OtherVehicles] = []
+
+    def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
+        assert isinstance(message, OtherVehicles)
+        self.heard.append(message)
+
+    def request(self, channel: str, message: msgspec.Struct, *_: object, **ids: object) -> None:
+        assert channel == "info"
+        ASKED.append(str(ids["vehicle"]))
+
+
 def crew(folder: Path, *configs: VehicleBeside) -> tuple[VehiclesBeside, list[OtherVehicles]]:
     """The vehicles of a drive whose car begins at START_NS, and what is passed on of them."""
     members = tuple(Beside(config, VAN, commands_recorded=False) for config in configs)
     plan = town_plan(folder)
     lock_step = msgspec.structs.replace(plan.config, speed=None)
     plan = replace(plan, beside=members, drive_frame=FRAME, config=lock_step)
-    heard: list[OtherVehicles] = []
-    beside = VehiclesBeside(
-        plan, publish=heard.append, ask_info=ASKED.append, tell=lambda told: TOLD.append(told.text)
-    )
+    bus = HearingBus()
+    beside = VehiclesBeside(plan, bus, Mailbox(8), tell=lambda told: TOLD.append(told.text))
     beside.begin(INFO)
-    return beside, heard
+    return beside, bus.heard
 
 
 def van_log(folder: Path, *, start_ns: int) -> Path:
@@ -251,9 +265,7 @@ def test_jobs_of_a_drive_hold_who_is_beside_the_car(tmp_path: Path, role: Role, 
     house = House(tmp_path, futures=2)
     config = VehicleBeside(id="van", seen_as="17", role=role)
     plan = replace(house.plan, beside=(Beside(config, VAN, commands_recorded=False),))
-    house.conductor.beside = VehiclesBeside(
-        plan, publish=lambda _: None, ask_info=ASKED.append, tell=lambda _: None
-    )
+    house.conductor.beside = VehiclesBeside(plan, house.bus, Mailbox(8), tell=lambda _: None)
     house.conductor.beside.begin(INFO)
     house.conductor.roles.roles["van"] = role
     house.drive(25)
