@@ -39,7 +39,7 @@ def drive(
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
     map_file: Annotated[str | None, typer.Option("--map", help="map of the place")] = None,
     route: Annotated[
-        str | None, typer.Option(help="GPX or GeoJSON file, or from-log; default: predicted")
+        str | None, typer.Option(help="GPX or GeoJSON file, from-log, or live; default: predicted")
     ] = None,
     log: Annotated[str | None, typer.Option(help="recorded drive to replay")] = None,
     source: Annotated[

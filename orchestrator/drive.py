@@ -265,6 +265,8 @@ class _Drive:
         while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
             conductor.handle(item)
         conductor.changes.refuse_all("the drive is over")
+        conductor.beside.close()
+        conductor.route.close()
         conductor.tables.close()
         if conductor.tables.failed:
             line.say(f"error: {conductor.tables.failed}")

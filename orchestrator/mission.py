@@ -16,6 +16,7 @@ from orchestrator.instructions import BuildWorld, Instruction, NotReady, RoundIn
 from orchestrator.visits import VisitBook
 from orchestrator.way.junctions_ahead import PassedJunction
 from orchestrator.way.map_matching import OffRoadStretch
+from orchestrator.way.route import Route
 from orchestrator.way.way_ahead import WayAhead
 from telemetry.map_aid import RoadLine
 from world_gen.intersections import Junction
@@ -71,6 +72,10 @@ class Mission:
             for junction in junctions
             if self._visits.see(junction, load=True, mono_s=mono_s, drive_time_s=0.0)
         ]
+
+    def give_route(self, route: Route) -> None:
+        """Follow this route from the next state on."""
+        self._way.give(route)
 
     def on_state(self, state: VehicleState, *, mono_s: float) -> list[Instruction]:
         """Take where the car is."""

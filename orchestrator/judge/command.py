@@ -97,9 +97,17 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
             f"{run / RECORD}: of another version of foretwin: {one_line(error)}"
         ) from error
     route = was.route or (str(EMBEDDED_ROUTE) if was.map is None else None)
+    if was.route == "live":
+        _say(f"{run}: what it said of its route is not recorded; the way ahead is predicted")
+        route = None
+    kept = tuple(one for one in was.vehicles if not one.live)
+    if len(kept) < len(was.vehicles):
+        gone = ", ".join(one.id for one in was.vehicles if one.live)
+        _say(f"{run}: without {gone}: what live vehicles beside the car sent is not recorded")
     return msgspec.structs.replace(
         was, log=str(run / DRIVE), source="log", map=map_file, route=route,
         speed=None, view="none", out=str(out), endpoint=None, ros2=None, towards_vehicle=False,
+        vehicles=kept,
     ).validate()  # fmt: skip
 
 

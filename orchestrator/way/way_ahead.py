@@ -61,6 +61,11 @@ class WayAhead:
         self._progress: Progress | None = None
         self.junctions: tuple[JunctionAhead, ...] = ()
 
+    def give(self, route: Route) -> None:
+        """Follow this route from the next state on."""
+        self._given = True
+        self._follower.give((route,))
+
     def take_speed(self, state: VehicleState) -> None:
         """Learn from a state how the car is driven."""
         self._cruise.update(state.stamp_ns, state.speed_mps)

@@ -93,7 +93,7 @@ def test_ros_samples_become_telemetry() -> None:
         stamp_ns=5 * S, position=GeoPoint(52.6, 13.5, 40.0), std_m=pytest.approx(0.2)
     )
     assert second.message() == SteeringSample(stamp_ns=5 * S + 1, tire_angle_rad=0.25)
-    info = ground.gateway.info()
+    info = ground.gateway.introduction.info()
     assert info is not None
     assert (info.start_stamp_ns, info.sends) == (5 * S, ("gnss", "steering"))
 
@@ -159,7 +159,7 @@ def test_what_ros_says_once_is_asked_for_again() -> None:
     assert "0/sensing/gnss/*/*" in ground.foreign.subscribed
     ground.arrive(TF_KEY, antenna_at(1.5, -0.1, 1.8))
     ground.arrive(FIX_KEY, fix(5 * S, 52.6, 13.5))
-    info = ground.gateway.info()
+    info = ground.gateway.introduction.info()
     assert info is not None
     assert info.body_from_antenna_m == pytest.approx((1.5, -0.1, 1.8))
 

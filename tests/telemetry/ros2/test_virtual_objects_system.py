@@ -1,4 +1,4 @@
-"""A user's script says a road user that does not exist, and the car's ROS 2 hears of it, or not."""
+"""A script and the mirror say who does not exist, and the car's ROS 2 hears of it, or not."""
 
 from __future__ import annotations
 
@@ -31,6 +31,8 @@ id = "parked"
 kind = "car"
 lat_deg = 52.5003
 lon_deg = 13.4
+[mirrored]
+vehicles = ["van"]
 """
 
 ORCHESTRATOR = """
@@ -50,6 +52,25 @@ with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True) as bus:
             vehicle_id="ego", stamp_ns=time.time_ns(), position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
             speed_mps=1.0, yaw_rate_radps=0.0, accel_mps2=0.0), vehicle="ego")
         time.sleep(0.01)
+"""
+
+MIRROR = """
+import sys, time
+from contracts.bus import ZenohBus
+from contracts.setup import BusSetup
+from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
+car, van = PlaneState(0.0, 0.0, 0.0, 7.0), PlaneState(-40.0, 0.0, 0.0, 0.0)
+other = MirroredVehicle(
+    vehicle_id="van", role="shadow", real=van, shown=van, length_m=5.0, width_m=2.0, height_m=2.0,
+    rear_overhang_m=1.0)
+with ZenohBus(BusSetup(endpoint=sys.argv[1])) as bus:
+    print("ready", flush=True)
+    while True:
+        bus.publish("mirror", MirrorSample(
+            stamp_ns=time.time_ns(), world_id=None, real=car, twin=car, shadow=car, ghost=car,
+            gap_m=0.0, gap_along_m=0.0, gap_across_m=0.0, gap_yaw_rad=0.0, gap_speed_mps=0.0,
+            since_reset_s=0.0, independent=True, others=(other,)), run="r")
+        time.sleep(0.1)
 """
 
 
@@ -83,6 +104,7 @@ def ground(folder: Path, *, enabled: bool, flag: bool) -> Iterator[Ground]:
         ZenohForeignBus(own) as peer,
         python("-c", ORCHESTRATOR, run) as orchestrator,
         python(str(EXAMPLE), "--endpoint", run, "--lat", "52.5", "--lon", "13.4") as script,
+        python("-c", MIRROR, run),
     ):
         peer.subscribe(OBJECTS_KEY, objects)
         peer.subscribe(DIAGNOSTICS_KEY, diagnostics)
@@ -96,7 +118,7 @@ def objects_of(item: Arrived) -> list:
 
 @contextlib.contextmanager
 def after_the_scripts_death(folder: Path) -> Iterator[tuple[Ground, Arrived]]:
-    """A car that has heard of both road users, and of one when the other's script was killed.
+    """A car that has heard of all three road users, and of two when one's script was killed.
 
     Started anew where a busy machine halted the run for 150 ms: that shuts the gate, rightly.
     """
@@ -105,11 +127,11 @@ def after_the_scripts_death(folder: Path) -> Iterator[tuple[Ground, Arrived]]:
         place.mkdir()
         with ground(place, enabled=True, flag=True) as one:
             with kept_waiting(one.orchestrator.pid, one.gateway.pid) as kept:
-                both = one.heard_with(2)
+                everybody = one.heard_with(3)
                 one.script.send_signal(signal.SIGKILL)
-                alone = None if both is None else one.heard_with(1)
-            if both is not None and alone is not None:
-                yield one, both
+                others = None if everybody is None else one.heard_with(2)
+            if everybody is not None and others is not None:
+                yield one, everybody
                 return
             assert kept.seconds > 0.1, "the gate has shut though the word came"
     pytest.skip(f"in {ATTEMPTS} attempts the machine kept everybody waiting for over 150 ms")
@@ -121,14 +143,18 @@ def test_with_both_switches_the_car_hears_of_them_until_the_orchestrator_dies(
     with after_the_scripts_death(tmp_path) as (ground, heard):
         assert heard.attachment is not None
         assert len(heard.attachment) == 33
-        places = {}
+        places: dict[int, list[tuple[float, float]]] = {}
         for one in objects_of(heard):
             at = one.kinematics.initial_pose_with_covariance.pose.position
-            places[one.classification[0].label] = (at.x, at.y)
+            places.setdefault(one.classification[0].label, []).append((at.x, at.y))
         car, pedestrian = 1, 7
-        assert places[car] == pytest.approx((0.0, 33.4), abs=0.1)
-        assert places[pedestrian][0] == pytest.approx(0.0, abs=0.01)
-        assert -0.1 <= places[pedestrian][1] <= 6.1
+        from_mirror, placed = sorted(places[car])
+        assert placed == pytest.approx((0.0, 33.4), abs=0.1)
+        assert from_mirror == pytest.approx((-38.5, 0.0), abs=0.01)
+        ((walker_x_m, walker_y_m),) = places[pedestrian]
+        assert walker_x_m == pytest.approx(0.0, abs=0.01)
+        assert -0.1 <= walker_y_m <= 6.1
+        # The mirror speaks on, and nobody passes it on.
         with kept_waiting(ground.gateway.pid) as kept:
             ground.orchestrator.send_signal(signal.SIGKILL)
             killed_ns = last_ns = time.monotonic_ns()
