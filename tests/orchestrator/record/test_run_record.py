@@ -109,6 +109,14 @@ def test_the_summary_names_every_junction_and_the_maps_source(house: House) -> N
     assert text.splitlines()[-1] == house.plan.osm.attribution
 
 
+def test_the_summary_says_where_the_map_helped_to_find_the_car(house: House) -> None:
+    record = record_of(house)
+    assert "GNSS" not in summary_text(record)
+
+    record["telemetry"]["position_from"] = ["gnss", "map"]
+    assert "\n  position from GNSS and the map\n" in summary_text(record)
+
+
 @pytest.mark.parametrize(
     ("before_s", "within_at_s", "said"),
     [
