@@ -197,6 +197,9 @@ class VehicleState(msgspec.Struct, frozen=True, kw_only=True):
     estimated: tuple[str, ...] = ()
     stale: tuple[str, ...] = ()
     """Channels that the vehicle sends and that are overdue at this instant."""
+    map_shift_m: tuple[float, float] | None = None
+    """East and north: what the map's roads have moved the position by so far, which is no motion
+    of the car; None where the position comes from the vehicle's sensors alone."""
     yaw_valid: bool = True
     """False until the vehicle has moved far enough for a heading to be known."""
 

@@ -68,6 +68,9 @@ def drive(
         str | None,
         typer.Option(help="parameters from the driving: off, report, apply [default: report]"),
     ] = None,
+    map_aiding: Annotated[
+        str | None, typer.Option(help="roads help to find the car: auto, off [default: auto]")
+    ] = None,
     view: Annotated[
         str | None, typer.Option(help="auto, native, web or none [default: auto]")
     ] = None,
@@ -92,8 +95,9 @@ def drive(
             "map": map_file, "route": route, "log": log, "source": source, "start_s": start,
             "end_s": end, "speed": speed, "workers": workers, "futures": futures,
             "least_futures": least_futures, "rate_hz": rate, "horizon_s": horizon,
-            "planner": planner, "seed": seed, "vehicle": vehicle, "tuning": tuning, "view": view,
-            "out": out, "ros2": ros2, "towards_vehicle": towards_vehicle or None,
+            "planner": planner, "seed": seed, "vehicle": vehicle, "tuning": tuning,
+            "map_aiding": map_aiding, "view": view, "out": out, "ros2": ros2,
+            "towards_vehicle": towards_vehicle or None,
         },
     )  # fmt: skip
     raise typer.Exit(run_drive(settings))

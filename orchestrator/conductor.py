@@ -178,6 +178,8 @@ class Conductor:
         self.rounds.take_state(state)
         self.rounds.windows.take(self.intake.surroundings, state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
+        if self.mission.road_line is not None and self.plan.config.map_aiding == "auto":
+            self.intake.take_line(self.mission.road_line)
 
     def watch_telemetry(self, mono_ns: int) -> None:
         """Tell what newly went wrong with the telemetry; also when none comes any more."""

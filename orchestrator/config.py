@@ -14,6 +14,7 @@ from contracts.roles import Correction, FollowLimits, Role
 
 View = Literal["auto", "native", "web", "none"]
 Tuning = Literal["off", "report", "apply"]
+MapAiding = Literal["auto", "off"]
 Source = Literal["auto", "log", "standin", "live"]
 
 HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
@@ -96,6 +97,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Whether the driving is asked for the vehicle's parameters and the model's gap, and whether
     what is found counts (apply) or is only told: a simulation that nobody has asked to change
     stays that of the vehicle file."""
+    map_aiding: MapAiding = "auto"
+    """Whether the map's roads help to find the car where its positions are rougher than they."""
     follow: FollowLimits = FollowLimits()
     """How hard a twin that follows may be drawn."""
     vehicles: tuple[VehicleBeside, ...] = ()

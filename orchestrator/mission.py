@@ -18,6 +18,7 @@ from orchestrator.way.junctions_ahead import PassedJunction
 from orchestrator.way.map_matching import OffRoadStretch
 from orchestrator.way.route import Route
 from orchestrator.way.way_ahead import WayAhead
+from telemetry.map_aid import RoadLine
 from world_gen.intersections import Junction
 
 MissionState = Literal["waiting", "following", "off_map"]
@@ -49,6 +50,8 @@ class Mission:
     ) -> None:
         self.state: MissionState = "waiting"
         self.start_stamp_ns = start_stamp_ns
+        self.road_line: RoadLine | None = None
+        """The line that the latest state drives along; None in doubt, or between two matches."""
         self._way = way
         self._settings = settings
         self._visits = VisitBook()
@@ -58,6 +61,7 @@ class Mission:
         self._last_match_ns: int | None = None
         self._stretches_told = 0
         self._off_route_told = False
+        self._map_told = False
 
     # What comes in.
 
@@ -77,11 +81,13 @@ class Mission:
         """Take where the car is."""
         self._car = state
         self._way.take_speed(state)
+        self.road_line = None
         if not self._time_to_match(state):
             return []
         passed = self._way.locate(state)
         if passed is None:
             return self._off_map()
+        self.road_line = self._way.road_line(state)
         told: list[Instruction] = []
         if self.state != "following":
             text = "on the map" if self.state == "waiting" else "back on the map"
@@ -92,6 +98,9 @@ class Mission:
         told += self._wanted_worlds(mono_s)
         told += self._choose_current()
         told += self._tell_deviations()
+        if state.map_shift_m is not None and not self._map_told:
+            self._map_told = True
+            told.append(Tell("info", "position from GNSS and the map"))
         return told
 
     def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:

@@ -15,11 +15,11 @@ from contracts.arrays import Array
 from contracts.drive import VehicleInfo
 from contracts.errors import UserError
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup
 from contracts.vehicle import VehicleParameters
 from orchestrator.config import ConfigError, DriveConfig, VehicleBeside
 from orchestrator.doctor import has_display
-from orchestrator.endpoints import free_endpoint
 from orchestrator.maps.given_worlds import check_given_worlds
 from orchestrator.maps.opening import Clip, open_map
 from orchestrator.ros2_mapping import read_ros2, read_ros2_beside

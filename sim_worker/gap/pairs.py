@@ -163,6 +163,10 @@ def _runs(record: MotionRecord, runner: FreeRunner) -> tuple[Array, Array, Array
     by_measured, by_command, tire = (np.full(count, np.nan) for _ in range(3))
     if not len(at):
         return by_measured, by_command, tire, push_blocks(record, eased, at, np.zeros((0, 1)))
+    # What was measured has the actuator's lag in it; the model's own must not come on top.
+    led = signals.measured_rad + runner.vehicle.steering_lag_s.value * (
+        np.gradient(signals.measured_rad) / PERIOD_S
+    )
     zero = np.zeros(len(at))
     begin = start_states(
         runner.vehicle, x_m=zero, y_m=zero, yaw_rad=zero, speed_mps=eased[at],
@@ -174,7 +178,7 @@ def _runs(record: MotionRecord, runner: FreeRunner) -> tuple[Array, Array, Array
     states = runner.run(
         states=begin, starts=np.where(held, at + count, at), steps=_RUN,
         accel_mps2=np.concatenate([accel, accel]),
-        tire_rad=np.concatenate([signals.commanded_rad, signals.measured_rad]),
+        tire_rad=np.concatenate([signals.commanded_rad, led]),
         hold_speed_mps=np.concatenate([np.full(count, np.nan), eased]), delayed=~held,
     )  # fmt: skip
     tail = np.arange(_RUN - _TAIL + 1, _RUN + 1)

@@ -133,6 +133,21 @@ def test_a_process_that_dies_holds_up_nothing(house: House) -> None:
     assert len(watcher) == 1
 
 
+def test_live_no_round_waits_for_who_only_watches(house: House) -> None:
+    house.bus.declare_alive(alive_key(run=house.plan.run_id, process="tuning"))
+    watcher = asked(house, "tuning")
+    workers = [asked(house, worker.process_id) for worker in house.workers]
+    house.drive(20)
+    set_mass(house)
+    house.conductor.make_changes()
+    for questions in workers:
+        answer(questions)
+    house.settle()
+    assert house.conductor.tuning.parameters.settled
+    assert len(watcher) == 1
+    assert house.conductor.start_round()
+
+
 @pytest.mark.parametrize(("mode", "version"), [("report", 0), ("apply", 1)])
 def test_what_is_identified_counts_only_where_it_shall(
     tmp_path: Path, mode: str, version: int
