@@ -112,6 +112,8 @@ class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     added_roads: tuple[int, ...] = ()
     worlds_dir: str
     cache_dir: str
+    given_worlds: str | None = None
+    """A folder of Worlds that are used as they are, instead of being built."""
 
 
 class ViewerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -51,18 +51,22 @@ def judge(
     vehicle: Annotated[
         str | None, typer.Option(help="corrected vehicle parameters [default: the run's own]")
     ] = None,
+    worlds: Annotated[
+        Path | None, typer.Option(help="folder of corrected Worlds (.world), not built anew")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="folder for the runs it makes [default: RUN/judged]")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="what changes as JSON")] = False,
 ) -> None:
-    """Judge a run's recorded drive again with a corrected map or vehicle: what changes?"""
+    """Judge a run's recorded drive again with a corrected map, vehicle or Worlds: what changes?"""
     from orchestrator.judge.command import JudgeRequest
     from orchestrator.judge.command import judge as judge_run
 
     request = JudgeRequest(
-        run=run_folder, map_file=map_file, vehicle=vehicle, out=out, as_json=as_json
-    )
+        run=run_folder, map_file=map_file, vehicle=vehicle, worlds=worlds, out=out,
+        as_json=as_json,
+    )  # fmt: skip
     raise typer.Exit(judge_run(request))
 
 

@@ -110,6 +110,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Whether driveways and parking aisles make junctions even where no given route uses them."""
     look_ahead_s: float = 60.0
     cache_dir: str | None = None
+    worlds: str | None = None
+    """A folder of Worlds that are used as they are, instead of being built."""
     endpoint: str | None = None
     """Where the router listens, such as tcp/127.0.0.1:7447; None takes a free loopback port."""
     standin_plan_shift_m: float = 0.0

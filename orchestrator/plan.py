@@ -20,6 +20,7 @@ from contracts.setup import BusSetup
 from contracts.vehicle import VehicleParameters
 from orchestrator.config import ConfigError, DriveConfig, VehicleBeside
 from orchestrator.doctor import has_display
+from orchestrator.maps.given_worlds import check_given_worlds
 from orchestrator.maps.opening import Clip, open_map
 from orchestrator.ros2_mapping import read_ros2, read_ros2_beside
 from orchestrator.rounds.jobs import scenarios_of
@@ -159,6 +160,11 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         graph, junctions = opened.graph, opened.junctions
         index = RoadIndex(graph)
         routes, route_source = _routes(config, graph, index, given)
+    if config.worlds is not None:
+        check_given_worlds(
+            Path(config.worlds), map_sha256=osm.sha256, junctions=junctions,
+            radius_m=config.radius_m,
+        )  # fmt: skip
     standin = None
     if source == "standin":
         standin = standin_path(osm, graph, routes[0])

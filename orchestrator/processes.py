@@ -109,6 +109,7 @@ def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
         added_roads=plan.added_roads,
         worlds_dir=str(plan.worlds_dir),
         cache_dir=str(plan.config.worlds_cache),
+        given_worlds=plan.config.worlds,
     )
 
 

@@ -12,6 +12,7 @@ from contracts.bus import Bus, Mailbox, Request
 from contracts.process import ProcessLife, run_process
 from contracts.setup import BuilderSetup
 from contracts.simulation import BuildReply
+from orchestrator.maps.given_worlds import read_given_worlds
 from orchestrator.maps.opening import Clip, open_map
 from world_gen.map_index import index_map
 from world_gen.world_store import WorldStore, cached_build
@@ -28,6 +29,8 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     junctions = {j.summary.id: j for j in opened.junctions}
     index = index_map(osm, graph, junctions.values())
     cache, run_worlds = WorldStore(Path(setup.cache_dir)), WorldStore(Path(setup.worlds_dir))
+    folder = setup.given_worlds
+    given = {} if folder is None else read_given_worlds(Path(folder))
     mailbox = Mailbox(256)
     bus.serve("build", mailbox, run=setup.run_id, process=setup.process_id)
     life.ready()
@@ -42,7 +45,11 @@ def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
             continue
         started = time.perf_counter()
         try:
-            world, cached = cached_build(cache, index, junction, radius_m=wanted.radius_m)
+            if wanted.intersection_id in given:
+                world, cached = given[wanted.intersection_id], False
+                log.info("world %s of %s as given", world.id, wanted.intersection_id)
+            else:
+                world, cached = cached_build(cache, index, junction, radius_m=wanted.radius_m)
             run_worlds.save(world)
         except Exception as error:
             log.exception("world of %s", wanted.intersection_id)

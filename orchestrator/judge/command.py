@@ -1,7 +1,8 @@
-"""`foretwin judge`: a recorded drive again, with a corrected map or vehicle: what changes?"""
+"""`foretwin judge`: a recorded drive again, with map, vehicle or Worlds corrected: what changes?"""
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import json
 import sys
@@ -11,10 +12,13 @@ from typing import Any
 
 import msgspec
 
+from contracts.codec import SchemaMismatch, read_message
 from contracts.errors import UserError, one_line
+from contracts.world import World
 from orchestrator.config import DriveConfig
 from orchestrator.drive import carry_out
 from orchestrator.judge.difference import difference_lines, difference_of, read_judged
+from orchestrator.maps.given_worlds import read_given_worlds
 from orchestrator.plan import EMBEDDED_ROUTE, make_plan, read_inputs
 from orchestrator.record.versions import versions
 
@@ -29,6 +33,7 @@ class JudgeRequest:
     run: Path
     map_file: Path | None = None
     vehicle: str | None = None
+    worlds: Path | None = None
     out: Path | None = None
     as_json: bool = False
 
@@ -46,7 +51,10 @@ def judge(request: JudgeRequest) -> int:
         again,
         map=again.map if request.map_file is None else str(request.map_file),
         vehicle=request.vehicle or again.vehicle,
+        worlds=again.worlds if request.worlds is None else str(request.worlds),
     )
+    if request.worlds is not None:
+        _check_on_way(request.worlds, request.run, record)
     read_inputs(corrected)  # what is wrong with them is told before anything long begins
     before = request.run
     if record["config"].get("speed") is not None or record.get("versions") != versions():
@@ -109,6 +117,22 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
         speed=None, view="none", out=str(out), endpoint=None, ros2=None, towards_vehicle=False,
         vehicles=kept,
     ).validate()  # fmt: skip
+
+
+def _check_on_way(folder: Path, run: Path, record: dict[str, Any]) -> None:
+    """Raise UserError for a World that the run never asked for: nothing would change by it."""
+    reached = record.get("intersections") or ()
+    asked = {str(one["id"]) for one in reached if isinstance(one, dict) and "id" in one}
+    for file in run.glob("worlds/*.world"):
+        with contextlib.suppress(SchemaMismatch):
+            asked.add(read_message(file, World).intersection.id)
+    for name in read_given_worlds(folder):
+        if name not in asked:
+            known = ", ".join(sorted(asked)) or "none"
+            raise UserError(
+                f"worlds {folder}: that of junction {name} does not belong to the way of {run}: "
+                f"its junctions are {known}"
+            )
 
 
 def _say(text: str) -> None:

@@ -53,7 +53,8 @@ def difference_of(before: JudgedRun, after: JudgedRun) -> dict[str, Any]:
 def difference_lines(found: dict[str, Any]) -> list[str]:
     """Return the difference for people."""
     lines = [
-        f"{side}: {found[side]['run']} (map {found[side]['map']})" for side in ("before", "after")
+        f"{side}: {found[side]['run']} (map {found[side]['map']}{_worlds(found[side])})"
+        for side in ("before", "after")
     ]
     apart = found["disagreements"]
     lines.append(
@@ -92,10 +93,15 @@ def difference_lines(found: dict[str, Any]) -> list[str]:
     return lines
 
 
+def _worlds(who: dict[str, Any]) -> str:
+    return f", Worlds of {who['worlds']}" if who.get("worlds") else ""
+
+
 def _who(run: JudgedRun) -> dict[str, Any]:
     return {
         "run": str(run.folder), "map": run.record["map"]["file"],
         "vehicle": run.record["config"]["vehicle"],
+        "worlds": run.record["config"].get("worlds"),
     }  # fmt: skip
 
 

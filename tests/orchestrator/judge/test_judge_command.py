@@ -11,12 +11,18 @@ import msgspec
 import numpy as np
 import pytest
 
+from contracts.codec import read_message
 from contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
+from contracts.provenance import Choice
+from contracts.world import StopLine, World
 from orchestrator.cli import run
+from orchestrator.config import DriveConfig
 from orchestrator.plan import EMBEDDED_MAP
 from telemetry.logs import open_log
 from telemetry.mcap_file import create
+from tests.orchestrator.trip import town_world
 from tests.system.foretwin_command import environment, foretwin
+from world_gen.world_store import WorldStore
 
 
 @pytest.mark.parametrize(
@@ -44,6 +50,25 @@ def test_a_folder_that_is_no_run_is_told_in_one_line(
     told = capsys.readouterr().err.strip()
     assert said in told
     assert "\n" not in told
+
+
+def test_a_world_beside_the_way_is_told_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record = {
+        "config": msgspec.to_builtins(DriveConfig()), "map": {"file": str(EMBEDDED_MAP)},
+        "intersections": [{"id": "n7"}],
+    }  # fmt: skip
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    (tmp_path / "drive.mcap").write_bytes(b"")
+    given = WorldStore(tmp_path / "given")
+    given.save(town_world("n4"))
+    assert run(["judge", str(tmp_path), "--worlds", str(given.folder)]) == 2
+    told = capsys.readouterr().err.strip()
+    assert "that of junction n4 does not belong to the way of" in told
+    assert told.endswith("its junctions are n7")
+    assert run(["judge", str(tmp_path), "--worlds", str(tmp_path / "nowhere")]) == 2
+    assert "nowhere: no such folder" in capsys.readouterr().err
 
 
 def with_stop_sign() -> str:
@@ -86,6 +111,50 @@ def test_a_forgotten_stop_sign_changes_the_verdict_of_a_recorded_drive(tmp_path:
     # Nothing corrected, nothing changes: the recorded drive is the drive.
     assert same["outcomes"] == []
     assert same["gap"]["nominal_ade_m"]["before"] == same["gap"]["nominal_ade_m"]["after"]
+
+
+def with_stop_lines(world: World) -> World:
+    """The World with a stop sign where each of its lanes comes to the junction."""
+    entered = {one.from_lane_id for one in world.connections}
+    lines = []
+    for lane in world.lanes:
+        if lane.id in entered and lane.role == "approach":
+            (before, end), half_m = lane.centerline[-2:], 0.5 * lane.width_m.value
+            along = (end - before) / np.hypot(*(end - before))
+            left = half_m * np.array([-along[1], along[0]])
+            ends = np.stack([end + left, end - left])
+            control = Choice("stop", "tagged")
+            lines.append(StopLine(id=f"s{lane.id}", lane_id=lane.id, ends=ends, control=control))
+    assert lines
+    return msgspec.structs.replace(world, stop_lines=tuple(lines))
+
+
+@pytest.mark.judge
+@pytest.mark.timeout(900)
+def test_a_world_corrected_by_hand_changes_the_verdict_of_a_recorded_drive(tmp_path: Path) -> None:
+    driven = foretwin(
+        tmp_path / "runs", "--speed", "max", "--futures", "16", "--rate", "1", "--end", "22",
+        "--workers", "1",
+    )  # fmt: skip
+    assert driven.code == 0, driven.screen
+    assert driven.run is not None
+    given = WorldStore(tmp_path / "given")
+    for file in (driven.run / "worlds").glob("*.world"):
+        world = read_message(file, World)
+        given.save(with_stop_lines(world) if world.intersection.id == "n4" else world)
+    done = subprocess.run(
+        [sys.executable, "-m", "orchestrator", "judge", str(driven.run), "--json",
+         "--worlds", str(given.folder)],
+        env=environment(tmp_path / "cache"), capture_output=True, text=True, timeout=300,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    changed = json.loads(done.stdout)
+    assert changed["after"]["worlds"] == str(given.folder)
+    assert changed["outcomes"]
+    for one in changed["outcomes"]:
+        assert "stop_line" not in one["before"]["observable"]
+        assert one["after"]["driven_fails"] == "stop_line"
 
 
 @pytest.mark.judge
