@@ -177,7 +177,13 @@ def test_a_route_given_while_driving_counts_from_where_the_car_is_on_it() -> Non
     assert (driver.progress[-1].source, driver.progress[-1].off_route) == ("given", False)
     assert driver.ahead(300.0)[:2] == [("n103", 40), ("n203", 140)]
     # One that lies elsewhere is given all the same, and told of as left.
-    driver.follower.give((along((12, False),),))
+    driver.follower.give(
+        (
+            along(
+                (12, False),
+            ),
+        )
+    )
     driver.go([(161, 100), (170, 100)])
     assert driver.progress[-1] is not None
     assert driver.progress[-1].off_route
