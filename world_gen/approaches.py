@@ -9,7 +9,8 @@ import msgspec
 
 from contracts.provenance import Choice
 from contracts.world import LineControl, YieldRule
-from world_gen.clusters import Cluster, Surroundings
+from world_gen.cluster import Cluster
+from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.legs import RING_KINDS, dot, heading_out, is_ring_edge
 from world_gen.met_on_the_way import (

@@ -12,6 +12,7 @@ import shapely.ops
 
 from contracts.frames import GeoPoint, LocalFrame, target_from_source
 from contracts.world import DrivingSide
+from world_gen.cluster import Cluster
 from world_gen.cross_section import CrossSection, cross_section
 from world_gen.extent import Extent
 from world_gen.intersections import Junction
@@ -24,28 +25,6 @@ from world_gen.trims import trims
 from world_gen.turn_restrictions import restriction_notes
 
 _REPEAT_M = 0.01
-
-
-class Cluster(msgspec.Struct, frozen=True, kw_only=True):
-    """Graph nodes where lanes end and begin: one junction, one node of a ring, or a lone node.
-
-    `legs` leave the cluster outward; `inner` edges lie within and have no lanes of their own.
-    `whole` tells that it belongs to a junction that lies whole in the World: such a junction
-    gets stop lines, control and right of way.
-    """
-
-    key: str
-    nodes: frozenset[int]
-    inner: frozenset[int]
-    legs: tuple[DirectedEdge, ...]
-    junction: Junction | None
-    whole: bool
-    ring: bool
-
-    @property
-    def plain(self) -> bool:
-        """Whether one road merely goes on here."""
-        return len(self.legs) == 2 and len(self.nodes) == 1 and not self.whole
 
 
 class Surroundings(msgspec.Struct, frozen=True, kw_only=True):

@@ -8,7 +8,8 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.provenance import Quantity
 from contracts.world import Connection, DrivingSide, LineControl, Turn
-from world_gen.clusters import Cluster, Surroundings
+from world_gen.cluster import Cluster
+from world_gen.clusters import Surroundings
 from world_gen.cross_section import LanePlan
 from world_gen.forks import beside_at_fork, merged_ends, merges
 from world_gen.lanes import LaneDraft, LaneSet

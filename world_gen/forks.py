@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from world_gen.clusters import Cluster, Surroundings
+from world_gen.cluster import Cluster
+from world_gen.clusters import Surroundings
 from world_gen.lanes import LaneDraft
 from world_gen.movements import Movement
 from world_gen.road_graph import DirectedEdge

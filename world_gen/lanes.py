@@ -11,7 +11,8 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.provenance import Provenance, Quantity
 from contracts.world import Lane, LaneKind, Road, Turn
-from world_gen.clusters import Cluster, Surroundings
+from world_gen.cluster import Cluster
+from world_gen.clusters import Surroundings
 from world_gen.cross_section import CrossSection, LanePlan
 from world_gen.places import places_led_through, without_dead_places
 from world_gen.polyline_batch import Polylines, offset, without_repeats

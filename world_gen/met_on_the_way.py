@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from contracts.world import YieldRule
-from world_gen.clusters import Cluster
+from world_gen.cluster import Cluster
 from world_gen.polyline import arc_lengths
 from world_gen.polyline_batch import Polylines
 from world_gen.road_graph import DirectedEdge, RoadEdge

@@ -9,7 +9,8 @@ import msgspec
 import numpy as np
 
 from contracts.world import DrivingSide, Turn
-from world_gen.clusters import Cluster, Surroundings
+from world_gen.cluster import Cluster
+from world_gen.clusters import Surroundings
 from world_gen.legs import Heads, dot, heading_out, is_ring_edge, opposed
 from world_gen.road_graph import DirectedEdge
 from world_gen.turn_restrictions import TurnRestrictions

@@ -10,7 +10,8 @@ import numpy as np
 
 from contracts.arrays import Array
 from contracts.world import DrivingSide, YieldRule
-from world_gen.clusters import Cluster, Surroundings
+from world_gen.cluster import Cluster
+from world_gen.clusters import Surroundings
 from world_gen.connections import ConnectionDraft
 from world_gen.met_on_the_way import NodeTags, faces, sign_of
 from world_gen.polyline import locate, points_at

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+from world_gen.cluster import Cluster
 from world_gen.cross_section import TRANSITION, CrossSection
 from world_gen.road_graph import DirectedEdge, RoadEdge
-
-if TYPE_CHECKING:
-    from world_gen.clusters import Cluster
 
 _KEYS = ("placement", "placement:forward", "placement:backward")
 

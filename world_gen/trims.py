@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from contracts.arrays import Array
+from world_gen.cluster import Cluster
 from world_gen.cross_section import CrossSection
 from world_gen.legs import Heads, heading_out, is_ring_edge, lateral_positions
 from world_gen.polyline_batch import Polylines, cut, without_repeats
@@ -17,9 +18,6 @@ from world_gen.road_graph import RoadEdge
 from world_gen.turn_curves import LEAD_M, WANTED_RADIUS_M
 
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
-
-if TYPE_CHECKING:
-    from world_gen.clusters import Cluster
 
 CORNER_M = 3.5
 """Room between the kerb of the other road and a lane's end: makes turns wider than 4 m radius."""

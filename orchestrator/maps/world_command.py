@@ -25,15 +25,8 @@ from orchestrator.maps.choice import (
 from orchestrator.maps.opening import Clip, NodeClip, OpenMap, open_map, region_on_map
 from orchestrator.maps.world_files import write_each, write_report
 from world_gen.build import build_region, build_world
-from world_gen.export.formats import (
-    FORMATS,
-    OPENDRIVE_VERSIONS,
-    SIMULATORS,
-    VEHICLE_KINDS,
-    ExportOptions,
-    Format,
-    VehicleKind,
-)
+from world_gen.export.choices import OPENDRIVE_VERSIONS, SIMULATORS, VEHICLE_KINDS, VehicleKind
+from world_gen.export.formats import FORMATS, ExportOptions, Format
 from world_gen.intersections import Junction
 from world_gen.map_index import MapIndex, index_map
 from world_gen.osm_map import LatLonBounds

@@ -13,10 +13,10 @@ import pytest
 from contracts.bus import ZenohBus
 from contracts.drive import GnssFix, SpeedSample
 from contracts.foreign_bus import Arrived, ZenohForeignBus
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup
 from telemetry.ros2.mapping import AUTOWARE
 from telemetry.ros_parts import PREDICTED_OBJECTS, typestore
-from tests.contracts.bus_sides import free_endpoint
 from tests.system.foretwin_command import run_folder, started, wait_for
 from tests.system.ros2_car import SPEED_MPS, Ros2Car
 

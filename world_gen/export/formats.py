@@ -5,17 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
 
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-
-OpenDriveVersion = Literal["1.8", "1.4"]
-OPENDRIVE_VERSIONS: tuple[OpenDriveVersion, ...] = get_args(OpenDriveVersion)
-Simulator = Literal["classic", "gazebo"]
-SIMULATORS: tuple[Simulator, ...] = get_args(Simulator)
-VehicleKind = Literal["twin", "shadow", "ghost"]
-VEHICLE_KINDS: tuple[VehicleKind, ...] = get_args(VehicleKind)
+from world_gen.export.choices import OpenDriveVersion, Simulator, VehicleKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,7 @@ from lxml import etree
 
 from contracts.arrays import Array
 from contracts.world import Area, World
-from world_gen.export.formats import SIMULATORS, Simulator
+from world_gen.export.choices import SIMULATORS, Simulator
 from world_gen.export.sdformat_plugins import HEADING_DEG, world_plugins
 from world_gen.export.sdformat_shapes import (
     Element,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from contracts.vehicle import VehicleParameters
-from world_gen.export.formats import Simulator
+from world_gen.export.choices import Simulator
 from world_gen.export.sdformat_shapes import Element, child, numbers, pose
 
 HEADING_DEG: Mapping[str, str] = {"classic": "180", "gazebo": "0"}

@@ -15,7 +15,7 @@ import numpy as np
 
 from contracts.vehicle import VehicleParameters
 from contracts.world import World
-from world_gen.export.formats import Simulator, VehicleKind
+from world_gen.export.choices import Simulator, VehicleKind
 from world_gen.export.sdformat_plugins import ackermann_plugin, gps_sensor
 from world_gen.export.sdformat_shapes import Element, child, material, numbers, pose
 from world_gen.export.solids import Rgba

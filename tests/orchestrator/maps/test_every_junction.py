@@ -20,7 +20,8 @@ from orchestrator.maps.opening import open_map
 from sim_worker.vehicle.parameters import load_vehicle
 from tests.world_gen.export.judged_sample import QUOTA
 from world_gen.build import build_world
-from world_gen.export.formats import FORMATS, OPENDRIVE_VERSIONS, SIMULATORS, ExportOptions
+from world_gen.export.choices import OPENDRIVE_VERSIONS, SIMULATORS
+from world_gen.export.formats import FORMATS, ExportOptions
 from world_gen.map_index import index_map
 from world_gen.report import note_kind, report_of
 

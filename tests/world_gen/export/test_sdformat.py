@@ -20,9 +20,10 @@ from contracts.signals import Signal
 from contracts.vehicle import Parameter, VehicleParameters
 from contracts.world import ATTRIBUTION, Building, StopLine, World
 from tests.world_gen.drawn_maps import GERMANY, crossing, roundabout, world_of
+from world_gen.export.choices import VehicleKind
 from world_gen.export.sdformat import write_sdf
 from world_gen.export.sdformat_shapes import extrusions
-from world_gen.export.sdformat_vehicles import SdfVehicle, VehicleKind, place_vehicles
+from world_gen.export.sdformat_vehicles import SdfVehicle, place_vehicles
 
 _CAR = {
     "mass_kg": 1100.0, "yaw_inertia_kgm2": 1800.0, "wheelbase_m": 2.6,
