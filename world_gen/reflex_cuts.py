@@ -186,8 +186,8 @@ def _cut_once(pieces: Geometries, owner: Indices) -> tuple[Geometries, Indices]:
     on, back = here - corners.xy[corners.before[corner]], here - corners.xy[corners.after[corner]]
     away, walls, places = corners.hits(corner, _unit(np.stack([on, back])))
     nearer = away[0] <= away[1]
-    wall = np.where(nearer, *walls)
-    place = np.where(nearer[:, None], *places)
+    wall = np.where(nearer, walls[0], walls[1])
+    place = np.where(nearer[:, None], places[0], places[1])
     stuck = ~np.isfinite(away.min(axis=0))
     ends = np.stack([wall, corners.after[wall]], axis=1)
     neighbours = np.stack([corner, corners.before[corner], corners.after[corner]], axis=1)
