@@ -156,12 +156,19 @@ def target_from_source(
     """Move poses, (N, 2) metres and (N,) radians, from frame `source` into frame `target`."""
     if target == source:
         return LocalPoses(np.asarray(xy_m, dtype=np.float64), np.asarray(yaw_rad, dtype=np.float64))
-    geo = geo_from_local(source, xy_m)
-    true_yaw = geo_from_local_yaw(source, yaw_rad, xy_m)
+    lat, lon = np.moveaxis(geo_from_local(source, xy_m), -1, 0)
+    true_yaw = wrap_angle(np.asarray(yaw_rad) - grid_convergence(source, lat, lon))
     return LocalPoses(
-        local_from_geo(target, geo[..., 0], geo[..., 1]),
-        local_from_geo_yaw(target, true_yaw, geo[..., 0], geo[..., 1]),
+        local_from_geo(target, lat, lon), local_from_geo_yaw(target, true_yaw, lat, lon)
     )
+
+
+def target_from_source_m(target: LocalFrame, source: LocalFrame, xy_m: Array) -> Array:
+    """Move positions, (N, 2) metres, from frame `source` into frame `target`."""
+    if target == source:
+        return np.asarray(xy_m, dtype=np.float64)
+    lat, lon = np.moveaxis(geo_from_local(source, xy_m), -1, 0)
+    return local_from_geo(target, lat, lon)
 
 
 def base_from_sensor(

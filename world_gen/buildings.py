@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.frames import LocalFrame, target_from_source
+from contracts.frames import LocalFrame, target_from_source_m
 from contracts.world import Building
 from world_gen.building_outlines import (
     MIN_PIECE_M2,
@@ -170,7 +170,7 @@ def buildings_in_frame(
     if not near:
         return (), ()
     shapes = np.array([f.polygon for f in near], dtype=object)
-    moved = shapely.transform(shapes, lambda xy: target_from_source(frame, map_frame, xy, 0.0).xy_m)
+    moved = shapely.transform(shapes, lambda xy: target_from_source_m(frame, map_frame, xy))
     moved = shapely.simplify(moved, FOOTPRINT_TOLERANCE_M - GRID_M, preserve_topology=True)
     low = np.flatnonzero([f.min_height_m < HEADROOM_M for f in near])
     blocked = low[_cut_back(moved, low, driven)]

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 import shapely.ops
 
-from contracts.frames import GeoPoint, LocalFrame, target_from_source
+from contracts.frames import GeoPoint, LocalFrame, target_from_source_m
 from contracts.world import DrivingSide
 from world_gen.cluster import Cluster
 from world_gen.cross_section import CrossSection, cross_section
@@ -61,9 +61,7 @@ class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
 
 def in_map(extent: Extent, frame: LocalFrame, map_frame: LocalFrame) -> shapely.Polygon:
     """Return a World's extent in the map's frame."""
-    return shapely.transform(
-        extent.polygon, lambda xy: target_from_source(map_frame, frame, xy, 0.0).xy_m
-    )
+    return shapely.transform(extent.polygon, lambda xy: target_from_source_m(map_frame, frame, xy))
 
 
 def world_frame(junction: Junction) -> LocalFrame:
@@ -176,7 +174,7 @@ def _in_frame(
     if not edges:
         return {}
     lines = Polylines.of([edge.xy_m for edge in edges])
-    moved = Polylines(target_from_source(frame, map_frame, lines.xy_m, 0.0).xy_m, lines.first)
+    moved = Polylines(target_from_source_m(frame, map_frame, lines.xy_m), lines.first)
     step_m = np.maximum.reduceat(moved.steps[1] * ~moved.is_last, moved.first[:-1]).tolist()
     return {
         edge.index: msgspec.structs.replace(edge, xy_m=xy)

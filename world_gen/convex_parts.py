@@ -62,7 +62,11 @@ def convex_cover(
     """
     shapes, owner = _sound(polygons_from(outlines))
     simple = shapely.simplify(shapes, SIMPLIFY_SHARE * tolerance_m, preserve_topology=True)
-    worse = ~shapely.is_valid(simple) | shapely.is_empty(simple)
+    changed = np.flatnonzero(
+        shapely.get_num_coordinates(simple) != shapely.get_num_coordinates(shapes)
+    )
+    # What is empty, or crosses itself now, stays as it was.
+    worse = changed[~shapely.is_valid(simple[changed]) | shapely.is_empty(simple[changed])]
     simple[worse] = shapes[worse]
     pieces, of = cut_at_reflex_corners(simple, HULL_SHARE * tolerance_m)
     keep = shapely.area(pieces) >= _MIN_AREA_M2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from itertools import pairwise
 
 import msgspec
@@ -18,7 +19,7 @@ MIN_PIECE_M = 0.5
 """Shorter pieces of road at the World's edge are left out."""
 
 
-class Disc(msgspec.Struct, frozen=True):
+class Disc(msgspec.Struct, frozen=True, dict=True):
     """All within `radius_m` of the World's origin."""
 
     radius_m: float
@@ -28,7 +29,7 @@ class Disc(msgspec.Struct, frozen=True):
         """None: a disc is told by its radius alone."""
         return None
 
-    @property
+    @cached_property
     def polygon(self) -> shapely.Polygon:
         """The disc as a polygon in the World's frame."""
         return shapely.Point(0.0, 0.0).buffer(self.radius_m, quad_segs=32)
@@ -44,12 +45,12 @@ class Disc(msgspec.Struct, frozen=True):
         aa = np.maximum((d * d).sum(axis=1), 1e-12)
         half_b = (a * d).sum(axis=1)
         disc = half_b * half_b - aa * ((a * a).sum(axis=1) - self.radius_m**2)
-        s = arc_lengths(xy_m)
-        found: list[float] = []
-        for i in np.nonzero(disc > 0.0)[0]:
-            root = math.sqrt(disc[i])
-            roots = ((-half_b[i] - root) / aa[i], (-half_b[i] + root) / aa[i])
-            found.extend(float(s[i] + t * math.sqrt(aa[i])) for t in roots if 0.0 < t < 1.0)
+        root = np.sqrt(np.maximum(disc, 0.0))
+        shares = np.stack([-half_b - root, -half_b + root]) / aa
+        at, length = arc_lengths(xy_m)[:-1], np.sqrt(aa)
+        found: list[float] = (at + shares * length)[
+            (disc > 0.0) & (shares > 0.0) & (shares < 1.0)
+        ].tolist()
         return found
 
 

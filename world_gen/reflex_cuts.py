@@ -40,6 +40,8 @@ def cut_at_reflex_corners(polygons: Geometries, tolerance_m: float) -> tuple[Geo
         convex = nearly_the_same(hulls, pieces, tolerance_m)
         done.append(hulls[convex])
         done_owner.append(owner[convex])
+        if convex.all():
+            break
         pieces, owner = _cut_once(pieces[~convex], owner[~convex])
     if not done:
         return pieces, owner
@@ -134,34 +136,42 @@ class _Corners:
     def sharpest(self) -> Indices:
         """Return for each ring its reflex corner between the longest walls."""
         into, out = self.xy - self.xy[self.before], self.xy[self.after] - self.xy
-        order = np.lexsort((_cross(into, out), self.ring))
-        found: Indices = order[self.first]
-        return found
+        return self._least(_cross(into, out))
 
     def hits(self, corner: Indices, ahead: Array) -> tuple[Array, Indices, Array]:
-        """Return where rays from a corner of each ring meet it next: distance, wall, place.
+        """Return where rays `ahead` (2, R, 2), two from a corner of each ring, meet it next.
 
-        The distance is infinite where a ray meets nothing.
+        That is distance (2, R), wall (2, R) and place (2, R, 2); the distance is infinite where a
+        ray meets nothing.
         """
         a, b = self.xy, self.xy[self.after]
-        start, along = self.xy[corner][self.ring], ahead[self.ring]
+        start, along = self.xy[corner][self.ring], ahead[:, self.ring]
         side_a, side_b = _cross(along, a - start), _cross(along, b - start)
         side_a[np.abs(side_a) < _SNAP_M] = 0.0
         side_b[np.abs(side_b) < _SNAP_M] = 0.0
         gap = side_a - side_b
         share = np.divide(side_a, gap, out=np.zeros_like(gap), where=gap != 0.0)
-        place = a + (b - a) * share[:, None]
-        distance = ((place - start) * along).sum(axis=1)
+        place = a + (b - a) * share[..., None]
+        distance = ((place - start) * along).sum(axis=-1)
         row = np.arange(len(a))
         meets = (side_a * side_b <= 0.0) & (gap != 0.0) & (distance > _SNAP_M)
         meets &= (row != corner[self.ring]) & (self.after != corner[self.ring])
         distance = np.where(meets, distance, np.inf)
-        nearest = np.lexsort((distance, self.ring))[self.first]
-        return distance[nearest], nearest, place[nearest]
+        nearest = self._least(distance)
+        ray = np.arange(2)[:, None]
+        return distance[ray, nearest], nearest, place[ray, nearest]
+
+    def _least(self, values: Array) -> Indices:
+        """Return for each ring the first of its corners with the least of `values` (…, P)."""
+        least = np.minimum.reduceat(values, self.first, axis=-1)
+        row = np.arange(len(self.xy))
+        at = np.where(values == least[..., self.ring], row, len(row))
+        found: Indices = np.minimum.reduceat(at, self.first, axis=-1)
+        return found
 
 
 def _cross(a: Array, b: Array) -> Array:
-    turned: Array = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    turned: Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return turned
 
 
@@ -174,24 +184,26 @@ def _cut_once(pieces: Geometries, owner: Indices) -> tuple[Geometries, Indices]:
     corner = corners.sharpest()
     here = corners.xy[corner]
     on, back = here - corners.xy[corners.before[corner]], here - corners.xy[corners.after[corner]]
-    first, second = corners.hits(corner, _unit(on)), corners.hits(corner, _unit(back))
-    nearer = first[0] <= second[0]
-    wall = np.where(nearer, first[1], second[1])
-    place = np.where(nearer[:, None], first[2], second[2])
-    stuck = ~np.isfinite(np.minimum(first[0], second[0]))
+    away, walls, places = corners.hits(corner, _unit(np.stack([on, back])))
+    nearer = away[0] <= away[1]
+    wall = np.where(nearer, walls[0], walls[1])
+    place = np.where(nearer[:, None], places[0], places[1])
+    stuck = ~np.isfinite(away.min(axis=0))
     ends = np.stack([wall, corners.after[wall]], axis=1)
     neighbours = np.stack([corner, corners.before[corner], corners.after[corner]], axis=1)
     off = np.hypot(*np.moveaxis(corners.xy[ends] - place[:, None], 2, 0))
     off[(ends[:, :, None] == neighbours[:, None, :]).any(axis=2)] = np.inf
     end = np.where(off.min(axis=1) < _TO_CORNER_M, off.argmin(axis=1), -1)
     made = _halves_at(corners, corner, wall, end, place, np.flatnonzero(~stuck))
-    # Where rounding has made a piece cross itself, no ray meets a wall.
-    sound, sound_owner = polygons_of(shapely.make_valid(pieces[stuck]), owner[stuck])
-    triangles, which = shapely.get_parts(
-        shapely.constrained_delaunay_triangles(sound), return_index=True
-    )
-    found = np.concatenate([made, triangles])
-    found_owner = np.concatenate([np.repeat(owner[~stuck], 2), sound_owner[which]])
+    found, found_owner = made, np.repeat(owner[~stuck], 2)
+    if stuck.any():
+        # Where rounding has made a piece cross itself, no ray meets a wall.
+        sound, sound_owner = polygons_of(shapely.make_valid(pieces[stuck]), owner[stuck])
+        triangles, which = shapely.get_parts(
+            shapely.constrained_delaunay_triangles(sound), return_index=True
+        )
+        found = np.concatenate([made, triangles])
+        found_owner = np.concatenate([found_owner, sound_owner[which]])
     solid = shapely.area(found) > _MIN_AREA_M2
     return found[solid], found_owner[solid]
 
@@ -225,5 +237,6 @@ def _halves_at(
 
 
 def _unit(vectors: Array) -> Array:
-    unit: Array = vectors / np.maximum(np.hypot(*vectors.T), 1e-12)[:, None]
+    size = np.hypot(vectors[..., 0], vectors[..., 1])
+    unit: Array = vectors / np.maximum(size, 1e-12)[..., None]
     return unit

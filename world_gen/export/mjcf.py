@@ -148,9 +148,12 @@ def _add_blocks(
     """Add outlines, each with an id, an underside and a top, as boxes and convex prisms."""
     parts = convex_cover(outlines)
     add_geom, add_mesh = spec.worldbody.add_geom, spec.add_mesh
+    low_m, high_m = np.array([extent[1:] for extent in extents]).reshape(-1, 2)[parts.owner].T
+    centres = np.column_stack([parts.centre_m, (low_m + high_m) / 2])
+    halves = np.column_stack([parts.half_m, (high_m - low_m) / 2])
+    quaternions = np.zeros((len(parts.owner), 4))
+    quaternions[:, 0], quaternions[:, 3] = np.cos(parts.yaw_rad / 2), np.sin(parts.yaw_rad / 2)
     count: dict[int, int] = {}
-    centres, halves = parts.centre_m.tolist(), parts.half_m.tolist()
-    cosines, sines = np.cos(parts.yaw_rad / 2).tolist(), np.sin(parts.yaw_rad / 2).tolist()
     owners, boxes = parts.owner.tolist(), parts.is_box.tolist()
     for k, (owner, is_box) in enumerate(zip(owners, boxes, strict=True)):
         given, low, high = extents[owner]
@@ -161,16 +164,16 @@ def _add_blocks(
         geom = add_geom(block)
         geom.name = name
         if is_box:
-            # Said in the call, the same values take twice as long.
-            geom.pos = *centres[k], (low + high) / 2
-            geom.size = *halves[k], (high - low) / 2
-            geom.quat = cosines[k], 0.0, 0.0, sines[k]
+            # Said in the call, or as lists, the same values take twice as long.
+            geom.pos, geom.size, geom.quat = centres[k], halves[k], quaternions[k]
             continue
         ring = parts.rings[k]
         corners = np.empty((2, len(ring), 3))
         corners[:, :, :2] = ring
         corners[0, :, 2], corners[1, :, 2] = low, high
-        add_mesh(name=name, uservert=corners.ravel().tolist(), userface=_prism_faces(len(ring)))
+        mesh = add_mesh()
+        mesh.name = name
+        mesh.uservert, mesh.userface = corners.ravel().tolist(), _prism_faces(len(ring))
         geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, name
 
 
@@ -218,8 +221,8 @@ def _add_road(spec: mujoco.MjSpec, world: World) -> None:
     faces = np.where(cross[:, None] < 0.0, faces[:, ::-1], faces)[np.abs(cross) > 1e-4]
     mesh = spec.add_mesh()
     mesh.name = "road"
-    mesh.uservert = np.column_stack([corners, np.full(len(corners), ROAD_TOP_M)]).ravel()
-    mesh.userface = faces.ravel()
+    mesh.uservert = np.column_stack([corners, np.full(len(corners), ROAD_TOP_M)]).ravel().tolist()
+    mesh.userface = faces.ravel().tolist()
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     geom = spec.worldbody.add_geom()
     geom.name = "road"

@@ -8,8 +8,10 @@ import msgspec
 import numpy as np
 import pytest
 import shapely
+from scipy.signal import savgol_filter
 
 from contracts.world import Area
+from sim_worker.metrics import comfort
 from sim_worker.metrics.ground import DrivableGround
 from sim_worker.metrics.rollout import Rollout
 from sim_worker.metrics.scene import Context
@@ -30,6 +32,15 @@ def braking(decel: float) -> np.ndarray:
     time_s = times()
     x = 20.0 * time_s - decel * time_s**2 / 2
     return np.column_stack([x, 0 * x, 0 * x])
+
+
+@pytest.mark.parametrize("count", [3, 9, 16, 80])
+@pytest.mark.parametrize(("window_s", "derivative"), [(0.8, 1), (1.4, 1), (1.4, 2)])
+def test_motion_is_smoothed_as_scipy_does(count: int, window_s: float, derivative: int) -> None:
+    operator = comfort._operator(count, 0.1, window_s, derivative)
+    window = min(2 * round(window_s / 0.2) + 1, count - (count + 1) % 2)
+    expected = savgol_filter(np.eye(count), window, 2, deriv=derivative, delta=0.1, axis=1)
+    assert operator == pytest.approx(expected, abs=1e-10)
 
 
 def test_braking_hard_is_uncomfortable_and_gently_is_not() -> None:
