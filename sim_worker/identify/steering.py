@@ -18,9 +18,11 @@ from sim_worker.identify.steering_signals import (
     ALIKE_S,
     GYRO_BIAS,
     INVERSE_RATIO,
+    LAG,
     OFFSET,
     PULL_BRAKED,
     PULL_DRIVEN,
+    TURNING,
     UNDERSTEER,
     SteeringSignals,
     steering_signals,
@@ -152,6 +154,11 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
         half_widths[INVERSE_RATIO], brief.quantile[INVERSE_RATIO] * doubt
     )
     covariance = fit.covariance.copy()
+    # How readily the car turns in, and when, every bend's beginning tells, whatever its radius.
+    for index in (TURNING, LAG):
+        narrower = math.sqrt(min(straight.covariance[index, index] / covariance[index, index], 1.0))
+        covariance[index] *= narrower
+        covariance[:, index] *= narrower
     covariance[INVERSE_RATIO, INVERSE_RATIO] += doubt**2
     varied = float(np.var(signals.wheel_rad[used] * per_m * weights)) / angles
     return SteeringFit(

@@ -7,7 +7,6 @@ identified parameters leave open there, and with what play in the steering may m
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -27,17 +26,26 @@ _LEAST_STRETCHES = 4
 _MUCH_WIDER = 1.5
 _STDS = 3.0
 """Twice in a row to the same side: once in 250,000 by chance, were it Gaussian."""
+_SEEN_STDS, _TOGETHER_STDS = 2.0, 4.5
+"""Tyres that grow softer alike on both axles show where a bend begins or ends, in one stretch of
+it alone: two of those that tell, one bend apart or more, must say so."""
+_TELLS = 1.0 / 5.0
+"""A stretch tells how readily the car turns in if it leaves no more of that open than this."""
 TURNING_MPS2 = 0.5
 """Sideways acceleration from which the car counts as turning."""
 _CANDIDATES = (INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING)
 
 
 class BendsBefore(NamedTuple):
-    """The identified parameters (8,), their covariance, and how bends scatter about each (8,)."""
+    """The identified parameters (8,), their covariance, and what they left unexplained (8,).
+
+    `noise` over the root of what a stretch's slopes come to is how its departures scatter: bends
+    that tell little of a parameter depart from it far.
+    """
 
     values: Array
     covariance: Array
-    scatter: Array
+    noise: Array
 
     def knows_less(self, other: BendsBefore) -> bool:
         """Return whether it leaves much more open of the understeer gradient than another."""
@@ -66,8 +74,12 @@ class _Stretches(NamedTuple):
     """Of each parameter (M, 8), all others held."""
     slopes: Array
     """Of these by each parameter (M, 8, 8)."""
-    gains: Array
-    """How much of the residuals' squares each departure explains (M, 8)."""
+    squares: Array
+    """How much each departure is told by (M, 8): times its square, what it explains."""
+
+    def explained(self) -> Array:
+        """Return how much of the residuals' squares each departure explains (M, 8)."""
+        return np.asarray(np.square(self.departures) * self.squares)
 
 
 def _stretches(signals: SteeringSignals, values: Array) -> _Stretches:
@@ -86,10 +98,8 @@ def _stretches(signals: SteeringSignals, values: Array) -> _Stretches:
     count = len(values)
     moment = np.reshape(moments, (-1, count))
     gram = np.reshape(grams, (-1, count, count))
-    square = np.maximum(np.diagonal(gram, axis1=1, axis2=2), 1e-300)
-    return _Stretches(
-        np.array(begins), moment / square, gram / square[:, :, None], np.square(moment) / square
-    )
+    squares = np.maximum(np.diagonal(gram, axis1=1, axis2=2), 1e-300)
+    return _Stretches(np.array(begins), moment / squares, gram / squares[:, :, None], squares)
 
 
 def bends_before(fit: SteeringFit) -> BendsBefore | None:
@@ -97,41 +107,66 @@ def bends_before(fit: SteeringFit) -> BendsBefore | None:
     told = _stretches(fit.signals, fit.fit.values)
     if len(told.begin_s) < _LEAST_STRETCHES:
         return None
-    scatter = np.sqrt(np.sum(np.square(told.departures), axis=0) / (len(told.begin_s) - 1))
-    return BendsBefore(fit.fit.values, fit.fit.covariance, scatter)
+    noise = np.sqrt(np.sum(told.explained(), axis=0) / (len(told.begin_s) - 1))
+    return BendsBefore(fit.fit.values, fit.fit.covariance, noise)
 
 
 def find_step(signals: SteeringSignals, before: BendsBefore) -> Step | None:
     """Return the step that the newest stretch of bends, or the newest two, tell of, if any."""
     told = _stretches(signals, before.values)
+    stds = _stds(told, before)
+    sides = told.departures / stds
+    newest = np.arange(len(told.begin_s))
     for count in (2, 1):
-        if len(told.begin_s) >= count:
-            found = _departed(told, before, count)
-            if found is not None:
-                return found
+        departed = np.all(np.abs(sides[-count:]) > _STDS, axis=0)
+        departed &= np.abs(np.sum(np.sign(sides[-count:]), axis=0)) == count
+        if len(newest) >= count and (found := _step(told, before, newest[-count:], departed)):
+            return found
+        if found := _softened(told, before, stds, count):
+            return found
     return None
 
 
-def _departed(told: _Stretches, before: BendsBefore, count: int) -> Step | None:
-    departures, slopes = told.departures[-count:], told.slopes[-count:]
-    open_std = np.sqrt(np.einsum("mji,ik,mjk->mj", slopes, before.covariance, slopes))
+def _stds(told: _Stretches, before: BendsBefore) -> Array:
+    """Return how far each departure may be from zero without a step (M, 8)."""
+    open_std = np.sqrt(np.einsum("mji,ik,mjk->mj", told.slopes, before.covariance, told.slopes))
     # However alike bends were: the tyres need not stand as the steering wheel says.
-    play_std = np.abs(slopes[:, :, OFFSET] * (PLAY_RAD * before.values[INVERSE_RATIO]))
-    apart = departures / np.hypot(np.hypot(before.scatter, open_std), play_std)
-    found: Step | None = None
-    most = 0.0
-    for index in _CANDIDATES:
-        sides = apart[:, index]
-        same = bool(np.all(sides > _STDS) or np.all(sides < -_STDS))
-        explained = math.fsum(told.gains[-count:, index])
-        if same and explained > most:
-            most = explained
-            value = float(before.values[index])
-            found = Step(
-                parameter=index,
-                before=value,
-                after=value + float(np.mean(departures[:, index])),
-                sure=count > 1,
-                after_s=float(told.begin_s[-count]) + STRETCH_S,
-            )
-    return found
+    play_std = np.abs(told.slopes[:, :, OFFSET] * (PLAY_RAD * before.values[INVERSE_RATIO]))
+    noise_std = before.noise / np.sqrt(told.squares)
+    return np.asarray(np.hypot(np.hypot(noise_std, open_std), play_std))
+
+
+def _softened(told: _Stretches, before: BendsBefore, stds: Array, count: int) -> Step | None:
+    """Return the step in how readily the car turns in that the newest two that tell speak of.
+
+    With `count` 1, that either of them speaks of.
+    """
+    tells = np.flatnonzero(stds[:, TURNING] < _TELLS * before.values[TURNING])[-2:]
+    sides = told.departures[tells, TURNING] / stds[tells, TURNING]
+    if count == 1:
+        tells, sides = tells[np.abs(sides) > _STDS][-1:], sides[np.abs(sides) > _STDS][-1:]
+    elif np.any(np.abs(sides) < _SEEN_STDS) or abs(float(sides.sum())) < 2.0**0.5 * _TOGETHER_STDS:
+        return None
+    if len(tells) < count:
+        return None
+    found = _step(told, before, tells, np.ones(len(before.values), dtype=np.bool_))
+    return found if found is not None and found.parameter == TURNING else None
+
+
+def _step(
+    told: _Stretches, before: BendsBefore, which: np.ndarray, departed: np.ndarray
+) -> Step | None:
+    """Return the step of the parameter that explains most, of those that `departed` (8,)."""
+    explained = np.sum(told.explained()[which], axis=0)
+    candidates = [index for index in _CANDIDATES if departed[index]]
+    if not candidates:
+        return None
+    most = max(candidates, key=lambda index: float(explained[index]))
+    value = float(before.values[most])
+    return Step(
+        parameter=most,
+        before=value,
+        after=value + float(np.mean(told.departures[which, most])),
+        sure=len(which) > 1,
+        after_s=float(told.begin_s[which[0]]) + STRETCH_S,
+    )

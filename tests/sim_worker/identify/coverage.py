@@ -4,7 +4,7 @@ Cars are drawn far more widely than the bundled file expects (its understeer gra
 of what is drawn), and none of the drawn values is told: intervals hold for each car by itself, not
 on the average over cars like the file's.
 
-    python -m tests.sim_worker.identify.coverage [CARS]
+    python -m tests.sim_worker.identify.coverage [CARS [FIRST_SEED]]
 
 prints, for each parameter, how many of the intervals held the truth, how many values were as near
 as they should be, how far they were off, and the intervals' median half width; a car takes some
@@ -198,7 +198,8 @@ def coverage(told: Iterable[Case]) -> dict[str, tuple[int, int]]:
 def main() -> None:
     """Print the coverage."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    told = [case for seed in range(count) for case in cases(seed)]
+    first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    told = [case for seed in range(first, first + count) for case in cases(seed)]
     for name, (held, of) in coverage(told).items():
         mine = [case for case in told if case.name == name]
         errors = np.array([case.value - case.truth for case in mine])

@@ -11,15 +11,26 @@ import pytest
 from contracts.drive import ImuSample, SteeringSample
 from contracts.errors import UserError
 from contracts.tuning import Identification
+from sim_worker.identify.smoothing import smoothed
+from sim_worker.identify.steering import fit_steering
+from sim_worker.identify.steering_signals import TURNING, steering_signals
+from sim_worker.identify.step import bends_before, find_step
 from sim_worker.identify.tuner import Tuner
-from sim_worker.identify.window import UNDERSTEER_NAME
+from sim_worker.identify.window import UNDERSTEER_NAME, identify
 from sim_worker.vehicle.parameters import load_vehicle, understeer_gradient
 from telemetry.standin.parameters import read_parameters
 from telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.sim_worker.identify.coverage import own_gradient, random_path
-from tests.sim_worker.standin_drives import estimate, samples_of, straight_minute
+from tests.sim_worker.standin_drives import (
+    city_minute,
+    estimate,
+    recorded,
+    samples_of,
+    straight_minute,
+)
 from tests.telemetry.city_drive import city_drive
 
+CAR = read_parameters().car
 Sample = tuple[str, Any]
 
 
@@ -119,6 +130,32 @@ def test_softer_front_tyres_are_noticed_in_seconds_of_bends_and_identified_anew(
     assert understeer_gradient(taken.vehicle) == pytest.approx(0.003, rel=0.15)
 
 
+def test_a_car_that_understeers_on_hills_is_told_from_the_bundled_one() -> None:
+    """Hills of up to 6 % are in the altitude; a column that gives is understeer."""
+    drive = city_drive(compliance=0.003, hill_m=3.0)
+    told = identify(recorded(drive.samples), load_vehicle(), vehicle_id="standin")
+    assert estimate(told, UNDERSTEER_NAME).value == pytest.approx(0.003, rel=0.10)
+    assert estimate(told, "steering_ratio").value == pytest.approx(CAR.steering_ratio, rel=0.02)
+    assert estimate(told, "drive_gain").value == pytest.approx(CAR.drive_gain, rel=0.05)
+    assert estimate(told, "brake_gain").value == pytest.approx(CAR.brake_gain, rel=0.05)
+
+
+def test_softer_tyres_on_both_axles_show_where_bends_begin_and_end() -> None:
+    """The steering wheel turns further while the car's rotation gains or loses, and no further."""
+    record = city_minute()
+    before = bends_before(fit_steering(record, load_vehicle()))
+    assert before is not None
+    period_s = float(record.time_s[1])
+    gaining = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=0.05, derivative=True)
+    softer = record.wheel_rad + CAR.steering_ratio * 0.006 * np.nan_to_num(gaining)
+    alike = find_step(steering_signals(record, load_vehicle()), before)
+    other = find_step(steering_signals(record._replace(wheel_rad=softer), load_vehicle()), before)
+    assert alike is None
+    assert other is not None
+    assert other.parameter == TURNING
+    assert other.after - other.before == pytest.approx(0.006, rel=0.3)
+
+
 @pytest.mark.judge
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -140,6 +177,24 @@ def test_tyres_changed_in_mid_drive_are_noticed_and_identified_anew(seed: int) -
     assert _bends_s(samples, change_ns, noticed[0].stamp_ns) < 8.0
     truth = own_gradient() + softer
     assert understeer_gradient(taken.vehicle) == pytest.approx(truth, abs=0.0005)
+
+
+@pytest.mark.judge
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_tyres_softer_on_both_axles_in_mid_drive_are_noticed(seed: int) -> None:
+    parameters = read_parameters()
+    path = random_path(np.random.default_rng(1000 + seed), parameters, length_m=1500.0)
+    source = StandinSource(path, parameters, vehicle_id="standin", seed=seed, end_s=110.0)
+    change_ns = START_STAMP_NS + 70_000_000_000
+    samples = list(source.advance(change_ns))
+    source.change_tyres(stiffness=0.7)
+    samples += source.advance(START_STAMP_NS + 110_000_000_000)
+    noticed = [found for found in through(tuner(), samples) if found.step_noticed]
+    assert noticed
+    assert "tyres' stiffness" in noticed[0].step_noticed
+    assert noticed[0].stamp_ns > change_ns
+    assert _bends_s(samples, change_ns, noticed[0].stamp_ns) < 12.0
 
 
 def test_a_straight_motorway_changes_no_parameter() -> None:

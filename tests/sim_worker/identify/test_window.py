@@ -14,8 +14,7 @@ from sim_worker.identify.window import UNDERSTEER_NAME, identify
 from sim_worker.motion_record import MotionRecord
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.standin.parameters import read_parameters
-from tests.sim_worker.standin_drives import city_minute, estimate, recorded, straight_minute
-from tests.telemetry.city_drive import city_drive
+from tests.sim_worker.standin_drives import city_minute, estimate, straight_minute
 
 CAR = read_parameters().car
 TOLD = (
@@ -92,16 +91,6 @@ def test_without_grade_gains_and_drag_are_not_told() -> None:
         assert found.value is None
         assert "grade is unknown" in found.reason
     assert estimate(told, "steering_ratio").value is not None
-
-
-def test_a_car_that_understeers_on_hills_is_told_from_the_bundled_one() -> None:
-    """Hills of up to 6 % are in the altitude; a column that gives is understeer."""
-    drive = city_drive(compliance=0.003, hill_m=3.0)
-    told = identify(recorded(drive.samples), load_vehicle(), vehicle_id="standin")
-    assert estimate(told, UNDERSTEER_NAME).value == pytest.approx(0.003, rel=0.10)
-    assert estimate(told, "steering_ratio").value == pytest.approx(CAR.steering_ratio, rel=0.02)
-    assert estimate(told, "drive_gain").value == pytest.approx(CAR.drive_gain, rel=0.05)
-    assert estimate(told, "brake_gain").value == pytest.approx(CAR.brake_gain, rel=0.05)
 
 
 def _nothing(record: MotionRecord) -> Array:

@@ -145,7 +145,7 @@ def test_other_parameters_do_not_move_a_following_twin() -> None:
     mirror.set_roles(UseRoles(stamp_ns=0, roles={}, correction="follow"))
     other = altered(CAR, drive_gain=0.9, wheelbase_m=2.7, cog_from_rear_axle_m=1.3)
     mirror.use_vehicle(other, from_stamp_ns=300 * TICK_NS)
-    samples = drive(mirror, wrong_gain=0.1, changes={})
+    samples = drive(mirror, wrong_gain=0.1, changes={}, ticks=450)
     assert _jumps(samples)[:, 0].max() < 0.03
 
 
