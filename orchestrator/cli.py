@@ -66,7 +66,10 @@ def drive(
     vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
     tuning: Annotated[
         str | None,
-        typer.Option(help="parameters from the driving: off, report, apply [default: report]"),
+        typer.Option(
+            help="parameters from the driving: off, report, apply [default: report; off where "
+            "there are fewer processors than workers]"
+        ),
     ] = None,
     view: Annotated[
         str | None, typer.Option(help="auto, native, web or none [default: auto]")

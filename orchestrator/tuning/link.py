@@ -39,8 +39,12 @@ class TuningLink:
     ) -> None:
         self._plan, self._bus, self._mailbox, self._tables = plan, bus, mailbox, tables
         self._events, self._intake, self._rounds, self._alive = events, intake, rounds, alive
+        # Live it gives way to rounds, and may be behind: they must not wait for it.
         self.parameters = ParameterDesk(
-            plan.vehicle, vehicle_id=plan.config.vehicle_id, ask=self._ask
+            plan.vehicle,
+            vehicle_id=plan.config.vehicle_id,
+            ask=self._ask,
+            not_awaited=() if plan.config.lock_step else (TUNING,),
         )
         self.findings = Findings(
             tables,
@@ -129,7 +133,7 @@ class TuningLink:
     def record(self) -> dict[str, object]:
         """Return the `tuning` of run.json."""
         return {
-            "mode": self._plan.config.tuning,
+            "mode": self._plan.config.tuning_choice.mode,
             "version": self.parameters.version,
             "changes": self.parameters.rows(),
             "pinned": sorted(self.parameters.in_force.pinned),
@@ -137,7 +141,7 @@ class TuningLink:
         }
 
     def _identified(self, told: Identification) -> None:
-        if self._plan.config.tuning == "apply":
+        if self._plan.config.tuning_choice.mode == "apply":
             self.parameters.apply(told)
 
     def _simulates(self, process_id: str) -> bool:
