@@ -40,6 +40,11 @@ __all__ = [
 
 CONNECT_S = 5.0
 """How long a client looks for its router."""
+LEASE_MS = 3000
+"""A process that is silent for so long counts as lost."""
+LOSSLESS_LEASE_MS = 60_000
+LOSSLESS_WAIT_US = 600_000_000
+"""How long a writer waits for a reader that stands still where nothing may be lost."""
 
 
 class BusUnreachable(ConnectionError):  # noqa: N818
@@ -113,13 +118,16 @@ def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
         "scouting/delay": 0,
         "timestamping/enabled": True,
         "transport/shared_memory/enabled": False,
-        "transport/link/tx/lease": 3000,
+        "transport/link/tx/lease": LOSSLESS_LEASE_MS if setup.lossless else LEASE_MS,
         "transport/link/tx/queue/size": {
             "control": 2, "real_time": 16, "interactive_high": 16, "interactive_low": 4,
             "data_high": 16, "data": 16, "data_low": 2, "background": 2,
         },
         "listen/endpoints": [setup.endpoint] if router else [],
     }  # fmt: skip
+    if setup.lossless:
+        queue = "transport/link/tx/queue/congestion_control/block"
+        settings[f"{queue}/wait_before_close"] = LOSSLESS_WAIT_US
     if not router:
         settings["connect/endpoints"] = [setup.endpoint]
         settings["connect/timeout_ms"] = round(1e3 * CONNECT_S)

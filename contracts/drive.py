@@ -109,6 +109,23 @@ class PlannedTrajectory(msgspec.Struct, frozen=True, kw_only=True):
     speed_mps: Array
 
 
+class RoutePose(msgspec.Struct, frozen=True):
+    """Where a route begins or ends, and the yaw there from true east."""
+
+    position: GeoPoint
+    yaw_rad: float
+
+
+class RouteToGoal(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the stack is on its way to; said again each second, so that who comes later knows."""
+
+    stamp_ns: int
+    start: RoutePose
+    goal: RoutePose
+    segments: int = 0
+    """Of the stack's own map, which nobody else has."""
+
+
 class VehicleStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Who drives, and how the vehicle is set."""
 
@@ -180,6 +197,9 @@ class VehicleState(msgspec.Struct, frozen=True, kw_only=True):
     estimated: tuple[str, ...] = ()
     stale: tuple[str, ...] = ()
     """Channels that the vehicle sends and that are overdue at this instant."""
+    map_shift_m: tuple[float, float] | None = None
+    """East and north: what the map's roads have moved the position by so far, which is no motion
+    of the car; None where the position comes from the vehicle's sensors alone."""
     yaw_valid: bool = True
     """False until the vehicle has moved far enough for a heading to be known."""
 

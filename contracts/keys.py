@@ -85,6 +85,7 @@ CHANNELS: dict[str, Channel] = {
         _row("end", f"{_TELEMETRY}/end", drive.DriveEnd, None, LIVE, "the drive is over"),
         # What is derived from it.
         _row("state", "vehicle/{vehicle}/state", drive.VehicleState, 50, LIVE, "estimated state"),
+        _row("route", "vehicle/{vehicle}/route", drive.RouteToGoal, 1, LIVE, "where the ADS goes"),
         # Questions to the vehicle's process.
         _row("info", "vehicle/{vehicle}/info", drive.InfoRequest, None, REQUEST,
              "what the vehicle is", drive.VehicleInfo),

@@ -69,6 +69,10 @@ class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=T
     mapping_name: str
     drive_frame: LocalFrame
     towards_vehicle: bool = False
+    vehicle: VehicleParameters | None = None
+    """Of the car: the size of its twin."""
+    listens_only: bool = False
+    """Of a vehicle beside the car: nothing goes out to it, whatever the mapping says."""
 
 
 class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):

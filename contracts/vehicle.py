@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import msgspec
 
+from contracts.drive import RoadUserKind
+
+_VAN_M, _LORRY_M = 5.2, 7.0
+
 
 class Parameter(msgspec.Struct, frozen=True):
     """One number with its uncertainty (one standard deviation, None where unknown) and source."""
@@ -59,3 +63,10 @@ class VehicleParameters(msgspec.Struct, frozen=True, kw_only=True, forbid_unknow
     height_m: Parameter
     rear_overhang_m: Parameter
     """From the rear bumper to the rear axle."""
+
+
+def kind_by_length(length_m: float) -> RoadUserKind:
+    """Return what others take a vehicle of this length for."""
+    if length_m <= _VAN_M:
+        return "car"
+    return "van" if length_m < _LORRY_M else "lorry"

@@ -39,7 +39,7 @@ def drive(
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
     map_file: Annotated[str | None, typer.Option("--map", help="map of the place")] = None,
     route: Annotated[
-        str | None, typer.Option(help="GPX or GeoJSON file, or from-log; default: predicted")
+        str | None, typer.Option(help="GPX or GeoJSON file, from-log, or live; default: predicted")
     ] = None,
     log: Annotated[str | None, typer.Option(help="recorded drive to replay")] = None,
     source: Annotated[
@@ -71,6 +71,9 @@ def drive(
             "there are fewer processors than workers]"
         ),
     ] = None,
+    map_aiding: Annotated[
+        str | None, typer.Option(help="roads help to find the car: auto, off [default: auto]")
+    ] = None,
     view: Annotated[
         str | None, typer.Option(help="auto, native, web or none [default: auto]")
     ] = None,
@@ -95,8 +98,9 @@ def drive(
             "map": map_file, "route": route, "log": log, "source": source, "start_s": start,
             "end_s": end, "speed": speed, "workers": workers, "futures": futures,
             "least_futures": least_futures, "rate_hz": rate, "horizon_s": horizon,
-            "planner": planner, "seed": seed, "vehicle": vehicle, "tuning": tuning, "view": view,
-            "out": out, "ros2": ros2, "towards_vehicle": towards_vehicle or None,
+            "planner": planner, "seed": seed, "vehicle": vehicle, "tuning": tuning,
+            "map_aiding": map_aiding, "view": view, "out": out, "ros2": ros2,
+            "towards_vehicle": towards_vehicle or None,
         },
     )  # fmt: skip
     raise typer.Exit(run_drive(settings))

@@ -14,6 +14,7 @@ from contracts.drive import VehicleInfo
 from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key, vehicle_of_key
 from contracts.simulation import ActiveWorld
 from contracts.world import World
+from orchestrator.beside.vehicles import VehiclesBeside
 from orchestrator.changes.desk import ChangeDesk
 from orchestrator.changes.roles import CorrectionHandler, RoleHandler, RolesInForce
 from orchestrator.events import EventDesk
@@ -27,9 +28,9 @@ from orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
 from orchestrator.questions import Questions
 from orchestrator.record.results import ResultTables
 from orchestrator.rounds.runner import RoundRunner
+from orchestrator.route_desk import RouteDesk
 from orchestrator.tuning.by_hand import VehicleHandler
 from orchestrator.tuning.link import FINDINGS, TuningLink
-from orchestrator.vehicles_beside import VehiclesBeside
 from orchestrator.world_desk import WorldDesk
 
 log = logging.getLogger(ORCHESTRATOR)
@@ -83,9 +84,8 @@ class Conductor:
             {"role": RoleHandler(self.roles), "correction": CorrectionHandler(self.roles),
              "vehicle": VehicleHandler(self.tuning.parameters)}
         )  # fmt: skip
-        self.beside = VehiclesBeside(
-            plan, publish=lambda message: bus.publish("other_vehicles", message, run=plan.run_id)
-        )
+        self.beside = VehiclesBeside(plan, bus, self.mailbox, tell=self.tell)
+        self.route = RouteDesk(plan, use=mission.give_route, tell=self.tell)
         self._active_world: str | None = None
         self._world_untold = False
 
@@ -98,6 +98,7 @@ class Conductor:
         for one in (vehicle, *live):
             for channel in TELEMETRY_CHANNELS:
                 self.bus.subscribe(channel, self.mailbox, vehicle=one)
+        self.route.join(self.bus, self.mailbox)
         for channel in ("mirror", "event"):
             self.bus.subscribe(channel, self.mailbox, run=run)
         self.tuning.join()
@@ -126,6 +127,8 @@ class Conductor:
                 self.mirror.take(item.message())
             case Received(channel="event"):
                 self.events.heard(item.message())
+            case Received(channel="route"):
+                self.route.take(item)
             case Received(channel=channel) if channel in FINDINGS:
                 self.tuning.heard(item)
             case Received():
@@ -138,6 +141,8 @@ class Conductor:
                 )
             case Reply(channel="prepare"):
                 self.worlds.prepare_reply(item)
+            case Reply(channel="info"):
+                self.beside.take_info(item.tag, item.message)
             case Reply(channel="use_world" | "use_roles"):
                 self.questions.answered()
             case Reply(channel="use_vehicle" | "tune"):
@@ -169,9 +174,12 @@ class Conductor:
         self.watch_telemetry(item.received_mono_ns)
         self.beside.keep_up_with(state, self.intake.road_users)
         self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
+        self.route.keep_up_with(state, self.intake.plan)
         self.rounds.take_state(state)
         self.rounds.windows.take(self.intake.surroundings, state)
         self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
+        if self.mission.road_line is not None and self.plan.config.map_aiding == "auto":
+            self.intake.take_line(self.mission.road_line)
 
     def watch_telemetry(self, mono_ns: int) -> None:
         """Tell what newly went wrong with the telemetry; also when none comes any more."""

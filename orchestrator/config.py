@@ -14,6 +14,7 @@ from contracts.roles import Correction, FollowLimits, Role
 from orchestrator.tuning.choice import Tuning, TuningChoice, choose_tuning, processors
 
 View = Literal["auto", "native", "web", "none"]
+MapAiding = Literal["auto", "off"]
 Source = Literal["auto", "log", "standin", "live"]
 
 HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
@@ -40,6 +41,8 @@ class VehicleBeside(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """Seconds of the log that have passed as the car's drive begins; None: by UTC, where both logs
     have it, else none."""
     live: bool = False
+    ros2: str | None = None
+    """A mapping in TOML, or `autoware`: how a live vehicle's own ROS 2 topics are read."""
     seen_as: str | None = None
 
     def trouble(self) -> str | None:
@@ -50,6 +53,8 @@ class VehicleBeside(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
             return "role all is the car's alone; must be twin, shadow or ghost"
         if (self.log is not None) + self.live + (self.seen_as is not None) != 1:
             return "needs exactly one of log = FILE, live = true, seen_as = ID"
+        if self.ros2 is not None and not self.live:
+            return "ros2 = MAPPING needs live = true: its topics are the vehicle's telemetry"
         return None
 
 
@@ -62,7 +67,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     map: str | None = None
     route: str | None = None
-    """A GPX or GeoJSON file, or `from-log`; None predicts the route from the road graph."""
+    """A GPX or GeoJSON file, `from-log`, or `live`: to the goal that the live car says it has; None
+    predicts the route from the road graph."""
     log: str | None = None
     source: Source = "auto"
     start_s: float = 0.0
@@ -92,6 +98,8 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     what is found counts (apply) or is only told: a simulation that nobody has asked to change
     stays that of the vehicle file. None is `report` in lock step and where workers have a
     processor each, else `off`."""
+    map_aiding: MapAiding = "auto"
+    """Whether the map's roads help to find the car where its positions are rougher than they."""
     follow: FollowLimits = FollowLimits()
     """How hard a twin that follows may be drawn."""
     vehicles: tuple[VehicleBeside, ...] = ()
@@ -143,6 +151,10 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             (
                 self.route != "from-log" or self.log is not None,
                 "--route from-log needs --log FILE",
+            ),
+            (
+                self.route != "live" or self.source == "live",
+                "--route live needs --source live: a car that says where it drives to",
             ),
             (
                 self.ros2 is None or self.source == "live",

@@ -36,9 +36,11 @@ from orchestrator.way.way_ahead import WayAhead
 
 log = logging.getLogger(ORCHESTRATOR)
 
-START_TIMEOUT_S = 60.0
-END_GRACE_S = 10.0
-"""What recorder and viewer get to write at the end of a drive."""
+START_TIMEOUT_S = 120.0
+END_GRACE_S, LOCK_STEP_GRACE_S = 10.0, 120.0
+"""What recorder and viewer get to write at the end of a drive, live and where nothing may miss."""
+LAST_WORDS_S = 0.1
+"""How long nothing may come from processes that have ended before all is taken for heard."""
 INTERRUPT_GRACE_S = 1.2
 HUNG_AFTER_S = 1.0
 """A process whose token is gone for so long while it runs (a stopped one, say) is killed."""
@@ -259,26 +261,24 @@ class _Drive:
         plan = self._plan
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
         bus.publish("run_end", end, run=plan.run_id)
+        to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
         quick = exit_word != "completed"
-        killed = self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else END_GRACE_S)
+        killed = self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else to_write_s)
         if killed:
             log.warning("had to kill %s", ", ".join(killed))
-        while (item := conductor.mailbox.take()) is not None:
+        while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
             conductor.handle(item)
         conductor.changes.refuse_all("the drive is over")
+        conductor.beside.close()
+        conductor.route.close()
         conductor.tables.close()
         if conductor.tables.failed:
             line.say(f"error: {conductor.tables.failed}")
         now_s = time.monotonic()
         record = run_record(
-            plan,
-            conductor,
-            self._mission,
-            self._supervisor,
-            exit_word=exit_word,
-            wall_s=now_s - started_s,
-            mono_s=now_s,
-        )
+            plan, conductor, self._mission, self._supervisor, exit_word=exit_word,
+            wall_s=now_s - started_s, mono_s=now_s,
+        )  # fmt: skip
         write_record(record, plan.folder / "run.json")
         logging.shutdown()
         with contextlib.suppress(OSError):  # a full disk has been told of

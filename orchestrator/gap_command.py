@@ -14,7 +14,7 @@ from contracts.errors import UserError
 from contracts.frames import LocalFrame
 from contracts.gap import GapAlarm, GapSample, Verdict
 from contracts.vehicle import VehicleParameters
-from orchestrator.gap_text import table_lines, verdict_lines
+from orchestrator.gap_text import nobody_accused, table_lines, verdict_lines
 from orchestrator.progress_bar import progress_bar
 from sim_worker.gap.errors import GapMeter, GapRow, gap_table
 from sim_worker.gap.free_run import FreeRunner
@@ -135,11 +135,15 @@ def report_gap(
 
 
 def as_object(report: GapReport) -> dict[str, Any]:
-    """Return the report as JSON has it: rows, verdicts with evidence, alarms, refused samples."""
+    """Return the report as JSON has it: rows, verdicts with evidence, alarms, refused samples.
+
+    `reason` says why nobody is accused, null where somebody is.
+    """
     return {
         "vehicle_id": report.info.vehicle_id,
         "independent": _commanded(report),
         "rows": [row._asdict() for row in report.rows],
+        "reason": nobody_accused(report.verdicts, commanded=_commanded(report)),
         "verdicts": [msgspec.to_builtins(verdict) for verdict in report.verdicts],
         "alarms": [msgspec.to_builtins(alarm) for alarm in report.alarms],
         "refused": report.refused,

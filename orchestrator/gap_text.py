@@ -35,6 +35,20 @@ def table_lines(rows: Sequence[GapRow]) -> Iterator[str]:
         yield ""
 
 
+def nobody_accused(verdicts: Sequence[Verdict], *, commanded: bool) -> str | None:
+    """Return why nobody is accused, None where somebody is."""
+    if any(verdict.culprit != "undecided" for verdict in verdicts):
+        return None
+    if not commanded:
+        return (
+            "commands were not recorded: the gap is that of commands estimated from the motion "
+            "itself, and who departs from them cannot be said"
+        )
+    if verdicts:
+        return verdicts[-1].text
+    return "nothing shows that the car or the model departs"
+
+
 def verdict_lines(
     verdicts: Sequence[Verdict], alarms: Sequence[GapAlarm], *, start_ns: int, commanded: bool
 ) -> Iterator[str]:
@@ -42,13 +56,9 @@ def verdict_lines(
     raised = [alarm for alarm in alarms if alarm.over]
     kinds = ", ".join(dict.fromkeys(alarm.quantity for alarm in raised))
     yield f"alarms: {len(raised)}{f' ({kinds})' if kinds else ''}"
-    if not commanded:
-        yield from _wrapped(
-            "commands were not recorded: the gap is that of commands estimated from the motion "
-            "itself, and who departs from them cannot be said"
-        )
-    if not verdicts and commanded:
-        yield "verdict: none: nothing shows that the car or the model departs"
+    reason = nobody_accused(verdicts, commanded=commanded)
+    if reason is not None and not (commanded and verdicts):
+        yield from _wrapped(f"verdict: none: {reason}" if commanded else reason)
     for verdict in verdicts:
         who = {"vehicle": "real vehicle", "model": "vehicle model"}.get(
             verdict.culprit, verdict.culprit

@@ -22,6 +22,7 @@ from contracts.vehicle import VehicleParameters
 from orchestrator.record.bookkeeping import TelemetryCount
 from orchestrator.telemetry_watch import TelemetryWatch, record
 from telemetry.estimator import StateEstimator
+from telemetry.map_aid import RoadLine
 
 
 class LatestState(NamedTuple):
@@ -114,6 +115,11 @@ class Intake:
             self.states += 1
         return state
 
+    def take_line(self, line: RoadLine) -> None:
+        """Take the line of the map along which the latest state drives."""
+        if self._estimator is not None:
+            self._estimator.take_line(line)
+
     def _with_tire_angle(self, state: VehicleState) -> VehicleState:
         """Return the state with the tyre angle that the parameters in force give it.
 
@@ -150,7 +156,8 @@ class Intake:
         """Return the `telemetry` part of run.json."""
         receiver_utc_ns = time.time_ns() - time.monotonic_ns()
         found = record(self._estimator, self.watch, receiver_utc_ns=receiver_utc_ns)
-        return {**self.counts.record(self.skipped_invalid), **found}
+        state = None if self.latest is None else self.latest.state
+        return {**self.counts.record(self.skipped_invalid), **found, **_position_record(state)}
 
     @property
     def surroundings(self) -> Surroundings:
@@ -172,6 +179,17 @@ class Intake:
         """Samples refused so far: by the source's reader, by the estimator, by the codec."""
         by_estimator = sum(self._estimator.skipped.values()) if self._estimator else 0
         return by_estimator + self.refused + (self.end.skipped_invalid if self.end else 0)
+
+
+def _position_record(state: VehicleState | None) -> dict[str, Any]:
+    """Return what gave the position, and how sure of it the newest state is."""
+    if state is None:
+        return {"position_from": [], "position_std_m": None}
+    std_m = state.position_std_m
+    return {
+        "position_from": ["gnss"] if state.map_shift_m is None else ["gnss", "map"],
+        "position_std_m": None if std_m is None else round(std_m, 3),
+    }
 
 
 def _tire_angle_rad(wheel_rad: float, vehicle: VehicleParameters) -> float:

@@ -18,6 +18,8 @@ from orchestrator.live_loop import is_telemetry
 
 ADVANCE_TIMEOUT_S = 120.0
 STUCK_AFTER_S = 120.0
+END_SILENCE_S = 5.0
+"""Having said nothing for so long, neither vehicle nor mirror have a last word."""
 
 
 class LockStepError(RuntimeError):
@@ -102,13 +104,18 @@ class LockStepLoop:
         """Take the vehicle's last word and what the mirror still has to say."""
         conductor = self._conductor
         last = conductor.intake.now_stamp_ns
-        deadline = time.monotonic() + 5.0
+        heard_ns, heard_s = conductor.mirror.stamp_ns, time.monotonic()
 
         def said() -> bool:
+            nonlocal heard_ns, heard_s
             for sample in self._in_order():
                 conductor.take_telemetry(sample)
-            mirrored = conductor.mirror.stamp_ns >= last - 200_000_000
-            return (conductor.intake.end is not None and mirrored) or time.monotonic() > deadline
+            if conductor.mirror.stamp_ns != heard_ns:
+                heard_ns, heard_s = conductor.mirror.stamp_ns, time.monotonic()
+            # What it still says after that is taken once it has ended.
+            silent = time.monotonic() - heard_s > END_SILENCE_S
+            mirrored = heard_ns >= last - 200_000_000
+            return (conductor.intake.end is not None and mirrored) or silent
 
         self._wait("the end", said)
 

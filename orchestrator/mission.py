@@ -16,7 +16,9 @@ from orchestrator.instructions import BuildWorld, Instruction, NotReady, RoundIn
 from orchestrator.visits import VisitBook
 from orchestrator.way.junctions_ahead import PassedJunction
 from orchestrator.way.map_matching import OffRoadStretch
+from orchestrator.way.route import Route
 from orchestrator.way.way_ahead import WayAhead
+from telemetry.map_aid import RoadLine
 from world_gen.intersections import Junction
 
 MissionState = Literal["waiting", "following", "off_map"]
@@ -48,6 +50,8 @@ class Mission:
     ) -> None:
         self.state: MissionState = "waiting"
         self.start_stamp_ns = start_stamp_ns
+        self.road_line: RoadLine | None = None
+        """The line that the latest state drives along; None in doubt, or between two matches."""
         self._way = way
         self._settings = settings
         self._visits = VisitBook()
@@ -57,6 +61,7 @@ class Mission:
         self._last_match_ns: int | None = None
         self._stretches_told = 0
         self._off_route_told = False
+        self._map_told = False
 
     # What comes in.
 
@@ -68,15 +73,21 @@ class Mission:
             if self._visits.see(junction, load=True, mono_s=mono_s, drive_time_s=0.0)
         ]
 
+    def give_route(self, route: Route) -> None:
+        """Follow this route from the next state on."""
+        self._way.give(route)
+
     def on_state(self, state: VehicleState, *, mono_s: float) -> list[Instruction]:
         """Take where the car is."""
         self._car = state
         self._way.take_speed(state)
+        self.road_line = None
         if not self._time_to_match(state):
             return []
         passed = self._way.locate(state)
         if passed is None:
             return self._off_map()
+        self.road_line = self._way.road_line(state)
         told: list[Instruction] = []
         if self.state != "following":
             text = "on the map" if self.state == "waiting" else "back on the map"
@@ -87,6 +98,9 @@ class Mission:
         told += self._wanted_worlds(mono_s)
         told += self._choose_current()
         told += self._tell_deviations()
+        if state.map_shift_m is not None and not self._map_told:
+            self._map_told = True
+            told.append(Tell("info", "position from GNSS and the map"))
         return told
 
     def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:

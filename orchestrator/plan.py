@@ -15,12 +15,13 @@ from contracts.arrays import Array
 from contracts.drive import VehicleInfo
 from contracts.errors import UserError
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup
 from contracts.vehicle import VehicleParameters
 from orchestrator.config import ConfigError, DriveConfig, VehicleBeside
 from orchestrator.doctor import has_display
-from orchestrator.endpoints import free_endpoint
 from orchestrator.maps.opening import Clip, open_map
+from orchestrator.ros2_mapping import read_ros2, read_ros2_beside
 from orchestrator.rounds.jobs import scenarios_of
 from orchestrator.way.line_matching import match_line
 from orchestrator.way.road_index import RoadIndex
@@ -29,7 +30,7 @@ from orchestrator.way.standin_path import StandinPath, standin_path
 from sim_worker.planners.registry import check_planner
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.logs import LogError, line_of_log, open_log, read_line
-from telemetry.ros2.mapping import MappingFile, read_mapping
+from telemetry.ros2.mapping import MappingFile
 from telemetry.standin.parameters import read_parameters
 from world_gen.intersections import Junction
 from world_gen.osm_map import OsmMap
@@ -53,6 +54,8 @@ class Beside(NamedTuple):
     config: VehicleBeside
     vehicle: VehicleParameters
     commands_recorded: bool
+    ros2: MappingFile | None = None
+    """How its own ROS 2 topics are read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +135,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
     if config.standin_parameters is not None:
         read_parameters(Path(config.standin_parameters))
-    ros2 = read_mapping(Path(config.ros2)) if config.ros2 else None
+    ros2 = read_ros2(config)
     map_file = Path(config.map) if config.map else EMBEDDED_MAP
     source = config.resolved_source
     info, positions, log_file = None, None, None
@@ -202,7 +205,8 @@ def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
 def _read_beside(config: VehicleBeside, own: VehicleParameters) -> Beside:
     vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
     if config.log is None:
-        return Beside(config, vehicle, commands_recorded=config.live)
+        ros2 = read_ros2_beside(config)
+        return Beside(config, vehicle, commands_recorded=config.live, ros2=ros2)
     file = Path(config.log)
     if not file.exists():
         raise FileNotFoundError(f"recorded drive {file} of {config.id}: no such file or folder")
@@ -228,6 +232,8 @@ def _bounds_text(graph: RoadGraph) -> str:
 
 def _given_line(config: DriveConfig, positions: Array | None) -> Array | None:
     """Return the line (N, 2) of degrees that the route shall follow; None: it is predicted."""
+    if config.route == "live":
+        return None
     if config.route == "from-log":
         return positions
     route_file = config.route
@@ -243,7 +249,7 @@ def _routes(
 ) -> tuple[tuple[Route, ...], str]:
     """Return the given routes, none where the route is predicted, and where they came from."""
     if given is None:
-        return (), "predicted"
+        return (), "live" if config.route == "live" else "predicted"
     from_log = config.route == "from-log"
     what = f"from-log of {config.log}" if from_log else config.route or EMBEDDED_ROUTE
     source = "from-log" if from_log else "given"

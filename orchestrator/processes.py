@@ -17,7 +17,7 @@ from contracts.setup import (
     ViewerSetup,
     WorkerSetup,
 )
-from orchestrator.plan import DrivePlan
+from orchestrator.plan import Beside, DrivePlan
 from orchestrator.rounds.jobs import planners_of
 
 ORCHESTRATOR = "orchestrator"
@@ -25,6 +25,7 @@ BUILDER = "builder"
 MIRROR = "mirror"
 TUNING = "tuning"
 VEHICLE = "vehicle"
+ROS2_BESIDE = "ros2-beside"
 
 WhenDead = Literal["restart", "report", "end_drive"]
 
@@ -40,6 +41,8 @@ class ProcessRow(NamedTuple):
     setup: Callable[[DrivePlan, str], ProcessSetup]
     nice: int = 0
     """Added to the scheduling niceness: who writes for later gives way to who is waited for."""
+    numbered: bool = False
+    """Whether its ids are its name with a number each."""
 
 
 def _one(_: DrivePlan) -> int:
@@ -159,6 +162,23 @@ def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
         mapping_name=plan.ros2.name,
         drive_frame=plan.drive_frame,
         towards_vehicle=plan.config.towards_vehicle,
+        vehicle=plan.vehicle,
+    )
+
+
+def _ros2_of_others(plan: DrivePlan) -> list[Beside]:
+    return [one for one in plan.beside if one.ros2 is not None]
+
+
+def _ros2_beside(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    one = _ros2_of_others(plan)[int(process_id.removeprefix(ROS2_BESIDE))]
+    assert one.ros2 is not None
+    return Ros2Setup(
+        **_base(plan, process_id) | {"vehicle_id": one.config.id},  # type: ignore[arg-type]
+        mapping=one.ros2.text,
+        mapping_name=one.ros2.name,
+        drive_frame=plan.drive_frame,
+        listens_only=True,
     )
 
 
@@ -172,7 +192,10 @@ def _source_is(source: str) -> Callable[[DrivePlan], bool]:
 
 PROCESSES: tuple[ProcessRow, ...] = (
     ProcessRow(BUILDER, "orchestrator.world_builder", _always, _one, "restart", _builder, 10),
-    ProcessRow("w", "sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker),
+    ProcessRow(
+        "w", "sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker,
+        numbered=True,
+    ),
     ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
     ProcessRow(TUNING, "sim_worker.tuning_process", _tunes, _one, "restart", _tuning, 15),
     ProcessRow("recorder", "telemetry.recorder", _always, _one, "report", _recorder),
@@ -181,7 +204,11 @@ PROCESSES: tuple[ProcessRow, ...] = (
     ProcessRow(VEHICLE, "telemetry.standin", _source_is("standin"), _one, "end_drive", _standin),
     # Never started again: what has stopped towards a vehicle must not resume by itself.
     ProcessRow("ros2", "telemetry.ros2", _speaks_ros2, _one, "end_drive", _ros2),
-)
+    ProcessRow(
+        ROS2_BESIDE, "telemetry.ros2", lambda plan: bool(_ros2_of_others(plan)),
+        lambda plan: len(_ros2_of_others(plan)), "restart", _ros2_beside, numbered=True,
+    ),
+)  # fmt: skip
 """In the order in which they are started; the vehicle waits for the orchestrator's token."""
 
 
@@ -196,7 +223,7 @@ def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
 
 
 def process_ids(row: ProcessRow, plan: DrivePlan) -> tuple[str, ...]:
-    """Return the ids of a row's processes: its name, numbered where there are several kinds."""
-    if row.name == "w":
-        return tuple(f"w{index}" for index in range(row.count(plan)))
+    """Return the ids of a row's processes."""
+    if row.numbered:
+        return tuple(f"{row.name}{index}" for index in range(row.count(plan)))
     return (row.name,)

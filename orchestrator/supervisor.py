@@ -30,6 +30,10 @@ log = logging.getLogger("orchestrator")
 GIVES_WAY_AFTER_S = 1.0
 """So long after its death a process may still count as alive."""
 RESTARTS_WITHIN_S = 30.0
+TERM_S = 5.0
+"""What a process that was told to leave has for its last words: on a busy machine one that writes a
+file is slow, not stuck."""
+_REAP_S = 30.0
 MAX_RESTARTS = 5
 """More deaths than this within RESTARTS_WITHIN_S and a process is given up."""
 
@@ -178,7 +182,7 @@ class Supervisor:
         """Return the operating system's id of a process."""
         return self._managed[process_id].child.pid
 
-    def stop(self, *, grace_s: float, term_s: float = 0.7) -> list[str]:
+    def stop(self, *, grace_s: float, term_s: float = TERM_S) -> list[str]:
         """Wait `grace_s` for all to end by themselves, then terminate, then kill.
 
         Returns the ids that had to be killed. Those who gave way are waited for now.
@@ -195,7 +199,8 @@ class Supervisor:
         for managed in killed:
             _signal(managed.child, signal.SIGKILL)
         for managed in self._managed.values():
-            managed.child.wait(timeout=5.0)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                managed.child.wait(timeout=_REAP_S)
             managed.gone = True
         return [managed.setup.process_id for managed in killed]
 

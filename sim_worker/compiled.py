@@ -20,21 +20,21 @@ from contracts.arrays import Array
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 types: Any = numba.types  # whose annotations are incomplete
-_REAL, _WHOLE = types.float64, types.intp
-_OUT, _OUT_ROWS = _REAL[:], _REAL[:, :]
+REAL, WHOLE = types.float64, types.intp
+_OUT, _OUT_ROWS = REAL[:], REAL[:, :]
 
 
-def _given(dimensions: int, layout: str = "A") -> Any:
-    # Whatever numpy hands over: slices, and what a message holds, read-only and anywhere.
-    return types.Array(_REAL, dimensions, layout, readonly=True, aligned=False)
+def given(dimensions: int, layout: str = "A") -> Any:
+    """Return the type of what is only read: whatever numpy hands over, slices too, and what a
+    message holds, read-only and anywhere; with layout "C" as `np.ascontiguousarray` leaves it."""
+    return types.Array(REAL, dimensions, layout, readonly=True, aligned=False)
 
 
-_IN, _IN_ROWS = _given(1), _given(2)
-_LINE, _TABLE = _given(1, "C"), _given(2, "C")
-"""Read in order, as `np.ascontiguousarray` leaves them."""
+_IN, _IN_ROWS = given(1), given(2)
+_LINE, _TABLE = given(1, "C"), given(2, "C")
 
 
-def _compiled(returns: Any, *arguments: Any) -> Callable[[_Function], _Function]:
+def kernel(returns: Any, *arguments: Any) -> Callable[[_Function], _Function]:
     """Compile for these types, or take it from the cache: `__pycache__` beside this file, else the
     user's cache folder, or `NUMBA_CACHE_DIR`; where none can be written, for this process alone."""
 
@@ -53,7 +53,7 @@ def _compiled(returns: Any, *arguments: Any) -> Callable[[_Function], _Function]
     return compiled
 
 
-@_compiled(types.void, _IN_ROWS, _IN, _TABLE, _TABLE, _REAL, _WHOLE, _OUT_ROWS)
+@kernel(types.void, _IN_ROWS, _IN, _TABLE, _TABLE, REAL, WHOLE, _OUT_ROWS)
 def locate(
     xy: Array, near_arc_m: Array, nodes: Array, segments: Array,
     first_arc_m: float, either: int, found: Array,
@@ -82,9 +82,9 @@ def locate(
         found[1, car] = dx * segments[3, node] + dy * segments[5, node]
 
 
-@_compiled(
-    types.void, _IN_ROWS, _IN_ROWS, _IN, _IN, _IN, _IN, _TABLE, _REAL, _REAL, _REAL, _REAL,
-    types.UniTuple(_REAL, 8), _OUT, _OUT,
+@kernel(
+    types.void, _IN_ROWS, _IN_ROWS, _IN, _IN, _IN, _IN, _TABLE, REAL, REAL, REAL, REAL,
+    types.UniTuple(REAL, 8), _OUT, _OUT,
 )  # fmt: skip
 def curve(
     states: Array, heading: Array, arc_m: Array, offset_m: Array, desired_offset_m: Array,
@@ -140,7 +140,7 @@ def curve(
         angle[car] = wanted
 
 
-@_compiled(types.void, _IN_ROWS, _IN, _IN, _IN, _REAL, _OUT)
+@kernel(types.void, _IN_ROWS, _IN, _IN, _IN, REAL, _OUT)
 def free_road(
     states: Array, wished_mps: Array, wished_mps2: Array, exponent: Array, comfort_mps2: float,
     accel: Array,
@@ -156,8 +156,8 @@ def free_road(
         accel[car] = min(accel[car], free)
 
 
-@_compiled(
-    types.void, _IN, _IN, _IN, _IN, _IN_ROWS, _IN_ROWS, _IN_ROWS, types.UniTuple(_REAL, 5), _IN,
+@kernel(
+    types.void, _IN, _IN, _IN, _IN, _IN_ROWS, _IN_ROWS, _IN_ROWS, types.UniTuple(REAL, 5), _IN,
     _OUT_ROWS, _OUT_ROWS, _OUT_ROWS, _OUT_ROWS, _OUT, _OUT,
 )  # fmt: skip
 def forces(
@@ -186,7 +186,7 @@ def forces(
         along_high[car] = drive + brake
 
 
-@_compiled(types.void, _IN, _OUT, _REAL, _OUT_ROWS)
+@kernel(types.void, _IN, _OUT, REAL, _OUT_ROWS)
 def ramp(angle: Array, command: Array, step_rad: float, steer: Array) -> None:
     """Fill `steer` (steps, S) from the last `command` (S,) towards `angle`, and keep the end."""
     for car in range(len(command)):
@@ -198,7 +198,7 @@ def ramp(angle: Array, command: Array, step_rad: float, steer: Array) -> None:
         command[car] = steer[-1, car]
 
 
-@_compiled(types.void, _IN_ROWS, _REAL, _REAL, _OUT_ROWS, _OUT_ROWS)
+@kernel(types.void, _IN_ROWS, REAL, REAL, _OUT_ROWS, _OUT_ROWS)
 def read_base(joints: Array, rear_m: float, tick_s: float, states: Array, heading: Array) -> None:
     """Fill base_link `states` (8, S), and `heading` (2, S), from joints (8, S)."""
     for car in range(states.shape[1]):
@@ -216,7 +216,7 @@ def read_base(joints: Array, rear_m: float, tick_s: float, states: Array, headin
         heading[0, car], heading[1, car] = cos, sin
 
 
-@_compiled(types.boolean, _IN_ROWS, _IN)
+@kernel(types.boolean, _IN_ROWS, _IN)
 def all_sane(states: Array, most: Array) -> bool:
     """Whether no column of `states` (8, S) is beyond its bound (8,)."""
     for column in range(states.shape[0]):
@@ -226,7 +226,7 @@ def all_sane(states: Array, most: Array) -> bool:
     return True
 
 
-@_compiled(types.void, _TABLE, _TABLE, _LINE, _LINE, _OUT_ROWS)
+@kernel(types.void, _TABLE, _TABLE, _LINE, _LINE, _OUT_ROWS)
 def cheapest_walks(x: Array, y: Array, to_x: Array, to_y: Array, found: Array) -> None:
     """Fill `found` (2, S) with Fréchet and warping distances of curves (S, N) from (M,) points."""
     columns = len(to_x)

@@ -22,7 +22,8 @@ from sim_worker.world_file import load_world
 _DEPTH = 4096
 _IDLE_S = 0.2
 _LAST_WORDS_S = 0.5
-"""How long the messages that are already here may take once the run is over."""
+"""How long the messages that are here may take once the run is over; in lock step none is left."""
+_QUIET_S = 0.1
 
 log = logging.getLogger("sim_worker")
 
@@ -123,17 +124,18 @@ def serve_mirror(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     bus.subscribe("state", mailbox, vehicle=setup.vehicle_id)
     life.ready()
     while not life.over:
-        _take(worker, mailbox, _IDLE_S)
+        _take(worker, mailbox.take(_IDLE_S))
     deadline = time.monotonic() + _LAST_WORDS_S
-    while time.monotonic() < deadline and _take(worker, mailbox, 0.0):
-        pass
+    while setup.bus.lossless or time.monotonic() < deadline:
+        item = mailbox.take_last(_QUIET_S if setup.bus.lossless else 0.0)
+        if item is None:
+            break
+        _take(worker, item)
     worker.finish()
     if mailbox.dropped:
         log.warning("the mirror fell behind and passed over %d messages", mailbox.dropped)
 
 
-def _take(worker: MirrorWorker, mailbox: Mailbox, timeout_s: float) -> bool:
-    item = mailbox.take(timeout_s)
+def _take(worker: MirrorWorker, item: object) -> None:
     if isinstance(item, Received | Request):
         worker.handle(item)
-    return item is not None

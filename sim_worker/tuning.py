@@ -5,6 +5,7 @@ Pure: its time is that of the samples, so that the same samples say the same.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import msgspec
@@ -14,6 +15,7 @@ from contracts.frames import LocalFrame
 from contracts.gap import GapAlarm, GapSample, Verdict
 from contracts.tuning import Identification, UseVehicle
 from contracts.vehicle import VehicleParameters
+from sim_worker.commands import STEP_BACK_NS
 from sim_worker.gap.monitor import GapMonitor
 from sim_worker.identify.acceptance import in_force
 from sim_worker.identify.tuner import Tuner
@@ -24,19 +26,38 @@ SAMPLES = ("gnss", "imu", "speed", "heading", "steering", "control", "status")
 """Channels that say something of a vehicle's parameters, in the order of equal stamps."""
 
 
+_AHEAD_NS = 10_000_000_000
+
+
 class VehicleWatch:
     """Identifies one vehicle and watches its gap; what is in force is told by `use`.
 
-    `handle` takes samples under their channels, and estimated VehicleStates under "state".
+    `handle` takes samples under their channels, and estimated VehicleStates under "state". Where
+    those go back in time, the vehicle's clock has been set: all is watched anew. Samples far ahead
+    of the states are passed over, since one wrong stamp would make all later ones late.
     """
 
     def __init__(self, info: VehicleInfo, vehicle: VehicleParameters, *, frame: LocalFrame) -> None:
         self._in_force = vehicle
-        self._tuner = Tuner(vehicle=vehicle, vehicle_id=info.vehicle_id, frame=frame)
-        self._monitor = GapMonitor(info, vehicle, frame=frame)
+        self._info, self._frame = info, frame
+        self._state_ns: int | None = None
+        self._begin(pinned=frozenset())
+
+    def _begin(self, *, pinned: Collection[str]) -> None:
+        vehicle_id, frame = self._info.vehicle_id, self._frame
+        self._tuner = Tuner(vehicle=self._in_force, vehicle_id=vehicle_id, frame=frame)
+        self._tuner.pinned = set(pinned)
+        self._monitor = GapMonitor(self._info, self._in_force, frame=frame)
 
     def handle(self, channel: str, message: Any) -> list[Finding]:
         """Take one message; return what follows from it."""
+        before_ns, stamp_ns = self._state_ns, message.stamp_ns
+        if channel == "state":
+            if before_ns is not None and stamp_ns < before_ns - STEP_BACK_NS:
+                self._begin(pinned=self._tuner.pinned)
+            self._state_ns = stamp_ns
+        elif before_ns is not None and stamp_ns > before_ns + _AHEAD_NS:
+            return []
         found: list[Finding] = list(self._monitor.handle(channel, message))
         if channel == "state":
             return found

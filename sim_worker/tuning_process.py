@@ -70,6 +70,7 @@ class TuningWorker:
         except Exception as error:
             log.exception("%s passed over", getattr(item, "key", item))
             if isinstance(item, Request):
+                self._question = None if item is self._question else self._question
                 item.refuse(one_line(error))
 
     def _take(self, item: Received) -> None:
@@ -123,7 +124,7 @@ class TuningWorker:
         """Take one message and publish what follows; a fault in one costs that one alone."""
         try:
             found: list[Any] = self._watch.handle(channel, message)
-        except (ValueError, ArithmeticError):
+        except Exception:
             log.exception("%s at %s passed over", channel, message.stamp_ns)
             return []
         for one in found:

@@ -65,6 +65,7 @@ class Mirror:
         )
         self._measured: Array | None = None
         self._measured_stamp_ns = 0
+        self._map_shift_m = self._seed_map_shift_m = np.zeros(2)
         self._seed_stamp_ns = 0
         self._steps = 0
         self._independent = False
@@ -117,6 +118,7 @@ class Mirror:
         self._change_vehicle(state.stamp_ns)
         self._change_world(state.stamp_ns)
         measured = local_state(state, self._frame, self._vehicle)
+        self._map_shift_m = np.array(state.map_shift_m or (0.0, 0.0))
         gap_ns = state.stamp_ns - self._measured_stamp_ns
         self._casting.before(state, self._free_twin)
         if self._measured is None or gap_ns > self._window_ns:
@@ -168,6 +170,7 @@ class Mirror:
         scene.place(GHOST, measured[:3])
         scene.seed_twin(measured, steering_history_rad=history)
         self._seed_stamp_ns, self._steps = stamp_ns, 0
+        self._seed_map_shift_m = self._map_shift_m
         self._casting.start_anew(stamp_ns)
         self._independent = self._recorded and history is not None and not self._commands.estimated
 
@@ -225,7 +228,9 @@ class Mirror:
         twin = self._twin_at(state.stamp_ns)
         shadow = self._scene.measured_pose(SHADOW)
         ghost = self._scene.measured_pose(GHOST)
-        dx, dy = twin[0] - measured[0], twin[1] - measured[1]
+        # What a map has moved the position by since is no motion that the twin lacks.
+        shift = self._map_shift_m - self._seed_map_shift_m
+        dx, dy = twin[:2] - measured[:2] + shift
         cos, sin = np.cos(measured[2]), np.sin(measured[2])
         sample = MirrorSample(
             stamp_ns=state.stamp_ns,

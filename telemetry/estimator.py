@@ -22,6 +22,7 @@ from contracts.drive import (
 )
 from telemetry.clock import ClockEstimator
 from telemetry.clock_steps import ClockStep, ClockSteps
+from telemetry.map_aid import RoadLine
 from telemetry.motion_track import MotionTrack
 from telemetry.reordering import Reordering
 from telemetry.staleness import Staleness
@@ -157,6 +158,16 @@ class StateEstimator:
             own_ns = state.stamp_ns - (placed_ns - stamp_ns)
             state = msgspec.structs.replace(state, stamp_ns=own_ns)
         return state
+
+    def take_line(self, line: RoadLine) -> None:
+        """Take the line of a map along which the newest state drives; counts from the next on."""
+        if self._state_ns is None:
+            return
+        line = line._replace(stamp_ns=self._state_ns)
+        if self._reordering is None:
+            self._track.take("map", line)
+        else:
+            self._reordering.add("map", line)
 
     def overdue(self, received_ns: int) -> tuple[str, ...]:
         """Return the channels that are overdue now, for when nothing at all comes any more."""

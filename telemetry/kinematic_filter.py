@@ -2,9 +2,9 @@
 
 State: x, y, yaw, speed, acceleration, curvature, and what the sensors have of their own: the
 gyro's and the accelerometer's bias, a satellite receiver's wandering error (x, y), the speed
-sensor's scale, and the slip of the rear axle. Turning is a curvature times a speed, so that a car
-that stands cannot turn, whatever its positions jitter; and the gyro's bias is learnt for free
-while it stands.
+sensor's scale, and the slip of the rear axle; where a map helps, also how far the car drives from
+the line that it draws. Turning is a curvature times a speed, so that a car that stands cannot turn,
+whatever its positions jitter; and the gyro's bias is learnt for free while it stands.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from telemetry import motion_noise
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
 GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
 SIZE = 12
-_IDENTITY = np.eye(SIZE)
+ROAD_OFFSET = SIZE
+"""Metres to the left of the map's line; only in a filter that has been told of one."""
+_IDENTITY = np.eye(SIZE + 1)
 
 MAX_CURVATURE_PM = 0.25
 """A turning circle of 8 m across: tighter than any passenger car's."""
@@ -33,7 +35,8 @@ _KNOWN_YAW_VAR = 0.15**2
 class KinematicFilter:
     """Predicts with constant acceleration and curvature, and is corrected by each measurement.
 
-    `mean` (12,) and `covariance` (12, 12) are in SI units, in the order of the module's indices.
+    `mean` (12,) and `covariance` (12, 12) are in SI units, in the order of the module's indices;
+    (13,) and (13, 13) once a map helps.
     The point is base_link. Speed stays at or above zero unless `may_reverse`. What no sensor has
     spoken of yet (receiver's error, scale, slip) has no variance and so no effect.
     """
@@ -45,15 +48,8 @@ class KinematicFilter:
         self.mean[: CURVATURE + 1] = xy_m[0], xy_m[1], yaw_rad, speed_mps, 0.0, 0.0
         spread = np.zeros(SIZE)
         spread[: ACCEL_BIAS + 1] = (
-            0.1,
-            0.1,
-            yaw_std_rad,
-            1.0,
-            1.0,
-            0.05,
-            motion_noise.GYRO_BIAS_STD_RADPS,
-            0.1,
-        )
+            0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05, motion_noise.GYRO_BIAS_STD_RADPS, 0.1,
+        )  # fmt: skip
         self.covariance: Array = np.diag(spread * spread)
         self.may_reverse = speed_mps < 0.0
         self._gnss_std_m = 0.0
@@ -78,7 +74,9 @@ class KinematicFilter:
             self._step(duration_s / steps)
 
     def _step(self, dt: float) -> None:
-        x, y, yaw, speed, accel, curvature, *_, slip = self.mean.tolist()
+        x, y, yaw, speed, accel, curvature, *_ = self.mean.tolist()
+        slip = float(self.mean[SLIP])
+        size = len(self.mean)
         if not self.may_reverse and speed + accel * dt < 0.0:
             accel = min(0.0, -speed / dt)  # it stops within the step
         distance = (speed + 0.5 * accel * dt) * dt
@@ -90,7 +88,7 @@ class KinematicFilter:
         by_accel = 0.5 * distance * curvature * half
         by_curvature = distance * (0.5 * distance - slip * speed * speed)
         by_slip = -distance * speed * speed * curvature
-        jacobian = _IDENTITY.copy()
+        jacobian = _IDENTITY[:size, :size].copy()
         jacobian[X, YAW : CURVATURE + 1] = (
             -distance * sin, dt * cos - side * sin, half * cos - by_accel * sin,
             -by_curvature * sin,
@@ -112,7 +110,7 @@ class KinematicFilter:
         mean[GNSS_X : GNSS_Y + 1] *= fading
         self.mean = mean
         covariance = jacobian @ self.covariance @ jacobian.T
-        noise = covariance.reshape(-1)[:: SIZE + 1]  # a view of the diagonal
+        noise = covariance.reshape(-1)[:: size + 1]  # a view of the diagonal
         wandering = motion_noise.densities(speed, slip=self._slip_density)
         noise[YAW : ACCEL_BIAS + 1] += dt * np.array(wandering)
         if self._gnss_std_m:
@@ -120,7 +118,7 @@ class KinematicFilter:
         self.covariance = covariance
 
     def correct(self, row: Array, residual: float, std: float) -> None:
-        """Apply one scalar measurement: `row` (12,) is its derivative by the state."""
+        """Apply one scalar measurement: `row` is its derivative by the state."""
         cross = self.covariance @ row
         variance = float(row @ cross) + std * std
         self.mean += cross * (residual / variance)
@@ -146,6 +144,12 @@ class KinematicFilter:
         self.mean[GYRO_BIAS] = bias_radps
         self.covariance[GYRO_BIAS, GYRO_BIAS] = std_radps * std_radps
 
+    def know_road(self) -> None:
+        """Begin to tell how far beside a map's line the car drives."""
+        if len(self.mean) == SIZE:
+            self.mean = np.append(self.mean, 0.0)
+            self.covariance = np.pad(self.covariance, (0, 1))
+
     def doubt_position(self, std_m: float) -> None:
         """Make the place unknown within `std_m` and tell it apart from what else is known."""
         self.covariance[:2, :] = 0.0
@@ -169,9 +173,9 @@ class KinematicFilter:
             self.covariance[index, index] = self._gnss_std_m**2
 
     def _position_rows(self, lever_m: tuple[float, float], *, wander: bool) -> tuple[Array, Array]:
-        """Return where a receiver should say it is (2,), and that by the state (2, 12)."""
+        """Return where a receiver should say it is (2,), and that by the state."""
         expected = self.sensor_xy(lever_m)
-        rows = np.zeros((2, SIZE))
+        rows = np.zeros((2, len(self.mean)))
         rows[0, X] = rows[1, Y] = 1.0
         rows[0, YAW], rows[1, YAW] = self.mean[Y] - expected[1], expected[0] - self.mean[X]
         if wander:
@@ -241,19 +245,19 @@ class KinematicFilter:
         """Apply a measured speed, whose scale is estimated."""
         if self.covariance[SPEED_SCALE, SPEED_SCALE] == 0.0:
             self.covariance[SPEED_SCALE, SPEED_SCALE] = motion_noise.SPEED_SCALE_STD**2
-        row = np.zeros(SIZE)
+        row = np.zeros(len(self.mean))
         row[SPEED], row[SPEED_SCALE] = 1.0 + self.mean[SPEED_SCALE], self.mean[SPEED]
         self.correct(row, speed_mps - self.mean[SPEED] * row[SPEED], std_mps)
 
     def correct_yaw(self, yaw_rad: float, std_rad: float) -> None:
         """Apply a measured yaw in the local frame."""
-        row = np.zeros(SIZE)
+        row = np.zeros(len(self.mean))
         row[YAW] = 1.0
         self.correct(row, math.remainder(yaw_rad - self.mean[YAW], math.tau), std_rad)
 
     def correct_yaw_rate(self, rate_radps: float, std_radps: float, *, biased: bool) -> None:
         """Apply a measured yaw rate; `biased` for a gyro, whose bias is estimated."""
-        row = np.zeros(SIZE)
+        row = np.zeros(len(self.mean))
         row[SPEED], row[CURVATURE] = self.mean[CURVATURE], self.mean[SPEED]
         expected = self.yaw_rate_radps
         if biased:
@@ -271,21 +275,19 @@ class KinematicFilter:
 
     def correct_accel(self, accel_mps2: float, std_mps2: float) -> None:
         """Apply a forward specific force: acceleration plus a slow bias, such as the grade's."""
-        row = np.zeros(SIZE)
+        row = np.zeros(len(self.mean))
         row[ACCEL] = row[ACCEL_BIAS] = 1.0
-        self.correct(
-            row, accel_mps2 - self.mean[ACCEL] - self.mean[ACCEL_BIAS], std_mps2
-        )  # fmt: skip
+        self.correct(row, accel_mps2 - self.mean[ACCEL] - self.mean[ACCEL_BIAS], std_mps2)
 
     def correct_curvature(self, curvature_pm: float, std_pm: float) -> None:
         """Apply the curvature that the measured steering implies."""
-        row = np.zeros(SIZE)
+        row = np.zeros(len(self.mean))
         row[CURVATURE] = 1.0
         self.correct(row, curvature_pm - self.mean[CURVATURE], std_pm)
 
     def stand(self) -> None:
         """Apply that the car stands: no speed and no acceleration; yaw stays as it is."""
-        row = np.zeros(SIZE)
+        row = np.zeros(len(self.mean))
         row[SPEED] = 1.0
         self.correct(row, -self.mean[SPEED], 0.01)
         row[SPEED], row[ACCEL] = 0.0, 1.0

@@ -13,6 +13,7 @@ from contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, Ve
 from contracts.frames import GeoPoint, base_from_sensor
 from telemetry.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
 from telemetry.local_place import LocalPlace
+from telemetry.map_aid import MapAid, RoadLine
 from telemetry.measured import Measured
 from telemetry.motion_corrections import STANDING_MPS, MotionCorrections
 from telemetry.position_gate import PositionGate
@@ -51,6 +52,7 @@ class MotionTrack:
             skipped=self._gate.skipped,
         )  # fmt: skip
         self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
+        self._aid = MapAid()
         self._place: LocalPlace | None = None
         self._start_ns = 0
         self._filter: KinematicFilter | None = None
@@ -71,6 +73,7 @@ class MotionTrack:
         other._gate = self._gate.copy()
         other._measured = self._measured.copy(skipped=other._gate.skipped)
         other._corrections = self._corrections.copy(other._measured)
+        other._aid = self._aid.copy()
         if self._filter is not None:
             other._filter = self._filter.copy()
         return other
@@ -79,6 +82,8 @@ class MotionTrack:
         """Take a sample; returns whether it was believed. Channels without motion are ignored."""
         if channel == "gnss":
             return self._position(message)
+        if channel == "map":
+            return self._road(message)
         if not self._measured.take(channel, message):
             return False
         self._motion(message)
@@ -106,6 +111,14 @@ class MotionTrack:
         elif isinstance(message, HeadingSample):
             local_yaw = message.yaw_rad + self._convergence_rad
             self._start(message.stamp_ns, local_yaw, yaw_std_rad=0.02)
+
+    def _road(self, line: RoadLine) -> bool:
+        """Take a map's line where positions say of themselves how far they can be off."""
+        filter_, fix, place = self._filter, self._fix, self._place
+        if filter_ is None or fix is None or place is None or fix.std_m is None:
+            return False
+        std = fix.std_m if self._wanders else 0.0
+        return self._aid.take(filter_, place, line, receiver_std_m=std)
 
     # Positions.
 
@@ -170,14 +183,15 @@ class MotionTrack:
             if self._shifts >= 3:
                 self._turn_to_course(filter_)
             return
-        self._shifts = 0
-        yaw_before = filter_.mean[YAW]
+        self._shifts, yaw_before = 0, filter_.mean[YAW]
         wheels = self._measured.fresh("speed_mps", self._filter_stamp_ns)
         if abs(filter_.mean[SPEED]) < _CREEPING_MPS and not wander:
             filter_.drift_sideways(xy, std, lever)
         hold = wheels and self._standing
         filter_.correct_position(xy, white, lever, wander=wander, hold_yaw=hold)
         filter_.limit_turn(yaw_before, moved_m=self._gate.last_step_m)
+        if wander:
+            self._aid.watch(filter_, receiver_std_m=std)
         if not wheels:
             self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
             if self._standing:
@@ -197,8 +211,7 @@ class MotionTrack:
     @property
     def _wanders(self) -> bool:
         """Whether the receiver itself says that it is rough: then its error wanders slowly."""
-        std = None if self._fix is None else self._fix.std_m
-        return std is not None and std >= _WANDER_M
+        return self._fix is not None and (self._fix.std_m or 0.0) >= _WANDER_M
 
     def _turn_to_course(self, filter_: KinematicFilter) -> None:
         course = self._gate.course(1.0, within_s=3.0)
@@ -219,14 +232,12 @@ class MotionTrack:
     def _start(self, stamp_ns: int, yaw_rad: float, *, yaw_std_rad: float) -> None:
         if not self._gate.recent:
             return
-        measured = self._measured.fresh("speed_mps", stamp_ns)
-        xy = base_from_sensor(self._gate.recent[-1].xy_m, yaw_rad, self._lever)
+        measured, at = self._measured.fresh("speed_mps", stamp_ns), self._gate.recent[-1].xy_m
+        xy = base_from_sensor(at, yaw_rad, self._lever)
         self._filter = KinematicFilter(
-            xy_m=xy,
-            yaw_rad=yaw_rad,
+            xy_m=xy, yaw_rad=yaw_rad, yaw_std_rad=yaw_std_rad,
             speed_mps=self._measured.speed_mps if measured else self._gate.speed_mps(),
-            yaw_std_rad=yaw_std_rad,
-        )
+        )  # fmt: skip
         self._corrections.begin(self._filter)
         self._filter_stamp_ns = stamp_ns
         if self._wanders:
@@ -234,7 +245,6 @@ class MotionTrack:
             std = self._gate.std_m(self._fix)
             self._filter.doubt_position(_UNKNOWN_PLACE_M)
             self._filter.expect_wander(std)
-            at = self._gate.recent[-1].xy_m
             self._filter.correct_position(at, _WHITE_SHARE * std, self._lever[:2], wander=True)
 
     def _advance(self, stamp_ns: int) -> KinematicFilter | None:
@@ -250,17 +260,12 @@ class MotionTrack:
 
     # What comes out.
 
-    def _passes_through(self, fix: GnssFix) -> bool:
-        if fix.std_m is None:
-            return not self._gate.rough
-        return fix.std_m <= 0.05 and not self._measured.anything
-
     def _position_out(self, fix: GnssFix | None) -> GeoPoint:
         assert self._place is not None
         if self._filter is None:
             assert self._fix is not None
             return self._fix.position
-        if fix is not None and self._passes_through(fix):
+        if fix is not None and self._gate.at_its_word(fix, alone=not self._measured.anything):
             if not any(self._lever):
                 return fix.position
             xy = base_from_sensor(self._gate.recent[-1].xy_m, self._filter.mean[YAW], self._lever)
@@ -284,15 +289,10 @@ class MotionTrack:
                 position=position, position_std_m=self._fix.std_m,
             )  # fmt: skip
         return moving_state(
-            self._filter,
-            self._measured,
-            vehicle_id=self._info.vehicle_id,
-            stamp_ns=stamp_ns,
-            position=position,
-            convergence_rad=self._convergence_rad,
-            wheelbase_m=self._wheelbase_m,
-            standing=self._standing,
-        )
+            self._filter, self._measured, vehicle_id=self._info.vehicle_id, stamp_ns=stamp_ns,
+            position=position, convergence_rad=self._convergence_rad,
+            wheelbase_m=self._wheelbase_m, standing=self._standing, map_shift_m=self._aid.shift_m,
+        )  # fmt: skip
 
     @property
     def gyro_bias_radps(self) -> float:

@@ -144,6 +144,12 @@ class PositionGate:
             return min(max(fix.std_m, 1e-3), 1e4)
         return self.roughness_m if self.rough else _UNKNOWN_STD_M
 
+    def at_its_word(self, fix: GnssFix, *, alone: bool) -> bool:
+        """Whether a fix is passed on unchanged; `alone` where nothing else tells of the motion."""
+        if fix.std_m is None:
+            return not self.rough
+        return fix.std_m <= 0.05 and alone
+
     def standing(self, std_m: float) -> bool:
         """Return whether the last fixes show nothing but jitter of `std_m` about one point."""
         if len(self.recent) < _STANDING_FIXES:

@@ -41,7 +41,7 @@ _ASK_EVERY_S = 1.0
 _GRACE_S = 1.0
 """How long the orchestrator may be out of sight before it counts as gone."""
 _LAST_WORDS_S = 0.5
-"""How long messages are still taken after the end of the run."""
+"""How long messages are still taken after the end of the run; in lock step as long as some come."""
 
 log = logging.getLogger("telemetry.recorder")
 
@@ -115,9 +115,15 @@ class RecorderProcess:
         return not (self._stop or gone)
 
     def finish(self) -> None:
-        """Write what still waits or is on its way, for half a second at most, and end the file."""
+        """Write what still waits or is on its way, and end the file.
+
+        Live for half a second at most; in lock step nothing may be missing.
+        """
         until_s = self._mono_s() + _LAST_WORDS_S
-        while self._mono_s() < until_s and (item := self._messages.take(_WAIT_S)) is not None:
+        while self._lossless or self._mono_s() < until_s:
+            item = self._messages.take_last(_WAIT_S)
+            if item is None:
+                break
             self._take_messages(item)
         left = len(self._messages)
         self._messages.close()

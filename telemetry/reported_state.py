@@ -9,6 +9,7 @@ import numpy as np
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, wrap_angle
 from telemetry.kinematic_filter import ACCEL, CURVATURE, SPEED, YAW, KinematicFilter, X, Y
+from telemetry.map_aid import ALIKE_M
 from telemetry.measured import Measured
 
 
@@ -22,6 +23,7 @@ def moving_state(
     convergence_rad: float,
     wheelbase_m: float,
     standing: bool,
+    map_shift_m: tuple[float, float] | None,
 ) -> VehicleState:
     """Return the state of a car whose heading is known.
 
@@ -33,6 +35,9 @@ def moving_state(
     if angle is None:
         angle = math.atan(wheelbase_m * filter_.mean[CURVATURE])
     spread = np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
+    position_std_m = math.hypot(spread[X], spread[Y]) / math.sqrt(2.0)
+    if map_shift_m is not None:
+        position_std_m = math.hypot(position_std_m, ALIKE_M)
     return VehicleState(
         vehicle_id=vehicle_id,
         stamp_ns=stamp_ns,
@@ -43,10 +48,11 @@ def moving_state(
         accel_mps2=0.0 if standing else float(filter_.mean[ACCEL]),
         tire_angle_rad=angle,
         steering_wheel_rad=measured.steering_wheel_rad,
-        position_std_m=float(math.hypot(spread[X], spread[Y]) / math.sqrt(2.0)),
+        position_std_m=position_std_m,
         yaw_std_rad=float(spread[YAW]),
         speed_std_mps=float(spread[SPEED]),
         estimated=estimated,
+        map_shift_m=map_shift_m,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from contracts import drive
 from contracts.frames import (
+    GeoPoint,
     LocalFrame,
     geo_from_local,
     geo_from_local_yaw,
@@ -97,6 +98,31 @@ def plan_from_trajectory(ros: Any, frame: LocalFrame | None) -> drive.PlannedTra
         yaw_rad=geo_from_local_yaw(frame, yaw, xy_m),
         speed_mps=np.array([p.longitudinal_velocity_mps for p in points]),
     )
+
+
+def route_from_lanelets(ros: Any, frame: LocalFrame | None) -> drive.RouteToGoal:
+    """Return where a LaneletRoute begins and ends; its lanelets mean nothing without their map.
+
+    `frame` is that of `map`. Raises ValueError without it, for another frame, and for poses that
+    are not finite.
+    """
+    if frame is None or ros.header.frame_id.lstrip("/") != MAP_FRAME:
+        raise ValueError("a route in a frame whose origin is not known")
+    return drive.RouteToGoal(
+        stamp_ns=stamp_ns_of(ros.header.stamp),
+        start=_route_pose(ros.start_pose, frame),
+        goal=_route_pose(ros.goal_pose, frame),
+        segments=len(ros.segments),
+    )
+
+
+def _route_pose(pose: Any, frame: LocalFrame) -> drive.RoutePose:
+    xy_m = np.array([[pose.position.x, pose.position.y]])
+    yaw = geo_from_local_yaw(frame, np.array([yaw_of(pose.orientation)]), xy_m)
+    lat_deg, lon_deg = geo_from_local(frame, xy_m)[0].tolist()
+    if not np.isfinite([lat_deg, lon_deg, yaw[0]]).all():
+        raise ValueError("a route from or to nowhere")
+    return drive.RoutePose(GeoPoint(lat_deg, lon_deg), float(yaw[0]))
 
 
 def ros_from_state(message: drive.VehicleState, frame: LocalFrame | None) -> Parts:

@@ -8,8 +8,12 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-# A busy machine is no fault of the code: pytest-timeout alone says what takes too long.
-settings.register_profile("foretwin", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# A busy machine is no fault of the code: pytest-timeout alone says what takes too long. The same
+# code meets the same examples, so that a change alone can break a test;
+# `--hypothesis-profile explore` looks for others.
+CALM = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("foretwin", CALM, derandomize=True)
+settings.register_profile("explore", CALM)
 settings.load_profile("foretwin")
 
 

@@ -50,6 +50,8 @@ class Farewell(NamedTuple):
 
 
 ENDED = Farewell(quiet_s=0.25, drain_s=6.0, live_s=1.0)
+COMPLETE = ENDED._replace(drain_s=60.0)
+"""In lock step nothing may be missing."""
 HURRIED = Farewell(quiet_s=0.05, drain_s=0.4, live_s=0.1)
 """When told to leave, or left alone: Ctrl-C ends a whole run within 3 s."""
 
@@ -88,7 +90,9 @@ class Recorder:
 
     def take_one(self, timeout_s: float) -> bool:
         """Write the rows of one message; False where none came in time."""
-        item = self._messages.take(timeout_s)
+        return self._take(self._messages.take(timeout_s))
+
+    def _take(self, item: object) -> bool:
         if isinstance(item, Received):
             try:
                 rows = self._monitor.handle(item.channel, item.message())
@@ -104,8 +108,9 @@ class Recorder:
     def drain(self, farewell: Farewell) -> None:
         """Write what still lies in the mailbox, in bounded time."""
         deadline_s = time.monotonic() + farewell.drain_s
-        while self.take_one(farewell.quiet_s) and time.monotonic() < deadline_s:
-            pass
+        while self._take(self._messages.take_last(farewell.quiet_s)):
+            if time.monotonic() > deadline_s:
+                break
 
     def close(self, farewell: Farewell, *, keep_window: bool) -> None:
         """Complete the file, then give the live view a moment; bounded even if it is frozen."""
@@ -160,7 +165,8 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
             recorder.take_one(0.0)
         if not setup.bus.lossless:
             time.sleep(GATHER_S)
-    farewell = ENDED if life.run_ended else HURRIED
+    ended = COMPLETE if setup.bus.lossless else ENDED
+    farewell = ended if life.run_ended else HURRIED
     recorder.drain(farewell)
     messages.close()
     recorder.close(farewell, keep_window=life.run_ended)

@@ -13,10 +13,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-HOST = "127.0.0.1"
+from contracts.ports import LOOPBACK, free_port
+
+HOST = LOOPBACK
 PORT = 9876
 WEB_PORT = 9090
-START_S = 20.0
+START_S = 60.0
 LIVE_CHOICES = ("native", "web", "none")
 
 _log = logging.getLogger(__name__)
@@ -47,13 +49,6 @@ def has_display() -> bool:
     """Return whether a window can be opened; only Linux says so in the environment."""
     names = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
     return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in names)
-
-
-def free_port() -> int:
-    """Return a TCP port that was free a moment ago."""
-    with socket.socket() as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])
 
 
 def answers(port: int) -> bool:

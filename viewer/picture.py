@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from rerun.experimental import ViewerClient
 
+from contracts.ports import free_port
 from viewer.blueprint import DETAIL_VIEWS, MAIN_VIEWS, DetailView, MainView, drive_blueprint
 from viewer.live_viewer import (
     NoViewerError,
     address,
-    free_port,
     start_program,
     wait_until_it_answers,
 )

@@ -11,8 +11,8 @@ from contracts.errors import UserError
 from contracts.setup import BusSetup
 from contracts.tuning import SetReply, SetRequest
 
-ANSWER_S = 30.0
-"""A change waits for the round in progress; in lock step that may take a while."""
+ANSWER_S = 120.0
+"""A change waits for the drive to begin and for the round in progress; that may take a while."""
 
 
 class RunningDrive(NamedTuple):

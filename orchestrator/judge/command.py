@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from contracts.errors import UserError
+from contracts.errors import UserError, one_line
 from orchestrator.config import DriveConfig
 from orchestrator.drive import carry_out
 from orchestrator.judge.difference import difference_lines, difference_of, read_judged
@@ -49,7 +49,7 @@ def judge(request: JudgeRequest) -> int:
     )
     read_inputs(corrected)  # what is wrong with them is told before anything long begins
     before = request.run
-    if record["config"]["speed"] is not None or record.get("versions") != versions():
+    if record["config"].get("speed") is not None or record.get("versions") != versions():
         _say(f"{request.run}: driven again as it was, in lock step, to compare with")
         code, before = _drive(again)
         if code:
@@ -79,8 +79,11 @@ def _record(run: Path) -> dict[str, Any]:
         record: dict[str, Any] = json.loads((run / RECORD).read_text(encoding="utf-8"))
     except ValueError as error:
         raise UserError(f"{run / RECORD}: not JSON: {error}") from error
+    if not isinstance(record, dict):
+        raise UserError(f"{run / RECORD}: not the record of a run: must be a JSON object")
     if "config" not in record:
-        raise UserError(f"{run / RECORD}: the drive never came to its end (exit: {record['exit']})")
+        exit_word = record.get("exit", "not told")
+        raise UserError(f"{run / RECORD}: the drive never came to its end (exit: {exit_word})")
     return record
 
 
@@ -88,12 +91,23 @@ def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
     """Return the configuration of a run, for its recorded drive in lock step."""
     try:
         was = msgspec.convert(record["config"], DriveConfig)
-    except msgspec.ValidationError as error:
-        raise UserError(f"{run / RECORD}: of another version of foretwin: {error}") from error
+        map_file = record["map"]["file"]
+    except (msgspec.ValidationError, KeyError, TypeError) as error:
+        raise UserError(
+            f"{run / RECORD}: of another version of foretwin: {one_line(error)}"
+        ) from error
     route = was.route or (str(EMBEDDED_ROUTE) if was.map is None else None)
+    if was.route == "live":
+        _say(f"{run}: what it said of its route is not recorded; the way ahead is predicted")
+        route = None
+    kept = tuple(one for one in was.vehicles if not one.live)
+    if len(kept) < len(was.vehicles):
+        gone = ", ".join(one.id for one in was.vehicles if one.live)
+        _say(f"{run}: without {gone}: what live vehicles beside the car sent is not recorded")
     return msgspec.structs.replace(
-        was, log=str(run / DRIVE), source="log", map=record["map"]["file"], route=route,
+        was, log=str(run / DRIVE), source="log", map=map_file, route=route,
         speed=None, view="none", out=str(out), endpoint=None, ros2=None, towards_vehicle=False,
+        vehicles=kept,
     ).validate()  # fmt: skip
 
 

@@ -122,7 +122,8 @@ class WindowDesk:
         return tally(self.judged, start_stamp_ns=start_stamp_ns) if self.judged else None
 
     def _settle(self, one: _Simulated) -> None:
-        if self._windows and one.stamp_ns - self._windows[-1].stamp_ns < self._every_ns:
+        # Negative where the vehicle's clock has been set back.
+        if self._windows and 0 <= one.stamp_ns - self._windows[-1].stamp_ns < self._every_ns:
             return
         window = self._window(one)
         if window is None:
@@ -132,6 +133,8 @@ class WindowDesk:
         if len(self._windows) >= MOST_WINDOWS:
             self._windows = self._windows[::2]
             self._every_ns *= 2
+            used = {window.world_id for window in self._windows}
+            self._worlds = {key: world for key, world in self._worlds.items() if key in used}
 
     def _window(self, one: _Simulated) -> Window | None:
         stamps = one.stamp_ns + np.round(one.time_s * 1e9).astype(np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import queue
 import threading
@@ -11,6 +12,8 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+
+from contracts.errors import one_line
 
 log = logging.getLogger("results")
 
@@ -135,6 +138,8 @@ TABLES: dict[str, pa.Schema] = {
 
 FLUSH_ROWS = 2000
 QUEUE_DEPTH = 4096
+CLOSE_S, LOCK_STEP_CLOSE_S = 10.0, 120.0
+"""How long the last rows may take to be written, live and where nothing may be missing."""
 
 
 class ResultTables:
@@ -162,13 +167,15 @@ class ResultTables:
         except queue.Full:
             self.dropped += len(rows)
 
-    def close(self, timeout_s: float = 10.0) -> None:
-        """Write everything and close the files."""
-        try:
+    def close(self, timeout_s: float | None = None) -> None:
+        """Write everything and close the files; `failed` says where that takes too long."""
+        if timeout_s is None:
+            timeout_s = LOCK_STEP_CLOSE_S if self._lossless else CLOSE_S
+        with contextlib.suppress(queue.Full):
             self._queue.put(None, timeout=timeout_s)
-        except queue.Full:
-            return
-        self._thread.join(timeout_s)
+            self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            self.failed = self.failed or f"results were not written within {timeout_s:g} s"
 
     def _run(self) -> None:
         writers = {}
@@ -185,8 +192,8 @@ class ResultTables:
                     _write(writers[name], name, pending[name])
             for name, rows in pending.items():
                 _write(writers[name], name, rows)
-        except (OSError, pa.ArrowException) as error:
-            self.failed = f"results cannot be written: {error}"
+        except Exception as error:
+            self.failed = f"results cannot be written: {one_line(error)}"
             log.error("%s", self.failed)
         finally:
             for writer in writers.values():

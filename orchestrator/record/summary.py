@@ -71,6 +71,8 @@ def summary_text(record: dict[str, object]) -> str:
         f"{junction['name'] or junction['id']}  {_readiness(junction, lock_step=lock_step)}"
         for junction in junctions
     ]
+    if "map" in record["telemetry"]["position_from"]:  # type: ignore[index]
+        lines.append("  position from GNSS and the map")
     lines += side_by_side_lines(record.get("side_by_side"))
     lines += agreement_lines(record.get("agreement"))  # type: ignore[arg-type]
     lines += summary_lines(record["tuning"])  # type: ignore[arg-type]

@@ -50,7 +50,8 @@ class ComparisonDesk:
         if not state.yaw_valid or (self._stamps_ns and state.stamp_ns <= self._stamps_ns[-1]):
             return []
         lat, lon = state.position.lat_deg, state.position.lon_deg
-        xy = local_from_geo(self.frame, lat, lon)
+        # What the map moves the position by is no motion that a future could have foreseen.
+        xy = local_from_geo(self.frame, lat, lon) - _shift_m(state)
         yaw = float(local_from_geo_yaw(self.frame, state.yaw_rad, lat, lon))
         self._stamps_ns.append(state.stamp_ns)
         self._poses.append(np.array([xy[0], xy[1], yaw]))
@@ -66,10 +67,11 @@ class ComparisonDesk:
         trajectory = done.results[0].trajectory
         states = np.asarray(trajectory.states[0], dtype=np.float64)
         poses = target_from_source(self.frame, world_frame, states[:, :2], states[:, 2])
+        xy = poses.xy_m - _shift_m(seed)
         nominal = NominalTrack(
             stamp_ns=trajectory.stamp_ns,
             time_s=np.asarray(trajectory.time_s),
-            xy_yaw=np.column_stack([poses.xy_m, poses.yaw_rad]),
+            xy_yaw=np.column_stack([xy, poses.yaw_rad]),
             speed_mps=seed.speed_mps,
             yaw_rate_radps=seed.yaw_rate_radps,
         )
@@ -112,3 +114,7 @@ class ComparisonDesk:
         while len(self._stamps_ns) > 2 and self._stamps_ns[1] < oldest:
             self._stamps_ns.popleft()
             self._poses.popleft()
+
+
+def _shift_m(state: VehicleState) -> Array:
+    return np.array(state.map_shift_m or (0.0, 0.0))

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 ATTEMPTS = 3
 """A task on which so many workers died is given up."""
 _POLL_S = 0.5
-_END_S = 1.0
+_END_S = 10.0
+"""What a worker that was told to end may take on a busy machine."""
 _START_S = 60.0
 """What a worker may take to start on top: a busy machine's imports are no fault of the task."""
 _STARTED = "started"

@@ -16,7 +16,7 @@ from orchestrator.instructions import Tell
 from orchestrator.record.results import ResultTables
 from orchestrator.tuning.parameter_desk import departs
 from orchestrator.tuning.words import alarm_text, found_text, verdict_text
-from sim_worker.identify.acceptance import in_force, is_acceptable
+from sim_worker.identify.acceptance import in_force, is_acceptable, is_left_open
 
 HORIZON_S = 2.0
 """The horizon whose gap is told; the tables hold all."""
@@ -122,6 +122,8 @@ class Findings:
                     "name": one.name, "in_use": in_force(self._vehicle(), one.name),
                     "identified": one.value, "low": one.low, "high": one.high,
                     "departs": departs(one, in_force(self._vehicle(), one.name)),
+                    "left_open": one.value is not None
+                    and is_left_open(self._vehicle(), one.name, one.value),
                     "reason": one.reason,
                 }
                 for one in self._latest.values()

@@ -39,12 +39,8 @@ class TuningLink:
     ) -> None:
         self._plan, self._bus, self._mailbox, self._tables = plan, bus, mailbox, tables
         self._events, self._intake, self._rounds, self._alive = events, intake, rounds, alive
-        # Live it gives way to rounds, and may be behind: they must not wait for it.
         self.parameters = ParameterDesk(
-            plan.vehicle,
-            vehicle_id=plan.config.vehicle_id,
-            ask=self._ask,
-            not_awaited=() if plan.config.lock_step else (TUNING,),
+            plan.vehicle, vehicle_id=plan.config.vehicle_id, ask=self._ask
         )
         self.findings = Findings(
             tables,
@@ -90,6 +86,7 @@ class TuningLink:
         changes = self.parameters.hand_over(
             simulating, watcher=TUNING, stamp_ns=self._intake.now_stamp_ns + 1
         )
+        self._wait_for_no_watcher()
         if not changes:
             return
         version, vehicle = self.parameters.version, self.parameters.in_force.vehicle
@@ -102,7 +99,14 @@ class TuningLink:
 
     def process_up(self, process_id: str) -> bool:
         """Tell a process what counts; returns whether its answer must be waited for."""
-        return self._simulates(process_id) and self.parameters.tell(process_id)
+        told = self._simulates(process_id) and self.parameters.tell(process_id)
+        self._wait_for_no_watcher()
+        return told
+
+    def _wait_for_no_watcher(self) -> None:
+        """Live, let no round wait for who only watches: he may be seconds behind."""
+        if not self._plan.config.lock_step:
+            self.parameters.answered(TUNING)
 
     def process_down(self, process_id: str) -> None:
         """Wait no more for a process that is gone."""

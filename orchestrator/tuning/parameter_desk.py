@@ -5,7 +5,7 @@ Pure but for `ask`: changes wait until no round is open, so that each round has 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import msgspec
@@ -26,8 +26,7 @@ _BY_HAND = ("set", "rolled_back")
 class ParameterDesk:
     """Holds the parameters of one drive; `ask` sends a UseVehicle to a process.
 
-    Every process that was asked answers once by `answered`; no round may start before. Rounds do
-    not wait for those `not_awaited`, who are told all the same.
+    Every process that was asked answers once by `answered`; no round may start before.
     """
 
     def __init__(
@@ -36,14 +35,12 @@ class ParameterDesk:
         *,
         vehicle_id: str,
         ask: Callable[[str, UseVehicle], None],
-        not_awaited: Collection[str] = (),
     ) -> None:
         self.in_force = ParametersInForce(vehicle=vehicle, vehicle_id=vehicle_id)
         self.version = 0
         self.made: list[ParameterChange] = []
         """Every change of the drive, in order."""
         self._ask = ask
-        self._not_awaited = not_awaited
         self._waiting: list[ParameterChange] = []
         self._pinned: frozenset[str] = frozenset()
         self._awaited: set[str] = set()
@@ -51,7 +48,7 @@ class ParameterDesk:
 
     @property
     def settled(self) -> bool:
-        """Whether every process that rounds wait for has what counts."""
+        """Whether every process has what counts."""
         return not self._awaited
 
     @property
@@ -105,8 +102,7 @@ class ParameterDesk:
         return True
 
     def _tell(self, process_id: str, changes: tuple[ParameterChange, ...]) -> None:
-        if process_id not in self._not_awaited:
-            self._awaited.add(process_id)
+        self._awaited.add(process_id)
         self._ask(
             process_id,
             UseVehicle(

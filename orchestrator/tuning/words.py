@@ -72,7 +72,12 @@ def summary_lines(tuning: dict[str, Any]) -> list[str]:
         f"  {name} {first[name]:.5g} -> {change['value']:.5g} ({_HOW[change['origin']]})"
         for name, change in last.items()
     ]
-    apart = [one for one in tuning["parameters"] if one["departs"]]
+    departs = [one for one in tuning["parameters"] if one["departs"]]
+    finer = [one for one in departs if one["left_open"]]
+    if finer:
+        told = ", ".join(f"{one['name']} {one['identified']:.4g}" for one in finer)
+        lines.append(f"  found, within what the vehicle file leaves open: {told}")
+    apart = [one for one in departs if not one["left_open"]]
     if len(apart) > _EACH_ITS_LINE:
         told = ", ".join(f"{one['name']} {one['identified']:.4g}" for one in apart)
         return [*lines, f"  the driving says other than the vehicle in use: {told}"]

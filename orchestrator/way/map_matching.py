@@ -60,6 +60,8 @@ class MapMatcher:
         self._weights = weights or MatchingWeights()
         self._lost_after_m = lost_after_m
         self._hypotheses: list[Hypothesis] = []
+        self.roads_near: list[NearEdge] = []
+        """Both directions of all roads near the car where it was matched last, nearest first."""
         self._step_xy: Array | None = None
         self._road_xy: Array | None = None
         self._away_m = 0.0
@@ -103,7 +105,7 @@ class MapMatcher:
 
     def _begin(self, xy: Array, yaw: float | None) -> None:
         candidates = self._index.near(xy, self._weights.begin_radius_m)
-        self._step_xy = xy
+        self._step_xy, self.roads_near = xy, candidates
         if candidates:
             self._hypotheses = first_hypotheses(candidates, yaw, self._weights)
             self._direction_known = yaw is not None
@@ -111,7 +113,7 @@ class MapMatcher:
 
     def _step(self, xy: Array, yaw: float | None, moved_m: float) -> None:
         candidates = self._index.near(xy, self._weights.search_radius_m)
-        self._step_xy = xy
+        self._step_xy, self.roads_near = xy, candidates
         if not candidates or candidates[0].distance_m > self._weights.begin_radius_m:
             # A single wild fix must not end the match: no step counts for more than 5 m.
             self._away_m += min(moved_m, 5.0)

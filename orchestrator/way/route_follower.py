@@ -69,6 +69,10 @@ class RouteFollower:
         self._encounters: tuple[PassedJunction, ...] = ()
         self._passed_at: dict[str, float] = {}
 
+    def give(self, routes: Sequence[Route]) -> None:
+        """Follow these from the next match on; what is driven on now is kept until they are met."""
+        self._given, self._given_from, self._on_given = GivenRoutes(routes), 0, False
+
     @property
     def route(self) -> Route:
         """The road from 150 m behind the car to at least `ahead_m` ahead, if roads lead on."""

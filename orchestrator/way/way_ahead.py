@@ -15,8 +15,10 @@ from orchestrator.way.driving_path import driving_path
 from orchestrator.way.junctions_ahead import PassedJunction, UpcomingJunction
 from orchestrator.way.map_matching import MapMatcher, Match, OffRoadStretch
 from orchestrator.way.road_index import RoadIndex
+from orchestrator.way.road_line import RoadLines
 from orchestrator.way.route import Route
 from orchestrator.way.route_follower import Progress, RouteFollower
+from telemetry.map_aid import RoadLine
 from world_gen.intersections import Junction
 from world_gen.road_graph import RoadGraph
 
@@ -51,12 +53,18 @@ class WayAhead:
         self._graph = graph
         self._matcher = MapMatcher(graph, index=index)
         self._follower = RouteFollower(graph, junctions, routes, index=index)
+        self._lines = RoadLines(graph)
         self._pace = DrivingPace()
         self._cruise = CruiseSpeed()
         self._given = bool(routes)
         self._match: Match | None = None
         self._progress: Progress | None = None
         self.junctions: tuple[JunctionAhead, ...] = ()
+
+    def give(self, route: Route) -> None:
+        """Follow this route from the next state on."""
+        self._given = True
+        self._follower.give((route,))
 
     def take_speed(self, state: VehicleState) -> None:
         """Learn from a state how the car is driven."""
@@ -77,6 +85,16 @@ class WayAhead:
         arrivals = predict_arrivals(self._follower.route, self._progress.s_m, upcoming, self._pace)
         self.junctions = tuple(JunctionAhead(a.junction, a.distance_m, a.in_s) for a in arrivals)
         return self._progress.passed
+
+    def road_line(self, state: VehicleState) -> RoadLine | None:
+        """Return the line that a state just located drives along, None where it is in doubt."""
+        if self._match is None or self._progress is None or not state.yaw_valid:
+            return None
+        xy = local_from_geo(self._graph.frame, state.position.lat_deg, state.position.lon_deg)
+        return self._lines.near(
+            state, xy, self._match, self._follower.route, self._progress.s_m,
+            roads_near=self._matcher.roads_near,
+        )  # fmt: skip
 
     @property
     def s_m(self) -> float:

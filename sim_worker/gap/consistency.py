@@ -13,8 +13,19 @@ from sim_worker.motion_record import PERIOD_S
 
 _MIN_TURN_RAD, _MIN_CURVATURE_PM = 0.012, 0.006
 _HARD_MPS2 = 1.2
+_LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
+_TOGETHER_S = 0.3
+"""Samples nearer to each other than this err alike."""
+_LEAST_STOP_S = 0.3
 _EVERY = 5
 """Smoothed signals need not be compared at every sample."""
+
+
+class Lag(NamedTuple):
+    """A time and its standard deviation."""
+
+    seconds: float
+    std_s: float
 
 
 class Consistency(NamedTuple):
@@ -28,13 +39,15 @@ class Consistency(NamedTuple):
     speed_by_gnss: Line | None
     measured_by_command: Follower | None
     model_by_command: Follower | None
+    model_stops_at_rad: float
+    """The tyre angle that the model holds while commands and car go beyond, NaN where none."""
     motion_by_measured: Line | None
     motion_by_measured_hard: Line | None
     """The same where the lateral acceleration is high."""
     missing_mps2: float
     """Lateral acceleration (RMS) by which the model at the measured steering misses the car's."""
-    motion_lag_s: float
-    """By how much the model's turning lags behind the car's, NaN where unknown."""
+    motion_lag: Lag | None
+    """By how much the model's turning lags behind the car's."""
     motion_by_command: Line | None
     motion_by_angle: Line | None
     """Kinematic tyre angle of the motion over the measured one: free of the model's limits."""
@@ -60,12 +73,13 @@ def consistency_of(pairs: Pairs) -> Consistency:
                                   period_s=_EVERY * PERIOD_S, together_s=0.4, least_s=1.5),
         measured_by_command=measured,
         model_by_command=model,
+        model_stops_at_rad=_stop(pairs.commanded_rad, pairs.done_rad, pairs.model_tire_rad),
         motion_by_measured=motion,
         motion_by_measured_hard=None if motion is None else _mean_ratio(
             np.where(hard, by_measured, np.nan), real,
             period_s=PERIOD_S, together_s=0.4, least_s=0.6),
         missing_mps2=_missing(pairs),
-        motion_lag_s=_lag(by_measured, real),
+        motion_lag=_lag(by_measured, real),
         motion_by_command=_turning(pairs.by_command_pm, real),
         motion_by_angle=angle,
         excited_s=float(pairs.excited.sum()) * PERIOD_S,
@@ -78,7 +92,16 @@ def _varies(angle: Array) -> bool:
     return len(known) > 50 and bool(np.ptp(known) > _MIN_TURN_RAD)
 
 
-def _line(x: Array, y: Array, *, together_s: float = 0.3) -> Line | None:
+def _stop(asked: Array, done: Array, model: Array) -> float:
+    """Return where the tyres of the model, which has no noise, stop."""
+    known = np.isfinite(asked) & np.isfinite(done) & np.isfinite(model)
+    asked, done, model = np.abs(asked[known]), np.abs(done[known]), np.abs(model[known])
+    top = float(np.max(model, initial=0.0))
+    held = (model > 0.995 * top) & (np.minimum(asked, done) > 1.1 * top)
+    return top if held.sum() * PERIOD_S >= _LEAST_STOP_S else float("nan")
+
+
+def _line(x: Array, y: Array, *, together_s: float = _TOGETHER_S) -> Line | None:
     known = np.isfinite(x) & np.isfinite(y)
     return line_through(x[known], y[known], independent=known.sum() * PERIOD_S / together_s)
 
@@ -143,25 +166,21 @@ def _mean_ratio(
     return Line(gain, std, 0.0, 0.0, residual, 1.0)
 
 
-def _lag(model: Array, real: Array) -> float:
-    """Return how much the model's turning lags behind the car's, by the best common shift."""
-    known = np.flatnonzero(np.isfinite(model))
-    if len(known) < 10 or float(np.ptp(model[known])) < 0.02:
-        return float("nan")
-    shifts = range(-10, 21)
-    errors = []
-    for shift in shifts:
-        at = known - shift
-        inside = (at >= 0) & (at < len(real))
-        inside[inside] &= np.isfinite(real[at[inside]])
-        if inside.sum() < 0.8 * len(known):
-            errors.append(np.inf)
-            continue
-        other, flat = real[at[inside]], model[known[inside]]
-        scale = float(np.sum(flat * other) / max(np.sum(flat * flat), 1e-12))
-        errors.append(float(np.mean((other - scale * flat) ** 2)))
-    best = int(np.argmin(errors))
-    unshifted = errors[10]
-    if not np.isfinite(unshifted) or errors[best] > 0.5 * unshifted:
-        return 0.0
-    return shifts[best] * PERIOD_S
+def _lag(model: Array, real: Array) -> Lag | None:
+    """Return how much the model's turning lags behind the car's, None where unknown.
+
+    An offset is fitted too: on the way into a bend it looks like a lag.
+    """
+    known = np.isfinite(model) & np.isfinite(real)
+    if known.sum() < 10 or float(np.ptp(model[known])) < _LEAST_SWING_PM:
+        return None
+    pair = follower(real, model, longest_s=_LONGEST_LAG_S)
+    at_once = _line(real, model)
+    changes = _line(real, np.gradient(real) / PERIOD_S)
+    if pair is None or at_once is None or changes is None:
+        return None
+    # What a lag changes beyond what gain and offset could.
+    tells = abs(pair.line.gain) * changes.residual * np.sqrt(known.sum() * PERIOD_S / _TOGETHER_S)
+    std_s = pair.line.residual / max(float(tells), 1e-9)
+    helps = pair.line.residual**2 < 0.5 * at_once.residual**2
+    return Lag(pair.delay_s if helps else 0.0, std_s)

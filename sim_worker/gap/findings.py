@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from contracts.gap import Evidence
-from sim_worker.gap.consistency import Consistency
+from sim_worker.gap.consistency import Consistency, Lag
 from sim_worker.gap.finding import Finding
 from sim_worker.gap.fitting import Follower, Line
 
@@ -19,6 +19,8 @@ _MISSING_MPS2, _FOLLOWS = 0.5, 0.9
 """A right model misses no more than 0.17 m/s²; one whose gain alone is off still follows."""
 _SLOW_S = 0.36
 """Steering by wire takes 0.05 to 0.3 s."""
+_LATE_S = 0.1
+"""Sensors' stamps and what tyres do on their way to a side force leave as much open."""
 _LEAST_EXCITED_S, _SETTLED_S = 0.8, 1.4
 
 
@@ -159,8 +161,8 @@ def _model_turns(seen: Consistency) -> Finding | None:
     obeys = car is not None and car.line.explained > 0.8 and abs(car.line.gain - 1.0) < _GAIN
     if obeys and car is not None and model is not None:
         said = f"the model's tyres do {model.line.gain:.2f} of the command"
-        if not math.isnan(model.saturated_at):
-            at = f"at {math.degrees(model.saturated_at):.1f}°"
+        if not math.isnan(seen.model_stops_at_rad):
+            at = f"at {math.degrees(seen.model_stops_at_rad):.1f}°"
             text = f"the model's steering stops {at} where the car's goes on: {said}"
             return accuse("steering_limit", text, _of("model_by_command", model.line, said))
         late = model.delay_s - car.delay_s
@@ -174,7 +176,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
     if line is None or (car is not None and not obeys) or not _gyro_confirmed(seen.gyro_by_course):
         return None
     hard = seen.motion_by_measured_hard
-    lag = 0.0 if math.isnan(seen.motion_lag_s) else seen.motion_lag_s
+    lag = seen.motion_lag or Lag(0.0, 0.0)
     said = f"the car turns {line.gain:.2f} times as the model does at the measured steering"
     bent = hard is not None and hard.gain_std < 0.15
     if seen.missing_mps2 > _MISSING_MPS2 and hard is not None and line.explained < _FOLLOWS:
@@ -187,15 +189,17 @@ def _model_turns(seen: Consistency) -> Finding | None:
         return None
     if _beyond(seen, line):
         cause, why = "steering_ratio", "steering ratio or wheelbase"
-        if lag >= 0.06 or (bent and hard is not None and abs(hard.gain - line.gain) > 0.25):
+        if lag.seconds >= 0.06 or (bent and hard is not None and abs(hard.gain - line.gain) > 0.25):
             cause, why = "cornering_stiffness", "cornering stiffness or friction"
         text = f"{said}, though the car obeys its commands: the model's {why} is wrong"
         return accuse(cause, text, _of("motion_by_measured", line, said))
     if seen.excited_s < _SETTLED_S:
         return None
-    if lag >= 0.12:
-        said = f"the model's turning lags {lag:.2f} s behind the car's"
-        more = Evidence(name="motion_lag_s", value=lag, expected=0.0, std=0.04, text=said)
+    if lag.seconds > _LATE_S + 3.0 * lag.std_s:
+        said = f"the model's turning lags {lag.seconds:.2f} s behind the car's"
+        more = Evidence(
+            name="motion_lag_s", value=lag.seconds, expected=0.0, std=lag.std_s, text=said
+        )
         return accuse("inertia", f"{said}: its yaw inertia or tyres are wrong", more)
     if abs(line.offset) > _OFFSET_PM + 3.0 * line.offset_std:
         said = f"the model's curvature is off by {-line.offset:+.4f} 1/m"

@@ -39,7 +39,8 @@ def motion_on_grid(
 ) -> MeasuredMotion:
     """Interpolate states with a known heading to `stamp_ns` (N,), which ascend.
 
-    States out of time order or with numbers that are not finite are passed over.
+    Positions are without what a map has moved them by: that is no motion of the car. States out of
+    time order or with numbers that are not finite are passed over.
     """
     rows: list[tuple[float, ...]] = []
     base_ns = int(stamp_ns[0])
@@ -47,7 +48,7 @@ def motion_on_grid(
         place = state.position
         values = (
             place.lat_deg, place.lon_deg, state.yaw_rad, state.speed_mps, state.yaw_rate_radps,
-            state.accel_mps2,
+            state.accel_mps2, *(state.map_shift_m or (0.0, 0.0)),
         )  # fmt: skip
         time_s = (state.stamp_ns - base_ns) * 1e-9
         if state.yaw_valid and np.isfinite(values).all() and (not rows or time_s > rows[-1][0]):
@@ -56,7 +57,7 @@ def motion_on_grid(
     if len(rows) < 2:
         return MeasuredMotion(*(np.full(len(at), np.nan) for _ in MeasuredMotion._fields))
     table = np.array(rows)
-    xy = local_from_geo(frame, table[:, 1], table[:, 2])
+    xy = local_from_geo(frame, table[:, 1], table[:, 2]) - table[:, 7:9]
     yaw = np.unwrap(local_from_geo_yaw(frame, table[:, 3], table[:, 1], table[:, 2]))
     columns = (xy[:, 0], xy[:, 1], yaw, table[:, 4], table[:, 5], table[:, 6])
     return MeasuredMotion(

@@ -170,6 +170,10 @@ def _runs(
     by_measured, by_command, tire = (np.full(count, np.nan) for _ in range(3))
     if not len(at):
         return by_measured, by_command, tire, push_blocks(record, eased, at, np.zeros((0, 1)))
+    # What was measured has the actuator's lag in it; the model's own must not come on top.
+    led = signals.measured_rad + runner.vehicle.steering_lag_s.value * (
+        np.gradient(signals.measured_rad) / PERIOD_S
+    )
     slope, nothing = np.gradient(eased) / PERIOD_S, np.full(count, np.nan)
     # One batch for both kinds: the stretch as commanded, then as measured with its speed held.
     held = np.arange(len(at)) < len(measured)
@@ -184,7 +188,7 @@ def _runs(
         return runner.run(
             states=begin, starts=np.where(held[rows], begun + count, begun), steps=_RUN,
             accel_mps2=np.concatenate([accel, accel]),
-            tire_rad=np.concatenate([signals.commanded_rad, signals.measured_rad]),
+            tire_rad=np.concatenate([signals.commanded_rad, led]),
             hold_speed_mps=np.concatenate([nothing, eased]), delayed=~held[rows],
         )  # fmt: skip
 

@@ -4,13 +4,15 @@ Braking and pulling away last a second or two with a minute between them, so tha
 forgets the last one before the next begins. Kept here are the blocks in which something was asked
 for, however long ago. Each new block asks whether those since some earlier one agree on a
 departure: Page's test (1954) in its form for departures of unknown size (Lorden 1971), whose best
-first block is also when the departure began.
+first block is also when the departure began. What such a test finds is fitted together with all
+else that may be off, and named where nothing else explains as much.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +20,7 @@ import numpy as np
 from contracts.arrays import Array
 from contracts.gap import Culprit, Evidence
 from sim_worker.gap.finding import Finding
+from sim_worker.gap.joint_fit import JointFit, joint_fit
 from sim_worker.motion_record import PERIOD_S, MotionRecord
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
@@ -32,7 +35,7 @@ _TOGETHER = 2.0
 _KEPT, _LEAST, _SURE = 60, 3, 3.0
 """Blocks of one kind; the fewest, and the deviations beyond its limit, that accuse."""
 _BEFORE, _HARD = 25, 0.7
-_PLATEAU = 2.0 * _TOGETHER
+_PLATEAU = 2.0
 """What a plateau must explain beyond a gain, for being one more number (Akaike 1974)."""
 _ASKED_MPS2, _FAST_MPS = 0.25, 5.0
 
@@ -55,6 +58,14 @@ class _Kind(NamedTuple):
     unit: str
 
 
+_LEFT_OPEN = {"drag": 0.1, "rolling": 0.1, "drive_gain": 0.1, "brake_gain": 0.1}
+"""Standard deviations of what parameters of the right car leave open beside a cause."""
+_CLEARLY = 9.0
+"""Sum of squares, in deviations, that a cause must explain beyond all others."""
+_PUSH = {
+    "drive_gain": "drive", "saturated_drive": "drive", "brake_gain": "brake",
+    "saturated_brake": "brake", "drag": "drag",
+}  # fmt: skip
 _COMMANDED = " of the commanded acceleration"
 _KINDS = {
     "drive_gain": _Kind(0.25, 1.0, _COMMANDED),
@@ -125,7 +136,7 @@ class PushTest:
         self._blocks: deque[tuple[float, ...]] = deque(maxlen=8 * _KEPT)
         self._latest_ns = 0.0
 
-    def handle(self, blocks: PushBlocks) -> Finding | None:
+    def handle(self, blocks: PushBlocks) -> tuple[Finding, ...]:
         """Take the blocks that are new, in time order; return what all of them say."""
         came = False
         for row in zip(*blocks, strict=True):
@@ -133,13 +144,13 @@ class PushTest:
             if row[0] > self._latest_ns + 0.5e9 * _BLOCK_S and np.isfinite(row).all():
                 self._latest_ns, came = row[0], True
                 self._blocks.append(row)
-        return self._judge() if came else None
+        return self._judge() if came else ()
 
-    def _judge(self) -> Finding | None:
+    def _judge(self) -> tuple[Finding, ...]:
         blocks = PushBlocks(*np.array(self._blocks, dtype=np.float64).T)
         parts = _parts(blocks)
         gap, weight = blocks.model_mps2 - blocks.car_mps2, blocks.std_mps2**-2
-        found: list[tuple[str, Indices, float, float]] = []
+        found: list[tuple[str, Indices]] = []
         for cause, kind in _KINDS.items():
             column = parts[cause].column
             used = np.flatnonzero(column)[::-1][:_KEPT]
@@ -158,27 +169,65 @@ class PushTest:
             if sure[count] > _SURE and not (
                 cause.startswith("saturated") and _exceeds(blocks, parts[cause], used, off, doubt)
             ):
-                found.append((cause, used, off, doubt))
+                found.append((cause, used))
         if not found:
-            return None
-        # Blocks before the departure count too. Drag does not set in: it is there in all of them.
-        since = max(0, min(int(used[-1]) for _, used, _, _ in found) - _BEFORE)
+            return ()
+        return _explain(blocks, parts, found)
 
-        def left(value: float, column: Array, begun: int) -> float:
-            answer = value * column
-            answer[:begun] = 0.0
-            return float(np.sum((weight * (gap - answer) ** 2)[since:]))
 
-        unexplained = [
-            left(value, parts[cause].column, 0 if cause == "drag" else int(used[-1]))
-            + (0.0 if math.isnan(parts[cause].plateau) else _PLATEAU)
-            for cause, used, value, _ in found
-        ]
-        best = int(np.argmin(unexplained))
-        if unexplained[best] > 0.7 * left(0.0, gap, 0):
-            return None
-        cause, used, value_of, std_of = found[best]
-        return _finding(cause, *_of(blocks, parts[cause], used), value_of, std_of)
+def _explain(
+    blocks: PushBlocks, parts: dict[str, _Part], found: Sequence[tuple[str, Indices]]
+) -> tuple[Finding, ...]:
+    """Return the causes without which the rest leaves clearly more of the gap, surest first."""
+    # Blocks before the departure count too. Drag does not set in: it is there in all of them.
+    since = max(0, min(int(used[-1]) for _, used in found) - _BEFORE)
+    recent = slice(since, None)
+    asked, car, model = blocks.asked_mps2, blocks.car_mps2, blocks.model_mps2
+    variance = _TOGETHER * blocks.std_mps2[recent] ** 2
+    gap = (model - car)[recent]
+    columns = {name: parts[name].column[recent] for name in _LEFT_OPEN if name in parts}
+    columns["rolling"] = -np.ones(len(gap))
+    free = {}
+    for cause, used in found:
+        free[cause] = parts[cause].column.copy()
+        free[cause][: 0 if cause == "drag" else int(used[-1])] = 0.0
+
+    def fit(causes: Sequence[str], of: Array) -> JointFit:
+        left_open = [name for name in _LEFT_OPEN if name not in causes]
+        both = [free[cause][recent] for cause in causes] + [columns[name] for name in left_open]
+        prior = [np.inf] * len(causes) + [_LEFT_OPEN[name] for name in left_open]
+        stacked = np.stack(both, axis=1)
+        return joint_fit(of, stacked, variance=variance, prior_std=np.array(prior))
+
+    def cost(causes: Sequence[str]) -> float:
+        return fit(causes, gap).left + _PLATEAU * sum("saturated" in cause for cause in causes)
+
+    named: list[str] = []
+    others = [cause for cause, _ in found]
+    while others:
+        best = min(others, key=lambda cause: cost([*named, cause]))
+        if cost(named) - cost([*named, best]) < _CLEARLY:
+            break
+        named.append(best)
+        # Of one push a gain or a plateau is wrong.
+        others = [one for one in others if _PUSH[one] != _PUSH[best]]
+    worse = {one: cost([other for other in named if other != one]) - cost(named) for one in named}
+    named = sorted((one for one in named if worse[one] >= _CLEARLY), key=lambda one: -worse[one])
+    if not named or cost(named) > 0.7 * float(np.sum(gap**2 / variance)):
+        return ()
+    whole, of_car = fit(named, gap), fit(named, (car - asked)[recent])
+    begun_ns = {cause: int(blocks.stamp_ns[used[-1]]) for cause, used in found}
+    return tuple(
+        _finding(
+            cause,
+            parts[cause].plateau,
+            by_car=_KINDS[cause].usual + float(of_car.sizes[index]),
+            off=float(whole.sizes[index]),
+            std=float(whole.std[index]),
+            began_ns=begun_ns[cause] - round(_BLOCK_S * 1e9),
+        )
+        for index, cause in enumerate(named)
+    )
 
 
 def _by_car(blocks: PushBlocks, part: _Part) -> float:
@@ -199,15 +248,16 @@ def _exceeds(blocks: PushBlocks, part: _Part, used: Indices, off: float, doubt: 
     return max(by_car, by_car + off) > 1.0 + _KINDS["saturated_drive"].limit + 3.0 * doubt
 
 
-def _finding(cause: str, blocks: PushBlocks, part: _Part, value: float, std: float) -> Finding:
+def _finding(
+    cause: str, plateau: float, *, by_car: float, off: float, std: float, began_ns: int
+) -> Finding:
     """Say who departs: achieved over commanded is 1 for a car that does as told."""
-    kind, by_car = _KINDS[cause], _by_car(blocks, part)
-    by_model = by_car + value
+    kind, by_model = _KINDS[cause], by_car + off
     off_car, off_model = abs(by_car - kind.usual), abs(by_model - kind.usual)
     culprit: Culprit = "vehicle" if off_car > off_model else "model"
     if min(off_car, off_model) > kind.limit + 3.0 * std:
         culprit = "both"
-    unit = kind.unit.format(plateau=part.plateau)
+    unit = kind.unit.format(plateau=plateau)
     said = f"the car does {by_car:.2f} and the model {by_model:.2f}{unit}"
     who = {"vehicle": "the car departs", "model": "the model departs", "both": "both depart"}
     evidence = tuple(
@@ -215,6 +265,5 @@ def _finding(cause: str, blocks: PushBlocks, part: _Part, value: float, std: flo
                  text=f"the {whose}: {does:.2f}{unit}")
         for whose, does in (("car", by_car), ("model", by_model))
     )  # fmt: skip
-    began_ns = int(blocks.stamp_ns.min()) - round(_BLOCK_S * 1e9)
     text = f"{said}: {who[culprit]} from the command"
     return Finding(culprit, cause, text, evidence, began_ns)

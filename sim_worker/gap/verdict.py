@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ class Judge:
             # A departure that has just begun is a small part of the whole stretch.
             recent = pairs.latest(RECENT_S)
             found = _found_in(recent, consistency_of(recent))
-        return self._weigh(found or pushed, to_ns)
+        return self._weigh(pushed if found is None else (found,), to_ns)
 
     def _precise(self) -> bool:
         """Whether positions are dense and good enough to judge other sensors by."""
@@ -114,17 +115,18 @@ class Judge:
         apart_s = float(np.median(np.diff(table[:, 0]))) * 1e-9
         return apart_s <= _DENSE_S and float(np.median(table[:, 1])) <= _PRECISE_M
 
-    def _weigh(self, found: Finding | None, to_ns: int) -> Verdict | None:
+    def _weigh(self, findings: Sequence[Finding], to_ns: int) -> Verdict | None:
         for key, seen_ns in list(self._told.items()):
             if to_ns - seen_ns > _FORGOTTEN_S * 1e9:
                 del self._told[key]
-        if found is None:
+        if not findings:
             self._pending = None
+        by_key = {(str(one.culprit), one.cause): one for one in findings}
+        self._told |= {key: to_ns for key in by_key if key in self._told}
+        untold = [key for key in by_key if key not in self._told]
+        if not untold:
             return None
-        key = (found.culprit, found.cause)
-        if key in self._told:
-            self._told[key] = to_ns
-            return None
+        key, found = untold[0], by_key[untold[0]]
         before = self._pending
         if before is None or before[0] != found.culprit:
             self._pending = (*key, 1, found.since_ns)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Collection
 
 import msgspec
@@ -114,3 +115,21 @@ def in_force(vehicle: VehicleParameters, name: str) -> float:
     if not isinstance(parameter, Parameter):
         raise UserError(f"{name} is no parameter of a vehicle")
     return float(parameter.value)
+
+
+def is_left_open(vehicle: VehicleParameters, name: str, value: float) -> bool:
+    """Return whether a value lies within two standard deviations of what a vehicle file says."""
+    if name == UNDERSTEER_GRADIENT:
+        usual = understeer_gradient(vehicle)
+        parts = ("front_cornering_stiffness_npr", "rear_cornering_stiffness_npr")
+        softer = (understeer_gradient(_softer(vehicle, part)) for part in parts)
+        std = math.hypot(*(one - usual for one in softer))
+    else:
+        usual, std = in_force(vehicle, name), getattr(vehicle, name).std or 0.0
+    return abs(value - usual) <= 2.0 * std
+
+
+def _softer(vehicle: VehicleParameters, name: str) -> VehicleParameters:
+    given: Parameter = getattr(vehicle, name)
+    softer = Parameter(given.value - (given.std or 0.0), given.std, given.source)
+    return msgspec.structs.replace(vehicle, **{name: softer})

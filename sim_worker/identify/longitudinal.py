@@ -158,7 +158,7 @@ def fit_longitudinal(
         moved = -(gains[0] * changing[0] + gains[1] * changing[1])
         columns = np.stack([*acting(delay_s), *steady, moved], axis=1)
         fit = fit_linear(
-            columns, target, record.time_s[used], prior=centre, prior_std=spread, white=True
+            columns, target, record.time_s[used], prior=centre, prior_std=spread, brief=True
         )
         gains = fit.values[:2]
         delay_s = max(delay_s + float(fit.values[DELAY]), 0.0)

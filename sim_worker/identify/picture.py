@@ -50,8 +50,9 @@ def draw_steering(record: MotionRecord, vehicle: VehicleParameters, file: Path) 
     fit = fit_steering(record, vehicle)
     used = fit.signals.used
     time_s = record.time_s[used]
-    measured = fit.signals.yaw_rate_radps[used] - fit.fit.values[GYRO_BIAS]
-    explained = measured - fit.fit.residuals
+    values = fit.fit.values
+    measured = fit.signals.yaw_rate_radps[used] - values[GYRO_BIAS]
+    explained = measured - fit.signals.unexplained(values).yaw_rate_radps
     # A stop between two instants would else be drawn as a line.
     jumps = np.flatnonzero(np.diff(used) > 1) + 1
     time_s, measured, explained = (

@@ -8,7 +8,7 @@ cluster-robust inference"), averaged over where the stretches begin. A parameter
 bend tells has no other to vouch for it, and its interval says so.
 
 Leaving out is exact for residuals that last as long as a stretch, and exaggerates by a stretch's
-leverage where they do not; what is known to be white is corrected by the root of it instead (CV2,
+leverage where they do not; what is known to be brief is corrected by the root of it instead (CV2,
 Bell and McCaffrey, 2002).
 """
 
@@ -39,7 +39,11 @@ class Fit(NamedTuple):
 
     def half_width(self, index: int) -> float:
         """Return half the 95 % interval of one parameter."""
-        return float(self.quantile[index] * np.sqrt(self.covariance[index, index]))
+        return float(self.half_widths()[index])
+
+    def half_widths(self) -> Array:
+        """Return half the 95 % interval of each parameter (K,)."""
+        return np.asarray(self.quantile * np.sqrt(np.diagonal(self.covariance)))
 
 
 class _Cells(NamedTuple):
@@ -59,14 +63,14 @@ def fit_linear(
     prior: Array | None = None,
     prior_std: Array | None = None,
     least_std: float = 0.0,
-    white: bool = False,
+    brief: bool = False,
 ) -> Fit:
     """Solve `columns` (N, K) · values = `target` (N,) with Gaussian priors (K,), inf for none.
 
     `time_s` (N,) ascends; residuals count as alike within `length_s`. `least_std` is what one
     instant can be trusted to at best, however well the columns explain it: it weighs the priors
-    against the data and leaves the interval to the residuals. `white` residuals come from sensors
-    alone, and are not alike for as long as a stretch.
+    against the data and leaves the interval to the residuals. `brief` residuals are
+    alike for much less than a stretch, as those of sensors are.
 
     Raises ValueError for less than three stretches, or for a column of zeros without a prior.
     """
@@ -102,7 +106,7 @@ def fit_linear(
         likeness = float(np.mean(np.sum(np.square(sums), axis=0))) / square
         variance = max(square * max(likeness, 1.0), least_std**2)
     held = precision * variance + 1e-12
-    spread, freedom = _left_out(cells, gram + np.diag(held), white=white)
+    spread, freedom = _left_out(cells, gram + np.diag(held), brief=brief)
     inverse = np.linalg.inv(gram + np.diag(held))
     # What the prior holds is as uncertain as the prior.
     spread += inverse @ np.diag(precision * variance**2) @ inverse
@@ -119,7 +123,7 @@ def _by_stretch(values: Array, stretch: np.ndarray) -> Array:
     return np.asarray(np.add.reduceat(values, starts, axis=0))
 
 
-def _left_out(cells: _Cells, normal: Array, *, white: bool) -> tuple[Array, Array]:
+def _left_out(cells: _Cells, normal: Array, *, brief: bool) -> tuple[Array, Array]:
     """Return the jackknife's covariance (K, K) and its degrees of freedom (K,).
 
     The degrees are Satterthwaite's of a sum of as many squares as there are stretches, from the
@@ -130,7 +134,7 @@ def _left_out(cells: _Cells, normal: Array, *, white: bool) -> tuple[Array, Arra
         stretch = (cells.number + beginning) // _BEGINNINGS
         grams, moments = _by_stretch(cells.grams, stretch), _by_stretch(cells.moments, stretch)
         groups, share = len(moments), 1.0
-        if white:
+        if brief:
             moved = _by_root(normal, grams, moments)
         else:
             moved = np.asarray(np.linalg.solve(normal - grams, moments[..., None])[..., 0])

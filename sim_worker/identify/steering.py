@@ -11,14 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
 from sim_worker.identify.regression import Fit, fit_linear
 from sim_worker.identify.steering_signals import (
+    ALIKE_S,
     GYRO_BIAS,
     INVERSE_RATIO,
     OFFSET,
+    PULL_BRAKED,
+    PULL_DRIVEN,
     UNDERSTEER,
-    WIDTH_S,
     SteeringSignals,
     steering_signals,
 )
@@ -39,6 +42,14 @@ deviation. On centre it is a good part of the angle, and makes the ratio look to
 _PULL_STD_RAD_PER_MPS2 = 0.002
 """A driver corrects half a degree at the steering wheel for each m/s² without a thought."""
 _LAG_STD_S = 0.05
+_BEND_STD_RAD, _BEND_S = 4e-4, 9.0
+"""What a planar car leaves unexplained of the tyre angle in a bend, and the way to the next one:
+so little do a thousand instants of one bend tell."""
+_ANGLES_BELOW_MPS = 4.0
+"""A planar car leaves so much of the tyre angle unexplained, and sensors so much of the yaw rate,
+that an instant tells the angle best from this speed on, and no better when faster."""
+_ROLLING_MPS2 = 1.0
+"""Tyres that drive or brake by much more turn a car otherwise than those that roll."""
 
 
 class SteeringFit(NamedTuple):
@@ -46,13 +57,15 @@ class SteeringFit(NamedTuple):
 
     fit: Fit
     signals: SteeringSignals
+    half_widths: Array
+    """Of the 95 % intervals (8,)."""
     hidden_share: float
     """Of the steering wheel's variance, what play may account for."""
 
     def ratio(self) -> tuple[float, float, float]:
         """Return value, low and high of the steering ratio."""
         inverse = float(self.fit.values[INVERSE_RATIO])
-        half = self.fit.half_width(INVERSE_RATIO)
+        half = float(self.half_widths[INVERSE_RATIO])
         size, sign = abs(inverse), math.copysign(1.0, inverse)
         # Errors in a regressor only ever flatten its slope.
         most = size / (1.0 - self.hidden_share) + half
@@ -62,7 +75,7 @@ class SteeringFit(NamedTuple):
 
     def interval(self, index: int) -> tuple[float, float, float]:
         """Return value, low and high of a parameter by its index."""
-        value, half = float(self.fit.values[index]), self.fit.half_width(index)
+        value, half = float(self.fit.values[index]), float(self.half_widths[index])
         return value, value - half, value + half
 
 
@@ -95,35 +108,55 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     inverse = 1.0 / vehicle.steering_ratio.value
     centre = np.array(
         [inverse, vehicle.steering_offset_rad.value, understeer_gradient(vehicle),
-         turning_s2(vehicle), 0.0, 0.0, 0.0, 0.0]
+         turning_s2(vehicle), signals.gyro_bias_radps, 0.0, 0.0, 0.0]
     )  # fmt: skip
     spread = np.array(
         [_inverse_ratio_std(vehicle), _OFFSET_STD_RAD, _WEAK * understeer_std(vehicle),
-         turning_s2(vehicle), _GYRO_BIAS_STD_RADPS, _LAG_STD_S * inverse,
+         turning_s2(vehicle), min(signals.gyro_bias_std_radps, _GYRO_BIAS_STD_RADPS),
+         _LAG_STD_S * inverse,
          _PULL_STD_RAD_PER_MPS2, _PULL_STD_RAD_PER_MPS2]
     )  # fmt: skip
+    gaining = signals.given[PULL_DRIVEN, used] + signals.given[PULL_BRAKED, used]
+    weights = 1.0 / np.hypot(1.0, signals.speed_mps[used] / _ANGLES_BELOW_MPS)
+    weights /= np.hypot(1.0, gaining / _ROLLING_MPS2)
     # Play lasts: instants within the reach of the smoothing share it.
-    alike = 2.0 * math.sqrt(math.pi) * WIDTH_S / float(record.time_s[1])
-    play = PLAY_RAD / abs(vehicle.steering_ratio.value) * math.sqrt(np.mean(np.square(per_m)))
-    values = centre.copy()
-    fit: Fit | None = None
-    for _ in range(4):
+    period_s, angles = float(record.time_s[1]), float(np.mean(np.square(per_m * weights)))
+    play = PLAY_RAD / abs(vehicle.steering_ratio.value) * math.sqrt(ALIKE_S / period_s * angles)
+    of_bends = max(play, _BEND_STD_RAD * math.sqrt(_BEND_S / period_s * angles))
+
+    def fitted(values: Array, *, least_std: float, brief: bool) -> Fit:
         apart, slopes = signals.unexplained(values)
-        fit = fit_linear(slopes.T, apart + values @ slopes, record.time_s[used],
-                         prior=centre, prior_std=spread,
-                         least_std=play * math.sqrt(alike))  # fmt: skip
+        return fit_linear((slopes * weights).T, (apart + values @ slopes) * weights,
+                          record.time_s[used], prior=centre, prior_std=spread,
+                          least_std=least_std, brief=brief)  # fmt: skip
+
+    values = centre
+    for _ in range(4):
+        fit = fitted(values, least_std=of_bends, brief=False)
         moved = np.abs(fit.values - values).max()
         values = fit.values
         if moved < 1e-9:
             break
-    assert fit is not None
+    # What is left unexplained lasts for a second or two. Understeer alone is told by how bends of
+    # other speeds differ: few, each of which errs in its own way.
+    brief = fitted(values, least_std=of_bends, brief=True)
+    half_widths = brief.half_widths()
+    half_widths[UNDERSTEER] = fit.half_width(UNDERSTEER)
+    # The straights tell the offset, where tyres have nothing to be unexplained.
+    straight = fitted(values, least_std=play, brief=True)
+    values[OFFSET], half_widths[OFFSET] = straight.values[OFFSET], straight.half_width(OFFSET)
     # What is measured is wheelbase over ratio: the doubt of the first is the second's too.
-    std = vehicle.wheelbase_m.std or 0.0
+    base = vehicle.wheelbase_m
+    doubt = values[INVERSE_RATIO] * (base.std or 0.0) / base.value
+    half_widths[INVERSE_RATIO] = math.hypot(
+        half_widths[INVERSE_RATIO], brief.quantile[INVERSE_RATIO] * doubt
+    )
     covariance = fit.covariance.copy()
-    covariance[0, 0] += (values[0] * std / vehicle.wheelbase_m.value) ** 2
-    varied = float(np.var(signals.wheel_rad[used] * per_m) / np.mean(np.square(per_m)))
+    covariance[INVERSE_RATIO, INVERSE_RATIO] += doubt**2
+    varied = float(np.var(signals.wheel_rad[used] * per_m * weights)) / angles
     return SteeringFit(
         fit=fit._replace(covariance=covariance),
         signals=signals,
+        half_widths=half_widths,
         hidden_share=min(PLAY_RAD**2 / (varied + 1e-12), 0.9),
     )

@@ -12,6 +12,7 @@ is driven or braked.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +25,9 @@ from sim_worker.motion_record import MotionRecord
 
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 WIDTH_S = 0.1
+ALIKE_S = 2.0 * math.sqrt(math.pi) * WIDTH_S
+"""For so long, smoothed white noise says one thing only."""
+_LEAST_STOOD = 4.0
 _MAX_LATERAL_MPS2 = 4.0
 """Beyond it, tyres are no longer linear."""
 _LEAST_FEED = 0.2
@@ -40,7 +44,7 @@ class Unexplained(NamedTuple):
 
 
 class SteeringSignals(NamedTuple):
-    """Smoothed signals at N instants, of which those `used` (M) count: driving or standing."""
+    """Smoothed signals at N instants, of which those `used` (M) count, while driving."""
 
     time_s: Array
     used: Indices
@@ -53,8 +57,11 @@ class SteeringSignals(NamedTuple):
     given: Array
     """What each parameter is multiplied by at the tyre (8, N)."""
     per_m: Array
-    """Speed over wheelbase (M,), 0 at standstill."""
+    """Speed over wheelbase (M,)."""
     wheelbase_m: float
+    gyro_bias_radps: float
+    gyro_bias_std_radps: float
+    """What the gyro told while the car stood, and how surely; 0 and inf where it did not."""
 
     def unexplained(self, values: Array) -> Unexplained:
         """Return what parameters (8,) leave unexplained of the yaw rate."""
@@ -84,6 +91,14 @@ class SteeringSignals(NamedTuple):
         return np.asarray(self.wheel_rad - values[LAG] / values[INVERSE_RATIO] * self.wheel_radps)
 
 
+def _mean(values: Array, *, alike: float) -> tuple[float, float]:
+    """Return mean and its std, as wide as Student's of so few that are not `alike`."""
+    count = len(values) / alike
+    if count < _LEAST_STOOD:
+        return 0.0, math.inf
+    return float(np.mean(values)), float(np.std(values) / math.sqrt(count - 3.0))
+
+
 def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> SteeringSignals:
     """Return the signals of a record at even instants; ValueError saying what it lacks."""
     for name, told in (
@@ -107,11 +122,12 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
                     period_s=period_s)  # fmt: skip
     known = np.isfinite(wheel) & np.isfinite(side.accel_mps2)
     moving = known & (speed > SLOWEST_MPS) & (np.abs(side.accel_mps2) < _MAX_LATERAL_MPS2)
-    standing = known & (np.abs(speed) < 1e-3)
     if not moving.any():
         raise ValueError("the car did not drive")
-    used = np.flatnonzero(moving | standing)
+    used = np.flatnonzero(moving)
     base = vehicle.wheelbase_m.value
+    standing = np.isfinite(rate) & (np.abs(speed) < 1e-3)
+    bias, bias_std = _mean(rate[standing], alike=ALIKE_S / period_s)
     return SteeringSignals(
         time_s=record.time_s,
         used=used,
@@ -125,6 +141,8 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
             [wheel, np.ones_like(wheel), -side.accel_mps2, -turning, np.zeros_like(wheel),
              -steering, np.maximum(gaining, 0.0), np.minimum(gaining, 0.0)]
         ),
-        per_m=np.where(moving, speed, 0.0)[used] / base,
+        per_m=speed[used] / base,
         wheelbase_m=base,
+        gyro_bias_radps=bias,
+        gyro_bias_std_radps=bias_std,
     )  # fmt: skip

@@ -164,8 +164,8 @@ def _steering(
     half = max(ratio[2] - ratio[0], ratio[0] - ratio[1])
     wide = {
         "steering_ratio": not half <= _WIDE_RATIO * abs(ratio[0]),
-        "steering_offset_rad": fit.fit.half_width(OFFSET) > _WIDE_OFFSET_RAD,
-        UNDERSTEER_NAME: fit.fit.half_width(UNDERSTEER) > _WIDE_UNDERSTEER,
+        "steering_offset_rad": fit.half_widths[OFFSET] > _WIDE_OFFSET_RAD,
+        UNDERSTEER_NAME: fit.half_widths[UNDERSTEER] > _WIDE_UNDERSTEER,
     }
     intervals = {
         "steering_ratio": ratio,

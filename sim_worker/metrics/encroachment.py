@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from contracts.arrays import Array
+from sim_worker.metrics import compiled_pairs
 from sim_worker.metrics.rollout import Measure
 from sim_worker.metrics.scene import Scene
 
@@ -44,78 +45,26 @@ def post_encroachment_time(scene: Scene) -> Measure:
     oriented outlines. Both must pass within the rollout.
     """
     found = scene.keep(crossings)
-    _, _, yaw, _ = scene.users
-    half_length, half_width = scene.user_half_m
-    x, y, _, _ = scene.users
     future, user = found.future, found.user
-    ego_cos, ego_sin = scene.heading
-    ego = _Outline(
-        scene.centre_m[future], ego_cos[future], ego_sin[future],
-        np.full(len(future), scene.half_length_m), np.full(len(future), scene.half_width_m),
+    half_length, half_width = (half[future, 0, user] for half in scene.user_half_m)
+    own_half_length = np.full(len(future), scene.half_length_m)
+    own_half_width = np.full(len(future), scene.half_width_m)
+    centre = scene.centre_m
+    alone = tuple(v[..., None] for v in (centre[..., 0], centre[..., 1], scene.states[..., 2]))
+    stays = np.empty((4, len(future)))
+    compiled_pairs.stays_on_strips(
+        alone, own_half_length, own_half_width, future, np.zeros_like(user), found.ego_step,
+        found.point_m, found.user_way, half_width, scene.time_s, stays[:2],
     )  # fmt: skip
-    heading = yaw[future, :, user]
-    other = _Outline(
-        np.stack([x[future, :, user], y[future, :, user]], axis=-1),
-        np.cos(heading), np.sin(heading),
-        half_length[future, 0, user], half_width[future, 0, user],
+    compiled_pairs.stays_on_strips(
+        scene.users[:3], half_length, half_width, future, user, found.user_step,
+        found.point_m, found.ego_way, own_half_width, scene.time_s, stays[2:],
     )  # fmt: skip
-    ego_from, ego_until = _on_strip(
-        ego, found.point_m, found.user_way, other.half_width_m, found.ego_step, scene.time_s
-    )
-    other_from, other_until = _on_strip(
-        other, found.point_m, found.ego_way, ego.half_width_m, found.user_step, scene.time_s
-    )
+    ego_from, ego_until, other_from, other_until = stays
     between = np.maximum(np.maximum(other_from - ego_until, ego_from - other_until), 0.0)
     least = np.full(len(scene.valid), np.inf)
     np.minimum.at(least, future, between)
     return scene.measure(least)
-
-
-class _Outline(NamedTuple):
-    """K moving boxes: centres (K, N, 2), cosine and sine of yaw (K, N), half sizes (K,)."""
-
-    centre_m: Array
-    cos: Array
-    sin: Array
-    half_length_m: Array
-    half_width_m: Array
-
-
-def _on_strip(
-    box: _Outline, point_m: Array, way: Array, half_width_m: Array, step: Indices, time_s: Array
-) -> tuple[Array, Array]:
-    """Return when (K,) boxes come onto and leave strips through points along `way` (K, 2).
-
-    Only the stay that includes the step after `step` (K,) counts; a box that is on the strip at
-    the first instant came at that time, one that is at the last never leaves.
-    """
-    normal_x, normal_y = -way[:, 1, None], way[:, 0, None]
-    aside = (box.centre_m[..., 0] - point_m[:, :1]) * normal_x
-    aside += (box.centre_m[..., 1] - point_m[:, 1:]) * normal_y
-    reach = half_width_m[:, None] + box.half_length_m[:, None] * np.abs(
-        box.cos * normal_x + box.sin * normal_y
-    )
-    reach += box.half_width_m[:, None] * np.abs(box.cos * normal_y - box.sin * normal_x)
-    off = np.abs(aside) >= reach
-    index = np.arange(len(time_s))
-    last_off = np.where(off & (index <= step[:, None]), index, -1).max(axis=1)
-    next_off = np.where(off & (index > step[:, None]), index, len(time_s)).min(axis=1)
-    came = _edge_time(aside, reach, np.maximum(last_off, 0), 1, time_s)
-    left = _edge_time(aside, reach, np.minimum(next_off, len(time_s) - 1), -1, time_s)
-    came = np.where(last_off < 0, time_s[0], came)
-    return came, np.where(next_off == len(time_s), np.inf, left)
-
-
-def _edge_time(aside: Array, reach: Array, off: Indices, toward: int, time_s: Array) -> Array:
-    """Return when (K,), between instants `off` and `off + toward`, |aside| equals `reach`."""
-    row = np.arange(len(off))
-    on = np.clip(off + toward, 0, len(time_s) - 1)
-    side = np.sign(aside[row, off])
-    gap_off = side * aside[row, off] - reach[row, off]
-    gap_on = side * aside[row, on] - reach[row, on]
-    fall = gap_off - gap_on
-    share = gap_off / np.where(fall > 0.0, fall, np.inf)
-    return np.asarray(time_s[off] + share * (time_s[on] - time_s[off]))
 
 
 def crossings(scene: Scene) -> Crossings:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from contracts.arrays import Array
+from sim_worker.metrics import compiled_pairs
 from sim_worker.metrics.rollout import Measure
 from sim_worker.metrics.scene import Scene
 
@@ -107,72 +108,28 @@ def leaders(scene: Scene) -> Leaders:
     curvature = np.where(
         np.abs(speed) > _SLOW_MPS, scene.states[..., 5] / np.maximum(np.abs(speed), _SLOW_MPS), 0.0
     )
-    curvature = np.clip(curvature, -_MAX_CURVATURE_PM, _MAX_CURVATURE_PM)[..., None]
-    half_length, half_width = scene.user_half_m
-    widest = scene.half_width_m + np.hypot(half_length, half_width)
-    near = [
-        rows.start * seen.ahead_m[0].size
-        + _near_course(
-            seen.ahead_m[rows].reshape(-1), seen.left_m[rows].reshape(-1), scene.centre_ahead_m,
-            np.repeat(curvature[rows].reshape(-1), seen.ahead_m.shape[2]),
-            float(widest.max(initial=0.0)),
-        )
-        for rows in scene.blocks
-    ]  # fmt: skip
-    pair = np.concatenate(near) if near else np.zeros(0, dtype=np.intp)
-    users = seen.ahead_m.shape[2]
-    row, user = np.divmod(pair, max(users, 1))
-    future = row // scene.states.shape[1]
-    x, y = (values.reshape(-1)[pair] for values in (seen.ahead_m, seen.left_m))
-    x = x + scene.centre_ahead_m
-    kappa = curvature.reshape(-1)[row]
-    inward, across = 1.0 - kappa * y, kappa * x
-    radius = np.sqrt(across * across + inward * inward)
-    left = (2.0 * y - kappa * (x * x + y * y)) / (1.0 + radius)
-    close = np.flatnonzero(np.abs(left) < widest[future, 0, user])
-    pair, row, user, future = pair[close], row[close], user[close], future[close]
-    x, left, kappa, radius = x[close], left[close], kappa[close], radius[close]
-    inward, across = inward[close], across[close]
-    straight = np.abs(kappa) < 1e-6
-    along = np.where(straight, x, np.arctan2(across, inward) / np.where(straight, 1.0, kappa))
-    cos, sin, other = (v.reshape(-1)[pair] for v in (seen.cos, seen.sin, seen.speed_mps))
-    turned_cos = (cos * inward + sin * across) / radius
-    turned_sin = (sin * inward - cos * across) / radius
-    a, b = half_length[future, 0, user], half_width[future, 0, user]
-    reach = scene.half_width_m + a * np.abs(turned_sin) + b * np.abs(turned_cos)
-    front = scene.centre_ahead_m + scene.half_length_m
-    gap = along - front - a * np.abs(turned_cos) - b * np.abs(turned_sin)
-    kept = (np.abs(left) < reach) & (along > front)
-    kept &= (turned_cos >= _ALONG_COS) | (np.abs(other) < _STANDS_MPS)
+    curvature = np.clip(curvature, -_MAX_CURVATURE_PM, _MAX_CURVATURE_PM)
+    pairs = np.empty(seen.ahead_m.size, dtype=np.intp)
+    found = np.empty((5, len(pairs)))
+    count = compiled_pairs.find_leaders(
+        (*seen[:4], seen.speed_mps), *scene.user_half_m, curvature,
+        (scene.centre_ahead_m, scene.half_length_m, scene.half_width_m, _ALONG_COS, _STANDS_MPS),
+        pairs, found,
+    )  # fmt: skip
+    pair = pairs[:count]
+    gap, left, reach, turned_cos, turned_sin = found[:, :count]
+    row, user = np.divmod(pair, max(seen.ahead_m.shape[2], 1))
+    other = seen.speed_mps.reshape(-1)[pair]
     return Leaders(
-        row=row[kept],
-        gap_m=np.maximum(gap[kept], 0.0),
-        left_m=left[kept],
-        reach_m=reach[kept],
-        ego_mps=speed.reshape(-1)[row[kept]],
-        other_mps=(other * turned_cos)[kept],
-        other_left_mps=(other * turned_sin)[kept],
-        accel_mps2=_user_acceleration(scene, row[kept], user[kept]) * turned_cos[kept],
+        row=row,
+        gap_m=gap,
+        left_m=left,
+        reach_m=reach,
+        ego_mps=speed.reshape(-1)[row],
+        other_mps=other * turned_cos,
+        other_left_mps=other * turned_sin,
+        accel_mps2=_user_acceleration(scene, row, user) * turned_cos,
     )
-
-
-def _near_course(
-    ahead_m: Array, left_m: Array, centre_ahead_m: float, curvature: Array, widest_m: float
-) -> Indices:
-    """Return the indices, of all (K,), of those who may overlap the ego's strip and are ahead.
-
-    (1 - r) / κ = (2 y - κ (x² + y²)) / (1 + r), and r is at most 1 + |κ| widest where a road user
-    reaches the strip at all: a bound without a root.
-    """
-    sideways = np.square(ahead_m + centre_ahead_m)
-    sideways += np.square(left_m)
-    sideways *= -curvature
-    sideways += left_m
-    sideways += left_m
-    near = np.abs(sideways, out=sideways) < widest_m * (2.0 + np.abs(curvature) * widest_m)
-    near &= ahead_m > 0.0
-    near &= curvature * left_m < 1.0
-    return np.flatnonzero(near)
 
 
 def _user_acceleration(scene: Scene, row: Indices, user: Indices) -> Array:

@@ -142,7 +142,7 @@ class Scene:
         """x, y, yaw and speed (S, N, R) of road users, far away and standing where absent."""
         users = self.rollout.users
         x, y, yaw = (np.array(users[..., k], dtype=np.float64, order="C") for k in range(3))
-        speed = np.array(self.rollout.user_speed_mps, dtype=np.float64)
+        speed = np.array(self.rollout.user_speed_mps, dtype=np.float64, order="C")
         if not self.there.all():
             gone = ~self.there
             np.copyto(x, _FAR_M, where=gone)

@@ -5,16 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from contracts.arrays import Array
+from sim_worker.metrics import compiled_pairs
 from sim_worker.metrics.rollout import Measure
 from sim_worker.metrics.scene import Scene
 
-_NEVER_ZERO = 1e-300
-"""Added to speeds before division: standing still becomes a very long time, without a warning."""
-_PAIRS_AT_ONCE = 4096
-"""So many stay in the cache."""
 EXPOSED_BELOW_S = 1.5
 """Threshold τ* of the exposed and integrated times: Minderhoud and Bovy (2001), section 5."""
 
@@ -70,7 +66,7 @@ def meeting(pairs: Pairs) -> Meeting:
 
 
 def _interval(distance: Array, speed: Array, reach: Array) -> tuple[Array, Array]:
-    per_speed = 1.0 / (speed + _NEVER_ZERO)
+    per_speed = 1.0 / (speed + compiled_pairs.NEVER_ZERO)
     half = np.abs(per_speed)
     half *= reach
     per_speed *= distance
@@ -84,66 +80,6 @@ def _narrow(first: Array, last: Array, distance: Array, speed: Array, reach: Arr
     begin, end = _interval(distance, speed, reach)
     np.maximum(first, begin, out=first)
     np.minimum(last, end, out=last)
-
-
-def time_to_collision(scene: Scene) -> Array:
-    """Return (S, N, R) seconds until each road user is touched, infinite where never.
-
-    Hayward (1972), Near-miss determination through use of a scale of danger, with the shapes of
-    the road users instead of a common lane: both keep their velocity and heading.
-    """
-    seen = scene.relative
-    found = np.full(seen.ahead_m.shape, np.inf)
-    half_length, half_width = scene.user_half_m
-    reach = np.hypot(half_length, half_width) + np.hypot(scene.half_length_m, scene.half_width_m)
-    near = [
-        rows.start * seen.ahead_m[0].size
-        + _may_touch(
-            seen.ahead_m[rows], seen.left_m[rows], seen.ahead_mps[rows], seen.left_mps[rows],
-            reach[rows],
-        )
-        for rows in scene.blocks
-    ]  # fmt: skip
-    every = np.concatenate(near) if near else np.zeros(0, dtype=np.intp)
-    _, instants, users = seen.ahead_m.shape
-    flat = [values.reshape(-1) for values in seen[:6]]
-    for first in range(0, len(every), _PAIRS_AT_ONCE):
-        pair = every[first : first + _PAIRS_AT_ONCE]
-        row, user = np.divmod(pair, users)
-        future = row // instants
-        ahead, left, cos, sin, ahead_mps, left_mps = (values[pair] for values in flat)
-        touch = meeting(
-            Pairs(
-                ahead, left, ahead_mps, left_mps, cos, sin,
-                (scene.half_length_m, scene.half_width_m),
-                (half_length[future, 0, user], half_width[future, 0, user]),
-            )
-        )  # fmt: skip
-        until = np.maximum(touch.from_s, 0.0)
-        until[touch.until_s < until] = np.inf
-        found.reshape(-1)[pair] = until
-    return found
-
-
-def _may_touch(
-    ahead_m: Array, left_m: Array, ahead_mps: Array, left_mps: Array, reach_m: Array
-) -> npt.NDArray[np.intp]:
-    """Return the flat indices of pairs whose circles touch now or, with their velocities, later."""
-    past = ahead_m * left_mps
-    past -= left_m * ahead_mps
-    past *= past
-    speed = np.square(ahead_mps)
-    speed += np.square(left_mps)
-    square = reach_m * reach_m
-    speed *= square
-    passes = past <= speed
-    closing = ahead_m * ahead_mps
-    closing += left_m * left_mps
-    passes &= closing < 0.0
-    distance = np.square(ahead_m)
-    distance += np.square(left_m)
-    passes |= distance <= square
-    return np.flatnonzero(passes)
 
 
 def ttc_series(scene: Scene) -> Measure:
@@ -175,9 +111,14 @@ def time_integrated(scene: Scene) -> Measure:
 
 
 def _least_at_each_instant(scene: Scene) -> Array:
-    until = time_to_collision(scene)
-    least = np.full(until.shape[:2], np.inf)
-    # One road user after another: reducing a short last axis is five times slower.
-    for k in range(until.shape[2]):
-        np.minimum(least, until[..., k], out=least)
+    """Return (S, N) seconds until any road user is touched, infinite where none ever is.
+
+    Hayward (1972), Near-miss determination through use of a scale of danger, with the shapes of
+    the road users instead of a common lane: both keep their velocity and heading.
+    """
+    seen = scene.relative
+    least = np.full(seen.ahead_m.shape[:2], np.inf)
+    compiled_pairs.least_until_touch(
+        seen[:6], *scene.user_half_m, scene.half_length_m, scene.half_width_m, least
+    )
     return least

@@ -27,8 +27,8 @@ from sim_worker.planners.host_link import (
     send,
 )
 
-START_S = 20.0
-"""To import its package and say so."""
+START_S = 60.0
+"""To import its package and say so: many times what that takes, for a machine that is busy."""
 FIRST_ANSWER_S, ANSWER_S = 1.0, 0.5
 _BUFFER_BYTES = 1 << 20
 

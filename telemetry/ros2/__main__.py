@@ -9,7 +9,7 @@ from contracts.foreign_bus import ZenohForeignBus
 from contracts.process import ProcessLife, run_process
 from contracts.setup import Ros2Setup
 from telemetry.ros2.gateway import Gateway
-from telemetry.ros2.mapping import parse_mapping
+from telemetry.ros2.mapping import listening_only, parse_mapping
 from telemetry.ros_parts import typestore
 
 log = logging.getLogger("telemetry.ros2")
@@ -18,6 +18,9 @@ log = logging.getLogger("telemetry.ros2")
 def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
     """Pass messages on until the run is over."""
     mapping = parse_mapping(setup.mapping, name=setup.mapping_name)
+    if setup.listens_only:
+        mapping = listening_only(mapping)
+        log.info("listens to %s and sends it nothing", setup.vehicle_id)
     typestore()  # 0.15 s that no sample shall wait for
     with ZenohForeignBus(mapping.endpoint or setup.bus.endpoint) as foreign:
         gateway = Gateway(
@@ -28,6 +31,7 @@ def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:
             vehicle_id=setup.vehicle_id,
             drive_frame=setup.drive_frame,
             flag_on=setup.towards_vehicle,
+            car=setup.vehicle,
         )
         life.ready()
         while not life.over:

@@ -20,12 +20,15 @@ from contracts.foreign_bus import ForeignBus
 from contracts.frames import LocalFrame
 from contracts.simulation import Event, MirrorSample
 from contracts.towards_vehicle import Authority, VehicleCommand
-from telemetry.logs.foreign_ros import time_base_of
+from contracts.vehicle import VehicleParameters
+from telemetry.ros2.introduction import Introduction
 from telemetry.ros2.inwards import Inwards
 from telemetry.ros2.mapping import Mapping, OutRow, Source
-from telemetry.ros2.outwards import Level, Outwards
+from telemetry.ros2.mirrored import MirroredObjects, without_own_twin
+from telemetry.ros2.outwards import Outwards
 from telemetry.ros2.safety import VehicleGate
 from telemetry.ros2.sender import RosSender
+from telemetry.ros2.told import Told
 from telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
 
 _PORTION = 16
@@ -33,9 +36,9 @@ _PORTION = 16
 _DIAGNOSTICS_NS = 1_000_000_000
 _MEASURED_WITHIN_NS = 500_000_000
 """A measured steering angle that is older says nothing of now."""
-_INFO_WAITS_NS = 1_500_000_000
 _STATE_EVERY_NS = 20_000_000
 _OBJECTS_EVERY_NS = 100_000_000
+_ROUTE_EVERY_NS = 1_000_000_000
 
 log = logging.getLogger("telemetry.ros2")
 
@@ -53,13 +56,18 @@ class Gateway:
         vehicle_id: str,
         drive_frame: LocalFrame,
         flag_on: bool,
+        car: VehicleParameters | None = None,
         mono_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
-        """Subscribe to what the mapping names; `flag_on` is the command line's switch."""
+        """Subscribe to what the mapping names; `flag_on` is the command line's switch.
+
+        `car` gives the size of the car's own twin, where that goes out.
+        """
         self._mapping, self._bus, self._foreign = mapping, bus, foreign
         self._vehicle_id, self._mono_ns, self._wall_ns = vehicle_id, mono_ns, wall_ns
         self.inwards = Inwards(mapping)
+        self.introduction = Introduction(mapping, self.inwards, vehicle_id=vehicle_id)
         self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id)
         self.gate = VehicleGate(
             mapping.towards_vehicle.limits(),
@@ -73,8 +81,11 @@ class Gateway:
         )
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         self._last_ns: dict[str, int] = {}
-        self._told: dict[str, Level] = {}
-        self._waiting: list[tuple[int, Request]] = []
+        self._mirrored = MirroredObjects(
+            mapping.mirrored, car=car, drive_frame=drive_frame,
+            alt_m=(mapping.map_frame or drive_frame).origin.alt_m,
+        )  # fmt: skip
+        self._told = Told()
         self._inbox, self._words, self._views = Mailbox(2048), Mailbox(64), Mailbox(256)
         self._gate_told = self.gate.state
         self._out.warm_up()
@@ -110,23 +121,10 @@ class Gateway:
                 break
             self._pass_on(item)
             self._hear()
-        self._answer_info()
+        if self.inwards.route is not None and self._due("route", _ROUTE_EVERY_NS):
+            self._bus.publish("route", self.inwards.route, vehicle=self._vehicle_id)
+        self.introduction.answer(now_ns=self._mono_ns())
         self._diagnose()
-
-    def info(self) -> drive.VehicleInfo | None:
-        """Return what is known of the vehicle, None before its first sample."""
-        first_ns = self.inwards.first_stamp_ns
-        if first_ns is None:
-            return None
-        return drive.VehicleInfo(
-            vehicle_id=self._vehicle_id,
-            time_base=time_base_of(first_ns),
-            start_stamp_ns=first_ns,
-            source=f"ROS 2 through {self._mapping.dialect}",
-            reference_point="antenna",
-            body_from_antenna_m=self.inwards.antenna_m,
-            sends=self.inwards.channels,
-        )
 
     def report(self) -> dict[str, dict[str, int]]:
         """Return all counts: what came in, what was left out, what was sent, bounded and held."""
@@ -150,11 +148,13 @@ class Gateway:
             self._bus.subscribe("authority", self._words, run=run_id)
             if "vehicle_command" in sources:
                 self._bus.subscribe("vehicle_command", self._words, run=run_id)
-        if sources & {"state", "clock"} or self._virtual.has_own:
+        mirrored = bool(self._mapping.mirrored)
+        if sources & {"state", "clock"} or self._virtual.has_own or mirrored:
             self._bus.subscribe("state", self._views, vehicle=self._vehicle_id)
-        for source, channel in (("twin", "mirror"), ("virtual_objects", "virtual_objects")):
-            if source in sources:
-                self._bus.subscribe(channel, self._views, run=run_id)
+        if "twin" in sources or mirrored:
+            self._bus.subscribe("mirror", self._views, run=run_id)
+        if "virtual_objects" in sources:
+            self._bus.subscribe("virtual_objects", self._views, run=run_id)
         if "diagnostics" in sources:
             for channel in ("event", "gap_alarm", "verdict"):
                 self._bus.subscribe(channel, self._views, run=run_id)
@@ -192,40 +192,39 @@ class Gateway:
 
     def _pass_on(self, item: Any) -> None:
         if isinstance(item, Request):
-            self._waiting.append((self._mono_ns(), item))
+            self.introduction.asked(item, now_ns=self._mono_ns())
             return
         match _decoded(item):
             case drive.VehicleState() as state:
+                self._mirrored.take_state(state.stamp_ns)
                 self._send("state", lambda _: self._out.state(state), every_ns=_STATE_EVERY_NS)
                 self._send(
                     "clock", lambda _: self._out.clock(state.stamp_ns), every_ns=_STATE_EVERY_NS
                 )
                 if self._virtual.has_own and self._due("virtual objects", _OBJECTS_EVERY_NS):
-                    self._objects(self._virtual.own(state.stamp_ns))
+                    self._objects(lambda: self._virtual.own(state.stamp_ns))
             case MirrorSample() as mirror:
                 self._send("twin", lambda _: self._out.twin(mirror))
+                if self._mapping.mirrored:
+                    self._objects(lambda: self._mirrored.users(mirror))
             case drive.RoadUsers() as users:
-                self._objects(users)
-            case Event() as event if event.level != "info":
-                level = 2 if event.level == "error" else 1
-                self._told["event"] = Level("foretwin/event", level, event.text, {})
-            case gap.GapAlarm() as alarm:
-                name = f"foretwin/gap/{alarm.quantity}"
-                values = {"value": f"{alarm.value:.6g}", "limit": f"{alarm.limit:.6g}"}
-                text = "beyond its limit" if alarm.over else "within its limit"
-                self._told[name] = Level(name, int(alarm.over), text, values)
-            case gap.Verdict() as verdict:
-                values = {"cause": verdict.cause, "confidence": f"{verdict.confidence:.3f}"}
-                self._told["verdict"] = Level("foretwin/verdict", 1, verdict.text, values)
+                self._objects(lambda: users)
+            case Event() | gap.GapAlarm() | gap.Verdict() as told:
+                self._told.take(told)
 
-    def _objects(self, users: drive.RoadUsers) -> None:
+    def _objects(self, users: Callable[[], drive.RoadUsers]) -> None:
         """Send virtual road users together with those that others have said lately."""
         try:
-            known = self._virtual.take(users, now_ns=self._mono_ns())
+            known = self._virtual.take(users(), now_ns=self._mono_ns())
         except UnfitError as why:
             self.held[str(why)] += 1
-        else:
-            self._send("virtual_objects", lambda row: self._out.objects(known, row.type))
+            return
+
+        def payload(row: OutRow) -> bytes:
+            meant = without_own_twin(known) if row.towards_vehicle else known
+            return self._out.objects(meant, row.type)
+
+        self._send("virtual_objects", payload)
 
     def _due(self, what: str, every_ns: int) -> bool:
         now_ns = self._mono_ns()
@@ -260,33 +259,10 @@ class Gateway:
             return
         self._sender.put(row, payload)
 
-    def _answer_info(self) -> None:
-        if not self._waiting:
-            return
-        info, now_ns = self.info(), self._mono_ns()
-        kept = []
-        for since_ns, request in self._waiting:
-            early = now_ns - since_ns <= _INFO_WAITS_NS
-            if early and (info is None or self.inwards.awaits_antenna):
-                kept.append((since_ns, request))
-            elif info is not None:
-                request.reply(info)
-            else:
-                request.refuse("no sample of the vehicle yet")
-        self._waiting = kept
-
     def _diagnose(self) -> None:
         if not self._due("diagnostics", _DIAGNOSTICS_NS):
             return
-        levels = list(self._told.values())
-        for part, counts in self.report().items():
-            well = part in ("in", "sent", "gate") or not any(counts.values())
-            levels.append(
-                Level(f"foretwin/ros2/{part}", 0 if well else 1, "",
-                      {key: str(value) for key, value in counts.items()})
-            )  # fmt: skip
-        shut = self.gate.state == "shut"
-        levels.append(Level("foretwin/ros2/towards_vehicle", 2 * shut, self.gate.why, {}))
+        levels = self._told.levels(self.report(), gate=self.gate)
         stamp_ns = self._wall_ns()
         self._send("diagnostics", lambda _: self._out.diagnostics(stamp_ns, levels))
 

@@ -16,6 +16,7 @@ from telemetry.ros2.attachment import unpack
 from telemetry.ros2.mapping import InRow, Mapping
 from telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
 from telemetry.ros_foreign import FOREIGN, UnusableError, channel_of, stamp_of
+from telemetry.ros_motion import route_from_lanelets
 from telemetry.ros_parts import BASE_FRAME, CLOCK, LANELET_ROUTE, TF, typestore
 from telemetry.ros_status import StatusJoiner
 from telemetry.ros_transforms import TransformTree
@@ -54,6 +55,8 @@ class Inwards:
         self.tire_angle_rad: float | None = None
         """The newest measured angle at the tyres."""
         self.tire_angle_mono_ns = 0
+        self.route: drive.RouteToGoal | None = None
+        """The newest route of the vehicle's own driving stack."""
         self.clock_ns: int | None = None
         """The newest /clock of the vehicle's side."""
 
@@ -101,7 +104,7 @@ class Inwards:
             return self._samples(row, ros, arrived)
         except UnusableError as reason:
             self.unused[f"{row.topic}: {reason}"] += 1
-        except (ValueError, ArithmeticError) as error:
+        except Exception as error:  # no message may end the gateway
             # Its text may differ each time, and this must stay small.
             self.unused[f"{row.topic}: {type(error).__name__}"] += 1
         return []
@@ -138,8 +141,8 @@ class Inwards:
             self.clock_ns = int(ros.clock.sec) * 10**9 + int(ros.clock.nanosec)
             return []
         if row.type == LANELET_ROUTE:
-            # Lanelet ids say nothing without the vehicle's own map: the route is predicted instead.
-            raise UnusableError("a route of lanelets, whose map is not known")
+            self.route = route_from_lanelets(ros, self._mapping.map_frame)
+            return [("route", self.route)]
         how = FOREIGN[row.type]
         stamp_ns = arrived.received_wall_ns
         if row.stamp == "header":

@@ -18,6 +18,7 @@ from contracts.drive import Vector3
 from contracts.errors import UserError
 from contracts.frames import GeoPoint, LocalFrame
 from telemetry.logs.units import ANGLE, SPEED
+from telemetry.ros2.mirrored import Mirrored
 from telemetry.ros2.names import Dialect, check_topic, dds_type
 from telemetry.ros2.safety import Limits
 from telemetry.ros2.virtual_objects import PlacedObject
@@ -164,6 +165,8 @@ class Mapping(
     outwards: tuple[OutRow, ...] = ()
     placed: tuple[PlacedObject, ...] = ()
     """Virtual road users that the gateway itself says."""
+    mirrored: Mirrored = Mirrored()
+    """Vehicles of the mirror that go out among the virtual objects."""
     towards_vehicle: TowardsVehicle = TowardsVehicle()
 
     @property
@@ -205,6 +208,7 @@ def parse_mapping(text: str, *, name: str) -> Mapping:
     try:
         mapping.towards_vehicle.limits().validate()
         _check_head(mapping)
+        _check_mirrored(mapping)
     except ValueError as error:
         raise MappingError(f"{name}: {error}") from error
     seen: dict[str, str] = {}
@@ -224,6 +228,13 @@ def parse_mapping(text: str, *, name: str) -> Mapping:
     return mapping
 
 
+def listening_only(mapping: Mapping) -> Mapping:
+    """Return a mapping by which nothing goes out."""
+    return msgspec.structs.replace(
+        mapping, outwards=(), placed=(), mirrored=Mirrored(), towards_vehicle=TowardsVehicle()
+    )
+
+
 def _check_head(mapping: Mapping) -> None:
     if not 0 <= mapping.domain <= 232:
         raise ValueError(f"domain {mapping.domain}: 0 to 232")
@@ -232,6 +243,19 @@ def _check_head(mapping: Mapping) -> None:
         raise ValueError(f"map at {at.lat_deg}, {at.lon_deg}: degrees of latitude and longitude")
     if mapping.antenna_m is not None and not all(map(math.isfinite, mapping.antenna_m)):
         raise ValueError(f"antenna_m {mapping.antenna_m}: three finite numbers")
+
+
+def _check_mirrored(mapping: Mapping) -> None:
+    rows = [row for row in mapping.outwards if row.source == "virtual_objects"]
+    if mapping.mirrored and not rows:
+        raise ValueError(
+            '[mirrored]: without an [[out]] of source "virtual_objects" it goes nowhere'
+        )
+    if mapping.mirrored.own_twin and all(row.towards_vehicle for row in rows):
+        raise ValueError(
+            f"[mirrored] own_twin: needs a topic below {OWN_PREFIX}; it fills the car's own place, "
+            "and never goes towards the vehicle"
+        )
 
 
 def _check_alone(

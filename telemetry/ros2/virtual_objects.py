@@ -12,6 +12,9 @@ import numpy as np
 from contracts.drive import RoadUser, RoadUserKind, RoadUsers
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local
 
+_MOST_SPEED_MPS, _MOST_SIZE_M = 100.0, 50.0
+_STEP_BACK_NS = 1_000_000_000
+"""A stamp that goes back so far is the vehicle's clock set anew."""
 LIVES_NS = 500_000_000
 """A road user of which nothing was said for so long is gone."""
 
@@ -45,7 +48,7 @@ class PlacedObject(
         if not all(map(math.isfinite, (self.alt_m, self.yaw_deg))):
             raise ValueError("alt_m, yaw_deg: finite numbers")
         for name in ("length_m", "width_m"):
-            if not 0.0 < getattr(self, name) < 50.0:
+            if not 0.0 < getattr(self, name) < _MOST_SIZE_M:
                 raise ValueError(f"{name} {getattr(self, name)}: above 0 and below 50")
         if not (0.0 <= self.speed_mps <= 50.0 and 0.0 <= self.way_m <= 1000.0):
             raise ValueError("speed_mps 0 to 50 and way_m 0 to 1000")
@@ -81,6 +84,7 @@ class VirtualObjects:
         self._at_most, self._placed = at_most, placed
         self._begun_ns: int | None = None
         self._said: dict[str, _Said] = {}
+        self._newest_ns = 0
 
     @property
     def has_own(self) -> bool:
@@ -95,15 +99,18 @@ class VirtualObjects:
         return RoadUsers(stamp_ns=stamp_ns, users=tuple(one.at(time_s) for one in self._placed))
 
     def take(self, message: RoadUsers, *, now_ns: int) -> RoadUsers:
-        """Return all that are known at the message's stamp; `now_ns` is the host's clock.
+        """Return all that are known at one stamp; `now_ns` is the host's clock.
 
-        Those of other senders are moved on to the stamp. Raises UnfitError where one is not marked
-        as virtual or not finite, or where they are too many.
+        The stamp is the message's, or that of the list before where that is newer: all are moved on
+        to it. Raises UnfitError where one is not marked as virtual, not finite or of no vehicle's
+        size or speed, or where they are too many.
         """
         if not all(user.virtual for user in message.users):
             raise UnfitError("road users that are not marked as virtual")
         if not all(map(_is_finite, message.users)):
             raise UnfitError("virtual objects that are not finite")
+        if not all(map(_is_possible, message.users)):
+            raise UnfitError("virtual objects of an impossible size or speed")
         fresh = {
             name: said for name, said in self._said.items() if now_ns - said.heard_ns <= LIVES_NS
         }
@@ -113,9 +120,13 @@ class VirtualObjects:
         if len(fresh) > self._at_most:
             raise UnfitError("virtual objects that are too many")
         self._said = fresh
+        stamp_ns = message.stamp_ns
+        if 0 < self._newest_ns - stamp_ns < _STEP_BACK_NS:
+            stamp_ns = self._newest_ns
+        self._newest_ns = stamp_ns
         return RoadUsers(
-            stamp_ns=message.stamp_ns,
-            users=tuple(_at(said, message.stamp_ns) for _, said in sorted(fresh.items())),
+            stamp_ns=stamp_ns,
+            users=tuple(_at(said, stamp_ns) for _, said in sorted(fresh.items())),
         )
 
 
@@ -141,3 +152,8 @@ def _is_finite(user: RoadUser) -> bool:
         at.lat_deg, at.lon_deg, at.alt_m, user.yaw_rad, user.speed_mps, user.length_m, user.width_m,
     )  # fmt: skip
     return all(map(math.isfinite, numbers))
+
+
+def _is_possible(user: RoadUser) -> bool:
+    sizes_m = (user.length_m, user.width_m)
+    return abs(user.speed_mps) <= _MOST_SPEED_MPS and all(0.0 < m < _MOST_SIZE_M for m in sizes_m)

@@ -18,13 +18,14 @@ from contracts.bus import Bus, Mailbox, Reply, ZenohBus, ask, zenoh_config
 from contracts.codec import encode
 from contracts.futures import FuturesJob
 from contracts.keys import alive_key
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup, WorkerSetup, write_setup
 from contracts.simulation import PrepareRequest
 from sim_worker.variants import plan_variants
 from sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import scenes
 from tests.benchmarks.measuring import Measurement
-from tests.contracts.bus_sides import free_endpoint, python, take, take_until
+from tests.contracts.bus_sides import python, take, take_until
 from world_gen.world_store import WorldStore
 
 ROUNDS = 20

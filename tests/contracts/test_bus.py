@@ -7,13 +7,15 @@ from collections.abc import Iterator
 
 import pytest
 
-from contracts.bus import Alive, Mailbox, Reply, Request, ask
+from contracts.bus import Alive, Mailbox, Reply, ask
 from contracts.codec import SchemaMismatch
 from contracts.drive import SpeedSample
 from contracts.keys import alive_key
 from contracts.simulation import PrepareReply, PrepareRequest
 from tests.contracts.bus_sides import (
+    DEADLINE_S,
     Sides,
+    ask_until_served,
     memory_sides,
     publish_until_received,
     take,
@@ -30,17 +32,6 @@ def sides(request: pytest.FixtureRequest) -> Iterator[Sides]:
     # Lossless: a live bus may drop of a burst, which is no promise to hold it to.
     with memory_sides() if request.param == "memory" else zenoh_sides(lossless=True) as both:
         yield both
-
-
-def ask_until_served(sides: Sides, mailbox: Mailbox, replies: Mailbox, tag: object) -> Request:
-    """Ask until the question reaches the server: declarations take a moment over Zenoh."""
-    for _ in range(200):
-        sides.near.request("prepare", PREPARE, replies, tag=tag, **W0)
-        if (item := mailbox.take(0.1)) is not None:
-            while (early := replies.take()) is not None:
-                assert early.error == "no answer"
-            return item
-    raise AssertionError("the question never reached the server")
 
 
 def test_messages_arrive_in_order_and_numbered(sides: Sides) -> None:
@@ -114,8 +105,8 @@ def test_a_question_that_its_server_forgets_ends_too(sides: Sides) -> None:
     ask_until_served(sides, questions, replies, tag=0).refuse("met")
     assert take(replies).error == "met"
 
-    sides.near.request("prepare", PREPARE, replies, tag="first", **W0)
-    sides.near.request("prepare", PREPARE, replies, tag="second", **W0)
+    for tag in ("first", "second"):
+        sides.near.request("prepare", PREPARE, replies, tag=tag, timeout_s=DEADLINE_S, **W0)
 
     assert (reply := take(replies)).tag == "first"
     assert reply.error == "no answer"
@@ -126,12 +117,12 @@ def test_a_question_that_its_server_forgets_ends_too(sides: Sides) -> None:
 def test_nobody_there_is_an_answer_too(sides: Sides) -> None:
     replies = Mailbox(10)
 
-    sides.near.request("prepare", PREPARE, replies, tag=7, timeout_s=5.0, **W0)
+    sides.near.request("prepare", PREPARE, replies, tag=7, timeout_s=DEADLINE_S, **W0)
 
     reply = take(replies)
     assert (reply.tag, reply.message, reply.error) == (7, None, "no answer")
     with pytest.raises(TimeoutError, match=r"worker/w0/prepare: no answer"):
-        ask(sides.near, "prepare", PREPARE, timeout_s=5.0, **W0)
+        ask(sides.near, "prepare", PREPARE, timeout_s=DEADLINE_S, **W0)
 
 
 def test_a_channel_without_replies_takes_no_questions(sides: Sides) -> None:

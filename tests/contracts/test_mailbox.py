@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from contracts.mailbox import Mailbox
+from tests.contracts.bus_sides import DEADLINE_S
 
 
 @given(depth=st.integers(1, 20), count=st.integers(0, 60))
@@ -30,8 +31,8 @@ def test_a_blocking_mailbox_makes_the_writer_wait_and_loses_nothing() -> None:
     writer = threading.Thread(target=lambda: [mailbox.put(item) for item in range(100)])
     writer.start()
 
-    taken = [mailbox.take(5.0) for _ in range(100)]
-    writer.join(5.0)
+    taken = [mailbox.take(DEADLINE_S) for _ in range(100)]
+    writer.join(DEADLINE_S)
 
     assert taken == list(range(100))
     assert mailbox.dropped == 0
@@ -47,7 +48,7 @@ def test_many_writers_lose_nothing_while_there_is_room() -> None:
     for writer in writers:
         writer.start()
 
-    taken = [mailbox.take(5.0) for _ in range(4000)]
+    taken = [mailbox.take(DEADLINE_S) for _ in range(4000)]
 
     for n in range(4):
         assert [i for writer, i in taken if writer == n] == list(range(1000))
@@ -59,7 +60,7 @@ def test_take_waits_for_the_next_item() -> None:
     reader_ready = threading.Event()
 
     def write() -> None:
-        reader_ready.wait(5.0)
+        reader_ready.wait(DEADLINE_S)
         mailbox.put("late")
 
     writer = threading.Thread(target=write)
@@ -68,7 +69,17 @@ def test_take_waits_for_the_next_item() -> None:
     reader_ready.set()
 
     assert mailbox.take(None) == "late"
-    writer.join(5.0)
+    writer.join(DEADLINE_S)
+
+
+def test_the_last_item_is_waited_for_and_then_there_is_none() -> None:
+    mailbox = Mailbox(1)
+    writer = threading.Timer(0.02, mailbox.put, ("late",))
+    writer.start()
+
+    assert mailbox.take_last(DEADLINE_S) == "late"
+    assert mailbox.take_last(0.01) is None
+    writer.join()
 
 
 def test_closing_wakes_reader_and_writer() -> None:
@@ -85,7 +96,7 @@ def test_closing_wakes_reader_and_writer() -> None:
     full.close()
     empty.close()
     for thread in threads:
-        thread.join(5.0)
+        thread.join(DEADLINE_S)
 
     assert not any(thread.is_alive() for thread in threads)
     assert taken == [None]

@@ -13,9 +13,10 @@ import pytest
 
 from contracts.bus import Alive, Mailbox, ZenohBus
 from contracts.keys import alive_key
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup, ProcessSetup, write_setup
 from contracts.simulation import RunEnd
-from tests.contracts.bus_sides import DEADLINE_S, free_endpoint, take
+from tests.contracts.bus_sides import DEADLINE_S, take
 
 RUN = {"run": "r1"}
 

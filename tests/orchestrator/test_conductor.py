@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from contracts.codec import encode
-from contracts.drive import GnssFix
+from contracts.drive import GnssFix, SpeedSample
+from contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from contracts.mailbox import Received
 from orchestrator.conductor import Conductor
 from tests.orchestrator.house import INFO, Builder, House, Worker
@@ -238,3 +241,35 @@ def test_the_reference_point_of_a_source_that_keeps_it_to_itself_is_mentioned(ho
 
     (warning,) = (e for e in house.watched("event") if e.level == "warning")
     assert "roof" in warning.text
+
+
+@pytest.mark.parametrize(("setting", "helped"), [("auto", True), ("off", False)])
+def test_a_rough_receiver_is_helped_by_the_map_unless_told_not_to(
+    tmp_path: Path, setting: str, helped: bool
+) -> None:
+    """The town's fixes lie in the lane driven; these say that they are good to 3 m, and lie 3 m
+    to the left of it."""
+    house = House(tmp_path, speed=None, map_aiding=setting)
+    for state in house.states[:100]:
+        yaw, place = state.yaw_rad, state.position
+        beside = GeoPoint(
+            place.lat_deg + 3.0 * math.cos(yaw) / 111_266.0,
+            place.lon_deg - 3.0 * math.sin(yaw) / 78_850.0,
+        )
+        house.bus.publish(
+            "gnss", GnssFix(stamp_ns=state.stamp_ns, position=beside, std_m=3.0), vehicle="ego"
+        )
+        speed = SpeedSample(stamp_ns=state.stamp_ns + 1, speed_mps=state.speed_mps)
+        house.bus.publish("speed", speed, vehicle="ego")
+        house.settle()
+    intake, told = house.conductor.intake, [event.text for event in house.watched("event")]
+    house.tables.close()
+    assert intake.latest is not None
+    found, real = intake.latest.state, house.states[99]
+    frame = LocalFrame(real.position)
+    away_m = float(np.hypot(*local_from_geo(frame, found.position.lat_deg, found.position.lon_deg)))
+
+    assert (found.map_shift_m is not None) is helped
+    assert (away_m < 2.0) is helped
+    assert ("position from GNSS and the map" in told) is helped
+    assert intake.record()["position_from"] == (["gnss", "map"] if helped else ["gnss"])

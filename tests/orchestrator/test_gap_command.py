@@ -53,6 +53,7 @@ def test_the_verdict_names_degrees_in_json(
     assert (first["culprit"], first["cause"]) == ("vehicle", "steering_in_degrees")
     assert first["evidence"][0]["expected"] == 1.0
     assert first["since_stamp_ns"] < first["stamp_ns"]
+    assert said["reason"] is None
 
 
 def test_the_table_is_80_columns_wide_and_plots_are_written(
@@ -73,10 +74,16 @@ def test_without_commands_it_says_that_nobody_can_be_accused(
 ) -> None:
     drive = drive_of(SEED, end_s=END_S)
     quiet = (sample for sample in drive.samples if sample[0] != "control")
-    assert run(["gap", str(written(tmp_path / "quiet.mcap", drive.info, quiet))]) == 0
+    file = written(tmp_path / "quiet.mcap", drive.info, quiet)
+    assert run(["gap", str(file)]) == 0
     said = capsys.readouterr().out
     assert "commands were not recorded" in said
     assert "verdict" not in said
+    assert run(["gap", str(file), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["reason"].startswith("commands were not recorded")
+    assert told["rows"]
+    assert told["verdicts"] == []
 
 
 def test_dirt_is_counted_said_and_survived(
@@ -106,6 +113,7 @@ def test_dirt_is_counted_said_and_survived(
     assert run(["gap", str(file), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["verdicts"] == []
+    assert said["reason"] == "nothing shows that the car or the model departs"
     assert said["refused"]["value not finite"] >= 5
     assert said["refused"]["topic changed its type"] == 1
     assert sum(count for reason, count in said["refused"].items() if "time" in reason) == 1

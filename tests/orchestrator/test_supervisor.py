@@ -16,6 +16,7 @@ import pytest
 from contracts.setup import BusSetup, ProcessSetup
 from orchestrator.processes import PROCESSES, ProcessRow, row_of
 from orchestrator.supervisor import MAX_RESTARTS, FreshInterpreter, Supervisor, fold_stderr
+from tests.contracts.bus_sides import DEADLINE_S
 
 
 class FakeChild:
@@ -127,9 +128,10 @@ def test_fresh_interpreters_end_and_leave_nothing(tmp_path: Path) -> None:
         else:
             os.environ["PYTHONPATH"] = before
     said = tmp_path / "w0.stderr"
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + DEADLINE_S
     while "up" not in said.read_text() and time.monotonic() < deadline:
         assert supervisor.running() == ["w0"]
+        time.sleep(0.01)
     pid = supervisor.pid("w0")
     assert supervisor.stop(grace_s=0.0, term_s=0.2) == ["w0"]
     with pytest.raises(ProcessLookupError):

@@ -16,6 +16,7 @@ from contracts.arrays import Array
 from contracts.futures import Faults, Variant
 from sim_worker import compiled
 from sim_worker.futures import run_job
+from sim_worker.metrics import compiled_pairs
 from sim_worker.metrics.curves import frechet_distance, warping_distance
 from sim_worker.planners import pure_pursuit_idm as idm
 from sim_worker.planners import registry
@@ -30,7 +31,10 @@ from sim_worker.vehicle.resistance import resistance_mps2
 from tests.sim_worker.places import crossroads, job, turning_path
 
 KERNELS: dict[str, Any] = {
-    name: kernel for name, kernel in vars(compiled).items() if hasattr(kernel, "signatures")
+    name: kernel
+    for module in (compiled, compiled_pairs)
+    for name, kernel in vars(module).items()
+    if hasattr(kernel, "signatures")
 }
 ARC = np.linspace(0.0, 1.5 * math.pi, 200)
 CIRCLE = FrenetPath(20.0 * np.stack([np.sin(ARC), 1.0 - np.cos(ARC)], axis=1))
@@ -64,6 +68,7 @@ def signatures() -> dict[str, list[Any]]:
 def test_all_is_compiled_once_it_is_imported_and_nothing_later() -> None:
     assert set(KERNELS) == {
         "locate", "curve", "free_road", "forces", "ramp", "read_base", "all_sane", "cheapest_walks",
+        "least_until_touch", "find_leaders", "stays_on_strips",
     }  # fmt: skip
     assert {name: len(found) for name, found in signatures().items()} == dict.fromkeys(KERNELS, 1)
     with pytest.raises(TypeError, match="No matching definition"):
@@ -105,7 +110,7 @@ def test_where_no_cache_can_be_written_it_is_compiled_for_this_process(
 
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
 
-    @compiled._compiled(compiled._REAL, compiled._REAL)
+    @compiled.kernel(compiled.REAL, compiled.REAL)
     def twice(number: float) -> float:
         return 2.0 * number
 

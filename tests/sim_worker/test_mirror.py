@@ -3,6 +3,7 @@ from __future__ import annotations
 import itertools
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -111,6 +112,28 @@ def test_without_recorded_commands_the_twin_repeats_the_motion_and_says_so() -> 
     assert max(abs(sample.gap_speed_mps) for sample in samples) < 0.1
     for sample in samples[5:]:
         assert sample.twin_yaw_rate_radps == pytest.approx(sample.twin.speed_mps / 25.0, abs=0.03)
+
+
+def test_where_a_map_moves_the_car_the_free_twins_gap_does_not_jump() -> None:
+    track = _circle(until_s=4.0)
+    found = []
+    for moved_m in (0.0, 3.0):
+        mirror = Mirror(CAR, drive_frame=FRAME)
+        states_ = [
+            msgspec.structs.replace(
+                state,
+                position=GeoPoint(
+                    state.position.lat_deg + moved_m / 111_266.0, state.position.lon_deg
+                ),
+                map_shift_m=(0.0, moved_m) if moved_m else None,
+            )
+            if k > 100
+            else state
+            for k, state in enumerate(track)
+        ]
+        found.append([sample.gap_m for sample in _samples(mirror, states_)])
+
+    np.testing.assert_allclose(found[0], found[1], atol=0.2)
 
 
 @pytest.mark.parametrize("hz", [10.0, 50.0, 33.3])

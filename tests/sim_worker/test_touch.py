@@ -121,10 +121,13 @@ def test_twenty_distant_road_users_of_64_futures_cost_little() -> None:
     users = np.zeros((64, 161, 20, 3))
     users[..., 1] = 40.0 + 5.0 * np.arange(20)
     size = np.broadcast_to([4.5, 1.8], (64, 20, 2))
-    best = np.inf
+    best_s, yardstick_s = np.inf, np.inf
     for _ in range(30):
         start = time.process_time()
         first_touches(CAR, states, users, size, tick_s=TICK_S)
-        best = min(best, time.process_time() - start)
-    # 1.5 ms where the core is free; another thread on the same core doubles that.
-    assert best < 0.006
+        middle = time.process_time()
+        np.hypot(users[..., 0], users[..., 1])
+        best_s = min(best_s, middle - start)
+        yardstick_s = min(yardstick_s, time.process_time() - middle)
+    print(f"{best_s / yardstick_s:.2f} times one distance of each")
+    assert best_s < 4.0 * yardstick_s

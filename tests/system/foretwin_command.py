@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import pyarrow.parquet as pq
 
+from tests.contracts.bus_sides import DEADLINE_S
+
 REPOSITORY = Path(__file__).parents[2]
 
 
@@ -38,7 +40,7 @@ def environment(cache: Path) -> dict[str, str]:
     return os.environ | {"XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(REPOSITORY)}
 
 
-def foretwin(out: Path, *arguments: str, timeout_s: float = 240.0) -> Finished:
+def foretwin(out: Path, *arguments: str, timeout_s: float = 280.0) -> Finished:
     """Run `foretwin drive` to its end."""
     with started(out, *arguments) as process:
         screen, _ = process.communicate(timeout=timeout_s)
@@ -65,7 +67,7 @@ def started(out: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
             try:
-                process.wait(15.0)
+                process.wait(DEADLINE_S)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
@@ -100,7 +102,7 @@ def child_pids(run: Path) -> dict[str, int]:
     return pids
 
 
-def wait_for(condition: Callable[[], bool], what: str, *, within_s: float = 60.0) -> float:
+def wait_for(condition: Callable[[], bool], what: str, *, within_s: float = DEADLINE_S) -> float:
     """Wait until a condition holds; returns the seconds that took, fails after `within_s`."""
     begun = time.monotonic()
     pause = Pause()

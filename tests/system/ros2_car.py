@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -23,8 +24,16 @@ REPORT_EVERY_S = 0.02
 class Ros2Car:
     """Publishes GNSS at 10 Hz, speed and steering at 50 Hz, and keeps what comes back."""
 
-    def __init__(self, bus: ZenohForeignBus, *, listens_to: tuple[str, ...]) -> None:
-        self._bus = bus
+    def __init__(
+        self,
+        bus: ZenohForeignBus,
+        *,
+        listens_to: tuple[str, ...] = (),
+        namespace: str = "",
+        ahead_m: float = 0.0,
+    ) -> None:
+        """`namespace` is its bridge's, such as `second/`; it begins `ahead_m` along the route."""
+        self._bus, self._namespace, self._ahead_m = bus, namespace, ahead_m
         self.heard = Mailbox(100_000)
         for key in listens_to:
             bus.subscribe(key, self.heard)
@@ -36,25 +45,39 @@ class Ros2Car:
         self._started_s = time.monotonic()
         self._turn = 0
 
-    def drive_until(self, *, deadline_s: float) -> Arrived | None:
-        """Drive on until something comes back; None where nothing does in so many seconds."""
+    def drive_until(
+        self, *, deadline_s: float, beside: Sequence[Callable[[], None]] = ()
+    ) -> Arrived | None:
+        """Drive on until something comes back; None where nothing does in so many seconds.
+
+        `beside` lets others drive on too.
+        """
         until_s = time.monotonic() + deadline_s
         while time.monotonic() < until_s:
-            if time.monotonic() - self._started_s >= REPORT_EVERY_S * self._turn:
-                self._report()
+            for go_on in (self.go_on, *beside):
+                go_on()
             item = self.heard.take(0.005)
             if item is not None:
                 assert isinstance(item, Arrived)
                 return item
         return None
 
-    def _report(self) -> None:
-        stamp_ns = time.time_ns()
-        arc_m = (time.monotonic() - self._started_s) * SPEED_MPS
+    def go_on(self) -> None:
+        """Report where it is, where a report is due."""
+        if time.monotonic() - self._started_s >= REPORT_EVERY_S * self._turn:
+            self._report()
+
+    def place(self) -> GeoPoint:
+        """Where it is now."""
+        arc_m = self._ahead_m + (time.monotonic() - self._started_s) * SPEED_MPS
         xy_m = np.array([[np.interp(arc_m, self._arc_m, axis) for axis in self._xy_m.T]])
         lat_deg, lon_deg = geo_from_local(self._frame, xy_m)[0].tolist()
+        return GeoPoint(lat_deg, lon_deg)
+
+    def _report(self) -> None:
+        stamp_ns = time.time_ns()
         if self._turn % 5 == 0:
-            fix = drive.GnssFix(stamp_ns=stamp_ns, position=GeoPoint(lat_deg, lon_deg), std_m=0.1)
+            fix = drive.GnssFix(stamp_ns=stamp_ns, position=self.place(), std_m=0.1)
             ((_, kind, ros),) = ros_from_gnss(fix, None)
             self._put("sensing/gnss/ublox/nav_sat_fix", ros, kind)
         speed = velocity_report(stamp_ns, speed_mps=SPEED_MPS, yaw_rate_radps=0.0)
@@ -64,4 +87,4 @@ class Ros2Car:
         self._turn += 1
 
     def _put(self, key: str, ros: object, kind: str) -> None:
-        self._bus.put(key, bytes(typestore().serialize_cdr(ros, kind)))
+        self._bus.put(self._namespace + key, bytes(typestore().serialize_cdr(ros, kind)))

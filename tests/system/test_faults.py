@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 from mcap.reader import make_reader
 
 from orchestrator.cli import run as command
+from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
     child_pids,
     is_running,
@@ -20,6 +21,7 @@ from tests.system.foretwin_command import (
     wait_for,
 )
 
+ENDS_WITHIN_S = 240.0
 LIVE = ("--futures", "12", "--least-futures", "12", "--rate", "2")
 
 
@@ -63,15 +65,15 @@ def test_a_killed_worker_is_replaced_and_no_result_counts_twice(tmp_path: Path) 
     with started(out, *LIVE, "--end", "9") as process:
         run = under_way(out)
         victim = child_pids(run)["w0"]
-        os.kill(victim, signal.SIGKILL)
-        killed_s = time.time()
-        wait_for(lambda: says(run, "w0 ended with code -9"), "the death being seen")
-        wait_for(lambda: child_pids(run)["w0"] != victim, "the new worker")
-        screen, _ = process.communicate(timeout=90.0)
+        with kept_waiting(process.pid) as kept:
+            os.kill(victim, signal.SIGKILL)
+            killed_s = time.time()
+            wait_for(lambda: says(run, "w0 ended with code -9"), "the death being seen")
+            wait_for(lambda: child_pids(run)["w0"] != victim, "the new worker")
+        screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
     assert process.returncode == 0, screen
-    # Stated limits are 1 s and 2 s on an idle machine; a busy one starts interpreters later.
-    assert when(run, "w0 ended with code -9") - killed_s < 1.0
-    assert when(run, "started w0 again") - killed_s < 2.0
+    assert when(run, "w0 ended with code -9") - killed_s - kept.seconds < 1.0
+    assert when(run, "started w0 again") - killed_s - kept.seconds < 2.0
     rows = pq.read_table(run / "results" / "futures.parquet").to_pylist()
     seen = [(row["round_id"], row["variant"]) for row in rows]
     assert len(seen) == len(set(seen)) > 0
@@ -90,7 +92,7 @@ def test_a_killed_watcher_is_started_again_with_the_parameters_that_count(tmp_pa
         wait_for(lambda: says(run, "tuning ended with code -9; started again"), "the death seen")
         wait_for(lambda: said_by(run, "tuning", told) == 2, "the new one being told")
         process.send_signal(signal.SIGINT)
-        screen, _ = process.communicate(timeout=60.0)
+        screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
     assert process.returncode == 130, screen
     assert "warning: orchestrator: tuning ended with code -9; started again" in screen
     assert_nothing_left(run)
@@ -102,12 +104,15 @@ def test_a_frozen_viewer_holds_nothing_up(tmp_path: Path) -> None:
         run = under_way(out)
         os.kill(child_pids(run)["viewer"], signal.SIGSTOP)
         frozen_s = time.time()
-        screen, _ = process.communicate(timeout=90.0)
+        with kept_waiting(process.pid) as kept:
+            screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
     assert process.returncode == 0, screen
     rounds = pq.read_table(run / "results" / "rounds.parquet").to_pylist()
     started_s = when(run, "on the map")
     later = [row for row in rounds if row["drive_time_s"] > frozen_s - started_s + 1.0]
-    assert len(later) >= 5
+    # Half of the rounds that fall due in the time in which processes could run.
+    could_run_s = 12.0 - (frozen_s - started_s) - 1.0 - kept.seconds
+    assert len(later) >= max(1, min(5, int(0.5 * 2.0 * could_run_s)))
     assert_nothing_left(run)
 
 
@@ -115,12 +120,13 @@ def test_ctrl_c_ends_everything_and_leaves_readable_files(tmp_path: Path) -> Non
     out = tmp_path / "runs"
     with started(out, *LIVE) as process:
         run = under_way(out)
-        process.send_signal(signal.SIGINT)
         begun = time.monotonic()
-        screen, _ = process.communicate(timeout=30.0)
+        with kept_waiting(process.pid) as kept:
+            process.send_signal(signal.SIGINT)
+            screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
         taken_s = time.monotonic() - begun
     assert process.returncode == 130, screen
-    assert taken_s < 3.0
+    assert taken_s - kept.seconds < 3.0
     assert "Traceback" not in screen
     assert_readable(run)
     assert_nothing_left(run)

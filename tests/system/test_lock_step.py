@@ -13,6 +13,8 @@ BERLIN_LOG = "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt"
 SMALL = ("--speed", "max", "--futures", "36", "--rate", "0.5")
 Drives = tuple[Finished, Finished]
 
+pytestmark = pytest.mark.timeout(900)  # several drives each
+
 
 @pytest.fixture(scope="module")
 def drives(tmp_path_factory: pytest.TempPathFactory) -> Drives:

@@ -11,13 +11,14 @@ import numpy as np
 
 from contracts.bus import Bus, Mailbox, ZenohBus
 from contracts.futures import Variant
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup
 from sim_worker.futures import run_job
 from sim_worker.planners.registry import load_planner
 from sim_worker.planners.remote import RemotePlanner
 from sim_worker.stage import Stage
 from sim_worker.vehicle.parameters import load_vehicle
-from tests.contracts.bus_sides import free_endpoint, python
+from tests.contracts.bus_sides import DEADLINE_S, python
 from tests.sim_worker.places import crossroads, job
 from tests.sim_worker.planners.driven import at_rest_on, drive, straight
 from tests.system.foretwin_command import REPOSITORY, Finished, run_folder, started
@@ -33,7 +34,7 @@ def example(endpoint: str) -> AbstractContextManager[subprocess.Popen[str]]:
 @contextmanager
 def run_bus() -> Iterator[tuple[Bus, str]]:
     """A router and a worker's client, as in a run."""
-    setup = BusSetup(endpoint=free_endpoint())
+    setup = BusSetup(endpoint=free_endpoint(), lossless=True)
     with ZenohBus(setup, router=True), ZenohBus(setup) as bus:
         yield bus, setup.endpoint
 
@@ -42,7 +43,7 @@ def test_the_example_drives_and_after_its_death_the_fallback() -> None:
     path = straight()
     starts = at_rest_on(path, 5.0, 4.0, count=4)
     with run_bus() as (bus, endpoint):
-        planner = RemotePlanner(first_answer_s=10.0, answer_s=5.0)
+        planner = RemotePlanner(first_answer_s=DEADLINE_S, answer_s=DEADLINE_S)
         planner.connect(bus, run="r1", process="w0")
         with example(endpoint) as process:
             told: list[dict[int, str]] = []
@@ -99,7 +100,7 @@ def test_a_whole_drive_is_driven_by_it(tmp_path: Path) -> None:
         out, "--config", str(config), "--planner", "remote", "--speed", "max", "--end", "3",
         "--rate", "1", "--futures", "4", "--horizon", "2", "--workers", "1",
     ) as drive, example(endpoint):  # fmt: skip
-        screen, _ = drive.communicate(timeout=120.0)
+        screen, _ = drive.communicate(timeout=240.0)
     run = Finished(drive.returncode, screen, run_folder(out))
     assert run.code == 0, run.screen
     driven = [row for row in run.rows("futures") if row["planner"] == "remote"]

@@ -11,9 +11,10 @@ import pytest
 
 from contracts.bus import ZenohBus
 from contracts.foreign_bus import ZenohForeignBus
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup
 from telemetry.ros2.mapping import AUTOWARE
-from tests.contracts.bus_sides import free_endpoint
+from tests.starvation import kept_waiting
 from tests.system.foretwin_command import started
 from tests.system.ros2_car import Ros2Car
 
@@ -43,14 +44,15 @@ def test_a_killed_orchestrator_sends_nothing_towards_the_vehicle_after_200_ms(
         with started(tmp_path / "runs", *flags) as process:
             for _ in range(20):
                 assert car.drive_until(deadline_s=60.0) is not None, "nothing towards the vehicle"
-            killed_ns = time.monotonic_ns()
-            os.kill(process.pid, signal.SIGKILL)
-            last_ns = killed_ns
-            while (heard := car.drive_until(deadline_s=1.0)) is not None:
-                last_ns = heard.received_mono_ns
+            with kept_waiting(process.pid) as kept:
+                killed_ns = time.monotonic_ns()
+                os.kill(process.pid, signal.SIGKILL)
+                last_ns = killed_ns
+                while (heard := car.drive_until(deadline_s=1.0)) is not None:
+                    last_ns = heard.received_mono_ns
             after_ms = (last_ns - killed_ns) / 1e6
             print(f"last message {after_ms:.1f} ms after SIGKILL")
-            assert after_ms < 200.0
+            assert after_ms < 200.0 + 1e3 * kept.seconds
 
 
 @pytest.mark.judge

@@ -26,7 +26,7 @@ def test_roles_and_correction_of_a_running_drive_are_set(
             told.append(capsys.readouterr().out)
         assert run(["set", "role.ego=wheel", "--out", str(out)]) == EXIT_USER
         assert "role.ego=wheel: must be all, twin, shadow, ghost" in capsys.readouterr().err
-        screen, _ = process.communicate(timeout=120.0)
+        screen, _ = process.communicate(timeout=240.0)
     folder = run_folder(out)
     assert folder is not None
     done = Finished(process.returncode, screen, folder)

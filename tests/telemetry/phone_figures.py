@@ -1,9 +1,10 @@
 """What ten minutes with a telephone's positions give, beside what any filter could make of them.
 
-    python -m tests.telemetry.phone_figures [SEEDS]
+    python -m tests.telemetry.phone_figures [SEEDS [map]]
 
-prints a table; each of the SEEDS (6) takes about half a minute of CPU. Errors of positions are
-alike over 30 s and come once a second; 3 m may be meant on each axis or in the plane.
+prints a table; each of the SEEDS (6) takes about a minute of CPU. Errors of positions are alike
+over 30 s and come once a second; 3 m may be meant on each axis or in the plane. `map` prints alone
+what they give with a map of the way, whose streets lie beside where they really are.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from telemetry.standin.path import DrivenPath
 from telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.telemetry.city_drive import antenna_xy, phone_positions, xy_of
 from tests.telemetry.standin_drive import FRAME, Drive
+from tests.telemetry.town_map import Leg, MapSeer, seer
 
 DURATION_S = 600.0
 STD_M = {"3 m on each axis": 3.0, "3 m in the plane (2.1 m on each axis)": 3.0 / math.sqrt(2.0)}
@@ -31,6 +33,8 @@ WINDOWS_S = {"30 s": (25, 35), "1 min": (50, 70), "2 min": (110, 130), "5 min": 
              "10 min": (560, 600)}  # fmt: skip
 GYRO_BIAS_STD_RADPS = 2e-4
 """What two seconds of standing leave unknown of a gyro with 0.002 rad/s of white noise."""
+MAP_ERRORS_M = (1.0, 2.0)
+"""How far beside its place a map has each street: one standard deviation."""
 _MEANDER_MPS = 9.5
 
 
@@ -44,16 +48,24 @@ class Errors(NamedTuple):
     yaw_std_rad: Array
 
 
-@functools.cache
-def town_drive(seed: int, duration_s: float = DURATION_S) -> Drive:
-    """Return a drive through streets, turns and stops drawn at random."""
+class Streets(NamedTuple):
+    """A way (N, 2) through a town, the speed wished along it (N,), and its legs."""
+
+    xy_m: Array
+    wish_mps: Array
+    legs: list[Leg]
+
+
+def town_streets(seed: int, duration_s: float = DURATION_S) -> Streets:
+    """Return streets, turns and stops drawn at random."""
     random = np.random.default_rng(seed)
-    xy, wish = [np.zeros(2)], [12.0]
+    xy, wish, legs = [np.zeros(2)], [12.0], []
     yaw = 0.0
     while len(xy) < duration_s * _MEANDER_MPS:
         turn = float(random.choice([-1.0, 1.0]) * random.choice([0.3, math.pi / 4, math.pi / 2]))
         radius = random.uniform(10.0, 35.0) if abs(turn) > 1.0 else random.uniform(40.0, 80.0)
         straight_m, stops = random.uniform(60.0, 220.0), random.random() < 0.3
+        legs.append(Leg(straight_m, turn, radius))
         for length, curvature in (
             (straight_m, 0.0),
             (abs(turn) * radius, turn / abs(turn) / radius),
@@ -66,17 +78,24 @@ def town_drive(seed: int, duration_s: float = DURATION_S) -> Drive:
                 wish.append(12.0)
             if stops and curvature == 0.0:
                 wish[-3] = 0.0
-    geo = geo_from_local(FRAME, np.array(xy))
+    return Streets(np.array(xy), np.array(wish), legs)
+
+
+@functools.cache
+def town_drive(seed: int, duration_s: float = DURATION_S) -> Drive:
+    """Return a drive through `town_streets`."""
+    streets = town_streets(seed, duration_s)
+    geo = geo_from_local(FRAME, streets.xy_m)
     parameters = read_parameters()
-    path = DrivenPath(geo[:, 0], geo[:, 1], np.array(wish), driver=parameters.driver)
+    path = DrivenPath(geo[:, 0], geo[:, 1], streets.wish_mps, driver=parameters.driver)
     source = StandinSource(path, parameters, vehicle_id="standin", seed=seed)
     samples = source.advance(START_STAMP_NS + round(duration_s * 1e9))
     heard = ("gnss", "imu", "speed", "steering")
     return Drive(source, [sample for sample in samples if sample[0] in heard])
 
 
-def estimated(drive: Drive, *, seed: int, std_m: float) -> Errors:
-    """Return the errors twice a second, from samples in their order."""
+def estimated(drive: Drive, *, seed: int, std_m: float, roads: MapSeer | None = None) -> Errors:
+    """Return the errors ten times a second, from samples in their order; `roads` knows a map."""
     track = MotionTrack(
         drive.source.info, wheelbase_m=drive.source.wheelbase_m, steering_ratio=15.3
     )
@@ -85,8 +104,11 @@ def estimated(drive: Drive, *, seed: int, std_m: float) -> Errors:
         track.take(channel, message)
         if not track.started or message.stamp_ns < due_ns:
             continue
-        due_ns = message.stamp_ns + 500_000_000
+        due_ns = message.stamp_ns + 100_000_000
         state, truth = track.state(message.stamp_ns), drive.source.truth(message.stamp_ns)
+        line = None if roads is None else roads.line(state)
+        if line is not None:
+            track.take("map", line)
         rows.append((
             (message.stamp_ns - START_STAMP_NS) * 1e-9,
             float(np.hypot(*(xy_of(state) - xy_of(truth)))),
@@ -139,10 +161,35 @@ def _between(errors: list[Errors], window_s: tuple[int, int]) -> Errors:
     return Errors(*np.concatenate(cut, axis=1))
 
 
+def _print_with_map(drives: list[Drive], seeds: range) -> None:
+    for error_m in MAP_ERRORS_M:
+        print(f"3 m on each axis, with a map whose streets are off by {error_m:.0f} m:")
+        found = [mapped(drives[k % 2], 1 + k % 2, seed=k, error_m=error_m) for k in seeds]
+        for label, window_s in WINDOWS_S.items():
+            at = _between(found, window_s)
+            within = np.mean(at.position_m < 2.448 * at.position_std_m)
+            print(
+                f"  after {label:6s} position p95 {np.percentile(at.position_m, 95):4.1f} m "
+                f"heading p95 {np.degrees(np.percentile(at.yaw_rad, 95)):4.2f} deg; "
+                f"says {2.448 * at.position_std_m.mean():4.1f} m "
+                f"{1.96 * np.degrees(at.yaw_std_rad.mean()):4.2f} deg; within {within:.2f}",
+                flush=True,
+            )
+
+
+def mapped(drive: Drive, streets: int, *, seed: int, error_m: float) -> Errors:
+    """Return the errors of `town_drive(streets)` with a map, found on it without a route."""
+    roads = seer(town_streets(streets).legs, seed=seed, error_m=error_m)
+    return estimated(drive, seed=100 + seed, std_m=3.0, roads=roads)
+
+
 def main(arguments: list[str]) -> int:
-    """Print the table: 95 % of positions and headings after so long, and the bounds' 95 %."""
+    """Print 95 % of positions and headings after so long, with and without a map, and bounds."""
     seeds = range(int(arguments[0]) if arguments else 6)
     drives = [town_drive(1), town_drive(2)]
+    _print_with_map(drives, seeds)
+    if arguments[1:] == ["map"]:
+        return 0
     for name, std_m in STD_M.items():
         print(f"{name}, {len(seeds)} seeds on two drives:")
         found = [estimated(drives[k % 2], seed=100 + k, std_m=std_m) for k in seeds]

@@ -183,7 +183,7 @@ def test_rerun_converts_it(recorded: Path, tmp_path: Path) -> None:
     rerun = Path(sys.executable).with_name("rerun")
     done = subprocess.run(
         [rerun, "mcap", "convert", str(recorded), "-o", str(rrd)],
-        capture_output=True, text=True, timeout=60, check=False,
+        capture_output=True, text=True, timeout=240, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert rrd.stat().st_size > 1000

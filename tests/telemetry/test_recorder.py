@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -18,6 +17,7 @@ from contracts.bus import Alive, Mailbox, Received, ZenohBus
 from contracts.drive import SpeedSample
 from contracts.keys import alive_key
 from contracts.memory_bus import MemoryBus
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup, RecorderSetup, write_setup
 from contracts.simulation import RunEnd
 from telemetry.logs import open_log
@@ -25,12 +25,12 @@ from telemetry.logs.ros_log import read_drive
 from telemetry.mcap_file import DriveWriter, create
 from telemetry.recorder import RecorderProcess
 from telemetry.recording import Recording
+from tests.contracts.bus_sides import DEADLINE_S
 from tests.starvation import unhindered_wait_s
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 
 ORCHESTRATOR = alive_key(run="r1", process="orchestrator")
 RECORDER = alive_key(run="r1", process="recorder")
-DEADLINE_S = 30.0
 
 
 class Wall:
@@ -69,6 +69,20 @@ def test_all_channels_and_the_vehicle_are_recorded(tmp_path: Path) -> None:
     process.finish()
     assert [channel for channel, _ in read_drive(path)] == [c for c, _ in every_channel()]
     assert open_log(path).info.body_from_antenna_m == INFO.body_from_antenna_m
+
+
+def test_in_lock_step_nothing_is_left_out_however_slow_the_machine_is(tmp_path: Path) -> None:
+    class Slow(Wall):
+        def __call__(self) -> float:
+            self.now_s += 1.0
+            return self.now_s
+
+    bus, path = MemoryBus(), tmp_path / "drive.mcap"
+    recording = Recording(lambda: create(path), name="drive.mcap")
+    process = recorder(bus, recording, mono_s=Slow())
+    publish_all(bus)
+    process.finish()
+    assert [channel for channel, _ in read_drive(path)] == [c for c, _ in every_channel()]
 
 
 def test_a_vehicle_that_does_not_answer_is_recorded_all_the_same(tmp_path: Path) -> None:
@@ -171,17 +185,11 @@ def test_losses_are_told_again_when_there_are_twice_as_many_and_at_the_end(tmp_p
 
 
 @pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
-
-
-@pytest.fixture
-def started(tmp_path: Path, endpoint: str) -> Iterator[tuple[ZenohBus, Mailbox, Any]]:
+def started(tmp_path: Path) -> Iterator[tuple[ZenohBus, Mailbox, Any]]:
     """A router with an orchestrator's token, what lands there, and a recorder that is ready."""
     setup = RecorderSetup(
-        run_id="r1", process_id="recorder", vehicle_id="car", bus=BusSetup(endpoint=endpoint),
+        run_id="r1", process_id="recorder", vehicle_id="car",
+        bus=BusSetup(endpoint=free_endpoint(), lossless=True),
         log_file=str(tmp_path / "log"), file=str(tmp_path / "drive.mcap"),
     )  # fmt: skip
     write_setup(setup, tmp_path / "setup.json")

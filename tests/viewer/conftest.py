@@ -13,16 +13,17 @@ import pytest
 from contracts.bus import Mailbox, ZenohBus
 from contracts.codec import write_message
 from contracts.keys import alive_key
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup, ViewerSetup, write_setup
+from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
-from viewer.live_viewer import free_port
 
 RUN = "run1"
 VEHICLE = "car"
 VEHICLE_CHANNELS = ("state", "gnss", "plan", "end")
 
 
-def wait_until(condition: Callable[[], bool], *, timeout_s: float = 30.0) -> None:
+def wait_until(condition: Callable[[], bool], *, timeout_s: float = DEADLINE_S) -> None:
     deadline_s = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline_s, "the condition did not come true in time"
@@ -40,7 +41,7 @@ class ViewerRun:
         worlds = folder / "worlds"
         worlds.mkdir()
         write_message(scene.junction(), worlds / f"{scene.WORLD_ID}.world")
-        bus_setup = BusSetup(endpoint=f"tcp/127.0.0.1:{free_port()}", lossless=True)
+        bus_setup = BusSetup(endpoint=free_endpoint(), lossless=True)
         self.bus = ZenohBus(bus_setup, router=True)
         setup = ViewerSetup(
             run_id=RUN, process_id="viewer", vehicle_id=VEHICLE, bus=bus_setup,
@@ -54,7 +55,7 @@ class ViewerRun:
         self.process = subprocess.Popen(
             [sys.executable, "-m", "viewer", "--setup", str(folder / "viewer.json")]
         )
-        assert alive.take(30.0) is not None, "the viewer never said that it is ready"
+        assert alive.take(DEADLINE_S) is not None, "the viewer never said that it is ready"
 
     def send(self, messages: Iterator[scene.Message]) -> None:
         for channel, message in messages:

@@ -17,11 +17,13 @@ from contracts.codec import MAGIC
 from contracts.drive import VehicleInfo
 from contracts.keys import alive_key
 from contracts.keys import key as channel_key
+from contracts.ports import free_port
 from contracts.simulation import RunEnd
+from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 from tests.viewer.conftest import RUN, ViewerRun, wait_until
 from tests.viewer.readback import Recorded
-from viewer.live_viewer import address, free_port, start_program, wait_until_it_answers
+from viewer.live_viewer import address, start_program, wait_until_it_answers
 
 StartViewer = Callable[..., ViewerRun]
 
@@ -42,7 +44,7 @@ def test_a_whole_drive_is_in_the_file(start_viewer: StartViewer) -> None:
     run = start_viewer()
     run.send(scene.drive())
     _end_run(run)
-    assert run.process.wait(20.0) == 0
+    assert run.process.wait(DEADLINE_S) == 0
 
     recorded = Recorded(run.recording)
     world = f"/world/map/{scene.WORLD_ID}"
@@ -76,7 +78,7 @@ def test_sigterm_completes_the_file(start_viewer: StartViewer) -> None:
     wait_until(lambda: _readable_until(run.recording, 1.9))
     run.process.send_signal(signal.SIGINT)
     run.process.terminate()
-    assert run.process.wait(10.0) == 0
+    assert run.process.wait(DEADLINE_S) == 0
     assert RrdReader(run.recording).store().schema().entity_paths()
 
 
@@ -91,14 +93,14 @@ def test_the_file_is_complete_when_the_orchestrator_is_lost(start_viewer: StartV
         run.send(scene.drive(duration_s=2.0))
         wait_until(lambda: _readable_until(run.recording, 1.9))
         assert run.process.poll() is None
-    assert run.process.wait(15.0) == 0
+    assert run.process.wait(DEADLINE_S) == 0
     assert RrdReader(run.recording).store().schema().entity_paths()
 
 
 def test_a_killed_viewer_leaves_what_it_had(start_viewer: StartViewer) -> None:
     run = start_viewer()
     run.send(scene.drive(duration_s=2.0))
-    wait_until(lambda: _readable_until(run.recording, 1.9), timeout_s=5.0)
+    wait_until(lambda: _readable_until(run.recording, 1.9))
     run.process.kill()
     run.process.wait()
     assert len(Recorded(run.recording).times_s("/world/ego/real")) == 20
@@ -111,7 +113,7 @@ def test_a_missing_world_and_foreign_bytes_become_events(start_viewer: StartView
     run.bus._session.put(state, MAGIC + b"\x09\x00" + bytes(18))
     run.send(scene.drive(duration_s=1.0))
     _end_run(run)
-    assert run.process.wait(20.0) == 0
+    assert run.process.wait(DEADLINE_S) == 0
     recorded = Recorded(run.recording)
     told = " ".join(str(text) for text in recorded.values("/events", ":text"))
     assert f"World {scene.WORLD_ID} is not shown" in told
@@ -124,10 +126,10 @@ def test_the_vehicle_is_asked_when_its_drive_began(start_viewer: StartViewer) ->
     asked = Mailbox(1)
     run.bus.serve("info", asked, vehicle="car")
     run.send(m for m in scene.drive(duration_s=4.0) if m.channel == "state" and _late(m))
-    question = asked.take(10.0)
+    question = asked.take(DEADLINE_S)
     question.reply(VehicleInfo(vehicle_id="car", time_base="utc", start_stamp_ns=scene.START_NS))
     _end_run(run)
-    assert run.process.wait(20.0) == 0
+    assert run.process.wait(DEADLINE_S) == 0
     assert Recorded(run.recording).times_s("/world/ego/real")[0] == pytest.approx(2.0)
 
 
@@ -144,7 +146,7 @@ def test_without_a_display_the_drive_goes_on_and_says_so(
     run.send(scene.drive(duration_s=1.0))
     wait_until(lambda: run.logged("no live view"))
     _end_run(run)
-    assert run.process.wait(20.0) == 0
+    assert run.process.wait(DEADLINE_S) == 0
     recorded = Recorded(run.recording)
     assert any("no live view" in str(text) for text in recorded.values("/events", ":text"))
     assert len(recorded.times_s("/world/ego/real")) == 10
@@ -159,7 +161,7 @@ def test_a_frozen_window_holds_up_nothing(start_viewer: StartViewer) -> None:
         run = start_viewer(live=address(port))
         run.send(scene.drive())
         _end_run(run)
-        assert run.process.wait(20.0) == 0
+        assert run.process.wait(DEADLINE_S) == 0
         assert len(Recorded(run.recording).times_s("/world/futures")) == 40
     finally:
         os.kill(window.pid, signal.SIGCONT)

@@ -44,10 +44,10 @@ def both_ways(path: Path, folder: Path) -> OsmMap:
 def refused(path: Path, folder: Path, complaint: str) -> None:
     """Expect the same line from the reader and from the index."""
     for read in (read_map, lambda p: MapStore.open(p, folder / "index")):
-        begin_s = time.monotonic()
+        begin_s = time.process_time()
         with pytest.raises(MapError, match=complaint) as caught:
             read(path)
         message = str(caught.value)
         assert message.startswith(str(path))
         assert "\n" not in message
-        assert time.monotonic() - begin_s < 10.0
+        assert time.process_time() - begin_s < 10.0

@@ -163,7 +163,7 @@ def test_two_processes_may_build_at_once(tmp_path: Path) -> None:
     path, folder = town(tmp_path), tmp_path / "index"
     command = [sys.executable, "-m", "tests.world_gen.measure_index", str(path), str(folder)]
     builders = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    reports = [json.loads(builder.communicate(timeout=60)[0]) for builder in builders]
+    reports = [json.loads(builder.communicate(timeout=240)[0]) for builder in builders]
     assert [r["ways"] for r in reports] == [8, 8]
     assert len(list(folder.glob("*.mapindex"))) == 1
     assert not list(folder.glob("building-*"))

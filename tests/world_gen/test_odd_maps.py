@@ -112,12 +112,12 @@ def test_a_roundabout_of_ten_thousand_nodes(tmp_path: Path) -> None:
         angle = math.pi / 2.0 * arm
         sketch.node(1 + arm, 150.0 * math.cos(angle), 150.0 * math.sin(angle))
         sketch.road(20 + arm, [1000 + arm * count // 4, 1 + arm], f"Arm {arm}")
-    begin_s = time.monotonic()
+    begin_s = time.process_time()
     (world,) = build_all(file_of(tmp_path, sketch)).worlds
     assert world.intersection.kind == "roundabout"
     assert world.intersection.arms == 4
     # Work that grows with the square of the nodes would take minutes.
-    assert time.monotonic() - begin_s < 10.0
+    assert time.process_time() - begin_s < 10.0
 
 
 def test_relations_in_a_circle_and_of_nothing(tmp_path: Path) -> None:

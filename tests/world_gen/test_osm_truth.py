@@ -62,7 +62,7 @@ def judged(request: pytest.FixtureRequest, data_dir: Path) -> Judged:
         capture_output=True,
         text=True,
         check=True,
-        timeout=120.0,
+        timeout=240.0,
     )
     osm = read_map(path)
     graph = build_road_graph(osm)

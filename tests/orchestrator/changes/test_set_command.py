@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from contracts.ports import free_endpoint
 from orchestrator.changes.command import newest_running, running_drive
 from orchestrator.cli import EXIT_USER, run
-from tests.contracts.bus_sides import free_endpoint
 
 
 def _run(out: Path, name: str, exit_word: str, endpoint: str = "tcp/127.0.0.1:7447") -> Path:

@@ -26,6 +26,9 @@ from tests.system.foretwin_command import environment, foretwin
         ({"run.json": "{}"}, "no drive.mcap in it"),
         ({"run.json": "nonsense", "drive.mcap": ""}, "not JSON"),
         ({"run.json": '{"exit": "running"}', "drive.mcap": ""}, "never came to its end"),
+        ({"run.json": "{}", "drive.mcap": ""}, "never came to its end (exit: not told)"),
+        ({"run.json": "[]", "drive.mcap": ""}, "must be a JSON object"),
+        ({"run.json": '{"config": {}}', "drive.mcap": ""}, "another version"),
         (
             {"run.json": '{"config": {"wheels": 4}, "map": {"file": "m"}}', "drive.mcap": ""},
             "of another version of foretwin",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -38,6 +39,32 @@ def test_every_table_exists_even_when_empty(tmp_path: Path) -> None:
     ResultTables(tmp_path, {}).close()
     assert {file.stem for file in tmp_path.glob("*.parquet")} == set(TABLES)
     assert pq.read_table(tmp_path / "futures.parquet").num_rows == 0
+
+
+def test_a_row_that_no_table_holds_is_said(tmp_path: Path) -> None:
+    tables = ResultTables(tmp_path, {})
+    tables.add("events", [event(2**70)])
+    tables.close()
+    assert tables.failed is not None
+    assert "results cannot be written: OverflowError" in tables.failed
+    assert pq.read_table(tmp_path / "rounds.parquet").num_rows == 0
+
+
+def test_results_that_take_too_long_are_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk_answers = threading.Event()
+    write = pq.ParquetWriter.write_table
+    monkeypatch.setattr(
+        pq.ParquetWriter, "write_table", lambda *what: disk_answers.wait() and write(*what)
+    )
+    tables = ResultTables(tmp_path, {})
+    tables.add("events", [event(1)])
+    tables.close(0.2)
+    assert tables.failed == "results were not written within 0.2 s"
+    disk_answers.set()
+    tables.close()
+    assert pq.read_table(tmp_path / "events.parquet").num_rows == 1
 
 
 def test_a_disk_that_cannot_be_written_is_said(

@@ -77,6 +77,20 @@ def test_the_worlds_frame_makes_no_difference() -> None:
     assert found[8.0].nominal.ade_m == pytest.approx(0.0, abs=1e-3)
 
 
+def test_what_a_map_moves_the_position_by_is_no_error_of_the_future() -> None:
+    """From 3 s on the car is found 2 m further north; it has not driven there."""
+    states = car(DRIVE)
+    for k, state in enumerate(states):
+        if state.stamp_ns > START_NS + 3_000_000_000:
+            place = state.position
+            north = GeoPoint(place.lat_deg + 2.0 / 111_266.0, place.lon_deg)
+            states[k] = msgspec.structs.replace(state, position=north, map_shift_m=(0.0, 2.0))
+    found = compared(states, round_done(straight()))
+
+    for comparison in found.values():
+        assert comparison.nominal.ade_m == pytest.approx(0.0, abs=2e-3)
+
+
 def test_nothing_is_compared_before_the_longest_horizon_has_passed() -> None:
     nearly = [s for s in car(DRIVE) if s.stamp_ns < START_NS + 7_950_000_000]
 

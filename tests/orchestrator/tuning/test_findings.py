@@ -91,8 +91,24 @@ def test_the_end_of_a_drive_tells_it_in_a_few_lines(tmp_path: Path) -> None:
     assert summary_lines(Kept(tmp_path, reply).record) == [
         "  gap of the model after 2 s (RMS): 0.00 m along, 0.30 m across, 5.7°, 0.00 m/s; 0 alarms",
         "  verdict at 9.0 s: the model, steering_ratio: the model turns 14 % less",
-        "  steering_ratio: the driving says 15.3 (15.1 to 15.5), in use is 16",
+        "  found, within what the vehicle file leaves open: steering_ratio 15.3",
     ]
+
+
+def test_a_value_that_the_vehicle_file_leaves_open_is_no_other_car(tmp_path: Path) -> None:
+    """The bundled stand-in as it is identified: nothing in it contradicts the twin's own file."""
+    standin = {
+        "steering_ratio": 15.41, "steering_offset_rad": 0.0038, "steering_lag_s": 0.0833,
+        "understeer_gradient_rad_per_mps2": -0.00034, "drag_npv2": 0.42, "brake_gain": 1.06,
+    }  # fmt: skip
+    estimates = tuple(
+        ParameterEstimate(name=name, value=value, low=value - 1e-5, high=value + 1e-5)
+        for name, value in (*standin.items(), ("drive_gain", 0.7))
+    )
+    told = Identification(vehicle_id="ego", from_stamp_ns=0, stamp_ns=8, estimates=estimates)
+    finer, other = summary_lines(Kept(tmp_path, TuneReply(identifications=(told,))).record)
+    assert all(name in finer for name in standin)
+    assert other == "  drive_gain: the driving says 0.7 (0.69999 to 0.70001), in use is 1"
 
 
 def test_a_departure_is_told_once_and_a_drive_without_findings_says_nothing(tmp_path: Path) -> None:

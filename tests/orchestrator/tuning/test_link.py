@@ -125,12 +125,12 @@ def test_a_process_that_dies_holds_up_nothing(house: House) -> None:
         asked(house, worker.process_id)
     set_mass(house)
     house.conductor.make_changes()
-    for process_id in (worker.process_id for worker in house.workers):
+    for process_id in ("tuning", *(worker.process_id for worker in house.workers)):
         assert not house.conductor.tuning.parameters.settled
         house.bus.lose(alive_key(run=house.plan.run_id, process=process_id))
         house.settle()
     assert house.conductor.tuning.parameters.settled
-    assert len(watcher) == 1, "live, rounds do not wait for who gives way to them"
+    assert len(watcher) == 1
 
 
 def test_in_lock_step_rounds_wait_for_the_watcher_too(tmp_path: Path) -> None:
@@ -166,6 +166,21 @@ def test_a_watcher_that_is_started_again_is_told_what_counts(house: House) -> No
     assert (again.version, again.vehicle.mass_kg.value) == (1, 1300.0)
     assert [(one.name, one.origin) for one in again.changes] == [("mass_kg", "set")]
     assert again.pinned == ("mass_kg",)
+
+
+def test_live_no_round_waits_for_who_only_watches(house: House) -> None:
+    house.bus.declare_alive(alive_key(run=house.plan.run_id, process="tuning"))
+    watcher = asked(house, "tuning")
+    workers = [asked(house, worker.process_id) for worker in house.workers]
+    house.drive(20)
+    set_mass(house)
+    house.conductor.make_changes()
+    for questions in workers:
+        answer(questions)
+    house.settle()
+    assert house.conductor.tuning.parameters.settled
+    assert len(watcher) == 1
+    assert house.conductor.start_round()
 
 
 @pytest.mark.parametrize(("mode", "version"), [("report", 0), ("apply", 1)])

@@ -166,3 +166,24 @@ def test_the_future_changes_nothing_before_it() -> None:
     whole, cut = Driver().go(corners), Driver().go(corners[:2])
 
     assert whole.progress[: len(cut.progress)] == cut.progress
+
+
+def test_a_route_given_while_driving_counts_from_where_the_car_is_on_it() -> None:
+    driver = Driver().go([(20, 100), (150, 100)])
+    assert driver.ahead(300.0)[:2] == [("n103", 50), ("n104", 150)]
+    driver.follower.give((along((4, False), (5, False), (23, False)),))
+    driver.go([(151, 100), (160, 100)])
+    assert driver.progress[-1] is not None
+    assert (driver.progress[-1].source, driver.progress[-1].off_route) == ("given", False)
+    assert driver.ahead(300.0)[:2] == [("n103", 40), ("n203", 140)]
+    # One that lies elsewhere is given all the same, and told of as left.
+    driver.follower.give(
+        (
+            along(
+                (12, False),
+            ),
+        )
+    )
+    driver.go([(161, 100), (170, 100)])
+    assert driver.progress[-1] is not None
+    assert driver.progress[-1].off_route

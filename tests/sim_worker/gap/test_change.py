@@ -39,9 +39,19 @@ def first_of(every: PushBlocks) -> tuple[int, Finding] | None:
     for count in range(1, len(every.stamp_ns) + 1):
         # The latest two each time, as overlapping stretches give them.
         found = test.handle(PushBlocks(*(column[max(count - 2, 0) : count] for column in every)))
-        if found is not None:
-            return count, found
+        if found:
+            return count, found[0]
     return None
+
+
+def ever_said_of(every: PushBlocks) -> set[tuple[str, str]]:
+    """Return who and what is accused at any time, given blocks one by one."""
+    test = PushTest()
+    said: set[tuple[str, str]] = set()
+    for count in range(1, len(every.stamp_ns) + 1):
+        found = test.handle(PushBlocks(*(column[max(count - 2, 0) : count] for column in every)))
+        said |= {(one.culprit, one.cause) for one in found}
+    return said
 
 
 def test_a_brake_that_weakens_is_accused_with_the_block_where_it_began() -> None:
@@ -77,3 +87,34 @@ def test_drag_is_told_from_a_weak_drive_by_what_happens_while_nothing_is_asked()
     told = first_of(blocks(asked, asked, asked - 0.9))
     assert told is not None
     assert (told[1].culprit, told[1].cause) == ("model", "drag")
+
+
+PUSHES = np.tile([0.0] * 8 + [0.5] * 8 + [1.3] * 8 + [-0.6] * 8 + [-1.5] * 8, 3)
+SPEED_MPS = 8.0 + 4.0 * np.sin(np.arange(len(PUSHES)) / 7.0)
+
+
+def driven(
+    *, drive: float = 1.0, brake: float = 1.0, drag: float = 0.0, roll: float = 0.0
+) -> Array:
+    """Return the accelerations of a car with these gains, that loses `drag` at 10 m/s."""
+    gained = PUSHES * np.where(PUSHES > 0.0, drive, brake)
+    noise = np.random.default_rng(4).normal(0.0, 0.15, len(PUSHES))
+    return np.asarray(gained - drag * (SPEED_MPS / 10.0) ** 2 - roll + noise)
+
+
+@pytest.mark.parametrize(
+    ("car", "model", "said"),
+    [
+        ({"drive": 0.45}, {}, {("vehicle", "drive_gain")}),
+        ({"drive": 0.45, "drag": 1.0}, {}, {("vehicle", "drive_gain"), ("vehicle", "drag")}),
+        ({"drive": 0.45, "brake": 0.5}, {}, {("vehicle", "drive_gain"), ("vehicle", "brake_gain")}),
+        ({"brake": 0.5}, {"drag": 1.5}, {("vehicle", "brake_gain"), ("model", "drag")}),
+        ({}, {"drag": 1.0, "drive": 1.7}, {("model", "drive_gain"), ("model", "drag")}),
+        ({"drive": 0.88, "brake": 1.15, "drag": 0.1, "roll": 0.15}, {}, set()),
+    ],
+)  # fmt: skip
+def test_of_several_departures_each_is_named_and_nothing_beside_them(
+    car: dict[str, float], model: dict[str, float], said: set[tuple[str, str]]
+) -> None:
+    every = blocks(PUSHES, driven(**car), driven(**model))._replace(speed_mps=SPEED_MPS)
+    assert ever_said_of(every) == said

@@ -13,6 +13,7 @@ import pytest
 from contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample
 from contracts.frames import GeoPoint
 from sim_worker.gap.verdict import Judge
+from tests.sim_worker.driving import altered
 from tests.sim_worker.faulty_standin import CAR_FAULTS, MODEL_FAULTS, drive_of, model_with
 from tests.sim_worker.gap.judging_faults import (
     IN_TIME_S,
@@ -82,6 +83,33 @@ def test_without_commands_a_wrong_ratio_is_nobodys_but_degrees_are_the_cars() ->
 
     assert told("steering_ratio")[:1] == ["undecided steering_ratio"]
     assert told("steering_read_in_degrees")[:1] == ["vehicle steering_in_degrees"]
+
+
+def test_a_model_whose_steering_lags_as_the_cars_does_is_left_alone() -> None:
+    """What was measured has the lag in it already: it must not act twice."""
+    drive = drive_of(SEED, end_s=END_S)
+    judge = Judge(drive.info, altered(model_with(None), steering_lag_s=0.2), frame=FRAME)
+    lags = []
+    for sample in drive.samples[: round(0.75 * len(drive.samples))]:
+        verdict = judge.handle(*sample)
+        assert verdict is None or verdict.cause == "steering_delay"
+        if judge.latest is not None and judge.latest.motion_lag is not None:
+            lags.append(judge.latest.motion_lag.seconds)
+    assert max(lags) <= 0.04
+
+
+def test_late_lost_doubled_and_reordered_samples_accuse_nobody() -> None:
+    """50 ms of jitter, a fifth lost, some twice, in the order of their coming."""
+    drive = drive_of(SEED, end_s=END_S)
+    random = np.random.default_rng(3)
+    came = [
+        (message.stamp_ns + round(random.exponential(5e7)), channel, message)
+        for channel, message in drive.samples
+        for _ in range(random.choice([0, 1, 2], p=[0.2, 0.75, 0.05]))
+    ]
+    came.sort(key=lambda one: one[0])
+    judge = Judge(drive.info, model_with(None), frame=FRAME)
+    assert not any(judge.handle(channel, message) for _, channel, message in came)
 
 
 def test_a_telephones_positions_accuse_no_sensor_and_confirm_none() -> None:

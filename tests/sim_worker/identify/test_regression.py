@@ -13,32 +13,32 @@ PERIOD_S = 0.05
 TIME_S = np.arange(0.0, 60.0, PERIOD_S)
 
 
-def line(seed: int, *, lasting: float, white: bool = False) -> Fit:
+def line(seed: int, *, lasting: float, brief: bool = False) -> Fit:
     """Fit a line through 60 s of 3 s bends: white noise, and `lasting` as much for each bend."""
     random = np.random.default_rng(seed)
     per_bend = np.repeat(random.normal(size=(20, 2)), 60, axis=0)
     columns = np.column_stack([per_bend[:, 0], np.ones(len(TIME_S))])
     noise = random.normal(size=len(TIME_S)) + lasting * per_bend[:, 1]
-    return fit_linear(columns, columns @ TRUTH + 0.01 * noise, TIME_S, white=white)
+    return fit_linear(columns, columns @ TRUTH + 0.01 * noise, TIME_S, brief=brief)
 
 
-def share_held(*, lasting: float, white: bool = False) -> Array:
+def share_held(*, lasting: float, brief: bool = False) -> Array:
     held = [
         np.abs(fit.values - TRUTH) <= [fit.half_width(0), fit.half_width(1)]
-        for fit in (line(seed, lasting=lasting, white=white) for seed in range(200))
+        for fit in (line(seed, lasting=lasting, brief=brief) for seed in range(200))
     ]
     return np.asarray(np.mean(held, axis=0))
 
 
-@pytest.mark.parametrize(("lasting", "white"), [(0.0, True), (0.0, False), (1.0, False)])
-def test_intervals_hold_the_truth_19_times_of_20(lasting: float, white: bool) -> None:
-    share = share_held(lasting=lasting, white=white)
+@pytest.mark.parametrize(("lasting", "brief"), [(0.0, True), (0.0, False), (1.0, False)])
+def test_intervals_hold_the_truth_19_times_of_20(lasting: float, brief: bool) -> None:
+    share = share_held(lasting=lasting, brief=brief)
     assert share.min() > 0.90
     assert share.max() < 0.995
 
 
 def test_who_takes_what_lasts_for_white_is_too_sure() -> None:
-    sure = line(0, lasting=1.0, white=True).half_width(0)
+    sure = line(0, lasting=1.0, brief=True).half_width(0)
     assert sure < line(0, lasting=1.0).half_width(0)
 
 

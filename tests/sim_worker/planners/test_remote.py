@@ -17,7 +17,9 @@ from contracts.planner_link import PlannedMotions, PlannerScene
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from sim_worker.planners.remote import RemoteDriver, RemotePlanner
 from sim_worker.vehicle.parameters import load_vehicle
+from tests.contracts.bus_sides import DEADLINE_S
 from tests.sim_worker.planners.driven import Other, at_rest_on, drive, see, straight, view_of
+from tests.starvation import kept_waiting
 
 VEHICLE = load_vehicle()
 IDS = {"run": "r1", "process": "w0"}
@@ -63,7 +65,9 @@ def stack(bus: MemoryBus, answers: Stack) -> Iterator[list[PlannerScene]]:
         thread.join()
 
 
-def connected(bus: MemoryBus, *, first_s: float = 5.0, then_s: float = 5.0) -> RemotePlanner:
+def connected(
+    bus: MemoryBus, *, first_s: float = DEADLINE_S, then_s: float = DEADLINE_S
+) -> RemotePlanner:
     planner = RemotePlanner(first_answer_s=first_s, answer_s=then_s)
     planner.connect(bus, **IDS)
     return planner
@@ -94,8 +98,9 @@ def test_cars_go_where_the_stack_says() -> None:
     assert done.states[:, -1, 3] == pytest.approx(6.0, abs=0.3)
     assert done.states[:, -1, 1] == pytest.approx(1.0, abs=0.15)
     assert kept.drivers[0].remarks == {}
-    # Every 0.1 s a question, and none but the first asked twice.
-    assert 60 <= len(shown) <= 62
+    # Every 0.1 s a question, and none but the first asked more than once.
+    asked = [scene.question for scene in shown if scene.question > 1]
+    assert 59 <= len(asked) == len(set(asked)) <= 61
     assert {scene.question for scene in shown} == set(range(1, 61)) | {shown[-1].question}
 
 
@@ -123,10 +128,14 @@ def test_a_silent_stack_is_replaced_and_the_futures_are_marked() -> None:
     path = straight()
     kept = _Kept(connected(bus, first_s=0.2, then_s=0.1))
     starts = at_rest_on(path, 5.0, 4.0, count=2)
+    shown = Mailbox(128)
+    bus.subscribe("planner_scene", shown, **IDS)
     begun = time.monotonic()
-    done = drive(kept, path, starts, vehicle=VEHICLE, seconds=6.0)
-    plain = drive(PurePursuitIdm(), path, starts, vehicle=VEHICLE, seconds=6.0)
-    assert time.monotonic() - begun < 10.0
+    with kept_waiting() as kept_s:
+        done = drive(kept, path, starts, vehicle=VEHICLE, seconds=6.0)
+        plain = drive(PurePursuitIdm(), path, starts, vehicle=VEHICLE, seconds=6.0)
+    assert time.monotonic() - begun - kept_s.seconds < 10.0
+    assert len(shown) >= 60, "it may come back, and is asked on"
     assert done.states.tobytes() == plain.states.tobytes()
     words = "fallback 'pure_pursuit_idm' acted from 0 s on: no answer within 0.2 s"
     assert kept.drivers[0].remarks == {0: words, 1: words}

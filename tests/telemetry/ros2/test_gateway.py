@@ -14,6 +14,7 @@ from contracts.simulation import MirrorSample, PlaneState
 from contracts.towards_vehicle import Authority, VehicleCommand
 from telemetry.ros2.gateway import Gateway
 from telemetry.ros2.mapping import parse_mapping
+from telemetry.ros_foreign import FOREIGN
 from telemetry.ros_parts import ODOMETRY, typestore, yaw_of
 from tests.telemetry.ros2.gateway_ground import (
     FIX_KEY,
@@ -92,7 +93,7 @@ def test_ros_samples_become_telemetry() -> None:
         stamp_ns=5 * S, position=GeoPoint(52.6, 13.5, 40.0), std_m=pytest.approx(0.2)
     )
     assert second.message() == SteeringSample(stamp_ns=5 * S + 1, tire_angle_rad=0.25)
-    info = ground.gateway.info()
+    info = ground.gateway.introduction.info()
     assert info is not None
     assert (info.start_stamp_ns, info.sends) == (5 * S, ("gnss", "steering"))
 
@@ -112,6 +113,17 @@ def test_what_cannot_be_used_is_counted_and_survived() -> None:
     }
     ground.arrive(FIX_KEY, fix(5 * S, 52.6, 13.5))
     assert ground.inbox.take() is not None
+
+
+def test_no_message_ends_the_gateway(monkeypatch: pytest.MonkeyPatch) -> None:
+    def read(*_: object) -> None:
+        raise IndexError("an empty list")
+
+    ground = Ground(enabled=False, flag=False)
+    how = FOREIGN["sensor_msgs/msg/NavSatFix"]
+    monkeypatch.setitem(FOREIGN, "sensor_msgs/msg/NavSatFix", how._replace(read=read))
+    ground.arrive(FIX_KEY, fix(5 * S, 52.6, 13.5))
+    assert ground.gateway.report()["unused"] == {"/sensing/gnss: IndexError": 1}
 
 
 def test_lost_samples_are_counted_by_sequence_number() -> None:
@@ -147,7 +159,7 @@ def test_what_ros_says_once_is_asked_for_again() -> None:
     assert "0/sensing/gnss/*/*" in ground.foreign.subscribed
     ground.arrive(TF_KEY, antenna_at(1.5, -0.1, 1.8))
     ground.arrive(FIX_KEY, fix(5 * S, 52.6, 13.5))
-    info = ground.gateway.info()
+    info = ground.gateway.introduction.info()
     assert info is not None
     assert info.body_from_antenna_m == pytest.approx((1.5, -0.1, 1.8))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import subprocess
 import sys
@@ -15,10 +16,12 @@ import pytest
 from contracts.bus import Mailbox, ZenohBus, ask
 from contracts.drive import GnssFix, InfoRequest
 from contracts.foreign_bus import Arrived, ZenohForeignBus
+from contracts.ports import free_endpoint
 from contracts.setup import BusSetup
 from contracts.simulation import MirrorSample, PlaneState
 from telemetry.ros_parts import CONTROL, ODOMETRY, typestore
-from tests.contracts.bus_sides import free_endpoint, python, take_until
+from tests.contracts.bus_sides import DEADLINE_S, python, take_until
+from tests.starvation import kept_waiting
 from tests.telemetry.ros2.gateway_ground import (
     CONTROL_KEY,
     FIX_KEY,
@@ -33,6 +36,7 @@ from tests.telemetry.ros2.gateway_ground import (
     steering,
 )
 
+ATTEMPTS = 5
 ROOT = Path(__file__).resolve().parents[3]
 ODOMETRY_HASH = "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"
 
@@ -64,8 +68,8 @@ with zenoh.open(config) as session:
     kept.put(bytes.fromhex(sys.argv[6]), attachment=struct.pack("<qqB16s", 1, 5, 16, bytes(16)))
     print("ready", flush=True)
     seq = 0
-    until = time.monotonic() + 30.0
-    while not heard and time.monotonic() < until:
+    until = time.monotonic() + 240.0
+    while (not heard or len(ends) < 6) and time.monotonic() < until:
         seq += 1
         session.put(fix_key, payload, attachment=struct.pack(
             "<qqB16s", seq, time.time_ns(), 16, bytes(range(16))))
@@ -113,7 +117,7 @@ def test_a_peer_of_rmw_zenoh_talks_to_it_both_ways(tmp_path: Path) -> None:
             sample = take_until(inbox, lambda item: item.channel == "gnss").message()
             assert isinstance(sample, GnssFix)
             assert (sample.position.lat_deg, sample.stamp_ns) == (52.51, 10**18)
-            info = ask(bus, "info", InfoRequest(), vehicle="ego")
+            info = ask(bus, "info", InfoRequest(), timeout_s=DEADLINE_S, vehicle="ego")
             assert info.sends == ("gnss", "steering")
             # Said once, before the gateway was there, and kept by who said it.
             assert info.body_from_antenna_m == pytest.approx((1.5, -0.1, 1.8))
@@ -149,15 +153,21 @@ class Vehicle(NamedTuple):
     orchestrator: subprocess.Popen[str]
     gateway: subprocess.Popen[str]
 
-    def until_commanded(self) -> Arrived:
-        """Report steering as a vehicle does until the first command is there."""
-        deadline = time.monotonic() + 20.0
+    def until_commanded(self, within_s: float) -> Arrived | None:
+        """Report steering as a vehicle does until a command is there, or time is over."""
+        deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             self.peer.put(STEERING_KEY + "RIHS01_x", steering(time.time_ns(), 0.1), attached(1))
             item = self.commands.take(0.02)
             if item is not None:
                 return item
-        raise AssertionError("no command towards the vehicle")
+        return None
+
+    def flow(self) -> bool:
+        """Whether commands flow; a machine that halts us for 150 ms shuts the gate, rightly."""
+        while self.commands.take() is not None:
+            pass
+        return all(self.until_commanded(0.5) is not None for _ in range(30))
 
     def last_before_silence(self, silent_s: float) -> Arrived | None:
         """Report steering on and return the last command before so long a silence."""
@@ -169,38 +179,57 @@ class Vehicle(NamedTuple):
         return last
 
 
-@pytest.fixture
-def vehicle(tmp_path: Path) -> Iterator[Vehicle]:
+@contextlib.contextmanager
+def vehicle(folder: Path) -> Iterator[Vehicle]:
     own, run = free_endpoint(), free_endpoint()
     mapping = mapping_text(enabled=True, endpoint=own)
     with (
         ZenohBus(BusSetup(endpoint=own), router=True),
         ZenohForeignBus(own) as peer,
         python("-c", ORCHESTRATOR, run) as orchestrator,
-        gateway_process(tmp_path, run_endpoint=run, mapping=mapping, flag=True) as gateway,
+        gateway_process(folder, run_endpoint=run, mapping=mapping, flag=True) as gateway,
     ):
         commands = Mailbox(10_000)
         peer.subscribe(CONTROL_KEY, commands)
         yield Vehicle(peer, commands, orchestrator, gateway)
 
 
+@contextlib.contextmanager
+def commanded_vehicle(folder: Path) -> Iterator[Vehicle]:
+    """A vehicle that commands flow to.
+
+    Started anew where the machine was too busy for that: only a new drive opens the gate again.
+    """
+    for attempt in range(ATTEMPTS):
+        place = folder / str(attempt)
+        place.mkdir()
+        with vehicle(place) as one:
+            first = one.until_commanded(DEADLINE_S)
+            assert first is not None, "no command towards the vehicle"
+            control = typestore().deserialize_cdr(first.payload, CONTROL)
+            assert abs(control.lateral.steering_tire_angle) <= 0.5
+            with kept_waiting(one.orchestrator.pid, one.gateway.pid) as kept:
+                flows = one.flow()
+            assert flows or kept.seconds > 0.1, "the gate has shut though the word came"
+            if flows:
+                yield one
+                return
+    pytest.skip(f"in {ATTEMPTS} attempts the machine kept everybody waiting for over 150 ms")
+
+
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_dead_or_hung_orchestrator_stops_it_within_200_ms(
-    vehicle: Vehicle, how: signal.Signals
+    tmp_path: Path, how: signal.Signals
 ) -> None:
-    first = vehicle.until_commanded()
-    control = typestore().deserialize_cdr(first.payload, CONTROL)
-    assert abs(control.lateral.steering_tire_angle) <= 0.5
-    for _ in range(30):
-        last = vehicle.until_commanded()
-    killed_ns = time.monotonic_ns()
-    assert killed_ns - last.received_mono_ns < 100e6, "it did not flow any more when it was killed"
-    vehicle.orchestrator.send_signal(how)
-    last = vehicle.last_before_silence(0.6) or last
-    after_ms = (last.received_mono_ns - killed_ns) / 1e6
-    print(f"last command {after_ms:.1f} ms after {how.name}", file=sys.stderr)
-    assert after_ms < 200.0
-    if how == signal.SIGSTOP:
-        vehicle.orchestrator.send_signal(signal.SIGCONT)
-        assert vehicle.last_before_silence(0.6) is None, "it resumed without a new switch-on"
-        assert vehicle.gateway.poll() is None
+    with commanded_vehicle(tmp_path) as vehicle:
+        with kept_waiting(vehicle.gateway.pid) as kept:
+            vehicle.orchestrator.send_signal(how)
+            killed_ns = time.monotonic_ns()
+            last = vehicle.last_before_silence(0.6)
+        after_ms = 0.0 if last is None else (last.received_mono_ns - killed_ns) / 1e6
+        print(f"last command {after_ms:.1f} ms after {how.name}", file=sys.stderr)
+        assert after_ms < 200.0 + 1e3 * kept.seconds
+        if how == signal.SIGSTOP:
+            vehicle.orchestrator.send_signal(signal.SIGCONT)
+            assert vehicle.last_before_silence(0.6) is None, "it resumed without a new switch-on"
+            assert vehicle.gateway.poll() is None

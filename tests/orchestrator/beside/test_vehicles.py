@@ -22,10 +22,10 @@ from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_ge
 from contracts.mailbox import Mailbox
 from contracts.memory_bus import MemoryBus
 from contracts.roles import OtherVehicles, Role
-from orchestrator.config import ConfigError, DriveConfig, VehicleBeside, load_config
+from orchestrator.beside.vehicles import VehiclesBeside
+from orchestrator.config import VehicleBeside
 from orchestrator.intake import Surroundings
-from orchestrator.plan import Beside, read_inputs
-from orchestrator.vehicles_beside import VehiclesBeside
+from orchestrator.plan import Beside
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.vehicle.planar import box_centre_from_base_m
 from telemetry.mcap_file import create
@@ -36,6 +36,15 @@ VAN = load_vehicle("vw_vanagon")
 INFO = VehicleInfo(vehicle_id="ego", time_base="utc", start_stamp_ns=START_NS)
 ORIGIN = GeoPoint(52.5, 13.4)
 FRAME = LocalFrame(ORIGIN)
+
+ASKED: list[str] = []
+TOLD: list[str] = []
+
+
+@pytest.fixture(autouse=True)
+def nothing_said() -> None:
+    ASKED.clear()
+    TOLD.clear()
 
 
 def at(x_m: float, y_m: float = 0.0) -> GeoPoint:
@@ -50,14 +59,32 @@ def own(t_s: float, x_m: float = 0.0) -> VehicleState:
     )  # fmt: skip
 
 
+class HearingBus(MemoryBus):
+    """Keeps what is passed on, and who was asked what it is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.heard: list[OtherVehicles] = []
+
+    def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
+        assert isinstance(message, OtherVehicles)
+        self.heard.append(message)
+
+    def request(self, channel: str, message: msgspec.Struct, *_: object, **ids: object) -> None:
+        assert channel == "info"
+        ASKED.append(str(ids["vehicle"]))
+
+
 def crew(folder: Path, *configs: VehicleBeside) -> tuple[VehiclesBeside, list[OtherVehicles]]:
     """The vehicles of a drive whose car begins at START_NS, and what is passed on of them."""
     members = tuple(Beside(config, VAN, commands_recorded=False) for config in configs)
-    plan = replace(town_plan(folder), beside=members, drive_frame=FRAME)
-    heard: list[OtherVehicles] = []
-    beside = VehiclesBeside(plan, publish=heard.append)
+    plan = town_plan(folder)
+    lock_step = msgspec.structs.replace(plan.config, speed=None)
+    plan = replace(plan, beside=members, drive_frame=FRAME, config=lock_step)
+    bus = HearingBus()
+    beside = VehiclesBeside(plan, bus, Mailbox(8), tell=lambda told: TOLD.append(told.text))
     beside.begin(INFO)
-    return beside, heard
+    return beside, bus.heard
 
 
 def van_log(folder: Path, *, start_ns: int) -> Path:
@@ -122,6 +149,50 @@ def test_who_is_on_the_bus_is_estimated_from_what_it_sends(tmp_path: Path) -> No
     states = [one.state for message in heard for one in message.heard]
     assert x_of(states[-1]) == pytest.approx(29.0, abs=0.5)
     assert {state.vehicle_id for state in states} == {"van"}
+    assert ASKED == ["van"]
+    assert TOLD[0] == "van is heard"
+
+
+def on_the_bus(beside: VehiclesBeside, *, from_s: float, to_s: float, later_s: float = 0.0) -> None:
+    """Let the van drive east at 10 m/s; its antenna is where its position is measured."""
+    bus, box = MemoryBus(), Mailbox(64)
+    for channel in ("gnss", "speed"):
+        bus.subscribe(channel, box, vehicle="van")
+    for k in range(round(from_s * 10), round(to_s * 10)):
+        ns = START_NS + k * 100_000_000 + round(later_s * 1e9)
+        bus.publish("gnss", GnssFix(stamp_ns=ns, position=at(k)), vehicle="van")
+        bus.publish("speed", SpeedSample(stamp_ns=ns, speed_mps=10.0), vehicle="van")
+        while (item := box.take()) is not None:
+            beside.take_sample("van", item)
+
+
+def test_who_is_on_the_bus_is_placed_by_its_antenna_once_it_says_where_that_sits(
+    tmp_path: Path,
+) -> None:
+    beside, heard = crew(tmp_path, VehicleBeside(id="van", live=True))
+    on_the_bus(beside, from_s=0.0, to_s=2.0)
+    said = msgspec.structs.replace(INFO, vehicle_id="van", body_from_antenna_m=(1.5, 0.0, 0.0))
+    beside.take_info("van", said)
+    on_the_bus(beside, from_s=2.0, to_s=5.0)
+    beside.keep_up_with(own(4.9), None)
+    assert x_of(heard[-1].heard[-1].state) == pytest.approx(49.0 - 1.5, abs=0.5)
+    assert ASKED == ["van"]
+
+
+def test_who_does_not_say_where_its_antenna_sits_is_told_of(tmp_path: Path) -> None:
+    beside, _ = crew(tmp_path, VehicleBeside(id="van", live=True))
+    on_the_bus(beside, from_s=0.0, to_s=0.2)
+    beside.take_info("van", None)
+    assert "van does not say where its reference point sits" in TOLD[-1]
+
+
+def test_stamps_of_another_clock_are_told_once(tmp_path: Path) -> None:
+    beside, _ = crew(tmp_path, VehicleBeside(id="van", live=True))
+    for second in (0.0, 2.0):
+        on_the_bus(beside, from_s=second, to_s=second + 2.0, later_s=30.0)
+        beside.keep_up_with(own(second + 1.9), None)
+    (told,) = (text for text in TOLD if "clock" in text)
+    assert told.startswith("van stamps 30.0 s ahead of the car")
 
 
 def user(user_id: str, x_m: float, *, yaw: float = 0.0, kind: str = "car") -> RoadUser:
@@ -194,7 +265,7 @@ def test_jobs_of_a_drive_hold_who_is_beside_the_car(tmp_path: Path, role: Role, 
     house = House(tmp_path, futures=2)
     config = VehicleBeside(id="van", seen_as="17", role=role)
     plan = replace(house.plan, beside=(Beside(config, VAN, commands_recorded=False),))
-    house.conductor.beside = VehiclesBeside(plan, publish=lambda _: None)
+    house.conductor.beside = VehiclesBeside(plan, house.bus, Mailbox(8), tell=lambda _: None)
     house.conductor.beside.begin(INFO)
     house.conductor.roles.roles["van"] = role
     house.drive(25)
@@ -213,37 +284,3 @@ def test_jobs_of_a_drive_hold_who_is_beside_the_car(tmp_path: Path, role: Role, 
         VAN.length_m.value for _ in met
     }
     house.tables.close()
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ('[[vehicles]]\nid = "v"', "vehicles, v: needs exactly one of log = FILE, live = true"),
-        ('[[vehicles]]\nid = "v"\nlive = true\nseen_as = "3"', "vehicles, v: needs exactly one"),
-        ('[[vehicles]]\nid = "v"\nlive = true\nrole = "all"', "role all is the car's alone"),
-        ('[[vehicles]]\nid = "a b"\nlive = true', "must be one word"),
-        ('[[vehicles]]\nid = "ego"\nlive = true', "ids ego, ego must differ"),
-        ('speed = "max"\n[[vehicles]]\nid = "v"\nlive = true', "knows no --speed max"),
-        ('[[vehicles]]\nid = "v"\nrole = "wheel"', "Invalid enum value 'wheel'"),
-        ("[follow]\njerk_mps3 = -1.0", "follow: jerk_mps3 -1.0: above 0"),
-        ("[follow]\njerk_mps3 = 100.0", "follow: jerk_mps3 100.0: at most 60 times"),
-        ('correction = "hard"', "Invalid enum value 'hard'"),
-    ],
-)
-def test_settings_that_cannot_be_used_are_told_in_one_line(
-    tmp_path: Path, text: str, told: str
-) -> None:
-    file = tmp_path / "drive.toml"
-    file.write_text(text + "\n")
-    with pytest.raises(ConfigError) as refused:
-        load_config(file, {})
-    assert told in str(refused.value)
-    assert "\n" not in str(refused.value)
-
-
-def test_a_log_beside_that_is_not_there_is_told_before_anything_begins(tmp_path: Path) -> None:
-    config = DriveConfig(
-        vehicles=(VehicleBeside(id="van", log=str(tmp_path / "no.mcap")),), out=str(tmp_path)
-    )
-    with pytest.raises(FileNotFoundError, match=r"no\.mcap of van: no such file or folder"):
-        read_inputs(config.validate())

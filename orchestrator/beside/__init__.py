@@ -1,0 +1,1 @@
+"""Vehicles beside the car: where their telemetry comes from, and what becomes of it."""

@@ -1,0 +1,170 @@
+"""What metrics ask of each road user at each instant, compiled: see `sim_worker.compiled`.
+
+Fifty thousand pairs take longer through dozens of numpy calls than through a loop that leaves each
+as soon as nothing can come of it. Shapes are (S, N, R): futures, instants, road users.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from contracts.arrays import Array
+from sim_worker.compiled import REAL, WHOLE, given, kernel, types
+
+_ALL, _SIZES, _ROWS, _LINE = given(3, "C"), given(3), given(2), given(1)
+_PICKED, _OUT_ROWS = types.Array(WHOLE, 1, "A", readonly=True), REAL[:, ::1]
+NEVER_ZERO = 1e-300
+"""Added to speeds before division: standing still becomes a very long time."""
+Indices = npt.NDArray[np.intp]
+
+
+@kernel(types.void, types.UniTuple(_ALL, 6), _SIZES, _SIZES, REAL, REAL, _OUT_ROWS)
+def least_until_touch(
+    relative: tuple[Array, ...], half_length_m: Array, half_width_m: Array,
+    length: float, width: float, least_s: Array,
+) -> None:  # fmt: skip
+    """Lower `least_s` (S, N) to the seconds until anybody is touched, by the formulas of `meeting`.
+
+    `relative` holds (S, N, R) each: ahead, left, cos, sin, and the speeds ahead and left. Half
+    sizes (S, 1, R) are the road users'; `length` and `width` are half of the ego's.
+    """
+    ahead_m, left_m, cos, sin, ahead_mps, left_mps = relative
+    futures, instants, users = ahead_m.shape
+    own_reach = math.hypot(length, width)
+    for future in range(futures):
+        for user in range(users):
+            other_length = half_length_m[future, 0, user]
+            other_width = half_width_m[future, 0, user]
+            reach = math.hypot(other_length, other_width) + own_reach
+            square = reach * reach
+            for instant in range(instants):
+                x, y = ahead_m[future, instant, user], left_m[future, instant, user]
+                vx, vy = ahead_mps[future, instant, user], left_mps[future, instant, user]
+                # Circles around the boxes touch now or, with these velocities, later.
+                past = x * vy - y * vx
+                closing = x * vx + y * vy < 0.0 and past * past <= (vx * vx + vy * vy) * square
+                if not closing and not x * x + y * y <= square:
+                    continue
+                c, s = cos[future, instant, user], sin[future, instant, user]
+                along, across = abs(c), abs(s)
+                first, last = -math.inf, math.inf
+                for away, speed, both in (
+                    (x, vx, along * other_length + across * other_width + length),
+                    (y, vy, across * other_length + along * other_width + width),
+                    (
+                        c * x + s * y,
+                        c * vx + s * vy,
+                        along * length + across * width + other_length,
+                    ),
+                    (c * y - s * x, c * vy - s * vx, across * length + along * width + other_width),
+                ):
+                    per_speed = 1.0 / (speed + NEVER_ZERO)
+                    half = abs(per_speed) * both
+                    first = max(first, -(per_speed * away) - half)
+                    last = min(last, half - per_speed * away)
+                until = max(first, 0.0)
+                if until <= last and until < least_s[future, instant]:
+                    least_s[future, instant] = until
+
+
+@kernel(
+    WHOLE, types.UniTuple(_ALL, 5), _SIZES, _SIZES, _ROWS, types.UniTuple(REAL, 5),
+    WHOLE[::1], _OUT_ROWS,
+)  # fmt: skip
+def find_leaders(
+    relative: tuple[Array, ...], half_length_m: Array, half_width_m: Array, curvature_pm: Array,
+    limits: tuple[float, ...], pair: Indices, found: Array,
+) -> int:  # fmt: skip
+    """Return how many (K) are ahead on the ego's course, as `following.leaders` defines it.
+
+    `relative` holds (S, N, R) each: ahead, left, cos, sin and speed; half sizes (S, 1, R);
+    `curvature_pm` (S, N). The first K of `pair` are filled with their flat indices, and the
+    first K columns of `found` (5, …) with gap, left, reach, and cosine and sine against the course.
+    """
+    ahead_m, left_m, cos, sin, speed_mps = relative
+    centre_ahead, length, width, along_cos, stands_mps = limits
+    futures, instants, users = ahead_m.shape
+    front, count = centre_ahead + length, 0
+    for future in range(futures):
+        for instant in range(instants):
+            kappa = curvature_pm[future, instant]
+            for user in range(users):
+                ahead, y = ahead_m[future, instant, user], left_m[future, instant, user]
+                inward = 1.0 - kappa * y
+                if not (ahead > 0.0 and inward > 0.0):
+                    continue
+                a, b = half_length_m[future, 0, user], half_width_m[future, 0, user]
+                x = ahead + centre_ahead
+                across = kappa * x
+                radius = math.sqrt(across * across + inward * inward)
+                left = (2.0 * y - kappa * (x * x + y * y)) / (1.0 + radius)
+                if not abs(left) < width + a + b:
+                    continue
+                c, s = cos[future, instant, user], sin[future, instant, user]
+                turned_cos = (c * inward + s * across) / radius
+                turned_sin = (s * inward - c * across) / radius
+                reach = width + a * abs(turned_sin) + b * abs(turned_cos)
+                if not abs(left) < reach:
+                    continue
+                if (
+                    turned_cos < along_cos
+                    and not abs(speed_mps[future, instant, user]) < stands_mps
+                ):
+                    continue
+                along = x if abs(kappa) < 1e-6 else math.atan2(across, inward) / kappa
+                if not along > front:
+                    continue
+                gap = along - front - a * abs(turned_cos) - b * abs(turned_sin)
+                pair[count] = (future * instants + instant) * users + user
+                found[0, count], found[1, count], found[2, count] = max(gap, 0.0), left, reach
+                found[3, count], found[4, count] = turned_cos, turned_sin
+                count += 1
+    return count
+
+
+@kernel(
+    types.void, types.UniTuple(given(3), 3), _LINE, _LINE, _PICKED, _PICKED, _PICKED, _ROWS,
+    _ROWS, _LINE, _LINE, _OUT_ROWS,
+)  # fmt: skip
+def stays_on_strips(
+    poses: tuple[Array, ...], half_length_m: Array, half_width_m: Array,
+    future: Indices, user: Indices, step: Indices,
+    point_m: Array, way: Array, strip_half_m: Array, time_s: Array, found: Array,
+) -> None:  # fmt: skip
+    """Fill `found` (2, K): when boxes come onto and leave strips through points along `way` (K, 2).
+
+    `poses` are x, y, yaw (S, N, R), of which box k has `future[k]`, `user[k]`; `strip_half_m` (K,)
+    half widths of strips. Only the stay that includes the instant after `step` (K,) counts; a box
+    that is on the strip at the first instant came at that time, one that is at the last never
+    leaves. Between instants, what a corner lies off the strip changes evenly.
+    """
+    x, y, yaw = poses
+    last = len(time_s) - 1
+    for k in range(len(step)):
+        who, other = future[k], user[k]
+        normal_x, normal_y = -way[k, 1], way[k, 0]
+        found[0, k], found[1, k] = time_s[0], math.inf
+        for end in range(2):
+            # From within outwards: back in time to where the stay began, then on to its end.
+            outward = 2 * end - 1
+            within = at = step[k] + 1 - end
+            inside_aside = inside_reach = 0.0
+            while 0 <= at <= last:
+                aside = (x[who, at, other] - point_m[k, 0]) * normal_x
+                aside += (y[who, at, other] - point_m[k, 1]) * normal_y
+                cos, sin = math.cos(yaw[who, at, other]), math.sin(yaw[who, at, other])
+                reach = strip_half_m[k] + half_length_m[k] * abs(cos * normal_x + sin * normal_y)
+                reach += half_width_m[k] * abs(cos * normal_y - sin * normal_x)
+                if at != within and abs(aside) >= reach:
+                    side = math.copysign(1.0, aside)
+                    outside = side * aside - reach
+                    fall = outside - (side * inside_aside - inside_reach)
+                    share = outside / fall if fall > 0.0 else 0.0
+                    begin, end_s = time_s[at], time_s[at - outward]
+                    found[end, k] = begin + share * (end_s - begin)
+                    break
+                inside_aside, inside_reach = aside, reach
+                at += outward
