@@ -35,7 +35,7 @@ class Qos(NamedTuple):
     express: bool
 
 
-LIVE = Qos("interactive_high", block=False, express=True)
+LIVE = Qos("interactive_high", block=False, express=False)
 RESULT = Qos("data_high", block=False, express=False)
 WATCH = Qos("data", block=False, express=False)
 REQUEST = Qos("interactive_high", block=True, express=True)

@@ -66,7 +66,10 @@ def drive(
     vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
     tuning: Annotated[
         str | None,
-        typer.Option(help="parameters from the driving: off, report, apply [default: report]"),
+        typer.Option(
+            help="parameters from the driving: off, report, apply [default: report; off where "
+            "there are fewer processors than workers]"
+        ),
     ] = None,
     map_aiding: Annotated[
         str | None, typer.Option(help="roads help to find the car: auto, off [default: auto]")

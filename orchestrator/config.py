@@ -11,9 +11,9 @@ import msgspec
 
 from contracts.errors import UserError
 from contracts.roles import Correction, FollowLimits, Role
+from orchestrator.tuning.choice import Tuning, TuningChoice, choose_tuning, processors
 
 View = Literal["auto", "native", "web", "none"]
-Tuning = Literal["off", "report", "apply"]
 MapAiding = Literal["auto", "off"]
 Source = Literal["auto", "log", "standin", "live"]
 
@@ -93,10 +93,11 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Of the car itself, as the drive begins: all is twin, shadow and ghost at once."""
     correction: Correction = "free"
     """Whether twins are drawn towards reality (follow) as the drive begins; see docs/roles.md."""
-    tuning: Tuning = "report"
+    tuning: Tuning | None = None
     """Whether the driving is asked for the vehicle's parameters and the model's gap, and whether
     what is found counts (apply) or is only told: a simulation that nobody has asked to change
-    stays that of the vehicle file."""
+    stays that of the vehicle file. None is `report` in lock step and where workers have a
+    processor each, else `off`."""
     map_aiding: MapAiding = "auto"
     """Whether the map's roads help to find the car where its positions are rougher than they."""
     follow: FollowLimits = FollowLimits()
@@ -215,6 +216,16 @@ class DriveConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     def lock_step(self) -> bool:
         """Whether no clock runs: every round complete, results a pure function of the input."""
         return self.speed is None
+
+    @property
+    def tuning_choice(self) -> TuningChoice:
+        """What `tuning` means here, and why."""
+        return choose_tuning(
+            self.tuning,
+            lock_step=self.lock_step,
+            workers=self.workers,
+            processors=processors(),
+        )
 
     @property
     def fewest_futures(self) -> int:

@@ -49,6 +49,13 @@ def _cores() -> Finding:
     return Finding("processor", "ok" if count >= 2 else "note", text)
 
 
+def _tuning() -> Finding:
+    from orchestrator.config import DriveConfig
+
+    choice = DriveConfig().tuning_choice
+    return Finding("tuning", "note" if choice.mode == "off" else "ok", choice.text)
+
+
 def _packages() -> Finding:
     names = ("mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "shapely", "pyproj", "pyarrow")
     versions, absent = [], []
@@ -140,5 +147,5 @@ def has_display() -> bool:
 
 
 CHECKS: tuple[Callable[[], Finding], ...] = (
-    _python, _cores, _packages, _bus, _clock, _vulkan, _display, _disk, _data,
+    _python, _cores, _tuning, _packages, _bus, _clock, _vulkan, _display, _disk, _data,
 )  # fmt: skip

@@ -10,7 +10,7 @@ import time
 from types import FrameType
 
 from contracts.bus import Mailbox, Reply, ZenohBus
-from contracts.drive import InfoRequest, VehicleInfo
+from contracts.drive import InfoRequest
 from contracts.keys import alive_key
 from contracts.process import log_to_file
 from contracts.setup import ProcessSetup
@@ -19,11 +19,12 @@ from orchestrator.conductor import Conductor
 from orchestrator.config import DriveConfig
 from orchestrator.in_charge import InCharge
 from orchestrator.instructions import Tell
+from orchestrator.intake import unannounced
 from orchestrator.live_loop import LiveLoop
 from orchestrator.lock_step import LockStepLoop
 from orchestrator.mission import Mission, MissionSettings
 from orchestrator.plan import DrivePlan, make_plan, read_inputs
-from orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids
+from orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
 from orchestrator.progress import ProgressLine
 from orchestrator.record.results import ResultTables
 from orchestrator.record.run_record import reserve_record, run_record, write_record
@@ -122,6 +123,7 @@ class _Drive:
             exit_word, code = "failed", EXIT_FAILED
             with ProgressLine(conductor, self._mission) as line:
                 line.say(f"run {plan.folder}")
+                line.say(plan.config.tuning_choice.text)
                 conductor.events.on_event = line.tell
                 try:
                     exit_word, code = self._go(bus, conductor, line)
@@ -143,6 +145,7 @@ class _Drive:
 
         def housekeeping(now_s: float) -> None:
             self._look_after(conductor, now_s)
+            self._supervisor.let_give_way(conductor.alive, now_s)
             line.update(now_s)
 
         loop: LockStepLoop | LiveLoop
@@ -168,7 +171,8 @@ class _Drive:
         for row in PROCESSES:
             if row.runs(self._plan):
                 for process_id in process_ids(row, self._plan):
-                    self._supervisor.start(row, row.setup(self._plan, process_id))
+                    setup = row.setup(self._plan, process_id)
+                    self._supervisor.start(row_of(row, self._plan), setup)
 
     def _join_processes(self, bus: ZenohBus, conductor: Conductor) -> bool:
         """Wait until every process is there and the vehicle has introduced itself."""
@@ -284,14 +288,3 @@ class _Drive:
 
 def _nothing() -> None:
     """Say nothing towards a vehicle."""
-
-
-def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
-    """Return what is taken for granted of a live car that does not say what it is."""
-    return VehicleInfo(
-        vehicle_id=vehicle_id,
-        time_base="utc",
-        start_stamp_ns=first_stamp_ns,
-        source="live telemetry",
-        reference_point="antenna",
-    )

@@ -194,3 +194,14 @@ def _position_record(state: VehicleState | None) -> dict[str, Any]:
 
 def _tire_angle_rad(wheel_rad: float, vehicle: VehicleParameters) -> float:
     return wheel_rad / vehicle.steering_ratio.value + vehicle.steering_offset_rad.value
+
+
+def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
+    """Return what is taken for granted of a live car that does not say what it is."""
+    return VehicleInfo(
+        vehicle_id=vehicle_id,
+        time_base="utc",
+        start_stamp_ns=first_stamp_ns,
+        source="live telemetry",
+        reference_point="antenna",
+    )

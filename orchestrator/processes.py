@@ -95,7 +95,7 @@ def _tuning(plan: DrivePlan, process_id: str) -> ProcessSetup:
 
 
 def _tunes(plan: DrivePlan) -> bool:
-    return plan.config.tuning != "off"
+    return plan.config.tuning_choice.mode != "off"
 
 
 def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
@@ -198,8 +198,7 @@ PROCESSES: tuple[ProcessRow, ...] = (
         numbered=True,
     ),
     ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
-    # Not started again: it would begin without the driving that it has seen.
-    ProcessRow(TUNING, "sim_worker.tuning_process", _tunes, _one, "report", _tuning, 15),
+    ProcessRow(TUNING, "sim_worker.tuning_process", _tunes, _one, "restart", _tuning, 15),
     ProcessRow("recorder", "telemetry.recorder", _always, _one, "report", _recorder),
     ProcessRow("viewer", "viewer", _always, _one, "report", _viewer, 10),
     ProcessRow(VEHICLE, "telemetry.replay", _source_is("log"), _one, "end_drive", _replay),
@@ -212,6 +211,16 @@ PROCESSES: tuple[ProcessRow, ...] = (
     ),
 )  # fmt: skip
 """In the order in which they are started; the vehicle waits for the orchestrator's token."""
+
+
+def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
+    """Return a row as it counts in one drive.
+
+    In lock step nobody may begin in the middle who answers for all samples from the first one on.
+    """
+    if row.name == TUNING and plan.config.lock_step:
+        return row._replace(when_dead="report")
+    return row
 
 
 def process_ids(row: ProcessRow, plan: DrivePlan) -> tuple[str, ...]:

@@ -9,21 +9,26 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import math
 import os
 import signal
 import subprocess
 import sys
 import time
 from collections import defaultdict, deque
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
 from contracts.setup import ProcessSetup, write_setup
+from orchestrator.priorities import gives_way
 from orchestrator.processes import ProcessRow
 
 log = logging.getLogger("orchestrator")
 
+GIVES_WAY_AFTER_S = 1.0
+"""So long after its death a process may still count as alive."""
 RESTARTS_WITHIN_S = 30.0
 TERM_S = 5.0
 """What a process that was told to leave has for its last words: on a busy machine one that writes a
@@ -108,20 +113,16 @@ class Supervisor:
     restarted: int = 0
     _managed: dict[str, _Managed] = field(default_factory=dict)
     _deaths: dict[str, deque[float]] = field(default_factory=lambda: defaultdict(deque))
+    _to_give_way: dict[str, float] = field(default_factory=dict)
 
     def start(self, row: ProcessRow, setup: ProcessSetup) -> None:
         """Start one process."""
-        child = self._launch(row, setup)
+        child = self.launch(module=row.module, setup=setup)
+        if row.nice:
+            self._to_give_way[setup.process_id] = -math.inf
         log.info("started %s (%s) as process %d", setup.process_id, row.module, child.pid)
         self._managed[setup.process_id] = _Managed(row, setup, child)
         self.started += 1
-
-    def _launch(self, row: ProcessRow, setup: ProcessSetup) -> Child:
-        child = self.launch(module=row.module, setup=setup)
-        if row.nice:
-            with contextlib.suppress(OSError):
-                os.setpriority(os.PRIO_PROCESS, child.pid, row.nice)
-        return child
 
     def poll(self, now_s: float) -> list[Death]:
         """Return the processes that died since the last call, restarted where the table says so."""
@@ -134,13 +135,27 @@ class Supervisor:
                 continue
             again = managed.row.when_dead == "restart" and self._may_restart(process_id, now_s)
             if again:
-                managed.child = self._launch(managed.row, managed.setup)
+                managed.child = self.launch(module=managed.row.module, setup=managed.setup)
+                if managed.row.nice:
+                    self._to_give_way[process_id] = now_s + GIVES_WAY_AFTER_S
                 log.info("started %s again as process %d", process_id, managed.child.pid)
                 self.restarted += 1
             else:
                 managed.gone = True
             deaths.append(Death(process_id, managed.row, exit_code, again))
         return deaths
+
+    def let_give_way(self, alive: Collection[str], now_s: float) -> None:
+        """Let those of the processes `alive` give way that shall; call it as often as `poll`.
+
+        Not before they can take work: at niceness, a start on a busy machine takes minutes.
+        """
+        for process_id, from_s in list(self._to_give_way.items()):
+            managed = self._managed[process_id]
+            if process_id not in alive or now_s < from_s:
+                continue
+            if gives_way(managed.child.pid, managed.row.nice):
+                del self._to_give_way[process_id]
 
     def _may_restart(self, process_id: str, now_s: float) -> bool:
         recent = self._deaths[process_id]
@@ -170,8 +185,11 @@ class Supervisor:
     def stop(self, *, grace_s: float, term_s: float = TERM_S) -> list[str]:
         """Wait `grace_s` for all to end by themselves, then terminate, then kill.
 
-        Returns the ids that had to be killed.
+        Returns the ids that had to be killed. Those who gave way are waited for now.
         """
+        for managed in self._alive():
+            if managed.row.nice:
+                gives_way(managed.child.pid, 0)
         self._wait(grace_s)
         for managed in self._alive():
             _signal(managed.child, signal.SIGTERM)

@@ -138,8 +138,10 @@ class _Planners:
             name, planner, rows = self._groups[0]
             return self._ask(name, planner, rows, view)
         accel, angle = np.zeros(len(view.arc_m)), np.zeros(len(view.arc_m))
+        alone = view._replace(users=None)
         for name, planner, rows in self._groups:
-            accel[rows], angle[rows] = self._ask(name, planner, rows, rows_of(view, rows))
+            shown = view if getattr(planner, "looks_at_users", True) else alone
+            accel[rows], angle[rows] = self._ask(name, planner, rows, rows_of(shown, rows))
         return PlannerOutput(accel, angle)
 
     def _ask(self, name: str, planner: Planner, rows: Rows, view: PlannerView) -> PlannerOutput:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections import Counter
 from typing import Any
 
@@ -13,9 +14,14 @@ from contracts.gap import GapAlarm, GapSample, Verdict
 from contracts.process import ProcessLife, run_process
 from contracts.setup import TuningSetup
 from contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
+from sim_worker.tuning import VehicleWatch
 
 _DEPTH = 16384
 _IDLE_S = 0.2
+_GATHER_S, _AT_ONCE = 0.05, 500
+"""Messages are taken in portions: waking up for each of them costs more than keeping it."""
+_LAST_WORDS_S = 1.0
+"""How long the messages that are already here may take once the run is over."""
 _ASK_EVERY = 2000
 """Samples between two questions to a vehicle that has not said what it is."""
 _UNANNOUNCED_AFTER = 4000
@@ -98,9 +104,6 @@ class TuningWorker:
     def _begin(self, info: VehicleInfo) -> None:
         if self._watch is not None:
             return
-        # Over a second of imports: not before the drive may begin.
-        from sim_worker.tuning import VehicleWatch
-
         self._watch = VehicleWatch(info, self._setup.vehicle, frame=self._setup.drive_frame)
         if self._used is not None:
             self._watch.use(self._used)
@@ -114,6 +117,7 @@ class TuningWorker:
         self._used = message
         if self._watch is not None:
             self._watch.use(message)
+        log.info("parameters %d count", message.version)
         request.reply(message)
 
     def _weigh(self, channel: str, message: Any) -> list[Any]:
@@ -160,11 +164,27 @@ def serve_tuning(setup: TuningSetup, bus: Bus, life: ProcessLife) -> None:
         bus.subscribe(channel, mailbox, vehicle=setup.vehicle_id)
     life.ready()
     while not life.over:
-        item = mailbox.take(_IDLE_S)
-        if item is not None:
-            worker.handle(item)
+        _take(worker, mailbox, _IDLE_S)
+        if not setup.bus.lossless:
+            time.sleep(_GATHER_S)
+    deadline_s = time.monotonic() + _LAST_WORDS_S
+    while time.monotonic() < deadline_s and len(mailbox):
+        _take(worker, mailbox, 0.0, most=1)
     if mailbox.dropped:
         log.warning("tuning fell behind and passed over %d messages", mailbox.dropped)
+
+
+def _take(
+    worker: TuningWorker, mailbox: Mailbox, timeout_s: float, *, most: int = _AT_ONCE
+) -> None:
+    item = mailbox.take(timeout_s)
+    for _ in range(most - 1):
+        if item is None:
+            return
+        worker.handle(item)
+        item = mailbox.take()
+    if item is not None:
+        worker.handle(item)
 
 
 if __name__ == "__main__":

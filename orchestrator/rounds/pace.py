@@ -23,6 +23,8 @@ a worker has to load."""
 CALM_PERIODS, MOST_CALM_PERIODS, LEAST_CALM_ROUNDS = 10, 60, 4
 """So many periods with room to spare, as many more for each fall remembered, and it grows again."""
 CALM_SHARE = 0.9
+COLD_ROUNDS = 2
+"""A drive's first rounds say nothing of the machine: caches are empty, and others still start."""
 REMEMBERED_ROUNDS = 240
 
 
@@ -96,10 +98,13 @@ def next_pace(history: Sequence[RoundTime], paces: Sequence[Pace], *, period_s: 
 
 
 class RoundPace:
-    """The pace of one drive's rounds, between `least` and `most` futures."""
+    """The pace of one drive's rounds, between `least` and `most` futures; the first are cold."""
 
-    def __init__(self, *, most: int, least: int, period_s: float) -> None:
+    def __init__(
+        self, *, most: int, least: int, period_s: float, cold_rounds: int = COLD_ROUNDS
+    ) -> None:
         self._paces = paces_between(most, least)
+        self._cold_rounds = cold_rounds
         self._period_s = period_s
         self._history: deque[RoundTime] = deque(maxlen=REMEMBERED_ROUNDS)
         self.now = self._paces[0]
@@ -111,6 +116,9 @@ class RoundPace:
 
     def take(self, pace: Pace, seconds: float) -> bool:
         """Count a round that is complete or given up; returns whether the pace changes."""
+        if self._cold_rounds:
+            self._cold_rounds -= 1
+            return False
         self._history.append(RoundTime(pace, seconds))
         before = self.now
         self.now = next_pace(list(self._history), self._paces, period_s=self._period_s)

@@ -137,7 +137,7 @@ class TuningLink:
     def record(self) -> dict[str, object]:
         """Return the `tuning` of run.json."""
         return {
-            "mode": self._plan.config.tuning,
+            "mode": self._plan.config.tuning_choice.mode,
             "version": self.parameters.version,
             "changes": self.parameters.rows(),
             "pinned": sorted(self.parameters.in_force.pinned),
@@ -145,7 +145,7 @@ class TuningLink:
         }
 
     def _identified(self, told: Identification) -> None:
-        if self._plan.config.tuning == "apply":
+        if self._plan.config.tuning_choice.mode == "apply":
             self.parameters.apply(told)
 
     def _simulates(self, process_id: str) -> bool:

@@ -14,10 +14,13 @@ import numpy as np
 from contracts.arrays import Array
 from sim_worker.gap.free_run import Flags, FreeRunner, start_states, steering_signals
 from sim_worker.gap.push import BLOCK, PushBlocks, push_blocks
+from sim_worker.gap.run_memory import Rows, RunMemory
 from sim_worker.motion_record import PERIOD_S, MotionRecord
 
 _RUN, _TAIL = round(1.0 / PERIOD_S), 2 * BLOCK
 """A run lasts a second, the end of which is compared: where it began is forgotten by then."""
+_SETTLED = round(0.4 / PERIOD_S)
+"""A run that ended so long ago has all of its samples, from slow and late senders too."""
 _SMOOTH_HALF, _COURSE_HALF, _TURN_HALF = 3, round(0.3 / PERIOD_S), round(0.24 / PERIOD_S)
 MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
 """Above them turning, and acceleration alone, say something."""
@@ -70,10 +73,12 @@ def pairs_of(
     *,
     antenna_ahead_m: float = 0.0,
     precise_positions: bool = True,
+    memory: RunMemory | None = None,
 ) -> Pairs:
     """Lay the signals of some seconds side by side and run the model over them.
 
-    Without precise positions no sensor is compared with them: a telephone's are smoothed and late.
+    `memory` is that of earlier stretches of the same drive with the same runner. Without precise
+    positions no sensor is compared with them: a telephone's are smoothed and late.
     """
     signals = steering_signals(record, runner.vehicle)
     speed, rate = record.speed_mps, record.yaw_rate_radps
@@ -90,7 +95,7 @@ def pairs_of(
     if precise_positions:
         sensors = _sensors(record, antenna_ahead_m)
     course, gyro, ground, wheels = sensors
-    by_measured, by_command, tire, pushes = _runs(record, runner)
+    by_measured, by_command, tire, pushes = _runs(record, runner, memory or RunMemory())
     return Pairs(
         stamp_ns=record.stamp_ns, moves=moves, excited=moves & (turn > _MIN_TURN_RAD),
         course_radps=course, gyro_radps=gyro, ground_mps=ground, wheel_mps=wheels,
@@ -137,7 +142,9 @@ def _sensors(record: MotionRecord, ahead_m: float) -> tuple[Array, Array, Array,
     return turns, gyro, np.where(drives, gone, np.nan), smooth(record.speed_mps, half)
 
 
-def _runs(record: MotionRecord, runner: FreeRunner) -> tuple[Array, Array, Array, PushBlocks]:
+def _runs(
+    record: MotionRecord, runner: FreeRunner, memory: RunMemory
+) -> tuple[Array, Array, Array, PushBlocks]:
     """Return the model's curvature by measured steering and by command, its tyres, and pushes.
 
     Runs overlap so that their ends tile the stretch, back from its own end.
@@ -167,19 +174,27 @@ def _runs(record: MotionRecord, runner: FreeRunner) -> tuple[Array, Array, Array
     led = signals.measured_rad + runner.vehicle.steering_lag_s.value * (
         np.gradient(signals.measured_rad) / PERIOD_S
     )
-    zero = np.zeros(len(at))
-    begin = start_states(
-        runner.vehicle, x_m=zero, y_m=zero, yaw_rad=zero, speed_mps=eased[at],
-        yaw_rate_radps=rate[at], accel_mps2=(np.gradient(eased) / PERIOD_S)[at],
-        tire_rad=np.full(len(at), np.nan),
-    )  # fmt: skip
+    slope, nothing = np.gradient(eased) / PERIOD_S, np.full(count, np.nan)
     # One batch for both kinds: the stretch as commanded, then as measured with its speed held.
     held = np.arange(len(at)) < len(measured)
-    states = runner.run(
-        states=begin, starts=np.where(held, at + count, at), steps=_RUN,
-        accel_mps2=np.concatenate([accel, accel]),
-        tire_rad=np.concatenate([signals.commanded_rad, led]),
-        hold_speed_mps=np.concatenate([np.full(count, np.nan), eased]), delayed=~held,
+
+    def run(rows: Rows) -> Array:
+        begun, zero = at[rows], np.zeros(len(rows))
+        begin = start_states(
+            runner.vehicle, x_m=zero, y_m=zero, yaw_rad=zero, speed_mps=eased[begun],
+            yaw_rate_radps=rate[begun], accel_mps2=slope[begun],
+            tire_rad=np.full(len(rows), np.nan),
+        )  # fmt: skip
+        return runner.run(
+            states=begin, starts=np.where(held[rows], begun + count, begun), steps=_RUN,
+            accel_mps2=np.concatenate([accel, accel]),
+            tire_rad=np.concatenate([signals.commanded_rad, led]),
+            hold_speed_mps=np.concatenate([nothing, eased]), delayed=~held[rows],
+        )  # fmt: skip
+
+    states = memory.states(
+        stamp_ns=record.stamp_ns[at], held=held, settled=at + _RUN + _SETTLED < count,
+        from_stamp_ns=int(record.stamp_ns[0]), run=run,
     )  # fmt: skip
     tail = np.arange(_RUN - _TAIL + 1, _RUN + 1)
     curvature = states[:, tail, 5] / np.maximum(states[:, tail, 3], 1.0)

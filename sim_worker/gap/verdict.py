@@ -20,12 +20,15 @@ from sim_worker.gap.findings import findings_of
 from sim_worker.gap.free_run import FreeRunner
 from sim_worker.gap.pairs import Pairs, pairs_of
 from sim_worker.gap.push import PushTest
+from sim_worker.gap.run_memory import RunMemory
 from sim_worker.motion_record import MotionRecord, MotionRecorder
 
 WINDOW_S, RECENT_S, EVERY_S = 6.0, 3.0, 0.2
 _EVERY_NS = round(EVERY_S * 1e9)
 _LATEST_S = 0.1
 """Samples of slower channels may still be on their way."""
+_AT_ONCE = 4
+"""So many runs are new in each stretch."""
 _IN_A_ROW = 2
 _DENSE_S, _PRECISE_M = 0.25, 0.15
 """Positions this near to each other and this good may accuse another sensor."""
@@ -45,7 +48,7 @@ class Judge:
         self._vehicle_id = info.vehicle_id
         self._ahead_m = 0.0 if lever is None else lever[0]
         self._recorder = MotionRecorder(frame=frame, keep_s=WINDOW_S + 4.0, depth=4000)
-        self._runner = FreeRunner(vehicle)
+        self._runner, self._runs = FreeRunner(vehicle, batch=_AT_ONCE), RunMemory()
         self._first_ns: int | None = None
         self._done = 0
         self._push = PushTest()
@@ -62,7 +65,7 @@ class Judge:
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Judge a model of other parameters from now on; what was about to be said is forgotten."""
-        self._runner = FreeRunner(vehicle)
+        self._runner, self._runs = FreeRunner(vehicle, batch=_AT_ONCE), RunMemory()
         self._push = PushTest()
         self._pending = None
 
@@ -92,8 +95,9 @@ class Judge:
             return None
         record = without_manual_commands(self._recorder.record(from_ns, to_ns))
         pairs = pairs_of(
-            record, self._runner, antenna_ahead_m=self._ahead_m, precise_positions=self._precise()
-        )
+            record, self._runner, antenna_ahead_m=self._ahead_m,
+            precise_positions=self._precise(), memory=self._runs,
+        )  # fmt: skip
         self.latest = consistency_of(pairs)
         pushed = self._push.handle(pairs.pushes)
         found = _found_in(pairs, self.latest)

@@ -9,10 +9,10 @@ left is noise of the measured speed: over 6 s it averages out as white noise doe
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from contracts.arrays import Array
 from contracts.vehicle import VehicleParameters
@@ -50,7 +50,9 @@ def _first_order(values: Array, *, period_s: float, lag_s: float) -> Array:
     if lag_s <= 0.0:
         return values
     decay = float(np.exp(-period_s / lag_s))
-    filtered = signal.lfilter([1.0 - decay], [1.0, -decay], np.nan_to_num(values))
+    # scipy.signal has this, and takes a second to import.
+    steps = ((1.0 - decay) * np.nan_to_num(values)).tolist()
+    filtered = np.array(list(accumulate(steps, lambda before, step: step + decay * before)))
     return np.where(np.isfinite(values), filtered, np.nan)
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from contracts.arrays import Array
 
@@ -113,7 +113,7 @@ def fit_linear(
     return Fit(
         values=values * scale,
         covariance=np.asarray(spread * scale[:, None] * scale),
-        quantile=np.asarray(stats.t.ppf(0.975, freedom)),
+        quantile=np.asarray(special.stdtrit(freedom, 0.975)),
         residuals=np.asarray(residuals),
     )
 

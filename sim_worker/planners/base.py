@@ -98,7 +98,8 @@ class PlannerOutput(NamedTuple):
 class Planner(Protocol):
     """A planner holds no state between ticks: its answer is a function of the view alone.
 
-    One whose class says `drives_backwards = True` has its cars driven in reverse.
+    One whose class says `drives_backwards = True` has its cars driven in reverse; one that says
+    `looks_at_users = False` is shown no `users`, whose rows would be cut out in vain.
     """
 
     def plan(self, view: PlannerView) -> PlannerOutput:

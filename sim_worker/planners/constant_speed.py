@@ -15,6 +15,8 @@ _LIMIT_MPS2 = 2.0
 class ConstantSpeed:
     """Reaches its target speed, then keeps it through curves and into other road users."""
 
+    looks_at_users = False
+
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick."""
         speed = view.states[:, 3]

@@ -61,6 +61,8 @@ class _Wishes(NamedTuple):
 class PurePursuitIdm:
     """Keeps its lane, slows for curves, follows what is ahead, stops at lights, and holds there."""
 
+    looks_at_users = False
+
     def __init__(self) -> None:
         self._wished: _Wishes | None = None
 

@@ -9,11 +9,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace as Namespace
 
 import pytest
 
 from contracts.setup import BusSetup, ProcessSetup
-from orchestrator.processes import PROCESSES, ProcessRow
+from orchestrator.processes import PROCESSES, ProcessRow, row_of
 from orchestrator.supervisor import MAX_RESTARTS, FreshInterpreter, Supervisor, fold_stderr
 from tests.contracts.bus_sides import DEADLINE_S
 
@@ -75,14 +76,27 @@ def test_a_dead_worker_is_started_again_and_a_dead_viewer_reported() -> None:
 def test_who_writes_for_later_gives_way() -> None:
     nice = {r.name: r.nice for r in PROCESSES}
     assert nice["w"] == nice["recorder"] == nice["vehicle"] == 0
-    assert nice["viewer"] > 0
+    assert 0 < nice["viewer"] < nice["tuning"]
     child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     try:
         supervisor = Supervisor(lambda *, module, setup: child)
         supervisor.start(row("viewer"), setup("viewer"))
+        supervisor.let_give_way({"w0"}, 0.0)
+        before = os.getpriority(os.PRIO_PROCESS, child.pid)
+        assert before == os.getpriority(os.PRIO_PROCESS, 0), "it is still waited for"
+        supervisor.let_give_way({"w0", "viewer"}, 0.1)
         assert os.getpriority(os.PRIO_PROCESS, child.pid) >= nice["viewer"]
     finally:
         child.communicate(b"\n")
+
+
+def test_who_watches_the_vehicle_is_started_again_but_not_in_lock_step() -> None:
+    tuning = row("tuning")
+    live, stepped = (Namespace(config=Namespace(lock_step=step)) for step in (False, True))
+    assert row_of(tuning, live).when_dead == "restart"  # type: ignore[arg-type]
+    assert row_of(tuning, stepped).when_dead == "report"  # type: ignore[arg-type]
+    others = [one for one in PROCESSES if one.name != "tuning"]
+    assert [row_of(one, stepped) for one in others] == others  # type: ignore[arg-type]
 
 
 def test_a_worker_that_keeps_dying_is_given_up() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 from mcap.reader import make_reader
 
+from orchestrator.cli import run as command
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
     child_pids,
@@ -26,6 +27,10 @@ LIVE = ("--futures", "12", "--least-futures", "12", "--rate", "2")
 
 def says(run: Path, text: str) -> bool:
     return any(text in line["text"] for line in log_lines(run))
+
+
+def said_by(run: Path, process_id: str, text: str) -> int:
+    return sum(line["process"] == process_id and line["text"] == text for line in log_lines(run))
 
 
 def when(run: Path, text: str) -> float:
@@ -73,6 +78,23 @@ def test_a_killed_worker_is_replaced_and_no_result_counts_twice(tmp_path: Path) 
     seen = [(row["round_id"], row["variant"]) for row in rows]
     assert len(seen) == len(set(seen)) > 0
     assert_readable(run)
+    assert_nothing_left(run)
+
+
+def test_a_killed_watcher_is_started_again_with_the_parameters_that_count(tmp_path: Path) -> None:
+    out = tmp_path / "runs"
+    with started(out, *LIVE, "--tuning", "report") as process:
+        run = under_way(out)
+        assert command(["set", "vehicle.mass_kg=1300", "--out", str(out)]) == 0
+        told = "parameters 1 count"
+        wait_for(lambda: said_by(run, "tuning", told) == 1, "the watcher being told")
+        os.kill(child_pids(run)["tuning"], signal.SIGKILL)
+        wait_for(lambda: says(run, "tuning ended with code -9; started again"), "the death seen")
+        wait_for(lambda: said_by(run, "tuning", told) == 2, "the new one being told")
+        process.send_signal(signal.SIGINT)
+        screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
+    assert process.returncode == 130, screen
+    assert "warning: orchestrator: tuning ended with code -9; started again" in screen
     assert_nothing_left(run)
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from orchestrator.rounds.pace import (
     CALM_PERIODS,
+    COLD_ROUNDS,
     LATE_ROUNDS,
     Pace,
     RoundPace,
@@ -28,9 +29,9 @@ Load = Callable[[int, int], float]
 """Seconds of round k with n futures."""
 
 
-def drive(load: Load, rounds: int, *, least: int = 16) -> list[Pace]:
-    """Paces of the rounds of a drive."""
-    pace = RoundPace(most=64, least=least, period_s=PERIOD_S)
+def drive(load: Load, rounds: int, *, least: int = 16, cold_rounds: int = 0) -> list[Pace]:
+    """Paces of the rounds of a drive, by default of one that has begun before them."""
+    pace = RoundPace(most=64, least=least, period_s=PERIOD_S, cold_rounds=cold_rounds)
     paces = []
     for number in range(rounds):
         paces.append(pace.now)
@@ -73,6 +74,16 @@ def test_where_the_least_futures_are_too_many_rounds_become_rare() -> None:
     assert paces == [ALL] * 2 + [QUARTER] * 2 + [SECOND] * 96
 
 
+def test_the_first_rounds_do_not_say_how_fast_the_machine_is() -> None:
+    def cold(number: int, n: int) -> float:
+        return 9.0 if number < COLD_ROUNDS else 0.004 * n
+
+    assert drive(cold, 100, cold_rounds=COLD_ROUNDS) == [ALL] * 100
+    assert drive(cold, 3) == [ALL] * 2 + [FOURTH]
+    slow = drive(lambda _, n: 0.0125 * n, 100, cold_rounds=COLD_ROUNDS)
+    assert slow == [ALL] * (COLD_ROUNDS + 2) + [HALF] * (98 - COLD_ROUNDS)
+
+
 def test_one_late_round_alone_changes_nothing() -> None:
     assert drive(lambda number, _: 2.0 if number % 5 == 3 else 0.1, 100) == [ALL] * 100
 
@@ -95,7 +106,7 @@ def test_with_room_to_spare_all_are_run_again_and_every_fall_makes_it_wait_longe
 
 
 def test_a_round_that_was_given_up_counts_as_endless() -> None:
-    pace = RoundPace(most=64, least=16, period_s=PERIOD_S)
+    pace = RoundPace(most=64, least=16, period_s=PERIOD_S, cold_rounds=0)
 
     assert not pace.take(ALL, math.inf)
     assert pace.take(ALL, math.inf)

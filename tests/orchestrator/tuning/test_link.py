@@ -133,6 +133,41 @@ def test_a_process_that_dies_holds_up_nothing(house: House) -> None:
     assert len(watcher) == 1
 
 
+def test_in_lock_step_rounds_wait_for_the_watcher_too(tmp_path: Path) -> None:
+    house = House(tmp_path, tuning="report", speed=None)
+    house.bus.declare_alive(alive_key(run=house.plan.run_id, process="tuning"))
+    questions = [asked(house, name) for name in ("tuning", *(w.process_id for w in house.workers))]
+    house.drive(20)
+    set_mass(house)
+    house.conductor.make_changes()
+    for mailbox in questions[1:]:
+        answer(mailbox)
+    house.settle()
+    assert not house.conductor.tuning.parameters.settled
+    answer(questions[0])
+    house.settle()
+    assert house.conductor.tuning.parameters.settled
+    house.tables.close()
+
+
+def test_a_watcher_that_is_started_again_is_told_what_counts(house: House) -> None:
+    alive = alive_key(run=house.plan.run_id, process="tuning")
+    house.bus.declare_alive(alive)
+    watcher = asked(house, "tuning")
+    house.drive(20)
+    set_mass(house)
+    house.conductor.make_changes()
+    assert answer(watcher).version == 1
+    house.bus.lose(alive)
+    house.settle()
+    house.bus.declare_alive(alive)
+    house.settle()
+    again: UseVehicle = answer(watcher)
+    assert (again.version, again.vehicle.mass_kg.value) == (1, 1300.0)
+    assert [(one.name, one.origin) for one in again.changes] == [("mass_kg", "set")]
+    assert again.pinned == ("mass_kg",)
+
+
 def test_live_no_round_waits_for_who_only_watches(house: House) -> None:
     house.bus.declare_alive(alive_key(run=house.plan.run_id, process="tuning"))
     watcher = asked(house, "tuning")
