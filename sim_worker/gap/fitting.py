@@ -72,31 +72,27 @@ def follower(
     count = len(x) - most
     if count < 3:
         return None
-    # The same instants for each delay, else the longest would win by having fewest.
+    # The same instants for each delay, else one would win by meeting the fewest, across gaps too.
     done = y[most:]
     late = np.lib.stride_tricks.sliding_window_view(x, count)[::-1]
-    known = np.isfinite(late) & np.isfinite(done)
-    seen = known.sum(axis=1)
-    shift = int(np.argmin(_residuals(np.where(known, late, 0.0), np.where(known, done, 0.0), seen)))
-    known, asked = known[shift], late[shift]
-    seconds = float(seen[shift]) * PERIOD_S
-    line = line_through(asked[known], done[known], independent=seconds / together_s)
+    known = np.isfinite(late).all(axis=0) & np.isfinite(done)
+    if not known.any():
+        return None
+    late, done = late[:, known], done[known]
+    shift = int(np.argmin(_residuals(late, done)))
+    line = line_through(late[shift], done, independent=len(done) * PERIOD_S / together_s)
     if line is None:
         return None
-    return Follower(line, shift * PERIOD_S, _plateau(asked[known], done[known], line))
+    return Follower(line, shift * PERIOD_S, _plateau(late[shift], done, line))
 
 
-def _residuals(x: Array, y: Array, count: Array) -> Array:
-    """Return the mean square (S,) that a line leaves of y in each row (S, N), 0 where unknown."""
-    n = np.maximum(count, 1.0)
-    mean_x, mean_y = x.sum(axis=1) / n, y.sum(axis=1) / n
-    xx = np.einsum("ij,ij->i", x, x) / n - mean_x**2
-    xy = np.einsum("ij,ij->i", x, y) / n - mean_x * mean_y
-    yy = np.einsum("ij,ij->i", y, y) / n - mean_y**2
-    left = yy - np.where(xx > 1e-18, xy**2 / np.maximum(xx, 1e-18), 0.0)
-    return np.asarray(
-        np.where((count >= 3) & (xx > 1e-18), left * n / np.maximum(n - 2, 1), np.inf)
-    )
+def _residuals(x: Array, y: Array) -> Array:
+    """Return the mean square (S,) that a line through each row of x (S, N) leaves of y (N,)."""
+    x = x - x.mean(axis=1)[:, None]
+    y = y - y.mean()
+    xx, xy = np.einsum("ij,ij->i", x, x), x @ y
+    left = y @ y - np.where(xx > 1e-18, xy**2 / np.maximum(xx, 1e-18), 0.0)
+    return np.asarray(np.where(xx > 1e-18, left, np.inf))
 
 
 def _plateau(x: Array, y: Array, line: Line) -> float:

@@ -60,6 +60,13 @@ class Pairs(NamedTuple):
     model_tire_rad: Array
     pushes: PushBlocks
 
+    @property
+    def broken(self) -> bool:
+        """Whether steering is lost somewhere since it was first known, the car not standing."""
+        known = np.isfinite(self.asked_rad) & np.isfinite(self.done_rad)
+        lost = ~known & ~(self.speed_mps < MOVES_MPS)
+        return bool(lost[int(np.argmax(known)) :].any()) if known.any() else False
+
     def latest(self, seconds: float) -> Pairs:
         """Return the signals of the latest seconds, with all of the pushes."""
         kept = slice(max(0, len(self.stamp_ns) - round(seconds / PERIOD_S)), None)

@@ -60,8 +60,8 @@ class _Kind(NamedTuple):
 
 _LEFT_OPEN = {"drag": 0.1, "rolling": 0.1, "drive_gain": 0.1, "brake_gain": 0.1}
 """Standard deviations of what parameters of the right car leave open beside a cause."""
-_CLEARLY = 9.0
-"""Sum of squares, in deviations, that a cause must explain beyond all others."""
+_CLEARLY = 6.63
+"""Squared deviations that a cause must explain beyond all others: 1 in 100 does by chance."""
 _PUSH = {
     "drive_gain": "drive", "saturated_drive": "drive", "brake_gain": "brake",
     "saturated_brake": "brake", "drag": "drag",

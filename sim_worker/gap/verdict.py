@@ -104,7 +104,8 @@ class Judge:
         if found is None:
             # A departure that has just begun is a small part of the whole stretch.
             recent = pairs.latest(RECENT_S)
-            found = _found_in(recent, consistency_of(recent))
+            if not recent.broken:
+                found = _found_in(recent, consistency_of(recent))
         return self._weigh(pushed if found is None else (found,), to_ns)
 
     def _precise(self) -> bool:

@@ -105,5 +105,17 @@ def test_where_the_car_stops_as_the_model_does_neither_is_limited_wrongly() -> N
     assert np.isnan(seen.model_stops_at_rad)
 
 
+def test_a_stretch_is_broken_where_steering_was_lost_but_not_where_the_car_stood() -> None:
+    pairs = turning(real_pm=TYRES_RAD, model_pm=TYRES_RAD)
+    lost = np.where((TIME_S > 3.0) & (TIME_S < 3.3), np.nan, TYRES_RAD)
+    at_the_end = np.where(TIME_S > 5.7, np.nan, TYRES_RAD)
+    stood = pairs.speed_mps * np.isfinite(lost)
+    assert not pairs.broken
+    assert pairs._replace(asked_rad=lost).broken
+    assert pairs._replace(asked_rad=at_the_end).broken
+    assert not pairs._replace(asked_rad=lost, speed_mps=stood).broken
+    assert not pairs._replace(asked_rad=np.full(len(TIME_S), np.nan)).broken
+
+
 def _found(pairs: Pairs) -> Finding | None:
     return findings_of(consistency_of(pairs))
