@@ -42,8 +42,9 @@ END_GRACE_S, LOCK_STEP_GRACE_S = 10.0, 120.0
 LAST_WORDS_S = 0.1
 """How long nothing may come from processes that have ended before all is taken for heard."""
 INTERRUPT_GRACE_S = 1.2
-HUNG_AFTER_S = 1.0
-"""A process whose token is gone for so long while it runs (a stopped one, say) is killed."""
+HUNG_AFTER_S, GIVES_WAY_HUNG_AFTER_S = 1.0, 30.0
+"""A process whose token is gone for so long while it runs (a stopped one, say) is killed; one that
+gives way may have to wait for a processor that long."""
 
 EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -245,7 +246,8 @@ class _Drive:
             elif process_id in self._seen_alive:
                 since_s = self._silent_since_s.setdefault(process_id, now_s)
                 row = self._supervisor.row(process_id)
-                if row.when_dead == "restart" and now_s - since_s > HUNG_AFTER_S:
+                patience_s = GIVES_WAY_HUNG_AFTER_S if row.nice else HUNG_AFTER_S
+                if row.when_dead == "restart" and now_s - since_s > patience_s:
                     log.warning("%s hangs: killed", process_id)
                     self._supervisor.kill(process_id)
                     self._seen_alive.discard(process_id)

@@ -198,7 +198,7 @@ PROCESSES: tuple[ProcessRow, ...] = (
         numbered=True,
     ),
     ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
-    ProcessRow(TUNING, "sim_worker.tuning_process", _tunes, _one, "restart", _tuning, 15),
+    ProcessRow(TUNING, "sim_worker.tuning_process", _tunes, _one, "restart", _tuning, 10),
     ProcessRow("recorder", "telemetry.recorder", _always, _one, "report", _recorder),
     ProcessRow("viewer", "viewer", _always, _one, "report", _viewer, 10),
     ProcessRow(VEHICLE, "telemetry.replay", _source_is("log"), _one, "end_drive", _replay),
