@@ -38,6 +38,7 @@ def draw_estimates(told: Identification, file: Path) -> None:
         axes.set_yticks([])
         axes.set_title(found.name, fontsize=9)
         axes.tick_params(labelsize=8)
+        axes.locator_params(axis="x", nbins=4)
     figure.suptitle("estimates with 95 % intervals (grey: not taken), x the value in force")
     figure.savefig(file, dpi=110)
 
