@@ -84,20 +84,25 @@ def with_stop_sign() -> str:
     )
 
 
-@pytest.mark.judge
-def test_a_forgotten_stop_sign_changes_the_verdict_of_a_recorded_drive(tmp_path: Path) -> None:
+def recorded(out: Path) -> Path:
+    """Drive past the first junction, and return the run."""
     driven = foretwin(
-        tmp_path / "runs", "--speed", "max", "--futures", "16", "--rate", "1", "--end", "22",
-        "--workers", "1",
-    )  # fmt: skip
+        out, "--speed", "max", "--futures", "16", "--rate", "1", "--end", "22", "--workers", "1"
+    )
     assert driven.code == 0, driven.screen
     assert driven.run is not None
+    return driven.run
+
+
+@pytest.mark.judge
+def test_a_forgotten_stop_sign_changes_the_verdict_of_a_recorded_drive(tmp_path: Path) -> None:
+    run = recorded(tmp_path / "runs")
     corrected = tmp_path / "corrected.osm"
     corrected.write_text(with_stop_sign(), encoding="utf-8")
     answers = []
     for options in (("--map", str(corrected)), ()):
         done = subprocess.run(
-            [sys.executable, "-m", "orchestrator", "judge", str(driven.run), "--json", *options],
+            [sys.executable, "-m", "orchestrator", "judge", str(run), "--json", *options],
             env=environment(tmp_path / "cache"), capture_output=True, text=True, timeout=300,
             check=False,
         )  # fmt: skip
@@ -132,18 +137,13 @@ def with_stop_lines(world: World) -> World:
 @pytest.mark.judge
 @pytest.mark.timeout(900)
 def test_a_world_corrected_by_hand_changes_the_verdict_of_a_recorded_drive(tmp_path: Path) -> None:
-    driven = foretwin(
-        tmp_path / "runs", "--speed", "max", "--futures", "16", "--rate", "1", "--end", "22",
-        "--workers", "1",
-    )  # fmt: skip
-    assert driven.code == 0, driven.screen
-    assert driven.run is not None
+    run = recorded(tmp_path / "runs")
     given = WorldStore(tmp_path / "given")
-    for file in (driven.run / "worlds").glob("*.world"):
+    for file in (run / "worlds").glob("*.world"):
         world = read_message(file, World)
         given.save(with_stop_lines(world) if world.intersection.id == "n4" else world)
     done = subprocess.run(
-        [sys.executable, "-m", "orchestrator", "judge", str(driven.run), "--json",
+        [sys.executable, "-m", "orchestrator", "judge", str(run), "--json",
          "--worlds", str(given.folder)],
         env=environment(tmp_path / "cache"), capture_output=True, text=True, timeout=300,
         check=False,
