@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from contracts.errors import UserError
-from orchestrator.cli_logs import convert, gap, identify, judge
-from orchestrator.cli_options import MapArgument, OutOption, ServiceRoadsOption
-from orchestrator.cli_scenarios import scenarios
-from orchestrator.cli_set import set_value
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.cli_logs import convert, gap, identify, judge
+from foretwin.orchestrator.cli_options import MapArgument, OutOption, ServiceRoadsOption
+from foretwin.orchestrator.cli_scenarios import scenarios
+from foretwin.orchestrator.cli_set import set_value
 
 EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
 PATH_ERRORS = (
@@ -89,8 +89,8 @@ def drive(
     ] = False,
 ) -> None:
     """Drive ahead of a car: worlds for the coming junctions, futures, live comparison."""
-    from orchestrator.config import load_config
-    from orchestrator.drive import drive as run_drive
+    from foretwin.orchestrator.config import load_config
+    from foretwin.orchestrator.drive import drive as run_drive
 
     settings = load_config(
         config,
@@ -116,7 +116,7 @@ def intersections(
     as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
 ) -> None:
     """List the junctions of a map, each one as a driver sees it."""
-    from orchestrator.maps.commands import list_intersections
+    from foretwin.orchestrator.maps.commands import list_intersections
 
     list_intersections(map_file, route=route, as_json=as_json, service_roads=service_roads)
 
@@ -157,7 +157,7 @@ def world(
     ] = False,
 ) -> None:
     """Write Worlds of a map: models, road networks for other simulators, or pictures."""
-    from orchestrator.maps.world_command import WorldRequest, write_worlds
+    from foretwin.orchestrator.maps.world_command import WorldRequest, write_worlds
 
     raise typer.Exit(
         write_worlds(
@@ -182,7 +182,7 @@ def get_map(
     config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
 ) -> None:
     """Fetch the map of a region, or of a route's surroundings, from an Overpass endpoint."""
-    from orchestrator.maps.get import get_map as fetch
+    from foretwin.orchestrator.maps.get import get_map as fetch
 
     fetch(area, out=out, config=config)
 
@@ -195,7 +195,7 @@ def index_map(
     ] = None,
 ) -> None:
     """Read a map of any size into an index on disk, from which places and routes are clipped."""
-    from orchestrator.maps.index_command import index_map_file
+    from foretwin.orchestrator.maps.index_command import index_map_file
 
     index_map_file(map_file, folder=folder)
 
@@ -213,8 +213,8 @@ def sweep(
     as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
 ) -> None:
     """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
-    from orchestrator.sweep.command import SweepRequest
-    from orchestrator.sweep.command import sweep as run_sweep
+    from foretwin.orchestrator.sweep.command import SweepRequest
+    from foretwin.orchestrator.sweep.command import sweep as run_sweep
 
     raise typer.Exit(run_sweep(SweepRequest(spec, out, workers, fresh, as_json)))
 
@@ -230,7 +230,7 @@ def view(
     run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
 ) -> None:
     """Open the recording of a run in the viewer."""
-    from orchestrator.log_commands import open_view
+    from foretwin.orchestrator.log_commands import open_view
 
     raise typer.Exit(open_view(run_folder))
 
@@ -238,7 +238,7 @@ def view(
 @app.command()
 def doctor() -> None:
     """Say what this machine has and what is missing."""
-    from orchestrator.doctor import examine
+    from foretwin.orchestrator.doctor import examine
 
     raise typer.Exit(examine())
 

@@ -22,7 +22,7 @@ def convert(
     ] = None,
 ) -> None:
     """Convert a recorded drive to MCAP, a ROS bag, or CSV."""
-    from orchestrator.log_commands import convert_log
+    from foretwin.orchestrator.log_commands import convert_log
 
     convert_log(source, target, to=to, declaration=declaration)
 
@@ -38,7 +38,7 @@ def identify(
     ] = None,
 ) -> None:
     """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances."""
-    from orchestrator.identify_command import identify_log
+    from foretwin.orchestrator.identify_command import identify_log
 
     raise typer.Exit(identify_log(log, vehicle_file=vehicle, as_json=as_json, out=out))
 
@@ -60,8 +60,8 @@ def judge(
     as_json: Annotated[bool, typer.Option("--json", help="what changes as JSON")] = False,
 ) -> None:
     """Judge a run's recorded drive again with a corrected map, vehicle or Worlds: what changes?"""
-    from orchestrator.judge.command import JudgeRequest
-    from orchestrator.judge.command import judge as judge_run
+    from foretwin.orchestrator.judge.command import JudgeRequest
+    from foretwin.orchestrator.judge.command import judge as judge_run
 
     request = JudgeRequest(
         run=run_folder, map_file=map_file, vehicle=vehicle, worlds=worlds, out=out,
@@ -83,6 +83,6 @@ def gap(
     ] = None,
 ) -> None:
     """Measure how far the model leaves a recorded drive, and say which of the two is wrong."""
-    from orchestrator.gap_command import report_gap
+    from foretwin.orchestrator.gap_command import report_gap
 
     report_gap(recording, vehicle=vehicle, as_json=as_json, out=out, declaration=declaration)

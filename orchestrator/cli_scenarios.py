@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from orchestrator.cli_options import MapArgument, ServiceRoadsOption
+from foretwin.orchestrator.cli_options import MapArgument, ServiceRoadsOption
 
 scenarios = typer.Typer(name="scenarios", help="List, check, place, draw and export scenarios.")
 
@@ -20,7 +20,7 @@ def list_scenarios(
     """List the scenarios that come with foretwin, or check and place scenarios."""
     if context.invoked_subcommand is not None:
         return
-    from orchestrator.scenario_commands import list_scenarios as list_them
+    from foretwin.orchestrator.scenario_commands import list_scenarios as list_them
 
     list_them(as_json=as_json)
 
@@ -30,7 +30,7 @@ def check_scenario(
     file: Annotated[Path, typer.Argument(help="scenario, TOML")],
 ) -> None:
     """Say whether a scenario file is sound, and how many cases it has."""
-    from orchestrator.scenario_commands import check_scenario_file
+    from foretwin.orchestrator.scenario_commands import check_scenario_file
 
     check_scenario_file(file)
 
@@ -47,8 +47,8 @@ def place_scenarios(
     as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
 ) -> None:
     """Say which junctions of a map take which scenarios, and why not elsewhere."""
-    from orchestrator.scenario_commands import PlaceRequest
-    from orchestrator.scenario_commands import place_scenarios as place_them
+    from foretwin.orchestrator.scenario_commands import PlaceRequest
+    from foretwin.orchestrator.scenario_commands import place_scenarios as place_them
 
     request = PlaceRequest(map_file, scenario or (), junction_id, at, service_roads)
     raise typer.Exit(place_them(request, as_json=as_json))
@@ -74,9 +74,9 @@ def export_scenario(
     service_roads: ServiceRoadsOption = False,
 ) -> None:
     """Write one case at one junction as OpenSCENARIO 1.2, with its roads as OpenDRIVE."""
-    from orchestrator.scenario_commands import PlaceRequest
-    from orchestrator.scenario_export import CaseRequest
-    from orchestrator.scenario_export import export_scenario as export
+    from foretwin.orchestrator.scenario_commands import PlaceRequest
+    from foretwin.orchestrator.scenario_export import CaseRequest
+    from foretwin.orchestrator.scenario_export import export_scenario as export
 
     where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
     export(CaseRequest(scenario, where, case, vehicle), out)
@@ -95,9 +95,9 @@ def draw_scenario(
     service_roads: ServiceRoadsOption = False,
 ) -> None:
     """Draw one case at one junction from above: as planned, and as a planner drives it."""
-    from orchestrator.scenario_commands import PlaceRequest
-    from orchestrator.scenario_export import CaseRequest
-    from orchestrator.scenario_export import draw_scenario as draw
+    from foretwin.orchestrator.scenario_commands import PlaceRequest
+    from foretwin.orchestrator.scenario_export import CaseRequest
+    from foretwin.orchestrator.scenario_export import draw_scenario as draw
 
     where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
     draw(CaseRequest(scenario, where, case, vehicle), out, planner=planner)

@@ -24,6 +24,6 @@ def set_value(
     out: Annotated[Path, typer.Option(help="folder of the runs")] = Path("runs"),
 ) -> None:
     """Change a running drive: a vehicle's role, the twins' correction, the car's parameters."""
-    from orchestrator.changes.command import set_in_drive
+    from foretwin.orchestrator.changes.command import set_in_drive
 
     print(set_in_drive(assignment, run=run, out=out))

@@ -8,30 +8,35 @@ from __future__ import annotations
 import logging
 import time
 
-from contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
-from contracts.codec import SchemaMismatch
-from contracts.drive import VehicleInfo
-from contracts.keys import TELEMETRY_CHANNELS, alive_key, process_of_alive_key, vehicle_of_key
-from contracts.simulation import ActiveWorld
-from contracts.world import World
-from orchestrator.beside.vehicles import VehiclesBeside
-from orchestrator.changes.desk import ChangeDesk
-from orchestrator.changes.roles import CorrectionHandler, RoleHandler, RolesInForce
-from orchestrator.events import EventDesk
-from orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
-from orchestrator.intake import Intake
-from orchestrator.judge.human_desk import HumanDesk
-from orchestrator.mirror_desk import MirrorDesk
-from orchestrator.mission import Mission
-from orchestrator.plan import DrivePlan
-from orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
-from orchestrator.questions import Questions
-from orchestrator.record.results import ResultTables
-from orchestrator.rounds.runner import RoundRunner
-from orchestrator.route_desk import RouteDesk
-from orchestrator.tuning.by_hand import VehicleHandler
-from orchestrator.tuning.link import FINDINGS, TuningLink
-from orchestrator.world_desk import WorldDesk
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.keys import (
+    TELEMETRY_CHANNELS,
+    alive_key,
+    process_of_alive_key,
+    vehicle_of_key,
+)
+from foretwin.contracts.simulation import ActiveWorld
+from foretwin.contracts.world import World
+from foretwin.orchestrator.beside.vehicles import VehiclesBeside
+from foretwin.orchestrator.changes.desk import ChangeDesk
+from foretwin.orchestrator.changes.roles import CorrectionHandler, RoleHandler, RolesInForce
+from foretwin.orchestrator.events import EventDesk
+from foretwin.orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
+from foretwin.orchestrator.intake import Intake
+from foretwin.orchestrator.judge.human_desk import HumanDesk
+from foretwin.orchestrator.mirror_desk import MirrorDesk
+from foretwin.orchestrator.mission import Mission
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.processes import BUILDER, MIRROR, ORCHESTRATOR
+from foretwin.orchestrator.questions import Questions
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.rounds.runner import RoundRunner
+from foretwin.orchestrator.route_desk import RouteDesk
+from foretwin.orchestrator.tuning.by_hand import VehicleHandler
+from foretwin.orchestrator.tuning.link import FINDINGS, TuningLink
+from foretwin.orchestrator.world_desk import WorldDesk
 
 log = logging.getLogger(ORCHESTRATOR)
 

@@ -50,7 +50,7 @@ def _cores() -> Finding:
 
 
 def _tuning() -> Finding:
-    from orchestrator.config import DriveConfig
+    from foretwin.orchestrator.config import DriveConfig
 
     choice = DriveConfig().tuning_choice
     return Finding("tuning", "note" if choice.mode == "off" else "ok", choice.text)
@@ -73,10 +73,10 @@ def _bus() -> Finding:
     import contextlib
     import threading
 
-    from contracts.bus import Mailbox, Request, ZenohBus, ask
-    from contracts.drive import InfoRequest, VehicleInfo
-    from contracts.ports import free_endpoint
-    from contracts.setup import BusSetup
+    from foretwin.contracts.bus import Mailbox, Request, ZenohBus, ask
+    from foretwin.contracts.drive import InfoRequest, VehicleInfo
+    from foretwin.contracts.ports import free_endpoint
+    from foretwin.contracts.setup import BusSetup
 
     setup = BusSetup(endpoint=free_endpoint())
     with (
@@ -105,7 +105,7 @@ def _bus() -> Finding:
 
 
 def _clock() -> Finding:
-    from sim_worker.vehicle.clock import silence_step_clock
+    from foretwin.sim_worker.vehicle.clock import silence_step_clock
 
     if silence_step_clock():
         return Finding("MuJoCo's step clock", "ok", "switched off")

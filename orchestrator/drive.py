@@ -9,30 +9,30 @@ import signal
 import time
 from types import FrameType
 
-from contracts.bus import Mailbox, Reply, ZenohBus
-from contracts.drive import InfoRequest
-from contracts.keys import alive_key
-from contracts.process import log_to_file
-from contracts.setup import ProcessSetup
-from contracts.simulation import RunEnd
-from orchestrator.conductor import Conductor
-from orchestrator.config import DriveConfig
-from orchestrator.in_charge import InCharge
-from orchestrator.instructions import Tell
-from orchestrator.intake import unannounced
-from orchestrator.live_loop import LiveLoop
-from orchestrator.lock_step import LockStepLoop
-from orchestrator.mission import Mission, MissionSettings
-from orchestrator.plan import DrivePlan, make_plan, read_inputs
-from orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
-from orchestrator.progress import ProgressLine
-from orchestrator.record.results import ResultTables
-from orchestrator.record.run_record import reserve_record, run_record, write_record
-from orchestrator.record.summary import summary_text
-from orchestrator.record.versions import versions
-from orchestrator.start_worlds import prepare_start
-from orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
-from orchestrator.way.way_ahead import WayAhead
+from foretwin.contracts.bus import Mailbox, Reply, ZenohBus
+from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.process import log_to_file
+from foretwin.contracts.setup import ProcessSetup
+from foretwin.contracts.simulation import RunEnd
+from foretwin.orchestrator.conductor import Conductor
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.in_charge import InCharge
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.intake import unannounced
+from foretwin.orchestrator.live_loop import LiveLoop
+from foretwin.orchestrator.lock_step import LockStepLoop
+from foretwin.orchestrator.mission import Mission, MissionSettings
+from foretwin.orchestrator.plan import DrivePlan, make_plan, read_inputs
+from foretwin.orchestrator.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
+from foretwin.orchestrator.progress import ProgressLine
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.run_record import reserve_record, run_record, write_record
+from foretwin.orchestrator.record.summary import summary_text
+from foretwin.orchestrator.record.versions import versions
+from foretwin.orchestrator.start_worlds import prepare_start
+from foretwin.orchestrator.supervisor import FreshInterpreter, Supervisor, fold_stderr
+from foretwin.orchestrator.way.way_ahead import WayAhead
 
 log = logging.getLogger(ORCHESTRATOR)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-from contracts.bus import Bus
-from contracts.simulation import Event
-from orchestrator.instructions import Tell
-from orchestrator.processes import ORCHESTRATOR
-from orchestrator.record.results import ResultTables
+from foretwin.contracts.bus import Bus
+from foretwin.contracts.simulation import Event
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.processes import ORCHESTRATOR
+from foretwin.orchestrator.record.results import ResultTables
 
 log = logging.getLogger(ORCHESTRATOR)
 

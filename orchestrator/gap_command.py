@@ -9,23 +9,23 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from contracts.drive import GnssFix, VehicleInfo, VehicleState
-from contracts.errors import UserError
-from contracts.frames import LocalFrame
-from contracts.gap import GapAlarm, GapSample, Verdict
-from contracts.vehicle import VehicleParameters
-from orchestrator.gap_text import nobody_accused, table_lines, verdict_lines
-from orchestrator.progress_bar import progress_bar
-from sim_worker.gap.errors import GapMeter, GapRow, gap_table
-from sim_worker.gap.free_run import FreeRunner
-from sim_worker.gap.limits import GapLimits
-from sim_worker.gap.measured_motion import motion_on_grid
-from sim_worker.gap.verdict import Judge, without_manual_commands
-from sim_worker.motion_record import MotionRecorder
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.estimator import StateEstimator
-from telemetry.logs.log import Log, Sample
-from telemetry.logs.opening import open_log
+from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.gap_text import nobody_accused, table_lines, verdict_lines
+from foretwin.orchestrator.progress_bar import progress_bar
+from foretwin.sim_worker.gap.errors import GapMeter, GapRow, gap_table
+from foretwin.sim_worker.gap.free_run import FreeRunner
+from foretwin.sim_worker.gap.limits import GapLimits
+from foretwin.sim_worker.gap.measured_motion import motion_on_grid
+from foretwin.sim_worker.gap.verdict import Judge, without_manual_commands
+from foretwin.sim_worker.motion_record import MotionRecorder
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.logs.log import Log, Sample
+from foretwin.telemetry.logs.opening import open_log
 
 _SECOND_NS = 1_000_000_000
 
@@ -120,7 +120,7 @@ def report_gap(
     report = gap_of(log, parameters, name=str(recording), progress=True)
     plots: list[Path] = []
     if out is not None:
-        from orchestrator.gap_plots import write_plots
+        from foretwin.orchestrator.gap_plots import write_plots
 
         out.mkdir(parents=True, exist_ok=True)
         plots = write_plots(

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from contracts.gap import GapSample, Verdict
-from sim_worker.gap.errors import gap_table
+from foretwin.contracts.gap import GapSample, Verdict
+from foretwin.sim_worker.gap.errors import gap_table
 
 _PANELS = (
     ("along_m", "along, m", 1.0),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from contracts.gap import GapAlarm, Verdict
-from sim_worker.gap.errors import GapRow
+from foretwin.contracts.gap import GapAlarm, Verdict
+from foretwin.sim_worker.gap.errors import GapRow
 
 WIDTH = 80
 _DEGREES = 57.29578

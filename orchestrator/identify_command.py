@@ -11,16 +11,16 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from contracts.drive import GnssFix
-from contracts.errors import UserError
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.tuning import Identification
-from sim_worker.identify.acceptance import accepted, is_acceptable, vehicle_toml
-from sim_worker.identify.picture import draw_estimates, draw_steering
-from sim_worker.identify.window import UNDERSTEER_NAME, identify
-from sim_worker.motion_record import MotionRecord, MotionRecorder
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.logs import open_log
+from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.tuning import Identification
+from foretwin.sim_worker.identify.acceptance import accepted, is_acceptable, vehicle_toml
+from foretwin.sim_worker.identify.picture import draw_estimates, draw_steering
+from foretwin.sim_worker.identify.window import UNDERSTEER_NAME, identify
+from foretwin.sim_worker.motion_record import MotionRecord, MotionRecorder
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.logs import open_log
 
 _FINE_S, _COARSE_S = 0.01, 0.02
 _LONG_S = 600.0

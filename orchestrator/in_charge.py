@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from contracts.bus import Bus
-from contracts.towards_vehicle import Authority
-from orchestrator.plan import DrivePlan
+from foretwin.contracts.bus import Bus
+from foretwin.contracts.towards_vehicle import Authority
+from foretwin.orchestrator.plan import DrivePlan
 
 EVERY_NS = 20_000_000
 

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from contracts.bus import Received
-from contracts.codec import SchemaMismatch
-from contracts.drive import (
+from foretwin.contracts.bus import Received
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import (
     DriveEnd,
     PlannedTrajectory,
     RoadUsers,
@@ -18,11 +18,11 @@ from contracts.drive import (
     VehicleState,
     VehicleStatus,
 )
-from contracts.vehicle import VehicleParameters
-from orchestrator.record.bookkeeping import TelemetryCount
-from orchestrator.telemetry_watch import TelemetryWatch, record
-from telemetry.estimator import StateEstimator
-from telemetry.map_aid import RoadLine
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.record.bookkeeping import TelemetryCount
+from foretwin.orchestrator.telemetry_watch import TelemetryWatch, record
+from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.map_aid import RoadLine
 
 
 class LatestState(NamedTuple):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from contracts.bus import Received
-from contracts.keys import TELEMETRY_CHANNELS
-from orchestrator.conductor import Conductor
+from foretwin.contracts.bus import Received
+from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.orchestrator.conductor import Conductor
 
 HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05

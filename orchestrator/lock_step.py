@@ -9,12 +9,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from contracts.bus import Received, Reply
-from contracts.codec import SchemaMismatch
-from contracts.drive import AdvanceReply, AdvanceRequest
-from contracts.keys import TELEMETRY_CHANNELS
-from orchestrator.conductor import Conductor
-from orchestrator.live_loop import is_telemetry
+from foretwin.contracts.bus import Received, Reply
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import AdvanceReply, AdvanceRequest
+from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.orchestrator.conductor import Conductor
+from foretwin.orchestrator.live_loop import is_telemetry
 
 ADVANCE_TIMEOUT_S = 120.0
 STUCK_AFTER_S = 120.0

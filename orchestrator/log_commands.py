@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from contracts.errors import UserError
+from foretwin.contracts.errors import UserError
 
 
 def convert_log(
@@ -14,9 +14,9 @@ def convert_log(
 ) -> None:
     """Convert a recorded drive and say what was kept and what was not.
 
-    `to` is one of telemetry.convert.TARGETS, else the target's suffix tells.
+    `to` is one of foretwin.telemetry.convert.TARGETS, else the target's suffix tells.
     """
-    from telemetry.convert import TARGETS, convert
+    from foretwin.telemetry.convert import TARGETS, convert
 
     kind = next((one for one in TARGETS if one == to), None)
     if to is not None and kind is None:
@@ -39,5 +39,5 @@ def open_view(run_folder: Path) -> int:
     if not recording.is_file():
         raise FileNotFoundError(f"{run_folder}: holds no monitor.rrd")
     return subprocess.run(
-        [sys.executable, "-m", "viewer", "--open", str(recording)], check=False
+        [sys.executable, "-P", "-m", "foretwin.viewer", "--open", str(recording)], check=False
     ).returncode

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from contracts.simulation import MirrorSample
-from orchestrator.instructions import Tell
-from orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
-from orchestrator.record.results import ResultTables
+from foretwin.contracts.simulation import MirrorSample
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
+from foretwin.orchestrator.record.results import ResultTables
 
 _APART_NS = 2_000_000_000
 """Who touches again sooner is not told of again."""

@@ -10,16 +10,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from contracts.drive import VehicleState
-from contracts.world import World
-from orchestrator.instructions import BuildWorld, Instruction, NotReady, RoundIntent, Tell, UseWorld
-from orchestrator.visits import VisitBook
-from orchestrator.way.junctions_ahead import PassedJunction
-from orchestrator.way.map_matching import OffRoadStretch
-from orchestrator.way.route import Route
-from orchestrator.way.way_ahead import WayAhead
-from telemetry.map_aid import RoadLine
-from world_gen.intersections import Junction
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.world import World
+from foretwin.orchestrator.instructions import (
+    BuildWorld,
+    Instruction,
+    NotReady,
+    RoundIntent,
+    Tell,
+    UseWorld,
+)
+from foretwin.orchestrator.visits import VisitBook
+from foretwin.orchestrator.way.junctions_ahead import PassedJunction
+from foretwin.orchestrator.way.map_matching import OffRoadStretch
+from foretwin.orchestrator.way.route import Route
+from foretwin.orchestrator.way.way_ahead import WayAhead
+from foretwin.telemetry.map_aid import RoadLine
+from foretwin.world_gen.intersections import Junction
 
 MissionState = Literal["waiting", "following", "off_map"]
 

@@ -11,32 +11,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleInfo
-from contracts.errors import UserError
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from contracts.vehicle import VehicleParameters
-from orchestrator.config import ConfigError, DriveConfig, VehicleBeside
-from orchestrator.doctor import has_display
-from orchestrator.maps.given_worlds import check_given_worlds
-from orchestrator.maps.opening import Clip, open_map
-from orchestrator.ros2_mapping import read_ros2, read_ros2_beside
-from orchestrator.rounds.jobs import scenarios_of
-from orchestrator.way.line_matching import match_line
-from orchestrator.way.road_index import RoadIndex
-from orchestrator.way.route import Route
-from orchestrator.way.standin_path import StandinPath, standin_path
-from sim_worker.planners.registry import check_planner
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.logs import LogError, line_of_log, open_log, read_line
-from telemetry.ros2.mapping import MappingFile
-from telemetry.standin.parameters import read_parameters
-from world_gen.intersections import Junction
-from world_gen.osm_map import OsmMap
-from world_gen.road_graph import RoadGraph
-from world_gen.service_roads import open_service_roads
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.config import ConfigError, DriveConfig, VehicleBeside
+from foretwin.orchestrator.doctor import has_display
+from foretwin.orchestrator.maps.given_worlds import check_given_worlds
+from foretwin.orchestrator.maps.opening import Clip, open_map
+from foretwin.orchestrator.ros2_mapping import read_ros2, read_ros2_beside
+from foretwin.orchestrator.rounds.jobs import scenarios_of
+from foretwin.orchestrator.way.line_matching import match_line
+from foretwin.orchestrator.way.road_index import RoadIndex
+from foretwin.orchestrator.way.route import Route
+from foretwin.orchestrator.way.standin_path import StandinPath, standin_path
+from foretwin.sim_worker.planners.registry import check_planner
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
+from foretwin.telemetry.ros2.mapping import MappingFile
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.road_graph import RoadGraph
+from foretwin.world_gen.service_roads import open_service_roads
 
 EMBEDDED = Path(__file__).parent / "embedded"
 EMBEDDED_MAP = EMBEDDED / "drawn_town.osm"

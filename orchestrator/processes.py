@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
-from contracts.roles import CastVehicle, MirrorCast
-from contracts.setup import (
+from foretwin.contracts.roles import CastVehicle, MirrorCast
+from foretwin.contracts.setup import (
     BuilderSetup,
     ProcessSetup,
     RecorderSetup,
@@ -17,8 +17,8 @@ from contracts.setup import (
     ViewerSetup,
     WorkerSetup,
 )
-from orchestrator.plan import Beside, DrivePlan
-from orchestrator.rounds.jobs import planners_of
+from foretwin.orchestrator.plan import Beside, DrivePlan
+from foretwin.orchestrator.rounds.jobs import planners_of
 
 ORCHESTRATOR = "orchestrator"
 BUILDER = "builder"
@@ -192,21 +192,21 @@ def _source_is(source: str) -> Callable[[DrivePlan], bool]:
 
 
 PROCESSES: tuple[ProcessRow, ...] = (
-    ProcessRow(BUILDER, "orchestrator.world_builder", _always, _one, "restart", _builder, 10),
+    ProcessRow(BUILDER, "foretwin.orchestrator.world_builder", _always, _one, "restart", _builder, 10),
     ProcessRow(
-        "w", "sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker,
+        "w", "foretwin.sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker,
         numbered=True,
     ),
-    ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
-    ProcessRow(TUNING, "sim_worker.tuning_process", _tunes, _one, "restart", _tuning, 10),
-    ProcessRow("recorder", "telemetry.recorder", _always, _one, "report", _recorder),
-    ProcessRow("viewer", "viewer", _always, _one, "report", _viewer, 10),
-    ProcessRow(VEHICLE, "telemetry.replay", _source_is("log"), _one, "end_drive", _replay),
-    ProcessRow(VEHICLE, "telemetry.standin", _source_is("standin"), _one, "end_drive", _standin),
+    ProcessRow(MIRROR, "foretwin.sim_worker", _always, _one, "restart", _worker),
+    ProcessRow(TUNING, "foretwin.sim_worker.tuning_process", _tunes, _one, "restart", _tuning, 10),
+    ProcessRow("recorder", "foretwin.telemetry.recorder", _always, _one, "report", _recorder),
+    ProcessRow("viewer", "foretwin.viewer", _always, _one, "report", _viewer, 10),
+    ProcessRow(VEHICLE, "foretwin.telemetry.replay", _source_is("log"), _one, "end_drive", _replay),
+    ProcessRow(VEHICLE, "foretwin.telemetry.standin", _source_is("standin"), _one, "end_drive", _standin),
     # Never started again: what has stopped towards a vehicle must not resume by itself.
-    ProcessRow("ros2", "telemetry.ros2", _speaks_ros2, _one, "end_drive", _ros2),
+    ProcessRow("ros2", "foretwin.telemetry.ros2", _speaks_ros2, _one, "end_drive", _ros2),
     ProcessRow(
-        ROS2_BESIDE, "telemetry.ros2", lambda plan: bool(_ros2_of_others(plan)),
+        ROS2_BESIDE, "foretwin.telemetry.ros2", lambda plan: bool(_ros2_of_others(plan)),
         lambda plan: len(_ros2_of_others(plan)), "restart", _ros2_beside, numbered=True,
     ),
 )  # fmt: skip

@@ -9,9 +9,9 @@ from typing import Literal
 from rich.console import Console
 from rich.status import Status
 
-from contracts.simulation import Event, Progress, WorkerStatus
-from orchestrator.conductor import Conductor
-from orchestrator.mission import Mission
+from foretwin.contracts.simulation import Event, Progress, WorkerStatus
+from foretwin.orchestrator.conductor import Conductor
+from foretwin.orchestrator.mission import Mission
 
 PERIOD_S = 0.25
 PLAIN_PERIOD_S = 10.0

@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import msgspec
 
-from contracts.bus import Bus, Mailbox
+from foretwin.contracts.bus import Bus, Mailbox
 
 ANSWER_TIMEOUT_S = 10.0
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orchestrator.config import DriveConfig, VehicleBeside
-from telemetry.ros2.mapping import MappingError, MappingFile, read_mapping
-from telemetry.ros_parts import LANELET_ROUTE
+from foretwin.orchestrator.config import DriveConfig, VehicleBeside
+from foretwin.telemetry.ros2.mapping import MappingError, MappingFile, read_mapping
+from foretwin.telemetry.ros_parts import LANELET_ROUTE
 
 
 def read_ros2(config: DriveConfig) -> MappingFile | None:

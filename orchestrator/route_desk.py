@@ -7,17 +7,17 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.bus import Bus, Mailbox, Received
-from contracts.codec import SchemaMismatch
-from contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
-from contracts.errors import UserError
-from contracts.frames import local_from_geo
-from orchestrator.instructions import Tell
-from orchestrator.plan import DrivePlan
-from orchestrator.way.road_index import RoadIndex
-from orchestrator.way.route import Route
-from orchestrator.way.route_to_goal import FoundWay, WayFinder, away_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.bus import Bus, Mailbox, Received
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import local_from_geo
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.way.road_index import RoadIndex
+from foretwin.orchestrator.way.route import Route
+from foretwin.orchestrator.way.route_to_goal import FoundWay, WayFinder, away_m
 
 LOOK_EVERY_NS = 1_000_000_000
 FRESH_PLAN_NS = 1_000_000_000

@@ -10,25 +10,25 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.errors import UserError
-from contracts.scenario import Scenario
-from orchestrator.maps.choice import (
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.scenario import Scenario
+from foretwin.orchestrator.maps.choice import (
     FARTHEST_M,
     junction_by_id,
     nearest_junction,
     node_of_id,
     parse_place,
 )
-from orchestrator.maps.opening import Clip, NodeClip, OpenMap, open_map
-from orchestrator.progress_bar import progress_bar
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.vehicle.parameters import load_vehicle
-from world_gen.build import build_world
-from world_gen.intersections import Junction
-from world_gen.map_index import index_map
+from foretwin.orchestrator.maps.opening import Clip, NodeClip, OpenMap, open_map
+from foretwin.orchestrator.progress_bar import progress_bar
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.map_index import index_map
 
 RADIUS_M = 150.0
 

@@ -6,19 +6,19 @@ import datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from contracts.errors import UserError
-from contracts.scenario import Scenario
-from contracts.world import World
-from orchestrator.scenario_commands import RADIUS_M, PlaceRequest, asked_junctions
-from sim_worker.planners.registry import check_planner
-from sim_worker.scenarios.casting import Cast, cast
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.openscenario import write_openscenario
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.reading import find_scenario
-from sim_worker.vehicle.parameters import load_vehicle
-from world_gen.build import build_world
-from world_gen.map_index import index_map
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.world import World
+from foretwin.orchestrator.scenario_commands import RADIUS_M, PlaceRequest, asked_junctions
+from foretwin.sim_worker.planners.registry import check_planner
+from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.openscenario import write_openscenario
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import find_scenario
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.map_index import index_map
 
 
 class CaseRequest(NamedTuple):
@@ -62,8 +62,8 @@ def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> None:
 
     Raises UserError where there is no such case, place or planner, or where the planner fails.
     """
-    from sim_worker.scenarios.picture import write_case_picture
-    from sim_worker.scenarios.picture_runs import heedless_run, planned_run
+    from foretwin.sim_worker.scenarios.picture import write_case_picture
+    from foretwin.sim_worker.scenarios.picture_runs import heedless_run, planned_run
 
     if out.suffix != ".png":
         raise UserError(f"{out}: a picture of a case is written as .png")

@@ -9,11 +9,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 
-from orchestrator.conductor import Conductor
-from orchestrator.plan import DrivePlan
-from orchestrator.way.junctions_ahead import encounters
-from orchestrator.way.route import Route
-from world_gen.intersections import Junction
+from foretwin.orchestrator.conductor import Conductor
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.way.junctions_ahead import encounters
+from foretwin.orchestrator.way.route import Route
+from foretwin.world_gen.intersections import Junction
 
 WITHIN_M = 300.0
 TIMEOUT_S = 10.0

@@ -21,9 +21,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from contracts.setup import ProcessSetup, write_setup
-from orchestrator.priorities import gives_way
-from orchestrator.processes import ProcessRow
+from foretwin.contracts.setup import ProcessSetup, write_setup
+from foretwin.orchestrator.priorities import gives_way
+from foretwin.orchestrator.processes import ProcessRow
 
 log = logging.getLogger("orchestrator")
 
@@ -77,7 +77,7 @@ class FreshInterpreter:
         write_setup(setup, setup_file)
         with (self._folder / f"{setup.process_id}.stderr").open("ab") as stderr:
             return subprocess.Popen(
-                [sys.executable, "-m", module, "--setup", str(setup_file)],
+                [sys.executable, "-P", "-m", module, "--setup", str(setup_file)],
                 stdin=subprocess.DEVNULL,
                 stdout=stderr,
                 stderr=stderr,

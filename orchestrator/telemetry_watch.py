@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from telemetry.estimator import ClockReport, StateEstimator
+from foretwin.telemetry.estimator import ClockReport, StateEstimator
 
 REARM_NS = 5_000_000_000
 """A channel that was overdue must have come for this long before it is named once more."""

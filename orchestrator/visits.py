@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from contracts.world import World
-from world_gen.intersections import Junction
+from foretwin.contracts.world import World
+from foretwin.world_gen.intersections import Junction
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""The process that builds Worlds in the background: `python -m orchestrator.world_builder`."""
+"""The process that builds Worlds in the background: `python -m foretwin.orchestrator.world_builder`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.bus import Bus, Mailbox, Request
-from contracts.process import ProcessLife, run_process
-from contracts.setup import BuilderSetup
-from contracts.simulation import BuildReply
-from orchestrator.maps.given_worlds import read_given_worlds
-from orchestrator.maps.opening import Clip, open_map
-from world_gen.map_index import index_map
-from world_gen.world_store import WorldStore, cached_build
+from foretwin.contracts.bus import Bus, Mailbox, Request
+from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.setup import BuilderSetup
+from foretwin.contracts.simulation import BuildReply
+from foretwin.orchestrator.maps.given_worlds import read_given_worlds
+from foretwin.orchestrator.maps.opening import Clip, open_map
+from foretwin.world_gen.map_index import index_map
+from foretwin.world_gen.world_store import WorldStore, cached_build
 
 log = logging.getLogger("builder")
 

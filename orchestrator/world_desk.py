@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from contracts.bus import Bus, Mailbox, Reply
-from contracts.codec import SchemaMismatch, read_message
-from contracts.simulation import BuildRequest, PrepareRequest, WorldNotice
-from contracts.world import World
-from orchestrator.instructions import Tell
-from orchestrator.plan import DrivePlan
-from orchestrator.processes import BUILDER
+from foretwin.contracts.bus import Bus, Mailbox, Reply
+from foretwin.contracts.codec import SchemaMismatch, read_message
+from foretwin.contracts.simulation import BuildRequest, PrepareRequest, WorldNotice
+from foretwin.contracts.world import World
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.processes import BUILDER
 
 log = logging.getLogger("orchestrator")
 

@@ -14,19 +14,19 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import RoadUserKind
-from contracts.vehicle import VehicleParameters
-from sim_worker.accident_bodies import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.accident_bodies import (
     Bodies,
     GroundForces,
     accident_bodies,
     ground_forces,
 )
-from sim_worker.accident_model import AccidentBatch, Crush, Impact
-from sim_worker.overlap import Rectangles, separations
-from sim_worker.touch import Indices, Touches
-from sim_worker.vehicle.planar import base_from_cog, cog_from_base
+from foretwin.sim_worker.accident_model import AccidentBatch, Crush, Impact
+from foretwin.sim_worker.overlap import Rectangles, separations
+from foretwin.sim_worker.touch import Indices, Touches
+from foretwin.sim_worker.vehicle.planar import base_from_cog, cog_from_base
 
 _STIFF, _STIFF_LOOK_S = Crush(400.0, 0.0005), 0.01
 _SOFT, _SOFT_LOOK_S = Crush(100.0, 0.0025), 0.025

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import RoadUserKind
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.kinds import KINDS
-from sim_worker.touch import Touches
-from sim_worker.vehicle.parameters import GRAVITY_MPS2
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.actors.kinds import KINDS
+from foretwin.sim_worker.touch import Touches
+from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 _TYRE_FRICTION = 0.75
 """Of tyres that slide, dry asphalt: Warner et al. (1983), Friction applications in accident

@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
-from contracts.arrays import Array
-from sim_worker.accident_bodies import Bodies, GroundForces
-from sim_worker.vehicle.planar import set_physics_options
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.accident_bodies import Bodies, GroundForces
+from foretwin.sim_worker.vehicle.planar import set_physics_options
 
 _BODIES = ("ego", "other")
 _HALF_HEIGHT_M = 100.0

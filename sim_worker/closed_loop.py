@@ -9,18 +9,18 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.planners.base import (
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planners.base import (
     Planner,
     PlannerOutput,
     PlannerView,
     RemembersWithinJob,
     rows_of,
 )
-from sim_worker.planners.registry import load_planner
-from sim_worker.play import Play
-from sim_worker.scene import Scene
-from sim_worker.stage import Stage
+from foretwin.sim_worker.planners.registry import load_planner
+from foretwin.sim_worker.play import Play
+from foretwin.sim_worker.scene import Scene
+from foretwin.sim_worker.stage import Stage
 
 Flags = npt.NDArray[np.bool_]
 Rows = npt.NDArray[np.intp]

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import ControlCommand
-from contracts.vehicle import VehicleParameters
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlCommand
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 STEP_BACK_NS = 1_000_000_000
 """A stamp that lies this far behind the last one is of a clock that has stepped back."""

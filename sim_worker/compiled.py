@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.roles import Cast
-from sim_worker.scenarios.ways import Way
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.ways import Way
 
 _KEEPS_SPEED, _KEEPS_TO_M = 0.35, 1.5
 """A car whose speed differs by more of what the case says, or that is farther from its path, does

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.futures import Faults
-from sim_worker.actors.perception import PerceptionFaults
-from sim_worker.planners.base import PlannerOutput
-from sim_worker.planners.path import FrenetPoint
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import Faults
+from foretwin.sim_worker.actors.perception import PerceptionFaults
+from foretwin.sim_worker.planners.base import PlannerOutput
+from foretwin.sim_worker.planners.path import FrenetPoint
 
 
 class Belief(NamedTuple):

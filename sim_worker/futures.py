@@ -13,18 +13,24 @@ import time
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.codec import content_bytes
-from contracts.futures import Accident, FuturesJob, FuturesResult, RoadUserTracks, Trajectory
-from sim_worker.accident import Accidents, run_accidents
-from sim_worker.actors.cast import KIND_NAMES
-from sim_worker.closed_loop import DriveRecord, drive
-from sim_worker.judging import judge, with_collisions
-from sim_worker.measuring import measure
-from sim_worker.rehearsal import staged_cases
-from sim_worker.scene import Scene, SceneMaker
-from sim_worker.stage import Stage
-from sim_worker.touch import Touches
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.codec import content_bytes
+from foretwin.contracts.futures import (
+    Accident,
+    FuturesJob,
+    FuturesResult,
+    RoadUserTracks,
+    Trajectory,
+)
+from foretwin.sim_worker.accident import Accidents, run_accidents
+from foretwin.sim_worker.actors.cast import KIND_NAMES
+from foretwin.sim_worker.closed_loop import DriveRecord, drive
+from foretwin.sim_worker.judging import judge, with_collisions
+from foretwin.sim_worker.measuring import measure
+from foretwin.sim_worker.rehearsal import staged_cases
+from foretwin.sim_worker.scene import Scene, SceneMaker
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.touch import Touches
 
 
 def run_job(

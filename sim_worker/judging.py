@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from contracts.arrays import Array, Array32
-from contracts.futures import Outcome
-from contracts.vehicle import VehicleParameters
-from sim_worker.accident import Accidents
-from sim_worker.closed_loop import DriveRecord
-from sim_worker.touch import Touches, first_touches
+from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.futures import Outcome
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.accident import Accidents
+from foretwin.sim_worker.closed_loop import DriveRecord
+from foretwin.sim_worker.touch import Touches, first_touches
 
 NOTHING, ROAD_USER, STATIC = 0, 1, 2
 """Values of Outcome.collision_with."""

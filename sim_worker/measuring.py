@@ -6,17 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.futures import FuturesJob
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.cast import KIND_NAMES
-from sim_worker.actors.kinds import KINDS
-from sim_worker.closed_loop import DriveRecord
-from sim_worker.metrics.rollout import Rollout
-from sim_worker.metrics.route_rules import RouteRules
-from sim_worker.metrics.scene import Context
-from sim_worker.metrics.table import METRICS, evaluate
-from sim_worker.scene import Scene, SceneMaker
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import FuturesJob
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.actors.cast import KIND_NAMES
+from foretwin.sim_worker.actors.kinds import KINDS
+from foretwin.sim_worker.closed_loop import DriveRecord
+from foretwin.sim_worker.metrics.rollout import Rollout
+from foretwin.sim_worker.metrics.route_rules import RouteRules
+from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.table import METRICS, evaluate
+from foretwin.sim_worker.scene import Scene, SceneMaker
 
 CLEARANCE = "min_clearance"
 

@@ -7,17 +7,17 @@ import time
 from collections import deque
 from pathlib import Path
 
-from contracts.bus import Bus, Mailbox, Received, Request
-from contracts.drive import ControlCommand, VehicleState
-from contracts.errors import one_line
-from contracts.process import ProcessLife
-from contracts.roles import OtherVehicles, UseRoles
-from contracts.setup import WorkerSetup
-from contracts.simulation import ActiveWorld
-from contracts.tuning import UseVehicle
-from sim_worker.commands import STEP_BACK_NS
-from sim_worker.twin import Mirror
-from sim_worker.world_file import load_world
+from foretwin.contracts.bus import Bus, Mailbox, Received, Request
+from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.errors import one_line
+from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.roles import OtherVehicles, UseRoles
+from foretwin.contracts.setup import WorkerSetup
+from foretwin.contracts.simulation import ActiveWorld
+from foretwin.contracts.tuning import UseVehicle
+from foretwin.sim_worker.commands import STEP_BACK_NS
+from foretwin.sim_worker.twin import Mirror
+from foretwin.sim_worker.world_file import load_world
 
 _DEPTH = 4096
 _IDLE_S = 0.2

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import (
     ControlCommand,
     GnssFix,
     HeadingSample,
@@ -22,7 +22,7 @@ from contracts.drive import (
     SteeringSample,
     VehicleStatus,
 )
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 
 PERIOD_S = 0.02
 _NAN = float("nan")

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.arrays import Array
-from world_gen.export.mjcf import VEHICLE
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.export.mjcf import VEHICLE
 
 Flags = npt.NDArray[np.bool_]
 

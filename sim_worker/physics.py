@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.stage_model import STATIC_CONTACT, compile_open
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.stage_model import STATIC_CONTACT, compile_open
 
 Flags = npt.NDArray[np.bool_]
 Rows = npt.NDArray[np.intp]

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.actors.crowd import EgoBoxes
-from sim_worker.actors.perception import Lead
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.path import FrenetPoint
-from sim_worker.scene import Scene
-from sim_worker.stage import Controls, Stage
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.actors.crowd import EgoBoxes
+from foretwin.sim_worker.actors.perception import Lead
+from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.path import FrenetPoint
+from foretwin.sim_worker.scene import Scene
+from foretwin.sim_worker.stage import Controls, Stage
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 Rows = npt.NDArray[np.intp]
 

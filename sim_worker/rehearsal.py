@@ -12,21 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.futures import FuturesJob, Variant
-from contracts.scenario import EGO
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.kinds import KINDS
-from sim_worker.closed_loop import drive
-from sim_worker.driven_line import DrivenLine, driven_lines, drives_as_cast, time_at
-from sim_worker.scenarios.impact import Moving, ego_box
-from sim_worker.scenarios.places import Unplaced
-from sim_worker.scenarios.roles import ALONG, Cast, CastActor
-from sim_worker.scenarios.staged import staged_players, staged_start
-from sim_worker.scenarios.ways import Way
-from sim_worker.scene import SceneMaker
-from sim_worker.stage import Stage
-from sim_worker.touch import first_touches
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import FuturesJob, Variant
+from foretwin.contracts.scenario import EGO
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.actors.kinds import KINDS
+from foretwin.sim_worker.closed_loop import drive
+from foretwin.sim_worker.driven_line import DrivenLine, driven_lines, drives_as_cast, time_at
+from foretwin.sim_worker.scenarios.impact import Moving, ego_box
+from foretwin.sim_worker.scenarios.places import Unplaced
+from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor
+from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
+from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.scene import SceneMaker
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.touch import first_touches
 
 _FORWARDS, _BACKWARDS = "constant_speed", "reverse_pursuit"
 _STRAIGHT_PM = 1e-3

@@ -10,30 +10,30 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import SignalColour
-from contracts.futures import Faults, FuturesJob, Variant
-from contracts.scenario import FAULTS, Scenario
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker.actors.cast import Casting, Player, casting
-from sim_worker.actors.path_table import PathTable
-from sim_worker.actors.perception import Sight
-from sim_worker.actors.right_of_way import JunctionRules, PathRules
-from sim_worker.actors.seen import SeenActors
-from sim_worker.actors.traffic import Traffic
-from sim_worker.faults import FaultArrays, fault_arrays
-from sim_worker.metrics.ground import DrivableGround
-from sim_worker.planners.base import KnownPlan, SharedGround
-from sim_worker.planners.path import FrenetPath
-from sim_worker.planners.registry import drives_backwards
-from sim_worker.scenarios.live import LiveScenarios
-from sim_worker.scenarios.places import Unplaced
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.scenarios.roles import Cast
-from sim_worker.scenarios.staged import StagedScenarios, staged_players, staged_start
-from sim_worker.seeding import local_state
-from world_gen.signal_state import LiveColour, world_colours_at
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import SignalColour
+from foretwin.contracts.futures import Faults, FuturesJob, Variant
+from foretwin.contracts.scenario import FAULTS, Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.actors.cast import Casting, Player, casting
+from foretwin.sim_worker.actors.path_table import PathTable
+from foretwin.sim_worker.actors.perception import Sight
+from foretwin.sim_worker.actors.right_of_way import JunctionRules, PathRules
+from foretwin.sim_worker.actors.seen import SeenActors
+from foretwin.sim_worker.actors.traffic import Traffic
+from foretwin.sim_worker.faults import FaultArrays, fault_arrays
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.planners.base import KnownPlan, SharedGround
+from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.planners.registry import drives_backwards
+from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.places import Unplaced
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.staged import StagedScenarios, staged_players, staged_start
+from foretwin.sim_worker.seeding import local_state
+from foretwin.world_gen.signal_state import LiveColour, world_colours_at
 
 _MAX_OFFSET_M = 8.0
 _CAR_WITHIN_M = 60.0

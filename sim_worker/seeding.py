@@ -6,18 +6,18 @@ import math
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.vehicle import VehicleParameters
-from sim_worker.vehicle.parameters import understeer_gradient
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.vehicle.parameters import understeer_gradient
 
 _MIN_SPEED_MPS = 1.0
 """Below it, a yaw rate says nothing about the steering."""
 
 
 def local_state(state: VehicleState, frame: LocalFrame, vehicle: VehicleParameters) -> Array:
-    """Return (8,) base_link state in `frame`, columns as `contracts.futures.STATE_COLUMNS`.
+    """Return (8,) base_link state in `frame`, columns as `foretwin.contracts.futures.STATE_COLUMNS`.
 
     The lateral velocity of the rear axle is that of steady cornering. Raises ValueError where the
     state is not finite.

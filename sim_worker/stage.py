@@ -8,17 +8,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker import compiled
-from sim_worker.nearness import NearStatics
-from sim_worker.physics import Physics
-from sim_worker.stage_model import PREFIX, change_vehicle, compile_stage, world_spec
-from sim_worker.vehicle.actuation import Actuation, actuator_ids
-from sim_worker.vehicle.clock import silence_step_clock
-from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
-from sim_worker.vehicle.planar import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker import compiled
+from foretwin.sim_worker.nearness import NearStatics
+from foretwin.sim_worker.physics import Physics
+from foretwin.sim_worker.stage_model import PREFIX, change_vehicle, compile_stage, world_spec
+from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
+from foretwin.sim_worker.vehicle.clock import silence_step_clock
+from foretwin.sim_worker.vehicle.mujoco_log import log_mujoco_warnings
+from foretwin.sim_worker.vehicle.planar import (
     JOINTS,
     TIMESTEP_S,
     box_centre_from_base_m,

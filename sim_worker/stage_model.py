@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import mujoco
 
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker.vehicle.planar import set_physics_options, vehicle_spec
-from world_gen.export.mjcf import world_spec as spec_of_world
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.vehicle.planar import set_physics_options, vehicle_spec
+from foretwin.world_gen.export.mjcf import world_spec as spec_of_world
 
 PREFIX = "ego_"
 STATIC_CONTACT = "static_contact"

@@ -12,16 +12,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.overlap import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.overlap import (
     Rectangles,
     corners,
     depth_within,
     overlapping,
     separations,
 )
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 Indices = npt.NDArray[np.intp]
 

@@ -10,15 +10,15 @@ from typing import Any
 
 import msgspec
 
-from contracts.drive import VehicleInfo
-from contracts.frames import LocalFrame
-from contracts.gap import GapAlarm, GapSample, Verdict
-from contracts.tuning import Identification, UseVehicle
-from contracts.vehicle import VehicleParameters
-from sim_worker.commands import STEP_BACK_NS
-from sim_worker.gap.monitor import GapMonitor
-from sim_worker.identify.acceptance import in_force
-from sim_worker.identify.tuner import Tuner
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.tuning import Identification, UseVehicle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.commands import STEP_BACK_NS
+from foretwin.sim_worker.gap.monitor import GapMonitor
+from foretwin.sim_worker.identify.acceptance import in_force
+from foretwin.sim_worker.identify.tuner import Tuner
 
 Finding = Identification | GapSample | GapAlarm | Verdict
 

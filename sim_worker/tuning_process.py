@@ -7,14 +7,14 @@ import time
 from collections import Counter
 from typing import Any
 
-from contracts.bus import Bus, Mailbox, Received, Reply, Request
-from contracts.drive import InfoRequest, VehicleInfo
-from contracts.errors import one_line
-from contracts.gap import GapAlarm, GapSample, Verdict
-from contracts.process import ProcessLife, run_process
-from contracts.setup import TuningSetup
-from contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
-from sim_worker.tuning import VehicleWatch
+from foretwin.contracts.bus import Bus, Mailbox, Received, Reply, Request
+from foretwin.contracts.drive import InfoRequest, VehicleInfo
+from foretwin.contracts.errors import one_line
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.setup import TuningSetup
+from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
+from foretwin.sim_worker.tuning import VehicleWatch
 
 _DEPTH = 16384
 _IDLE_S = 0.2

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import ControlCommand, VehicleState
-from contracts.frames import LocalFrame, wrap_angle
-from contracts.roles import MirrorCast, OtherVehicle, UseRoles
-from contracts.simulation import MirrorSample, PlaneState
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker.commands import STEP_BACK_NS, CommandMemory, TwinCommand, estimated_command
-from sim_worker.mirror_world import GHOST, SHADOW, MirrorWorld
-from sim_worker.roles.casting import Casting, FreeTwin
-from sim_worker.roles.member import CastMember
-from sim_worker.roles.told import plane_state
-from sim_worker.seeding import local_state
-from sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.frames import LocalFrame, wrap_angle
+from foretwin.contracts.roles import MirrorCast, OtherVehicle, UseRoles
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.commands import STEP_BACK_NS, CommandMemory, TwinCommand, estimated_command
+from foretwin.sim_worker.mirror_world import GHOST, SHADOW, MirrorWorld
+from foretwin.sim_worker.roles.casting import Casting, FreeTwin
+from foretwin.sim_worker.roles.member import CastMember
+from foretwin.sim_worker.roles.told import plane_state
+from foretwin.sim_worker.seeding import local_state
+from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
 
 _STEP_NS = round(TIMESTEP_S * 1e9)
 _ALONE = MirrorCast()

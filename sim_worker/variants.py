@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.futures import Faults, Variant
-from contracts.scenario import Scenario
-from sim_worker.scenarios.drawing import draw_cases
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import Faults, Variant
+from foretwin.contracts.scenario import Scenario
+from foretwin.sim_worker.scenarios.drawing import draw_cases
 
 MIN_SPEED_FACTOR, MAX_SPEED_FACTOR = 0.5, 1.3
 MAX_SPEED_OFFSET_MPS = 2.5

@@ -1,6 +1,6 @@
 """Writing a drive to a bag: a ROS 2 folder with SQLite, or a ROS 1 file.
 
-Topics and types are those of telemetry.ros_messages; vehicle and frame stand in the String topics
+Topics and types are those of foretwin.telemetry.ros_messages; vehicle and frame stand in the String topics
 INFO_TOPIC and FRAME_TOPIC. A ROS 1 bag defines in itself the types that ROS 1 does not have, such
 as Autoware's Trajectory.
 """
@@ -18,12 +18,12 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from contracts import drive
-from contracts.frames import LocalFrame
-from telemetry.mcap_file import position_of
-from telemetry.ros_definitions import DEFINITIONS
-from telemetry.ros_messages import FRAME_TOPIC, INFO_TOPIC, messages_from
-from telemetry.ros_parts import STRING, json_string, schema_text, typestore
+from foretwin.contracts import drive
+from foretwin.contracts.frames import LocalFrame
+from foretwin.telemetry.mcap_file import position_of
+from foretwin.telemetry.ros_definitions import DEFINITIONS
+from foretwin.telemetry.ros_messages import FRAME_TOPIC, INFO_TOPIC, messages_from
+from foretwin.telemetry.ros_parts import STRING, json_string, schema_text, typestore
 
 
 class BagWriter:

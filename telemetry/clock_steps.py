@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from telemetry.clock import ClockEstimator
+from foretwin.telemetry.clock import ClockEstimator
 
 CONFIRM_NS = 1_000_000_000
 """A clock that stepped is believed after this long of stamps that agree with one another."""

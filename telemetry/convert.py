@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 import msgspec
 
-from telemetry.logs import Log, LogError, open_log
+from foretwin.telemetry.logs import Log, LogError, open_log
 
 Target = Literal["mcap", "ros2", "ros1", "csv"]
 TARGETS: tuple[Target, ...] = get_args(Target)
@@ -46,7 +46,7 @@ def convert(
     """Write the log at `source` to `target`, complete or not at all.
 
     `to` is the kind of target, else its suffix tells; `declaration` is that of a CSV at `source`.
-    The declaration of a CSV written is `TARGET.toml`. Raises what `telemetry.logs.open_log` raises,
+    The declaration of a CSV written is `TARGET.toml`. Raises what `foretwin.telemetry.logs.open_log` raises,
     LogError where no sample is valid or the target is the source or an existing folder, and OSError
     where `target` cannot be written.
     """
@@ -80,7 +80,7 @@ def _partial(target: Path) -> Iterator[Path]:
 
 
 def _to_mcap(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
-    from telemetry.mcap_file import create
+    from foretwin.telemetry.mcap_file import create
 
     with _partial(target) as partial:
         with create(partial, info=log.info) as writer:
@@ -113,7 +113,7 @@ def _to_ros2(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counte
 
 
 def _to_bag(source: Path, log: Log, path: Path, *, ros1: bool) -> Counter[str]:
-    from telemetry.bag_file import BagWriter
+    from foretwin.telemetry.bag_file import BagWriter
 
     writer = BagWriter(path, ros1=ros1, info=log.info)
     try:
@@ -128,7 +128,7 @@ def _to_bag(source: Path, log: Log, path: Path, *, ros1: bool) -> Counter[str]:
 
 
 def _to_csv(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
-    from telemetry.csv_file import write_csv
+    from foretwin.telemetry.csv_file import write_csv
 
     toml = target.with_name(target.name + ".toml")
     with _partial(toml) as declaration, _partial(target) as table:

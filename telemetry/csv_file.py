@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from contracts.drive import VehicleInfo
-from telemetry.logs.log import LogError, Sample
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.telemetry.logs.log import LogError, Sample
 
 
 class _Column(NamedTuple):

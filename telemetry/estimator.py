@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from contracts.drive import (
+from foretwin.contracts.drive import (
     GnssFix,
     HeadingSample,
     ImuSample,
@@ -20,12 +20,12 @@ from contracts.drive import (
     VehicleInfo,
     VehicleState,
 )
-from telemetry.clock import ClockEstimator
-from telemetry.clock_steps import ClockStep, ClockSteps
-from telemetry.map_aid import RoadLine
-from telemetry.motion_track import MotionTrack
-from telemetry.reordering import Reordering
-from telemetry.staleness import Staleness
+from foretwin.telemetry.clock import ClockEstimator
+from foretwin.telemetry.clock_steps import ClockStep, ClockSteps
+from foretwin.telemetry.map_aid import RoadLine
+from foretwin.telemetry.motion_track import MotionTrack
+from foretwin.telemetry.reordering import Reordering
+from foretwin.telemetry.staleness import Staleness
 
 _STATE_PERIOD_NS = 20_000_000
 _KINDS: dict[str, type] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from telemetry.motion_noise import GYRO_BIAS_DENSITY, GYRO_BIAS_STD_RADPS
+from foretwin.telemetry.motion_noise import GYRO_BIAS_DENSITY, GYRO_BIAS_STD_RADPS
 
 _MOST_RADPS = 0.005
 """Of an automotive gyro on a rough road; taken until its own samples say less."""

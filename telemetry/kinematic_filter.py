@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from contracts.arrays import Array
-from telemetry import motion_noise
+from foretwin.contracts.arrays import Array
+from foretwin.telemetry import motion_noise
 
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
 GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)

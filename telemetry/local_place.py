@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     geo_from_local,

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import GeoPoint
-from telemetry.kinematic_filter import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.kinematic_filter import (
     GNSS_X,
     GNSS_Y,
     ROAD_OFFSET,
@@ -25,7 +25,7 @@ from telemetry.kinematic_filter import (
     X,
     Y,
 )
-from telemetry.local_place import LocalPlace
+from foretwin.telemetry.local_place import LocalPlace
 
 ALIKE_M = 0.5
 """How far the streets of a map lie off the ground all together: no street can tell."""

@@ -19,10 +19,10 @@ import msgspec
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame
-from telemetry.ros_messages import messages_from
-from telemetry.ros_parts import schema_text
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.ros_messages import messages_from
+from foretwin.telemetry.ros_parts import schema_text
 
 FORMAT_METADATA = "foretwin.format"
 INFO_METADATA = "foretwin.vehicle_info"
@@ -123,7 +123,7 @@ class DriveWriter:
         """Write one message.
 
         Raises OSError where the file cannot grow, and ValueError for what
-        `telemetry.ros_messages.messages_from` refuses.
+        `foretwin.telemetry.ros_messages.messages_from` refuses.
         """
         parts = messages_from(channel, message, self._frame_for(message))
         stamp_ns = message.stamp_ns  # type: ignore[attr-defined]

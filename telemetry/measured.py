@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from typing import Any
 
-from contracts.drive import SpeedSample, SteeringSample
+from foretwin.contracts.drive import SpeedSample, SteeringSample
 
 FRESH_NS = 1_000_000_000
 """A quantity counts as measured while its last sample is younger than this."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
-from telemetry.gyro import Gyro
-from telemetry.kinematic_filter import SPEED, YAW, KinematicFilter
-from telemetry.measured import Doubt, Measured
+from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
+from foretwin.telemetry.gyro import Gyro
+from foretwin.telemetry.kinematic_filter import SPEED, YAW, KinematicFilter
+from foretwin.telemetry.measured import Doubt, Measured
 
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""

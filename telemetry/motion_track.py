@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
-from contracts.frames import GeoPoint, base_from_sensor
-from telemetry.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
-from telemetry.local_place import LocalPlace
-from telemetry.map_aid import MapAid, RoadLine
-from telemetry.measured import Measured
-from telemetry.motion_corrections import STANDING_MPS, MotionCorrections
-from telemetry.position_gate import PositionGate
-from telemetry.reported_state import moving_state, unmoved_state
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
+from foretwin.contracts.frames import GeoPoint, base_from_sensor
+from foretwin.telemetry.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
+from foretwin.telemetry.local_place import LocalPlace
+from foretwin.telemetry.map_aid import MapAid, RoadLine
+from foretwin.telemetry.measured import Measured
+from foretwin.telemetry.motion_corrections import STANDING_MPS, MotionCorrections
+from foretwin.telemetry.position_gate import PositionGate
+from foretwin.telemetry.reported_state import moving_state, unmoved_state
 
 _WANDER_M = 0.5
 _WHITE_SHARE = 0.1

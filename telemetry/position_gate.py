@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix
 
 MAX_SPEED_MPS = 70.0
 """A position that asks for more than this is no motion of a road vehicle."""

@@ -1,6 +1,6 @@
 """The recorder process: what the vehicle sends, and the state estimated from it, to one MCAP file.
 
-`python -m telemetry.recorder --setup FILE` (contracts.setup.RecorderSetup).
+`python -m foretwin.telemetry.recorder --setup FILE` (foretwin.contracts.setup.RecorderSetup).
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from contracts.bus import Alive, Bus, Mailbox, Received, Reply, ZenohBus
-from contracts.codec import SchemaMismatch
-from contracts.drive import InfoRequest
-from contracts.keys import TELEMETRY_CHANNELS, alive_key
-from contracts.setup import RecorderSetup
-from contracts.simulation import Event
-from telemetry.mcap_file import create
-from telemetry.recording import SOURCE, Recording
-from telemetry.ros_parts import typestore
-from telemetry.vehicle_process import ORCHESTRATOR
-from telemetry.vehicle_process import main as process_main
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, ZenohBus
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.keys import TELEMETRY_CHANNELS, alive_key
+from foretwin.contracts.setup import RecorderSetup
+from foretwin.contracts.simulation import Event
+from foretwin.telemetry.mcap_file import create
+from foretwin.telemetry.recording import SOURCE, Recording
+from foretwin.telemetry.ros_parts import typestore
+from foretwin.telemetry.vehicle_process import ORCHESTRATOR
+from foretwin.telemetry.vehicle_process import main as process_main
 
 DEPTH = 20_000
 """Messages that may wait: more than a minute of a car at 300 messages a second."""
@@ -43,7 +43,7 @@ _GRACE_S = 1.0
 _LAST_WORDS_S = 0.5
 """How long messages are still taken after the end of the run; in lock step as long as some come."""
 
-log = logging.getLogger("telemetry.recorder")
+log = logging.getLogger("foretwin.telemetry.recorder")
 
 
 class RecorderProcess:
@@ -206,7 +206,7 @@ class RecorderProcess:
 def record(setup: RecorderSetup) -> None:
     """Record until the run ends; blocks, and owns SIGTERM.
 
-    Raises contracts.bus.BusUnreachable where no router answers at the start.
+    Raises foretwin.contracts.bus.BusUnreachable where no router answers at the start.
     """
     typestore()  # Costs a third of a second: before the first message, not at it.
     with ZenohBus(setup.bus) as bus:
@@ -238,4 +238,6 @@ def _give_way() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(process_main(sys.argv[1:], RecorderSetup, record, program="telemetry.recorder"))
+    sys.exit(
+        process_main(sys.argv[1:], RecorderSetup, record, program="foretwin.telemetry.recorder")
+    )

@@ -9,13 +9,13 @@ from typing import Literal
 
 import msgspec
 
-from contracts.drive import VehicleInfo
-from contracts.simulation import Event
-from telemetry.mcap_file import DriveWriter
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.simulation import Event
+from foretwin.telemetry.mcap_file import DriveWriter
 
 SOURCE = "recorder"
 
-log = logging.getLogger("telemetry.recorder")
+log = logging.getLogger("foretwin.telemetry.recorder")
 
 
 class Recording:

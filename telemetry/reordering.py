@@ -6,7 +6,7 @@ import bisect
 from collections import Counter, deque
 from typing import Any, NamedTuple
 
-from telemetry.motion_track import MotionTrack
+from foretwin.telemetry.motion_track import MotionTrack
 
 WINDOW_NS = 300_000_000
 """A sample that comes later than this behind the newest is too late to count."""

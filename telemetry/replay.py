@@ -1,4 +1,4 @@
-"""A recorded drive on the live keys: `python -m telemetry.replay --setup FILE`."""
+"""A recorded drive on the live keys: `python -m foretwin.telemetry.replay --setup FILE`."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any, Protocol
 
 import msgspec
 
-from contracts.drive import GnssFix, VehicleInfo
-from contracts.errors import UserError
-from contracts.setup import ReplaySetup
-from telemetry.vehicle_process import main, run_vehicle
+from foretwin.contracts.drive import GnssFix, VehicleInfo
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.setup import ReplaySetup
+from foretwin.telemetry.vehicle_process import main, run_vehicle
 
 
 class RecordedDrive(Protocol):
-    """What replay needs of a log; `telemetry.logs.open_log` gives it."""
+    """What replay needs of a log; `foretwin.telemetry.logs.open_log` gives it."""
 
     @property
     def info(self) -> VehicleInfo:
@@ -109,7 +109,7 @@ def _placed(fix: GnssFix) -> bool:
 
 def run(setup: ReplaySetup) -> None:
     """Replay the log of `setup` until the run ends."""
-    from telemetry.logs import open_log
+    from foretwin.telemetry.logs import open_log
 
     source = ReplaySource(
         open_log(Path(setup.log)),
@@ -121,4 +121,4 @@ def run(setup: ReplaySetup) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:], ReplaySetup, run, program="telemetry.replay"))
+    sys.exit(main(sys.argv[1:], ReplaySetup, run, program="foretwin.telemetry.replay"))

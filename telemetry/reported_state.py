@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint, wrap_angle
-from telemetry.kinematic_filter import ACCEL, CURVATURE, SPEED, YAW, KinematicFilter, X, Y
-from telemetry.map_aid import ALIKE_M
-from telemetry.measured import Measured
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint, wrap_angle
+from foretwin.telemetry.kinematic_filter import ACCEL, CURVATURE, SPEED, YAW, KinematicFilter, X, Y
+from foretwin.telemetry.map_aid import ALIKE_M
+from foretwin.telemetry.measured import Measured
 
 
 def moving_state(

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
-from telemetry.ros_parts import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.telemetry.ros_parts import (
     ACKERMANN,
     BASE_FRAME,
     CONTROL,

@@ -12,17 +12,17 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame
-from telemetry.ros_commands import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.ros_commands import (
     command_from_ackermann,
     command_from_control,
     state_from_odometry,
 )
-from telemetry.ros_motion import plan_from_trajectory
-from telemetry.ros_objects import users_from_detected, users_from_predicted
-from telemetry.ros_parts import stamp_ns_of
-from telemetry.ros_status import (
+from foretwin.telemetry.ros_motion import plan_from_trajectory
+from foretwin.telemetry.ros_objects import users_from_detected, users_from_predicted
+from foretwin.telemetry.ros_parts import stamp_ns_of
+from foretwin.telemetry.ros_status import (
     gear_from_ros,
     indicator_from_ros,
     mode_from_ros,
@@ -42,7 +42,7 @@ class Foreign(NamedTuple):
     """How messages of one type are read.
 
     Of the types and topics of one `stream` one is taken; a status has three streams, which
-    `telemetry.ros_status.StatusJoiner` joins. `read` takes the message, its stamp and the frame of
+    `foretwin.telemetry.ros_status.StatusJoiner` joins. `read` takes the message, its stamp and the frame of
     `map`, None where unknown, returns samples of `channels` and raises UnusableError.
     """
 

@@ -23,15 +23,15 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from contracts.frames import LocalFrame
-from contracts.keys import CHANNELS
-from telemetry.ros_motion import (
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.keys import CHANNELS
+from foretwin.telemetry.ros_motion import (
     plan_from_trajectory,
     ros_from_control,
     ros_from_plan,
     ros_from_state,
 )
-from telemetry.ros_parts import (
+from foretwin.telemetry.ros_parts import (
     IMU,
     JOINT_STATE,
     NAV_SAT_FIX,
@@ -42,7 +42,7 @@ from telemetry.ros_parts import (
     json_string,
     typestore,
 )
-from telemetry.ros_sensors import (
+from foretwin.telemetry.ros_sensors import (
     gnss_from_ros,
     heading_from_ros,
     imu_from_ros,

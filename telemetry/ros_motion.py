@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from contracts import drive
-from contracts.frames import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     geo_from_local,
@@ -16,7 +16,7 @@ from contracts.frames import (
     local_from_geo,
     local_from_geo_yaw,
 )
-from telemetry.ros_parts import (
+from foretwin.telemetry.ros_parts import (
     ACKERMANN,
     BASE_FRAME,
     MAP_FRAME,

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts import drive
-from contracts.frames import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     geo_from_local,
@@ -23,7 +23,7 @@ from contracts.frames import (
     local_from_geo,
     local_from_geo_yaw,
 )
-from telemetry.ros_parts import (
+from foretwin.telemetry.ros_parts import (
     DETECTED_OBJECTS,
     MAP_FRAME,
     PREDICTED_OBJECTS,
@@ -37,7 +37,7 @@ from telemetry.ros_parts import (
     vector_from,
     yaw_of,
 )
-from telemetry.ros_shapes import (
+from foretwin.telemetry.ros_shapes import (
     classes_from,
     height_m,
     is_passable,

@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from contracts.arrays import Array
-from telemetry.ros_definitions import DEFINITIONS
+from foretwin.contracts.arrays import Array
+from foretwin.telemetry.ros_definitions import DEFINITIONS
 
 MAP_FRAME, BASE_FRAME, ANTENNA_FRAME = "map", "base_link", "antenna"
 

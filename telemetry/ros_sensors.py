@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame
-from telemetry.ros_parts import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.ros_parts import (
     ANTENNA_FRAME,
     BASE_FRAME,
     IMU,

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from contracts import drive
-from telemetry.ros_parts import ros_type, vector_from, within_float32
+from foretwin.contracts import drive
+from foretwin.telemetry.ros_parts import ros_type, vector_from, within_float32
 
 _KIND_BY_LABEL: dict[int, drive.RoadUserKind] = {
     1: "car", 2: "lorry", 3: "bus", 4: "lorry", 5: "motorcycle", 6: "bicycle", 7: "pedestrian",

@@ -12,8 +12,8 @@ from typing import Any
 
 import msgspec
 
-from contracts import drive
-from telemetry.ros_parts import (
+from foretwin.contracts import drive
+from foretwin.telemetry.ros_parts import (
     CONTROL_MODE_REPORT,
     GEAR_REPORT,
     HAZARD_LIGHTS_REPORT,

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import Vector3
-from telemetry.ros_parts import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import Vector3
+from foretwin.telemetry.ros_parts import (
     CLOCK,
     TF,
     header_from,

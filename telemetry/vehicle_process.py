@@ -18,13 +18,13 @@ from typing import Any, Protocol, TypeVar
 
 import msgspec
 
-from contracts.bus import Alive, Bus, Mailbox, Received, Request, ZenohBus
-from contracts.codec import SchemaMismatch
-from contracts.drive import AdvanceReply, DriveEnd, VehicleInfo
-from contracts.errors import UserError
-from contracts.keys import alive_key
-from contracts.process import log_to_file
-from contracts.setup import ProcessSetup, read_setup
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Request, ZenohBus
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import AdvanceReply, DriveEnd, VehicleInfo
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.process import log_to_file
+from foretwin.contracts.setup import ProcessSetup, read_setup
 
 ORCHESTRATOR = "orchestrator"
 _TICK_S = 0.005
@@ -182,7 +182,7 @@ class VehicleProcess:
 def run_vehicle(source: VehicleSource, setup: ProcessSetup, *, speed: float | None) -> None:
     """Put `source` on the bus of `setup` until the run ends; blocks, and owns SIGTERM and SIGINT.
 
-    Raises contracts.bus.BusUnreachable where no router answers at the start.
+    Raises foretwin.contracts.bus.BusUnreachable where no router answers at the start.
     """
     with ZenohBus(setup.bus) as bus:
         process = VehicleProcess(

@@ -98,7 +98,7 @@ def test_pins_are_exact() -> None:
 
 
 def test_the_command_line_starts_without_heavy_libraries() -> None:
-    code = "import sys, orchestrator.__main__; print(*sys.modules)"
+    code = "import sys, foretwin.__main__; print(*sys.modules)"
     run = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )

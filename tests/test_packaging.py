@@ -48,7 +48,7 @@ def test_wheel_installed_alone_finds_its_embedded_map(wheel: Path, tmp_path: Pat
     python = venv / "bin" / "python"
     subprocess.run([python, "-m", "pip", "install", "--quiet", "--no-deps", wheel], check=True)
     code = (
-        "from orchestrator.embedded import MAP_FILE, ROUTE_FILE;"
+        "from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE;"
         "print(MAP_FILE.is_file(), ROUTE_FILE.is_file(), MAP_FILE)"
     )
 

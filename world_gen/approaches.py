@@ -7,13 +7,13 @@ from collections.abc import Collection, Sequence
 
 import msgspec
 
-from contracts.provenance import Choice
-from contracts.world import LineControl, YieldRule
-from world_gen.cluster import Cluster
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.legs import RING_KINDS, dot, heading_out, is_ring_edge
-from world_gen.met_on_the_way import (
+from foretwin.contracts.provenance import Choice
+from foretwin.contracts.world import LineControl, YieldRule
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.legs import RING_KINDS, dot, heading_out, is_ring_edge
+from foretwin.world_gen.met_on_the_way import (
     Met,
     NodeTags,
     is_light,
@@ -24,9 +24,9 @@ from world_gen.met_on_the_way import (
     passed_on,
     sign_of,
 )
-from world_gen.priority_roads import Entry, Rank, Standing, opposites, outward, standings
-from world_gen.road_graph import DirectedEdge
-from world_gen.signs_inside import SignsInside, shared_signs
+from foretwin.world_gen.priority_roads import Entry, Rank, Standing, opposites, outward, standings
+from foretwin.world_gen.road_graph import DirectedEdge
+from foretwin.world_gen.signs_inside import SignsInside, shared_signs
 
 OWN_LINE_M = 3.0
 """A sign or signal farther than this from the junction's node stands at the stop line."""

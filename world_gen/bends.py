@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from world_gen.polyline_batch import Polylines
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.polyline_batch import Polylines
 
 MIN_STEP_M = 0.25
 """Nodes of a way closer than this to the one before say nothing about where it leads."""

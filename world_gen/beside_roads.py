@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.frames import LocalFrame, local_from_geo
-from world_gen.extent import box_deg
-from world_gen.osm_map import OsmMap, OsmWay
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.world_gen.extent import box_deg
+from foretwin.world_gen.osm_map import OsmMap, OsmWay
 
 _RAILS = frozenset({"tram", "light_rail"})
 _WALKED = frozenset({"footway", "cycleway", "path", "pedestrian"})

@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.frames import local_from_geo
-from contracts.provenance import Quantity
-from world_gen.driving_side import driving_side
-from world_gen.node_locations import NodeLocations
-from world_gen.osm_map import MapError, OsmMap, OsmWay
-from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
-from world_gen.road_tags import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.driving_side import driving_side
+from foretwin.world_gen.node_locations import NodeLocations
+from foretwin.world_gen.osm_map import MapError, OsmMap, OsmWay
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.road_tags import (
     Directions,
     LaneCounts,
     directions,

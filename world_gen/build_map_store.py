@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from world_gen.map_assembly import (
+from foretwin.world_gen.map_assembly import (
     NO_WAYS,
     UNITS_PER_DEG,
     BoolArray,
@@ -20,10 +20,10 @@ from world_gen.map_assembly import (
     centre_of,
     sound_ways,
 )
-from world_gen.map_cells import Boxes, CellNodes, CellWays, differences, place
-from world_gen.map_tables import NODES, NOTES, RELATIONS, WAYS, MapMeta, TableWriter
-from world_gen.node_spool import NodeSpool
-from world_gen.opl import (
+from foretwin.world_gen.map_cells import Boxes, CellNodes, CellWays, differences, place
+from foretwin.world_gen.map_tables import NODES, NOTES, RELATIONS, WAYS, MapMeta, TableWriter
+from foretwin.world_gen.node_spool import NodeSpool
+from foretwin.world_gen.opl import (
     IntArray,
     NodeObjects,
     NodePositions,
@@ -36,9 +36,9 @@ from world_gen.opl import (
     way_lines,
     way_nodes,
 )
-from world_gen.opl_stream import OplStream, Progress
-from world_gen.osm_map import LatLonBounds, MapError
-from world_gen.read_osm import NODE_KEYS, WAY_KEYS, is_kept_relation
+from foretwin.world_gen.opl_stream import OplStream, Progress
+from foretwin.world_gen.osm_map import LatLonBounds, MapError
+from foretwin.world_gen.read_osm import NODE_KEYS, WAY_KEYS, is_kept_relation
 
 WANTED_WAYS, WANTED_NODES = any_key(WAY_KEYS), any_key(NODE_KEYS)
 BATCH_BYTES = 24 << 20

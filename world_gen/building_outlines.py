@@ -12,10 +12,10 @@ import numpy.typing as npt
 import shapely
 from shapely.geometry import Polygon
 
-from contracts.arrays import Array
-from contracts.frames import local_from_geo
-from world_gen.building_tags import is_part, stands_above_ground
-from world_gen.osm_map import OsmMap, OsmRelation
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import local_from_geo
+from foretwin.world_gen.building_tags import is_part, stands_above_ground
+from foretwin.world_gen.osm_map import OsmMap, OsmRelation
 
 MIN_PIECE_M2 = 0.05
 """Smaller pieces of a mended outline are left out."""

@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from contracts.provenance import Provenance, Quantity
-from world_gen.building_outlines import valid_polygons
+from foretwin.contracts.provenance import Provenance, Quantity
+from foretwin.world_gen.building_outlines import valid_polygons
 
 _OWN_SHARE = 0.5
 """A part belongs to the outline that holds at least this share of it."""

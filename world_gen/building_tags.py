@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from contracts.provenance import Quantity
+from foretwin.contracts.provenance import Quantity
 
 LEVEL_HEIGHT_M = 3.0
 DEFAULT_HEIGHT_M = 6.0

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.frames import LocalFrame, target_from_source_m
-from contracts.world import Building
-from world_gen.building_outlines import (
+from foretwin.contracts.frames import LocalFrame, target_from_source_m
+from foretwin.contracts.world import Building
+from foretwin.world_gen.building_outlines import (
     MIN_PIECE_M2,
     Indices,
     OutlineTable,
@@ -19,12 +19,12 @@ from world_gen.building_outlines import (
     outlines,
     valid_polygons,
 )
-from world_gen.building_parts import Footprint as Footprint
-from world_gen.building_parts import resolve_parts
-from world_gen.building_tags import building_extent
-from world_gen.extent import box_deg
-from world_gen.osm_map import OsmMap
-from world_gen.polygon_areas import rings_of
+from foretwin.world_gen.building_parts import Footprint as Footprint
+from foretwin.world_gen.building_parts import resolve_parts
+from foretwin.world_gen.building_tags import building_extent
+from foretwin.world_gen.extent import box_deg
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.polygon_areas import rings_of
 
 GRID_M = 0.001
 """Outlines are written in millimetres."""

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from world_gen.osm_map import OsmMap
-from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
-from world_gen.road_tags import RING_TAGS, is_car_road
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.road_tags import RING_TAGS, is_car_road
 
 Tags = Mapping[str, str]
 STOPS = frozenset({"traffic_signals", "stop", "give_way"})

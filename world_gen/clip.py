@@ -7,13 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.frames import LocalFrame
-from world_gen.map_assembly import UNITS_PER_DEG, BoolArray, MapObjects, assemble_map
-from world_gen.map_cells import Boxes, CellNodes, CellWays, cell_ranges, sums, touches, unpack
-from world_gen.map_tables import NODES, NOTES, RELATIONS, WAYS, TableReader
-from world_gen.opl import IntArray, NodePositions, TagReader, WayNodes, read_relations
-from world_gen.osm_map import LatLonBounds, OsmMap, OsmRelation
-from world_gen.read_osm import is_kept_relation
+from foretwin.contracts.frames import LocalFrame
+from foretwin.world_gen.map_assembly import UNITS_PER_DEG, BoolArray, MapObjects, assemble_map
+from foretwin.world_gen.map_cells import (
+    Boxes,
+    CellNodes,
+    CellWays,
+    cell_ranges,
+    sums,
+    touches,
+    unpack,
+)
+from foretwin.world_gen.map_tables import NODES, NOTES, RELATIONS, WAYS, TableReader
+from foretwin.world_gen.opl import IntArray, NodePositions, TagReader, WayNodes, read_relations
+from foretwin.world_gen.osm_map import LatLonBounds, OsmMap, OsmRelation
+from foretwin.world_gen.read_osm import is_kept_relation
 
 
 class _Ways(NamedTuple):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from world_gen.intersections import Junction
-from world_gen.road_graph import DirectedEdge
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.road_graph import DirectedEdge
 
 
 class Cluster(msgspec.Struct, frozen=True, kw_only=True):

@@ -10,19 +10,19 @@ import numpy as np
 import shapely
 import shapely.ops
 
-from contracts.frames import GeoPoint, LocalFrame, target_from_source_m
-from contracts.world import DrivingSide
-from world_gen.cluster import Cluster
-from world_gen.cross_section import CrossSection, cross_section
-from world_gen.extent import Extent
-from world_gen.intersections import Junction
-from world_gen.legs import RING_KINDS, Heads, heading_out, is_ring_edge
-from world_gen.map_index import MapIndex
-from world_gen.polyline_batch import Polylines
-from world_gen.road_graph import DirectedEdge, RoadEdge
-from world_gen.transitions import transition_shifts
-from world_gen.trims import trims
-from world_gen.turn_restrictions import restriction_notes
+from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source_m
+from foretwin.contracts.world import DrivingSide
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.cross_section import CrossSection, cross_section
+from foretwin.world_gen.extent import Extent
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.legs import RING_KINDS, Heads, heading_out, is_ring_edge
+from foretwin.world_gen.map_index import MapIndex
+from foretwin.world_gen.polyline_batch import Polylines
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.transitions import transition_shifts
+from foretwin.world_gen.trims import trims
+from foretwin.world_gen.turn_restrictions import restriction_notes
 
 _REPEAT_M = 0.01
 

@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from contracts.arrays import Array
-from world_gen.connections import ConnectionDraft
-from world_gen.polyline import left_of
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.polyline import left_of
 
 SWEPT_HALF_WIDTH_M = 1.0
 """Half of what a car sweeps: 1.8 m of body and 0.1 m to each side, whatever the lane's width."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from world_gen.bends import rounded_through
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.inner_lanes import paths_along_inner_lanes
-from world_gen.polyline import offset, without_repeats
-from world_gen.polyline_batch import Polylines
-from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.bends import rounded_through
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.inner_lanes import paths_along_inner_lanes
+from foretwin.world_gen.polyline import offset, without_repeats
+from foretwin.world_gen.polyline_batch import Polylines
+from foretwin.world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
 
 _LONG_PATH_M = 25.0
 _MAX_DETOUR_M = 9.0

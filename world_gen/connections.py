@@ -5,18 +5,18 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.provenance import Quantity
-from contracts.world import Connection, DrivingSide, LineControl, Turn
-from world_gen.cluster import Cluster
-from world_gen.clusters import Surroundings
-from world_gen.cross_section import LanePlan
-from world_gen.forks import beside_at_fork, merged_ends, merges
-from world_gen.lanes import LaneDraft, LaneSet
-from world_gen.movements import Movement
-from world_gen.polyline import unit
-from world_gen.road_graph import DirectedEdge
-from world_gen.turn_curves import LEAST_RADIUS_M
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import Connection, DrivingSide, LineControl, Turn
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.cross_section import LanePlan
+from foretwin.world_gen.forks import beside_at_fork, merged_ends, merges
+from foretwin.world_gen.lanes import LaneDraft, LaneSet
+from foretwin.world_gen.movements import Movement
+from foretwin.world_gen.polyline import unit
+from foretwin.world_gen.road_graph import DirectedEdge
+from foretwin.world_gen.turn_curves import LEAST_RADIUS_M
 
 _UNDRAWN = np.zeros((0, 2))
 _FROM_LEFT: tuple[Turn, ...] = ("left", "straight", "right")

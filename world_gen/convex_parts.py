@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.arrays import Array
-from world_gen.buildings import FOOTPRINT_TOLERANCE_M, SILHOUETTE_TOLERANCE_M
-from world_gen.reflex_cuts import cut_at_reflex_corners, nearly_the_same, polygons_of
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.buildings import FOOTPRINT_TOLERANCE_M, SILHOUETTE_TOLERANCE_M
+from foretwin.world_gen.reflex_cuts import cut_at_reflex_corners, nearly_the_same, polygons_of
 
 COLLISION_TOLERANCE_M = SILHOUETTE_TOLERANCE_M - FOOTPRINT_TOLERANCE_M
 """How far convex parts may move a silhouette that the footprint has moved already."""

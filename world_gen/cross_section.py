@@ -6,12 +6,12 @@ import re
 
 import msgspec
 
-from contracts.provenance import Quantity
-from contracts.world import DrivingSide
-from world_gen.lane_plans import CrossSection as CrossSection
-from world_gen.lane_plans import LanePlan as LanePlan
-from world_gen.lane_plans import metres as metres
-from world_gen.lane_tags import (
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import DrivingSide
+from foretwin.world_gen.lane_plans import CrossSection as CrossSection
+from foretwin.world_gen.lane_plans import LanePlan as LanePlan
+from foretwin.world_gen.lane_plans import metres as metres
+from foretwin.world_gen.lane_tags import (
     BUS_WIDTH_M,
     CLASS_WIDTH_M,
     DEFAULT_WIDTH_M,
@@ -19,8 +19,8 @@ from world_gen.lane_tags import (
     MIN_WIDTH_M,
     lanes_of_direction,
 )
-from world_gen.road_graph import RoadEdge
-from world_gen.side_lanes import side_lanes
+from foretwin.world_gen.road_graph import RoadEdge
+from foretwin.world_gen.side_lanes import side_lanes
 
 MAX_LANES = 12
 TRANSITION = "transition"

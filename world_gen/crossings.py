@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.provenance import Choice, Quantity
-from contracts.world import Crossing
-from world_gen.beside_roads import BesideRoads
-from world_gen.clusters import Surroundings
-from world_gen.polyline import left_of, unit
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Choice, Quantity
+from foretwin.contracts.world import Crossing
+from foretwin.world_gen.beside_roads import BesideRoads
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.polyline import left_of, unit
 
 CROSSING_WIDTH_M = 4.0
 _MARKED = ("zebra", "marked", "uncontrolled", "traffic_signals")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 
-from contracts.world import DrivingSide
-from world_gen.osm_map import OsmMap
+from foretwin.contracts.world import DrivingSide
+from foretwin.world_gen.osm_map import OsmMap
 
 # Rough outlines (lon, lat) of where traffic keeps left; they follow land borders within some tens
 # of kilometres. A `driving_side` tag in the map outranks them.

@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import geo_from_local
-from contracts.world import IntersectionSummary, JunctionKind
-from world_gen.chains import CarRoads, car_roads
-from world_gen.grouping import Cluster
-from world_gen.intersections import Junction
-from world_gen.junction_arms import Approach, ClusterRoads, approaches, roads_of
-from world_gen.junction_clusters import cluster_branchings
-from world_gen.junction_control import control_of, lights_of
-from world_gen.osm_map import OsmMap
-from world_gen.road_graph import RoadGraph
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import geo_from_local
+from foretwin.contracts.world import IntersectionSummary, JunctionKind
+from foretwin.world_gen.chains import CarRoads, car_roads
+from foretwin.world_gen.grouping import Cluster
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.junction_arms import Approach, ClusterRoads, approaches, roads_of
+from foretwin.world_gen.junction_clusters import cluster_branchings
+from foretwin.world_gen.junction_control import control_of, lights_of
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.road_graph import RoadGraph
 
 STAGGER_M = 8.0
 """Opposite arms whose axes lie farther apart make a junction staggered."""

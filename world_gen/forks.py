@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from world_gen.cluster import Cluster
-from world_gen.clusters import Surroundings
-from world_gen.lanes import LaneDraft
-from world_gen.movements import Movement
-from world_gen.road_graph import DirectedEdge
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.lanes import LaneDraft
+from foretwin.world_gen.movements import Movement
+from foretwin.world_gen.road_graph import DirectedEdge
 
 _FORK_RAD = math.radians(45.0)
 

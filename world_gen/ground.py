@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from contracts.arrays import Array
-from contracts.world import Area, Building
-from world_gen.beside_roads import BesideRoads
-from world_gen.buildings import buildings_in_frame
-from world_gen.clusters import Surroundings, in_map
-from world_gen.connections import ConnectionDraft
-from world_gen.lanes import LaneSet
-from world_gen.map_index import MapIndex
-from world_gen.map_islands import mapped_islands
-from world_gen.road_surface import areas
-from world_gen.sidewalks import sidewalk_areas
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Area, Building
+from foretwin.world_gen.beside_roads import BesideRoads
+from foretwin.world_gen.buildings import buildings_in_frame
+from foretwin.world_gen.clusters import Surroundings, in_map
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.lanes import LaneSet
+from foretwin.world_gen.map_index import MapIndex
+from foretwin.world_gen.map_islands import mapped_islands
+from foretwin.world_gen.road_surface import areas
+from foretwin.world_gen.sidewalks import sidewalk_areas
 
 
 class Ground(NamedTuple):

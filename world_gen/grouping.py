@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import msgspec
 
-from world_gen.chains import CarRoads, Chain, Ring
+from foretwin.world_gen.chains import CarRoads, Chain, Ring
 
 
 class Cluster(msgspec.Struct):

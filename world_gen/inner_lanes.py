@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.lane_plans import LanePlan
-from world_gen.polyline import length, offset, points_at, without_repeats
-from world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.lane_plans import LanePlan
+from foretwin.world_gen.polyline import length, offset, points_at, without_repeats
+from foretwin.world_gen.turn_curves import LEAST_RADIUS_M, turn_curves
 
 _LONG_EDGE_M = 18.0
 """Roads inside a junction that are shorter are crossed in one sweep."""

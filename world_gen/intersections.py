@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import msgspec
 
-from contracts.arrays import Array
-from contracts.world import IntersectionSummary
-from world_gen.road_graph import DirectedEdge
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import IntersectionSummary
+from foretwin.world_gen.road_graph import DirectedEdge
 
 
 class JunctionArm(msgspec.Struct, frozen=True, kw_only=True):

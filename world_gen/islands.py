@@ -6,11 +6,11 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from contracts.world import Area
-from world_gen.clusters import Surroundings
-from world_gen.lanes import LaneSet
-from world_gen.paved import GRID_M, Paved
-from world_gen.polygon_areas import area_of
+from foretwin.contracts.world import Area
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.lanes import LaneSet
+from foretwin.world_gen.paved import GRID_M, Paved
+from foretwin.world_gen.polygon_areas import area_of
 
 MIN_ISLAND_M2 = 2.5
 MAX_ISLAND_M2 = 2500.0

@@ -6,10 +6,10 @@ import math
 from itertools import combinations
 from typing import NamedTuple
 
-from world_gen.chains import CarRoads, Chain
-from world_gen.grouping import Cluster
-from world_gen.intersections import JunctionArm
-from world_gen.road_graph import RoadGraph
+from foretwin.world_gen.chains import CarRoads, Chain
+from foretwin.world_gen.grouping import Cluster
+from foretwin.world_gen.intersections import JunctionArm
+from foretwin.world_gen.road_graph import RoadGraph
 
 LOOK_M = 30.0
 """How far along a road its direction and its distance from another are judged."""

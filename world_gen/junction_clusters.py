@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 
-from world_gen.chains import CarRoads, Chain, Tags
-from world_gen.grouping import Cluster, Grouping
-from world_gen.junction_control import facing
-from world_gen.road_graph import RoadGraph
-from world_gen.slip_roads import add_slips, slip_ends
+from foretwin.world_gen.chains import CarRoads, Chain, Tags
+from foretwin.world_gen.grouping import Cluster, Grouping
+from foretwin.world_gen.junction_control import facing
+from foretwin.world_gen.road_graph import RoadGraph
+from foretwin.world_gen.slip_roads import add_slips, slip_ends
 
 CLOSE_M = 20.0
 """Branchings so near each other are one junction, staggered perhaps."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from contracts.world import Control
-from world_gen.chains import Chain, Mark, Tags
+from foretwin.contracts.world import Control
+from foretwin.world_gen.chains import Chain, Mark, Tags
 
 SIGNALS_WITHIN_M, SIGNS_WITHIN_M = 40.0, 30.0
 PEDESTRIAN_LIGHT_M = 15.0

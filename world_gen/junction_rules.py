@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-from contracts.signals import Signal, SignalPlan
-from contracts.world import Conflict, Crossing, StopLine
-from world_gen.approaches import Approach, approaches
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.lanes import LaneSet
-from world_gen.lone_lights import lone_lights
-from world_gen.met_on_the_way import NodeTags, lights_inside
-from world_gen.right_of_way import right_of_way
-from world_gen.signal_groups import lane_groups, walk_groups
-from world_gen.signal_heads import signal_heads
-from world_gen.signal_plan import signal_plans
-from world_gen.signs_inside import SignsInside, signs_inside
-from world_gen.stop_lines import line_controls, lines_at_signs, stop_lines
+from foretwin.contracts.signals import Signal, SignalPlan
+from foretwin.contracts.world import Conflict, Crossing, StopLine
+from foretwin.world_gen.approaches import Approach, approaches
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.lanes import LaneSet
+from foretwin.world_gen.lone_lights import lone_lights
+from foretwin.world_gen.met_on_the_way import NodeTags, lights_inside
+from foretwin.world_gen.right_of_way import right_of_way
+from foretwin.world_gen.signal_groups import lane_groups, walk_groups
+from foretwin.world_gen.signal_heads import signal_heads
+from foretwin.world_gen.signal_plan import signal_plans
+from foretwin.world_gen.signs_inside import SignsInside, signs_inside
+from foretwin.world_gen.stop_lines import line_controls, lines_at_signs, stop_lines
 
 
 class JunctionRules(NamedTuple):

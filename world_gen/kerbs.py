@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from world_gen.lanes import LaneSet
-from world_gen.paved import Paved
-from world_gen.polyline_batch import Polylines
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.lanes import LaneSet
+from foretwin.world_gen.paved import Paved
+from foretwin.world_gen.polyline_batch import Polylines
 
 OVERLAP_M = 0.06
 """So near to a neighbouring piece the border of a place is no kerb."""

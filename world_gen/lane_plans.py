@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import msgspec
 
-from contracts.provenance import Provenance, Quantity
-from contracts.world import LaneChange, LaneKind, Turn
+from foretwin.contracts.provenance import Provenance, Quantity
+from foretwin.contracts.world import LaneChange, LaneKind, Turn
 
 _NUMBER = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*(m|ft|')?\s*$")
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from contracts.provenance import Provenance, Quantity
-from contracts.world import DrivingSide, LaneChange, LaneKind, Turn
-from world_gen.lane_plans import LanePlan, metres, of_side
-from world_gen.road_graph import RoadEdge
-from world_gen.side_lanes import BICYCLE_WIDTH_M
+from foretwin.contracts.provenance import Provenance, Quantity
+from foretwin.contracts.world import DrivingSide, LaneChange, LaneKind, Turn
+from foretwin.world_gen.lane_plans import LanePlan, metres, of_side
+from foretwin.world_gen.road_graph import RoadEdge
+from foretwin.world_gen.side_lanes import BICYCLE_WIDTH_M
 
 CLASS_WIDTH_M: Mapping[str, float] = {
     "motorway": 3.75,

@@ -8,16 +8,16 @@ from typing import Literal, NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.provenance import Provenance, Quantity
-from contracts.world import Lane, LaneKind, Road, Turn
-from world_gen.cluster import Cluster
-from world_gen.clusters import Surroundings
-from world_gen.cross_section import CrossSection, LanePlan
-from world_gen.places import places_led_through, without_dead_places
-from world_gen.polyline_batch import Polylines, offset, without_repeats
-from world_gen.reference_lines import Stretch, reference_lines
-from world_gen.road_graph import DirectedEdge, RoadEdge
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Provenance, Quantity
+from foretwin.contracts.world import Lane, LaneKind, Road, Turn
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.cross_section import CrossSection, LanePlan
+from foretwin.world_gen.places import places_led_through, without_dead_places
+from foretwin.world_gen.polyline_batch import Polylines, offset, without_repeats
+from foretwin.world_gen.reference_lines import Stretch, reference_lines
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge
 
 Role = Literal["approach", "exit", "ring", "other"]
 

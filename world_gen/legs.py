@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from world_gen.cross_section import CrossSection
-from world_gen.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.cross_section import CrossSection
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge
 
 _PARTED_M = 25.0
 _BESIDE_COS = math.cos(math.radians(30.0))

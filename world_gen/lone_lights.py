@@ -8,22 +8,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.provenance import Choice
-from contracts.signals import Signal, SignalGroup, SignalPhase, SignalPlan
-from contracts.world import Crossing, StopLine
-from world_gen.approaches import BEFORE_CROSSING_M
-from world_gen.clusters import Surroundings
-from world_gen.lanes import LaneDraft, LaneSet
-from world_gen.met_on_the_way import NodeTags, faces, is_light
-from world_gen.polyline import length, locate, points_at
-from world_gen.signal_heads import (
+from foretwin.contracts.provenance import Choice
+from foretwin.contracts.signals import Signal, SignalGroup, SignalPhase, SignalPlan
+from foretwin.contracts.world import Crossing, StopLine
+from foretwin.world_gen.approaches import BEFORE_CROSSING_M
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.lanes import LaneDraft, LaneSet
+from foretwin.world_gen.met_on_the_way import NodeTags, faces, is_light
+from foretwin.world_gen.polyline import length, locate, points_at
+from foretwin.world_gen.signal_heads import (
     BESIDE_HEIGHT_M,
     beside,
     nearest_kerb,
     to_kerb_m,
     towards_drivers_rad,
 )
-from world_gen.stop_lines import lines_across
+from foretwin.world_gen.stop_lines import lines_across
 
 DRIVING_S, WALKING_S = 40.0, 10.0
 AMBER_S, ALL_RED_S = 3.0, 2.0

@@ -11,11 +11,18 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.frames import GeoPoint, LocalFrame
-from world_gen.node_locations import NodeLocations
-from world_gen.opl import NO_POSITION, IntArray, NodePositions, WayNodes
-from world_gen.osm_map import LatLonBounds, MapError, NoRoadsError, OsmMap, OsmRelation, OsmWay
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.world_gen.node_locations import NodeLocations
+from foretwin.world_gen.opl import NO_POSITION, IntArray, NodePositions, WayNodes
+from foretwin.world_gen.osm_map import (
+    LatLonBounds,
+    MapError,
+    NoRoadsError,
+    OsmMap,
+    OsmRelation,
+    OsmWay,
+)
 
 BoolArray = npt.NDArray[np.bool_]
 UNITS_PER_DEG = 10_000_000

@@ -9,9 +9,9 @@ from typing import NamedTuple, TypeVar
 import msgspec
 import numpy as np
 
-from world_gen.map_assembly import BoolArray
-from world_gen.opl import IntArray
-from world_gen.osm_map import LatLonBounds
+from foretwin.world_gen.map_assembly import BoolArray
+from foretwin.world_gen.opl import IntArray
+from foretwin.world_gen.osm_map import LatLonBounds
 
 FINEST_LEVEL = 13
 """360 degrees halved this often: cells of 0.044 degrees, some 5 by 3 km in Germany."""

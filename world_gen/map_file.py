@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from contracts.world import ATTRIBUTION, DRAWN_ATTRIBUTION, DRAWN_GENERATOR
-from world_gen.osm_map import LatLonBounds, MapError
+from foretwin.contracts.world import ATTRIBUTION, DRAWN_ATTRIBUTION, DRAWN_GENERATOR
+from foretwin.world_gen.osm_map import LatLonBounds, MapError
 
 HEAD_BYTES = 4096
 

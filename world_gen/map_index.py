@@ -9,15 +9,15 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.arrays import Array
-from world_gen.beside_roads import BesideIndex
-from world_gen.building_parts import Footprint
-from world_gen.buildings import BuildingIndex
-from world_gen.intersections import Junction
-from world_gen.osm_map import OsmMap
-from world_gen.road_graph import RoadGraph
-from world_gen.road_tags import OTHER_CLASSES
-from world_gen.turn_restrictions import TurnRestrictions, read_turn_restrictions
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.beside_roads import BesideIndex
+from foretwin.world_gen.building_parts import Footprint
+from foretwin.world_gen.buildings import BuildingIndex
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.road_graph import RoadGraph
+from foretwin.world_gen.road_tags import OTHER_CLASSES
+from foretwin.world_gen.turn_restrictions import TurnRestrictions, read_turn_restrictions
 
 
 class MapIndex(msgspec.Struct, frozen=True, kw_only=True):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from contracts.world import Area
-from world_gen.beside_roads import BesideRoads, in_frame
-from world_gen.clusters import Surroundings
-from world_gen.islands import MIN_ISLAND_M2
-from world_gen.osm_map import OsmMap
-from world_gen.paved import GRID_M
-from world_gen.polygon_areas import areas_of
+from foretwin.contracts.world import Area
+from foretwin.world_gen.beside_roads import BesideRoads, in_frame
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.islands import MIN_ISLAND_M2
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.paved import GRID_M
+from foretwin.world_gen.polygon_areas import areas_of
 
 
 def mapped_islands(

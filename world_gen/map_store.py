@@ -17,14 +17,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import GeoPoint, LocalFrame
-from world_gen.build_map_store import build_map_store
-from world_gen.clip import clip_map, find_node
-from world_gen.map_file import file_fault
-from world_gen.map_tables import FORMAT_VERSION, MapMeta, TableReader
-from world_gen.opl_stream import Progress
-from world_gen.osm_map import LatLonBounds, MapError, OsmMap
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.world_gen.build_map_store import build_map_store
+from foretwin.world_gen.clip import clip_map, find_node
+from foretwin.world_gen.map_file import file_fault
+from foretwin.world_gen.map_tables import FORMAT_VERSION, MapMeta, TableReader
+from foretwin.world_gen.opl_stream import Progress
+from foretwin.world_gen.osm_map import LatLonBounds, MapError, OsmMap
 
 DAMAGED = (sqlite3.DatabaseError, msgspec.MsgspecError, zlib.error, TypeError)
 FRAME_GRID_DEG = 0.5

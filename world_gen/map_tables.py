@@ -8,8 +8,8 @@ from pathlib import Path
 
 import msgspec
 
-from world_gen.map_cells import CellNodes, CellWays, pack
-from world_gen.osm_map import LatLonBounds
+from foretwin.world_gen.map_cells import CellNodes, CellWays, pack
+from foretwin.world_gen.osm_map import LatLonBounds
 
 FORMAT_VERSION = 2
 """Counts changes of the format and of what is kept; part of an index's name."""

@@ -6,11 +6,11 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-from contracts.world import YieldRule
-from world_gen.cluster import Cluster
-from world_gen.polyline import arc_lengths
-from world_gen.polyline_batch import Polylines
-from world_gen.road_graph import DirectedEdge, RoadEdge
+from foretwin.contracts.world import YieldRule
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.polyline import arc_lengths
+from foretwin.world_gen.polyline_batch import Polylines
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge
 
 LOOK_BACK_M = 40.0
 NodeTags = Mapping[int, Mapping[str, str]]

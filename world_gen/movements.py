@@ -8,12 +8,12 @@ import math
 import msgspec
 import numpy as np
 
-from contracts.world import DrivingSide, Turn
-from world_gen.cluster import Cluster
-from world_gen.clusters import Surroundings
-from world_gen.legs import Heads, dot, heading_out, is_ring_edge, opposed
-from world_gen.road_graph import DirectedEdge
-from world_gen.turn_restrictions import TurnRestrictions
+from foretwin.contracts.world import DrivingSide, Turn
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.legs import Heads, dot, heading_out, is_ring_edge, opposed
+from foretwin.world_gen.road_graph import DirectedEdge
+from foretwin.world_gen.turn_restrictions import TurnRestrictions
 
 STRAIGHT_RAD = math.radians(45.0)
 FORK_RAD = math.radians(18.0)

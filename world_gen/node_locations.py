@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 
 class NodeLocations(Mapping[int, tuple[float, float]]):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from world_gen.map_assembly import sorted_positions
-from world_gen.opl import IntArray, NodePositions
+from foretwin.world_gen.map_assembly import sorted_positions
+from foretwin.world_gen.opl import IntArray, NodePositions
 
 RECORD = np.dtype([("id", "<i8"), ("lat", "<i4"), ("lon", "<i4")])
 WINDOW = 1 << 18

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from world_gen.osm_map import OsmMember, OsmRelation
+from foretwin.world_gen.osm_map import OsmMember, OsmRelation
 
 IntArray = npt.NDArray[np.int64]
 OPL_OPTIONS = "opl,add_metadata=false"

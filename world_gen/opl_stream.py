@@ -13,10 +13,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
-from contracts.world import ATTRIBUTION
-from world_gen.map_file import HEAD_BYTES, MapHeader, file_fault, format_of, unreadable
-from world_gen.opl import OPL_OPTIONS
-from world_gen.osm_map import MapError
+from foretwin.contracts.world import ATTRIBUTION
+from foretwin.world_gen.map_file import HEAD_BYTES, MapHeader, file_fault, format_of, unreadable
+from foretwin.world_gen.opl import OPL_OPTIONS
+from foretwin.world_gen.osm_map import MapError
 
 Progress = Callable[[int, int], None]
 """Called with the bytes read and the bytes of the file, from another thread."""

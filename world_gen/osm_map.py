@@ -9,10 +9,10 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.errors import UserError
-from contracts.frames import LocalFrame
-from world_gen.node_locations import NodeLocations
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import LocalFrame
+from foretwin.world_gen.node_locations import NodeLocations
 
 
 class MapError(UserError):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from world_gen.cluster import Cluster
+from foretwin.world_gen.cluster import Cluster
 
 GRID_M = 0.001
 """Worlds are written in millimetres: areas lie on that grid, so that rounding breaks nothing."""

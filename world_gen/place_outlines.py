@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.lanes import LaneSet
-from world_gen.polyline import left_of
-from world_gen.polyline_batch import Polylines, points_at
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.lanes import LaneSet
+from foretwin.world_gen.polyline import left_of
+from foretwin.world_gen.polyline_batch import Polylines, points_at
 
 CORNER_STEPS = 6
 SHARPEST_CORNER_M = 0.3

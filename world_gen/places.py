@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import msgspec
 
-from contracts.world import Road
-from world_gen.legs import opposed
-from world_gen.road_graph import DirectedEdge
+from foretwin.contracts.world import Road
+from foretwin.world_gen.legs import opposed
+from foretwin.world_gen.road_graph import DirectedEdge
 
 
 def places_led_through(

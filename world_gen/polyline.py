@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 _MITRE_LIMIT = 2.0
 

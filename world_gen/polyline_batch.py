@@ -14,8 +14,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from world_gen.polyline import left_of
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.polyline import left_of
 
 _MITRE_LIMIT = 2.0
 Indices = np.ndarray[Any, np.dtype[np.int64]]

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
-from contracts.provenance import Provenance
-from contracts.world import DrivingSide, YieldRule
-from world_gen.legs import heading_out
-from world_gen.road_graph import DirectedEdge, RoadEdge
+from foretwin.contracts.provenance import Provenance
+from foretwin.contracts.world import DrivingSide, YieldRule
+from foretwin.world_gen.legs import heading_out
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge
 
 _IMPORTANCE: Mapping[str, float] = {
     "motorway": 8.0, "trunk": 7.0, "primary": 6.0, "secondary": 5.0, "tertiary": 4.0,

@@ -12,8 +12,8 @@ from typing import Any
 
 import osmium
 
-from world_gen.map_assembly import MapObjects, assemble_map, sorted_positions
-from world_gen.map_file import (
+from foretwin.world_gen.map_assembly import MapObjects, assemble_map, sorted_positions
+from foretwin.world_gen.map_file import (
     HEAD_BYTES,
     MapHeader,
     file_fault,
@@ -21,7 +21,7 @@ from world_gen.map_file import (
     header_of,
     unreadable,
 )
-from world_gen.opl import (
+from foretwin.world_gen.opl import (
     OPL_OPTIONS,
     NodePositions,
     TagReader,
@@ -33,7 +33,7 @@ from world_gen.opl import (
     way_lines,
     way_nodes,
 )
-from world_gen.osm_map import OsmMap, OsmRelation
+from foretwin.world_gen.osm_map import OsmMap, OsmRelation
 
 WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
 NODE_KEYS = (

@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from world_gen.bends import Rounded, rounded_through, thinned, without_end_kinks
-from world_gen.clusters import Surroundings
-from world_gen.extent import stretches_inside
-from world_gen.polyline import cut, left_of, points_at
-from world_gen.polyline_batch import Polylines
-from world_gen.polyline_batch import cut as cut_all
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.bends import Rounded, rounded_through, thinned, without_end_kinks
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.extent import stretches_inside
+from foretwin.world_gen.polyline import cut, left_of, points_at
+from foretwin.world_gen.polyline_batch import Polylines
+from foretwin.world_gen.polyline_batch import cut as cut_all
 
 MIN_LANE_M = 0.05
 INNER_RADIUS_M = 4.0

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 _SNAP_M = 1e-6
 _TO_CORNER_M = 0.06

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import msgspec
 
-from contracts.world import World, WorldJunction
-from world_gen import report_text
-from world_gen.report_subjects import Neighbourhood, building_subject, junction_subjects
-from world_gen.report_values import SUBJECT_WEIGHT, SubjectReport
+from foretwin.contracts.world import World, WorldJunction
+from foretwin.world_gen import report_text
+from foretwin.world_gen.report_subjects import Neighbourhood, building_subject, junction_subjects
+from foretwin.world_gen.report_values import SUBJECT_WEIGHT, SubjectReport
 
 _OBJECT = re.compile(r"^(way|node|relation|building|intersection) [-\w.]+: ")
 _ID = re.compile(r"\b(way|node|relation|building|ways|nodes) -?\d+\b|\b[wrn]-?\d[\w.-]*\b")

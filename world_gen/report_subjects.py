@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import msgspec
 import numpy as np
 
-from contracts.signals import Signal
-from contracts.world import (
+from foretwin.contracts.signals import Signal
+from foretwin.contracts.world import (
     Building,
     Conflict,
     Connection,
@@ -22,7 +22,7 @@ from contracts.world import (
     WorldJunction,
     YieldRule,
 )
-from world_gen.report_values import SubjectReport, Value, subject_report
+from foretwin.world_gen.report_values import SubjectReport, Value, subject_report
 
 CROSSING_REACH_M = 40.0
 """A crossing counts for the nearest junction within this."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
-from world_gen.report_values import SOURCE_CONFIDENCE, SubjectReport
+from foretwin.world_gen.report_values import SOURCE_CONFIDENCE, SubjectReport
 
 if TYPE_CHECKING:
-    from world_gen.report import JunctionReport, WorldReport
+    from foretwin.world_gen.report import JunctionReport, WorldReport
 
 COLUMNS = 100
 _HOW = ", ".join(f"{source} {worth:g}" for source, worth in SOURCE_CONFIDENCE.items())

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import msgspec
 
-from contracts.provenance import PROVENANCES, Provenance
+from foretwin.contracts.provenance import PROVENANCES, Provenance
 
 SOURCE_CONFIDENCE: Mapping[Provenance, float] = {"tagged": 1.0, "inferred": 0.7, "default": 0.3}
 """What a value is worth by where it came from: a convention to compare junctions by.

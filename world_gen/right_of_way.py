@@ -31,16 +31,16 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.provenance import Provenance
-from contracts.world import Conflict, DrivingSide, YieldRule
-from world_gen.approaches import Approach
-from world_gen.conflicts import Meetings, meetings
-from world_gen.connections import ConnectionDraft
-from world_gen.polyline import arc_lengths, locate
-from world_gen.polyline_batch import Polylines
-from world_gen.priority_roads import Rank, Standing, has_priority, importance
-from world_gen.signs_inside import SignsInside
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Provenance
+from foretwin.contracts.world import Conflict, DrivingSide, YieldRule
+from foretwin.world_gen.approaches import Approach
+from foretwin.world_gen.conflicts import Meetings, meetings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.polyline import arc_lengths, locate
+from foretwin.world_gen.polyline_batch import Polylines
+from foretwin.world_gen.priority_roads import Rank, Standing, has_priority, importance
+from foretwin.world_gen.signs_inside import SignsInside
 
 ALONGSIDE_RAD, FAST_ALONGSIDE_RAD = math.radians(10.0), math.radians(50.0)
 """Roads that meet at less run together; on motorways and trunk roads they merge at more."""

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import LocalFrame
-from contracts.provenance import Quantity
-from contracts.world import DrivingSide
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import DrivingSide
 
 
 class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):

@@ -15,18 +15,18 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from contracts.arrays import Array
-from contracts.world import Area
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.intersections import Junction
-from world_gen.islands import island_areas
-from world_gen.kerbs import kerb_lines
-from world_gen.lanes import LaneSet
-from world_gen.paved import GRID_M, Paved
-from world_gen.place_outlines import simple_outlines
-from world_gen.polygon_areas import areas_of
-from world_gen.polyline_batch import Polylines, cut, offset, without_repeats
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Area
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.islands import island_areas
+from foretwin.world_gen.kerbs import kerb_lines
+from foretwin.world_gen.lanes import LaneSet
+from foretwin.world_gen.paved import GRID_M, Paved
+from foretwin.world_gen.place_outlines import simple_outlines
+from foretwin.world_gen.polygon_areas import areas_of
+from foretwin.world_gen.polyline_batch import Polylines, cut, offset, without_repeats
 
 CORNER_FILLET_M = 3.0
 SMALLEST_M2 = 0.5

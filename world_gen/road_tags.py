@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from contracts.provenance import Quantity
+from foretwin.contracts.provenance import Quantity
 
 CAR_CLASSES = frozenset({
     "motorway", "motorway_link", "trunk", "trunk_link", "primary", "primary_link", "secondary",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from world_gen.intersections import Junction
-from world_gen.road_graph import DirectedEdge
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.road_graph import DirectedEdge
 
 
 class Passage(NamedTuple):

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import msgspec
 
-from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
 
 
 def with_service_roads(graph: RoadGraph) -> RoadGraph:

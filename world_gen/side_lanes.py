@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from contracts.provenance import Quantity
-from contracts.world import DrivingSide, LaneKind
-from world_gen.lane_plans import LanePlan, metres, of_side
-from world_gen.road_graph import RoadEdge
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import DrivingSide, LaneKind
+from foretwin.world_gen.lane_plans import LanePlan, metres, of_side
+from foretwin.world_gen.road_graph import RoadEdge
 
 BICYCLE_WIDTH_M = 1.85
 """Usual width of a bicycle lane with its line (RASt 06)."""

@@ -8,17 +8,17 @@ from itertools import chain
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.provenance import Provenance
-from contracts.world import Area
-from world_gen.beside_roads import BesideRoads, in_frame
-from world_gen.clusters import Surroundings
-from world_gen.lane_plans import metres
-from world_gen.lanes import LaneSet
-from world_gen.osm_map import OsmMap
-from world_gen.paved import GRID_M
-from world_gen.polygon_areas import areas_of
-from world_gen.polyline_batch import Polylines, offset
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Provenance
+from foretwin.contracts.world import Area
+from foretwin.world_gen.beside_roads import BesideRoads, in_frame
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.lane_plans import metres
+from foretwin.world_gen.lanes import LaneSet
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.paved import GRID_M
+from foretwin.world_gen.polygon_areas import areas_of
+from foretwin.world_gen.polyline_batch import Polylines, offset
 
 WIDTH_M = 2.0
 """Width of a sidewalk without a width tag."""

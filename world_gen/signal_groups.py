@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import msgspec
 
-from contracts.signals import SignalGroup
-from contracts.world import Crossing
-from world_gen.approaches import Approach
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.lanes import LaneDraft, LaneSet
-from world_gen.stop_lines import entering
+from foretwin.contracts.signals import SignalGroup
+from foretwin.contracts.world import Crossing
+from foretwin.world_gen.approaches import Approach
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.lanes import LaneDraft, LaneSet
+from foretwin.world_gen.stop_lines import entering
 
 CROSSING_WITHIN_M = 25.0
 

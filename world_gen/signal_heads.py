@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.provenance import Provenance
-from contracts.signals import Signal
-from contracts.world import DrivingSide, StopLine
-from world_gen.clusters import Surroundings
-from world_gen.lanes import LaneDraft
-from world_gen.signal_groups import LaneGroup
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Provenance
+from foretwin.contracts.signals import Signal
+from foretwin.contracts.world import DrivingSide, StopLine
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.lanes import LaneDraft
+from foretwin.world_gen.signal_groups import LaneGroup
 
 BESIDE_HEIGHT_M, ABOVE_HEIGHT_M = 3.0, 5.5
 """Middle of a head on a post beside the road, and of one over the lanes (RiLSA 2015 6.2.3)."""

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.signals import SignalPhase, SignalPlan
-from contracts.world import Conflict, YieldRule
-from world_gen.conflicts import Meetings
-from world_gen.connections import ConnectionDraft
-from world_gen.signal_groups import LaneGroup, WalkGroup
+from foretwin.contracts.signals import SignalPhase, SignalPlan
+from foretwin.contracts.world import Conflict, YieldRule
+from foretwin.world_gen.conflicts import Meetings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.signal_groups import LaneGroup, WalkGroup
 
 CYCLE_S, LONG_CYCLE_S, MANY_PHASES = 90.0, 120.0, 4
 LEAST_GREEN_S = 5.0

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import SignalColour, SignalState
-from contracts.signals import SignalPlan
-from contracts.world import World
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import SignalColour, SignalState
+from foretwin.contracts.signals import SignalPlan
+from foretwin.contracts.world import World
 
 LIVE_FOR_S = 2.0
 """A live colour counts for so long; vehicles and roadside units repeat theirs at 1 Hz or more."""

@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.world import DrivingSide, YieldRule
-from world_gen.cluster import Cluster
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.met_on_the_way import NodeTags, faces, sign_of
-from world_gen.polyline import locate, points_at
-from world_gen.road_graph import DirectedEdge
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import DrivingSide, YieldRule
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.met_on_the_way import NodeTags, faces, sign_of
+from foretwin.world_gen.polyline import locate, points_at
+from foretwin.world_gen.road_graph import DirectedEdge
 
 _BESIDE_M = 1.0
 

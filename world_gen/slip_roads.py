@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from world_gen.chains import CarRoads, Chain
-from world_gen.grouping import Cluster, Grouping
+from foretwin.world_gen.chains import CarRoads, Chain
+from foretwin.world_gen.grouping import Cluster, Grouping
 
 SLIP_M, RAMP_SLIP_M = 50.0, 120.0
 """Length of a slip road around a corner, by any class and by a link class."""

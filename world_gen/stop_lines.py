@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.provenance import Choice
-from contracts.world import LineControl, StopLine
-from world_gen.approaches import Approach
-from world_gen.clusters import Surroundings
-from world_gen.connections import ConnectionDraft
-from world_gen.lanes import LaneDraft, LaneSet
-from world_gen.polyline import left_of
-from world_gen.polyline_batch import Polylines
-from world_gen.signs_inside import SignsInside
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Choice
+from foretwin.contracts.world import LineControl, StopLine
+from foretwin.world_gen.approaches import Approach
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.connections import ConnectionDraft
+from foretwin.world_gen.lanes import LaneDraft, LaneSet
+from foretwin.world_gen.polyline import left_of
+from foretwin.world_gen.polyline_batch import Polylines
+from foretwin.world_gen.signs_inside import SignsInside
 
 LINE_SETBACK_M = 0.3
 

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.provenance import Quantity
-from contracts.world import Lane, Road
-from world_gen.beside_roads import BesideRoads, in_frame
-from world_gen.clusters import Surroundings
-from world_gen.extent import stretches_inside
-from world_gen.osm_map import OsmMap
-from world_gen.polyline import cut, length, without_repeats
-from world_gen.road_tags import road_layer, speed_limit
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import Lane, Road
+from foretwin.world_gen.beside_roads import BesideRoads, in_frame
+from foretwin.world_gen.clusters import Surroundings
+from foretwin.world_gen.extent import stretches_inside
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.polyline import cut, length, without_repeats
+from foretwin.world_gen.road_tags import road_layer, speed_limit
 
 TRAM_WIDTH_M = 2.65
 """Width of a usual tram (BOStrab: no wider)."""

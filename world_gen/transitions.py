@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from world_gen.cluster import Cluster
-from world_gen.cross_section import TRANSITION, CrossSection
-from world_gen.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.cross_section import TRANSITION, CrossSection
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge
 
 _KEYS = ("placement", "placement:forward", "placement:backward")
 

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from world_gen.cluster import Cluster
-from world_gen.cross_section import CrossSection
-from world_gen.legs import Heads, heading_out, is_ring_edge, lateral_positions
-from world_gen.polyline_batch import Polylines, cut, without_repeats
-from world_gen.road_graph import RoadEdge
-from world_gen.turn_curves import LEAD_M, WANTED_RADIUS_M
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.cluster import Cluster
+from foretwin.world_gen.cross_section import CrossSection
+from foretwin.world_gen.legs import Heads, heading_out, is_ring_edge, lateral_positions
+from foretwin.world_gen.polyline_batch import Polylines, cut, without_repeats
+from foretwin.world_gen.road_graph import RoadEdge
+from foretwin.world_gen.turn_curves import LEAD_M, WANTED_RADIUS_M
 
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 

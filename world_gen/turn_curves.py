@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from world_gen.polyline_batch import Polylines
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.polyline_batch import Polylines
 
 LEAST_RADIUS_M = 4.0
 """No car turns tighter (turning circle of a passenger car: 10 m and more from kerb to kerb)."""

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import msgspec
 
-from world_gen.osm_map import OsmMap
-from world_gen.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge
 
 _KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehicle", "restriction")
 """The most specific word holds; one for lorries or buses alone does not, nor one at times."""

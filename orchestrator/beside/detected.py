@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.drive import RoadUser, RoadUsers, VehicleState
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, wrap_angle
-from contracts.roles import OtherVehicle
-from contracts.vehicle import VehicleParameters
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, wrap_angle
+from foretwin.contracts.roles import OtherVehicle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 
 class DetectedBeside:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from contracts.bus import Received
-from contracts.codec import SchemaMismatch
-from contracts.drive import VehicleInfo, VehicleState
-from contracts.roles import OtherVehicle
-from contracts.vehicle import VehicleParameters
-from orchestrator.beside.measured import Measured, estimator_of
-from orchestrator.instructions import Tell
+from foretwin.contracts.bus import Received
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import VehicleInfo, VehicleState
+from foretwin.contracts.roles import OtherVehicle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.beside.measured import Measured, estimator_of
+from foretwin.orchestrator.instructions import Tell
 
 APART_NS = 1_000_000_000
 """Stamps that differ by more are not by one clock."""

@@ -6,10 +6,10 @@ from typing import Protocol
 
 import msgspec
 
-from contracts.drive import ControlCommand, VehicleInfo, VehicleState
-from contracts.roles import OtherVehicle
-from contracts.vehicle import VehicleParameters
-from telemetry.estimator import StateEstimator
+from foretwin.contracts.drive import ControlCommand, VehicleInfo, VehicleState
+from foretwin.contracts.roles import OtherVehicle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.telemetry.estimator import StateEstimator
 
 PERIOD_NS = 18_000_000
 """Between two states of a vehicle that are passed on: 50 Hz at most."""

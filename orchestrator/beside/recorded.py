@@ -7,15 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from contracts.drive import VehicleInfo, VehicleState
-from contracts.errors import one_line
-from contracts.mailbox import Mailbox
-from contracts.roles import OtherVehicle
-from contracts.vehicle import VehicleParameters
-from orchestrator.beside.measured import Measured, estimator_of
-from orchestrator.instructions import Tell
-from telemetry.logs import open_log
-from telemetry.replay import ReplaySource
+from foretwin.contracts.drive import VehicleInfo, VehicleState
+from foretwin.contracts.errors import one_line
+from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.roles import OtherVehicle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.beside.measured import Measured, estimator_of
+from foretwin.orchestrator.instructions import Tell
+from foretwin.telemetry.logs import open_log
+from foretwin.telemetry.replay import ReplaySource
 
 AHEAD_SAMPLES = 4096
 """So far at most is read ahead: some twenty seconds of a car that sends everything."""

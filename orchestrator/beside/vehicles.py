@@ -10,19 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.bus import Bus, Mailbox, Received
-from contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleInfo, VehicleState
-from contracts.frames import local_from_geo
-from contracts.roles import OtherVehicles, Role
-from contracts.vehicle import VehicleParameters, kind_by_length
-from orchestrator.beside.detected import DetectedBeside, moved_ahead
-from orchestrator.beside.live import LiveBeside
-from orchestrator.beside.measured import FRESH_NS, Source
-from orchestrator.beside.recorded import LogBeside
-from orchestrator.instructions import Tell
-from orchestrator.intake import Surroundings
-from orchestrator.plan import Beside, DrivePlan
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.bus import Bus, Mailbox, Received
+from foretwin.contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleInfo, VehicleState
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.roles import OtherVehicles, Role
+from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
+from foretwin.orchestrator.beside.detected import DetectedBeside, moved_ahead
+from foretwin.orchestrator.beside.live import LiveBeside
+from foretwin.orchestrator.beside.measured import FRESH_NS, Source
+from foretwin.orchestrator.beside.recorded import LogBeside
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.intake import Surroundings
+from foretwin.orchestrator.plan import Beside, DrivePlan
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 SAME_WITHIN_M = 2.0
 """A detection whose centre is so near to that of a vehicle with telemetry of its own is it."""

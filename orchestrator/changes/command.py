@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from contracts.bus import Bus, BusUnreachable, ZenohBus, ask
-from contracts.errors import UserError
-from contracts.setup import BusSetup
-from contracts.tuning import SetReply, SetRequest
+from foretwin.contracts.bus import Bus, BusUnreachable, ZenohBus, ask
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.tuning import SetReply, SetRequest
 
 ANSWER_S = 120.0
 """A change waits for the drive to begin and for the round in progress; that may take a while."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
-from contracts.codec import SchemaMismatch
-from contracts.errors import UserError, one_line
-from contracts.mailbox import Request
-from contracts.tuning import SetReply, SetRequest
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.mailbox import Request
+from foretwin.contracts.tuning import SetReply, SetRequest
 
 
 class RefusedError(UserError):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from contracts.roles import CORRECTIONS, ROLES, Correction, Role, UseRoles
-from orchestrator.changes.desk import Made, RefusedError
+from foretwin.contracts.roles import CORRECTIONS, ROLES, Correction, Role, UseRoles
+from foretwin.orchestrator.changes.desk import Made, RefusedError
 
 
 class RolesInForce:

@@ -12,15 +12,15 @@ from typing import Any
 
 import msgspec
 
-from contracts.codec import SchemaMismatch, read_message
-from contracts.errors import UserError, one_line
-from contracts.world import World
-from orchestrator.config import DriveConfig
-from orchestrator.drive import carry_out
-from orchestrator.judge.difference import difference_lines, difference_of, read_judged
-from orchestrator.maps.given_worlds import read_given_worlds
-from orchestrator.plan import EMBEDDED_ROUTE, make_plan, read_inputs
-from orchestrator.record.versions import versions
+from foretwin.contracts.codec import SchemaMismatch, read_message
+from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.world import World
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.drive import carry_out
+from foretwin.orchestrator.judge.difference import difference_lines, difference_of, read_judged
+from foretwin.orchestrator.maps.given_worlds import read_given_worlds
+from foretwin.orchestrator.plan import EMBEDDED_ROUTE, make_plan, read_inputs
+from foretwin.orchestrator.record.versions import versions
 
 RECORD, DRIVE = "run.json", "drive.mcap"
 JUDGED = "judged"

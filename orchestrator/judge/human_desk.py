@@ -8,17 +8,17 @@ from typing import Any
 
 import msgspec
 
-from contracts.bus import Bus
-from contracts.drive import PlannedTrajectory, VehicleState, VehicleStatus
-from contracts.frames import GeoPoint
-from contracts.side_by_side import Disagreement, DisagreementKind, DrivenSegment
-from orchestrator.instructions import Tell
-from orchestrator.intake import Intake
-from orchestrator.mission import Mission
-from orchestrator.plan import DrivePlan
-from orchestrator.record.results import ResultTables
-from sim_worker.side_by_side.segment import Place
-from sim_worker.side_by_side.watch import SideBySide
+from foretwin.contracts.bus import Bus
+from foretwin.contracts.drive import PlannedTrajectory, VehicleState, VehicleStatus
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.side_by_side import Disagreement, DisagreementKind, DrivenSegment
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.intake import Intake
+from foretwin.orchestrator.mission import Mission
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.sim_worker.side_by_side.segment import Place
+from foretwin.sim_worker.side_by_side.watch import SideBySide
 
 WORDS: dict[DisagreementKind, str] = {
     "ads_turns_elsewhere": "the ADS would have turned elsewhere",

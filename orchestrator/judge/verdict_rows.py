@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sim_worker.agreement.criteria import CRITERIA
-from sim_worker.agreement.tally import Judged
+from foretwin.sim_worker.agreement.criteria import CRITERIA
+from foretwin.sim_worker.agreement.tally import Judged
 
 
 def judged_row(one: Judged, *, start_stamp_ns: int) -> dict[str, Any]:

@@ -11,19 +11,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import RoadUser, RoadUsers, SignalColour, VehicleState
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.futures import PathAhead
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from orchestrator.intake import Surroundings
-from orchestrator.rounds.desk import RoundDone
-from sim_worker.agreement.criteria import Court, Heard, Users, Window
-from sim_worker.agreement.tally import Judged, judged, tally
-from sim_worker.metrics.ground import DrivableGround
-from sim_worker.metrics.route_rules import RouteRules
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUser, RoadUsers, SignalColour, VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.orchestrator.intake import Surroundings
+from foretwin.orchestrator.rounds.desk import RoundDone
+from foretwin.sim_worker.agreement.criteria import Court, Heard, Users, Window
+from foretwin.sim_worker.agreement.tally import Judged, judged, tally
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.route_rules import RouteRules
+from foretwin.sim_worker.planners.path import FrenetPath
 
 MOST_WINDOWS = 120
 """When there are as many, every second one goes, and they are taken half as often from then on."""

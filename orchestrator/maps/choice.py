@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.errors import UserError
-from contracts.frames import local_from_geo
-from orchestrator.maps.opening import OpenMap
-from world_gen.intersections import Junction
-from world_gen.osm_map import LatLonBounds
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import local_from_geo
+from foretwin.orchestrator.maps.opening import OpenMap
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.osm_map import LatLonBounds
 
 _JUNCTION_ID = re.compile(r"n-?\d{1,18}", re.ASCII)
 FARTHEST_M = 200.0
@@ -66,7 +66,7 @@ def parse_place(at: str) -> tuple[float, float]:
 
 def read_route(route: Path) -> Array:
     """Return a GPX or GeoJSON line as (N, 2) latitudes and longitudes in degrees."""
-    from telemetry.logs import read_line
+    from foretwin.telemetry.logs import read_line
 
     return read_line(route).lat_lon_deg
 
@@ -80,9 +80,9 @@ class AlongRoute(NamedTuple):
 
 def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> AlongRoute:
     """Return the junctions along a route's line; the service roads that it uses count there."""
-    from orchestrator.way.line_matching import match_line
-    from world_gen.route_junctions import junctions_on_route
-    from world_gen.service_roads import open_service_roads
+    from foretwin.orchestrator.way.line_matching import match_line
+    from foretwin.world_gen.route_junctions import junctions_on_route
+    from foretwin.world_gen.service_roads import open_service_roads
 
     matched = match_line(opened.graph, line_deg, name=f"--route {route}")
     used = (item.edge for stretch in matched.routes for item in stretch.edges)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import msgspec
 
-from orchestrator.maps.choice import junctions_along, read_route
-from orchestrator.maps.opening import Clip, open_map
+from foretwin.orchestrator.maps.choice import junctions_along, read_route
+from foretwin.orchestrator.maps.opening import Clip, open_map
 
 
 def list_intersections(

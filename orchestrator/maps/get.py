@@ -7,9 +7,14 @@ import os
 import shutil
 from pathlib import Path
 
-from contracts.errors import UserError
-from orchestrator.maps.overpass import OverpassConfig, fetch_map, load_overpass_config
-from orchestrator.maps.overpass_query import box_filter, line_filter, overpass_query, parse_bbox
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.maps.overpass import OverpassConfig, fetch_map, load_overpass_config
+from foretwin.orchestrator.maps.overpass_query import (
+    box_filter,
+    line_filter,
+    overpass_query,
+    parse_bbox,
+)
 
 ROUTE_SUFFIXES = (".gpx", ".geojson", ".json")
 
@@ -44,7 +49,7 @@ def get_map(area: str, *, out: Path, config: Path | None) -> None:
     finally:
         answer.unlink(missing_ok=True)
         packed.unlink(missing_ok=True)
-    from contracts.world import ATTRIBUTION
+    from foretwin.contracts.world import ATTRIBUTION
 
     print(f"{out}: {counts['w']} ways, {counts['n']} nodes. {ATTRIBUTION}")
 
@@ -53,7 +58,7 @@ def area_filter(area: str, *, margin_m: float) -> str:
     """Return the Overpass filter of a box W,S,E,N, or of the surroundings of a file's line."""
     if Path(area.rpartition("#")[0] or area).suffix.lower() not in ROUTE_SUFFIXES:
         return box_filter(parse_bbox(area))
-    from telemetry.logs import read_line
+    from foretwin.telemetry.logs import read_line
 
     return line_filter(read_line(Path(area)).lat_lon_deg, margin_m)
 
@@ -76,8 +81,8 @@ def _fetch(settings: OverpassConfig, query: str, answer: Path) -> None:
 
 def _count(answer: Path, out: Path) -> dict[str, int]:
     """Decode the whole answer; MapError where it is damaged, UserError where it is empty."""
-    from world_gen.opl import sections
-    from world_gen.opl_stream import OplStream
+    from foretwin.world_gen.opl import sections
+    from foretwin.world_gen.opl_stream import OplStream
 
     counts = dict.fromkeys("nwr", 0)
     with OplStream(answer) as stream:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from contracts.codec import SchemaMismatch, read_message
-from contracts.errors import UserError
-from contracts.world import World
-from world_gen.build import with_id
-from world_gen.intersections import Junction
+from foretwin.contracts.codec import SchemaMismatch, read_message
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import with_id
+from foretwin.world_gen.intersections import Junction
 
 _SAME_RADIUS_M = 0.5
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from world_gen.map_store import MapStore
+from foretwin.world_gen.map_store import MapStore
 
 
 def open_index(map_file: Path, folder: Path | None) -> MapStore:

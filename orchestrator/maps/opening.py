@@ -9,16 +9,16 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.errors import UserError
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.intersections import Junction
-from world_gen.osm_map import LatLonBounds, NoRoadsError, OsmMap
-from world_gen.read_osm import read_map
-from world_gen.road_graph import RoadGraph
-from world_gen.service_roads import with_roads, with_service_roads
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.osm_map import LatLonBounds, NoRoadsError, OsmMap
+from foretwin.world_gen.read_osm import read_map
+from foretwin.world_gen.road_graph import RoadGraph
+from foretwin.world_gen.service_roads import with_roads, with_service_roads
 
 LARGE_MAP_BYTES = 64_000_000
 """Of larger files, what is needed is clipped from an index on disk, made on first use."""
@@ -119,7 +119,7 @@ def _words(bounds: LatLonBounds) -> str:
 
 def _clipped(file: Path, clip: Clip | NodeClip | LatLonBounds) -> OsmMap:
     # Imported here: most maps are small, and commands on them are to start fast.
-    from orchestrator.maps.index_command import open_index
+    from foretwin.orchestrator.maps.index_command import open_index
 
     store = open_index(file, None)
     try:
@@ -139,7 +139,7 @@ def _clipped(file: Path, clip: Clip | NodeClip | LatLonBounds) -> OsmMap:
 
 
 def _widened(bounds: LatLonBounds) -> LatLonBounds:
-    from world_gen.map_store import route_boxes
+    from foretwin.world_gen.map_store import route_boxes
 
     low, high = (
         route_boxes(np.array([corner]), CLIP_MARGIN_M)[0]

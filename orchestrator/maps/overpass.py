@@ -13,7 +13,7 @@ from typing import IO
 import httpx
 import msgspec
 
-from contracts.errors import UserError
+from foretwin.contracts.errors import UserError
 
 BUSY = (429, 502, 503, 504)
 """Answers after which asking again later makes sense."""

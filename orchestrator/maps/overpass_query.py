@@ -7,9 +7,9 @@ import math
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.errors import UserError
-from world_gen.osm_map import LatLonBounds
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.world_gen.osm_map import LatLonBounds
 
 WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
 SIMPLIFIED_M = 20.0

@@ -10,9 +10,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from contracts.errors import UserError
-from contracts.world import World
-from orchestrator.maps.choice import (
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.orchestrator.maps.choice import (
     FARTHEST_M,
     junction_by_id,
     junctions_along,
@@ -22,14 +22,19 @@ from orchestrator.maps.choice import (
     parse_place,
     read_route,
 )
-from orchestrator.maps.opening import Clip, NodeClip, OpenMap, open_map, region_on_map
-from orchestrator.maps.world_files import write_each, write_report
-from world_gen.build import build_region, build_world
-from world_gen.export.choices import OPENDRIVE_VERSIONS, SIMULATORS, VEHICLE_KINDS, VehicleKind
-from world_gen.export.formats import FORMATS, ExportOptions, Format
-from world_gen.intersections import Junction
-from world_gen.map_index import MapIndex, index_map
-from world_gen.osm_map import LatLonBounds
+from foretwin.orchestrator.maps.opening import Clip, NodeClip, OpenMap, open_map, region_on_map
+from foretwin.orchestrator.maps.world_files import write_each, write_report
+from foretwin.world_gen.build import build_region, build_world
+from foretwin.world_gen.export.choices import (
+    OPENDRIVE_VERSIONS,
+    SIMULATORS,
+    VEHICLE_KINDS,
+    VehicleKind,
+)
+from foretwin.world_gen.export.formats import FORMATS, ExportOptions, Format
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.map_index import MapIndex, index_map
+from foretwin.world_gen.osm_map import LatLonBounds
 
 _Word = TypeVar("_Word", bound=str)
 MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
@@ -183,7 +188,7 @@ def _options(request: WorldRequest) -> ExportOptions:
     vehicles = _vehicles(request.vehicles)
     if request.file_format != "sdf" or not vehicles:
         return ExportOptions(opendrive_version=version, simulator=simulator)
-    from sim_worker.vehicle.parameters import load_vehicle
+    from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
     return ExportOptions(
         simulator=simulator, vehicles=vehicles, vehicle=load_vehicle(request.vehicle)

@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from contracts.world import World
-from orchestrator.progress_bar import progress_bar
-from world_gen.intersections import Junction
+from foretwin.contracts.world import World
+from foretwin.orchestrator.progress_bar import progress_bar
+from foretwin.world_gen.intersections import Junction
 
 FAILURES_FILE = "failures.txt"
 SOME_FAILED = 3
@@ -32,7 +32,7 @@ def write_each(
     What goes wrong with one junction is said in a line and in the failures file of the folder,
     and does not stop the others.
     """
-    from world_gen.report import note_kind
+    from foretwin.world_gen.report import note_kind
 
     folder.mkdir(parents=True, exist_ok=True)
     kinds: Counter[str] = Counter()
@@ -57,7 +57,7 @@ def write_each(
 
 def write_report(world: World, path: Path, *, show: bool) -> None:
     """Write what was tagged, inferred and a default beside a World's file; print it if asked to."""
-    from world_gen.report import report_of
+    from foretwin.world_gen.report import report_of
 
     report = report_of(world)
     for ending, text in ((".report.md", report.as_markdown()), (".report.json", report.as_json())):

@@ -8,12 +8,12 @@ from typing import Any
 
 import msgspec
 
-from orchestrator.conductor import Conductor
-from orchestrator.mission import Mission
-from orchestrator.plan import DrivePlan
-from orchestrator.record.bookkeeping import percentile
-from orchestrator.record.versions import versions
-from orchestrator.supervisor import Supervisor
+from foretwin.orchestrator.conductor import Conductor
+from foretwin.orchestrator.mission import Mission
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.record.bookkeeping import percentile
+from foretwin.orchestrator.record.versions import versions
+from foretwin.orchestrator.supervisor import Supervisor
 
 RESERVED_BYTES = 65536
 

@@ -9,7 +9,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from contracts.futures import FuturesJob, FuturesResult
+from foretwin.contracts.futures import FuturesJob, FuturesResult
 
 MAX_REFUSALS = 3
 """A round whose jobs are refused so often is given up: the same job would be refused for ever."""

@@ -10,16 +10,21 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from contracts.errors import UserError
-from orchestrator.progress_bar import progress_bar
-from orchestrator.sweep.folder import FoundPlaces, SweepFolder, built_worlds, fingerprint_of
-from orchestrator.sweep.plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
-from orchestrator.sweep.play import PlaceQuestion, PlaySetup, failed_rows, start_worker
-from orchestrator.sweep.pool import Crew, Lost, Task
-from orchestrator.sweep.rows import Parts, RowsHash
-from orchestrator.sweep.spec import Loaded, load_spec, worlds_folder
-from orchestrator.sweep.summary import Summary, print_summary
-from orchestrator.sweep.worlds import source_digest, sweep_worlds
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.progress_bar import progress_bar
+from foretwin.orchestrator.sweep.folder import (
+    FoundPlaces,
+    SweepFolder,
+    built_worlds,
+    fingerprint_of,
+)
+from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
+from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, failed_rows, start_worker
+from foretwin.orchestrator.sweep.pool import Crew, Lost, Task
+from foretwin.orchestrator.sweep.rows import Parts, RowsHash
+from foretwin.orchestrator.sweep.spec import Loaded, load_spec, worlds_folder
+from foretwin.orchestrator.sweep.summary import Summary, print_summary
+from foretwin.orchestrator.sweep.worlds import source_digest, sweep_worlds
 
 SOME_FAILED = 3
 

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contracts.arrays import Array32
-from contracts.futures import Accident, FuturesResult
-from contracts.vehicle import VehicleParameters
-from orchestrator.sweep.rows import Row
-from orchestrator.sweep.spec import STEP_S
-from sim_worker.actors.cast import KIND_NAMES
-from sim_worker.rehearsal import off_plan_m
-from sim_worker.scenarios.roles import Cast
+from foretwin.contracts.arrays import Array32
+from foretwin.contracts.futures import Accident, FuturesResult
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.sweep.rows import Row
+from foretwin.orchestrator.sweep.spec import STEP_S
+from foretwin.sim_worker.actors.cast import KIND_NAMES
+from foretwin.sim_worker.rehearsal import off_plan_m
+from foretwin.sim_worker.scenarios.roles import Cast
 
 COLLISION_WITH = ("", "road_user", "static")
 

@@ -10,15 +10,15 @@ from typing import Any
 
 import msgspec
 
-from contracts.tuning import (
+from foretwin.contracts.tuning import (
     Identification,
     ParameterChange,
     ParameterEstimate,
     UseVehicle,
 )
-from contracts.vehicle import VehicleParameters
-from sim_worker.identify.acceptance import in_force, is_acceptable
-from sim_worker.identify.parameters_in_force import ParametersInForce
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.identify.acceptance import in_force, is_acceptable
+from foretwin.sim_worker.identify.parameters_in_force import ParametersInForce
 
 _BY_HAND = ("set", "rolled_back")
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.way.junctions_ahead import UpcomingJunction
-from orchestrator.way.route import Route
-from world_gen.intersections import Junction
+from foretwin.orchestrator.way.junctions_ahead import UpcomingJunction
+from foretwin.orchestrator.way.route import Route
+from foretwin.world_gen.intersections import Junction
 
 USUAL_SHARE = 0.75
 """Of the speed limit: what is driven in towns, before the driver has shown a share of their own."""

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from contracts.arrays import Array
-from orchestrator.way.rounding import (
+from foretwin.contracts.arrays import Array
+from foretwin.orchestrator.way.rounding import (
     FINE_M,
     clip,
     curvature_pm,
@@ -26,9 +26,9 @@ from orchestrator.way.rounding import (
     turns,
     without_straight,
 )
-from orchestrator.way.route import Route, turn_angle
-from world_gen.polyline import arc_lengths
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.orchestrator.way.route import Route, turn_angle
+from foretwin.world_gen.polyline import arc_lengths
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 LANE_WIDTH_M = 3.0
 KERB_TURN_RADIUS_M = 10.5

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from orchestrator.way.route import Route
-from world_gen.road_graph import DirectedEdge
+from foretwin.orchestrator.way.route import Route
+from foretwin.world_gen.road_graph import DirectedEdge
 
 
 class GivenRoutes:

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from orchestrator.way.road_index import project
-from orchestrator.way.route import Route
-from world_gen.intersections import Junction
+from foretwin.contracts.arrays import Array
+from foretwin.orchestrator.way.road_index import project
+from foretwin.orchestrator.way.route import Route
+from foretwin.world_gen.intersections import Junction
 
 
 class UpcomingJunction(NamedTuple):

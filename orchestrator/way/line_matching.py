@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import local_from_geo
-from orchestrator.way.road_hypotheses import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import local_from_geo
+from foretwin.orchestrator.way.road_hypotheses import (
     Hypothesis,
     MatchingWeights,
     first_hypotheses,
     next_hypotheses,
 )
-from orchestrator.way.road_index import RoadIndex, key_of
-from orchestrator.way.route import Route, RouteError
-from orchestrator.way.shortest_ways import ShortestWays
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.orchestrator.way.road_index import RoadIndex, key_of
+from foretwin.orchestrator.way.route import Route, RouteError
+from foretwin.orchestrator.way.shortest_ways import ShortestWays
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 NEAR_ROAD_M = 30.0
 SPACING_M = 8.0

@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from orchestrator.way.road_hypotheses import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.orchestrator.way.road_hypotheses import (
     Hypothesis,
     MatchingWeights,
     first_hypotheses,
     next_hypotheses,
 )
-from orchestrator.way.road_index import NearEdge, RoadIndex, legality, project
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.orchestrator.way.road_index import NearEdge, RoadIndex, legality, project
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 
 class Match(NamedTuple):

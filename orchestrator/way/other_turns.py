@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from orchestrator.way.junctions_ahead import UpcomingJunction
-from orchestrator.way.road_index import key_of, reach
-from world_gen.intersections import Junction
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.orchestrator.way.junctions_ahead import UpcomingJunction
+from foretwin.orchestrator.way.road_index import key_of, reach
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 
 class OtherTurns:

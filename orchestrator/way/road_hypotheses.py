@@ -13,8 +13,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from orchestrator.way.road_index import EdgeKey, NearEdge, Reached, RoadIndex, key_of, legality
-from world_gen.road_graph import DirectedEdge
+from foretwin.orchestrator.way.road_index import (
+    EdgeKey,
+    NearEdge,
+    Reached,
+    RoadIndex,
+    key_of,
+    legality,
+)
+from foretwin.world_gen.road_graph import DirectedEdge
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

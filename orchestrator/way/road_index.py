@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 EdgeKey = tuple[int, bool]
 """Index of an edge and whether it is driven in reverse."""

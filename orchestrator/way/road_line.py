@@ -12,16 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
-from orchestrator.way.map_matching import Match
-from orchestrator.way.road_index import EdgeKey, NearEdge, key_of, legality
-from orchestrator.way.route import Route
-from telemetry.map_aid import RoadLine
-from world_gen.cross_section import cross_section
-from world_gen.polyline import arc_lengths
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
+from foretwin.orchestrator.way.map_matching import Match
+from foretwin.orchestrator.way.road_index import EdgeKey, NearEdge, key_of, legality
+from foretwin.orchestrator.way.route import Route
+from foretwin.telemetry.map_aid import RoadLine
+from foretwin.world_gen.cross_section import cross_section
+from foretwin.world_gen.polyline import arc_lengths
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 EVERY_M = 5.0
 MAP_STD_M = 1.2

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from contracts.arrays import Array
-from world_gen.polyline import arc_lengths
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.polyline import arc_lengths
 
 FINE_M = 0.5
 """Spacing of lines while they are worked on."""

@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.errors import UserError
-from contracts.frames import wrap_angle
-from orchestrator.way.road_index import key_of, legality
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import wrap_angle
+from foretwin.orchestrator.way.road_index import key_of, legality
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 HEADING_OVER_M = 15.0
 """Headings at a node are measured over this length: nearer, maps draw junctions with kinks."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-from orchestrator.way.given_routes import GivenRoutes
-from orchestrator.way.junctions_ahead import PassedJunction, UpcomingJunction, encounters
-from orchestrator.way.map_matching import Match
-from orchestrator.way.other_turns import OtherTurns
-from orchestrator.way.road_index import RoadIndex, key_of
-from orchestrator.way.route import Route, extend_most_probable
-from orchestrator.way.turning import TURNING_RAD, route_with_turn
-from world_gen.intersections import Junction
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.orchestrator.way.given_routes import GivenRoutes
+from foretwin.orchestrator.way.junctions_ahead import PassedJunction, UpcomingJunction, encounters
+from foretwin.orchestrator.way.map_matching import Match
+from foretwin.orchestrator.way.other_turns import OtherTurns
+from foretwin.orchestrator.way.road_index import RoadIndex, key_of
+from foretwin.orchestrator.way.route import Route, extend_most_probable
+from foretwin.orchestrator.way.turning import TURNING_RAD, route_with_turn
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 BEHIND_M = 150.0
 """Of the road already driven, what a route keeps."""

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import RoutePose
-from contracts.frames import local_from_geo, local_from_geo_yaw, wrap_angle
-from orchestrator.way.line_matching import match_line
-from orchestrator.way.road_index import NearEdge, RoadIndex, key_of, legality
-from orchestrator.way.route import Route, RouteError
-from orchestrator.way.shortest_ways import ShortestWays
-from world_gen.road_graph import DirectedEdge
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoutePose
+from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, wrap_angle
+from foretwin.orchestrator.way.line_matching import match_line
+from foretwin.orchestrator.way.road_index import NearEdge, RoadIndex, key_of, legality
+from foretwin.orchestrator.way.route import Route, RouteError
+from foretwin.orchestrator.way.shortest_ways import ShortestWays
+from foretwin.world_gen.road_graph import DirectedEdge
 
 NEAR_M = 30.0
 """A pose farther from every road is on none: yards and car parks are often not in the map."""

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import rustworkx
 
-from orchestrator.way.road_index import key_of, travel_factor
-from world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.orchestrator.way.road_index import key_of, travel_factor
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
 
 
 class ShortestWays:

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import geo_from_local
-from orchestrator.way.driving_path import driving_path
-from orchestrator.way.route import Route
-from world_gen.osm_map import OsmMap
-from world_gen.road_graph import RoadGraph
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import geo_from_local
+from foretwin.orchestrator.way.driving_path import driving_path
+from foretwin.orchestrator.way.route import Route
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.road_graph import RoadGraph
 
 LATERAL_MPS2 = 2.0
 ACCEL_MPS2 = 1.3

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from orchestrator.way.road_index import key_of, legality
-from orchestrator.way.route import Route, turn_angle
-from world_gen.road_graph import RoadGraph
+from foretwin.orchestrator.way.road_index import key_of, legality
+from foretwin.orchestrator.way.route import Route, turn_angle
+from foretwin.world_gen.road_graph import RoadGraph
 
 TURNING_RAD = math.radians(15.0)
 TURNING_M = 15.0

@@ -6,21 +6,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.drive import VehicleState
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, target_from_source
-from contracts.futures import PathAhead
-from orchestrator.way.arrival import DrivingPace, predict_arrivals
-from orchestrator.way.cruise import CruiseSpeed
-from orchestrator.way.driving_path import driving_path
-from orchestrator.way.junctions_ahead import PassedJunction, UpcomingJunction
-from orchestrator.way.map_matching import MapMatcher, Match, OffRoadStretch
-from orchestrator.way.road_index import RoadIndex
-from orchestrator.way.road_line import RoadLines
-from orchestrator.way.route import Route
-from orchestrator.way.route_follower import Progress, RouteFollower
-from telemetry.map_aid import RoadLine
-from world_gen.intersections import Junction
-from world_gen.road_graph import RoadGraph
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import (
+    LocalFrame,
+    local_from_geo,
+    local_from_geo_yaw,
+    target_from_source,
+)
+from foretwin.contracts.futures import PathAhead
+from foretwin.orchestrator.way.arrival import DrivingPace, predict_arrivals
+from foretwin.orchestrator.way.cruise import CruiseSpeed
+from foretwin.orchestrator.way.driving_path import driving_path
+from foretwin.orchestrator.way.junctions_ahead import PassedJunction, UpcomingJunction
+from foretwin.orchestrator.way.map_matching import MapMatcher, Match, OffRoadStretch
+from foretwin.orchestrator.way.road_index import RoadIndex
+from foretwin.orchestrator.way.road_line import RoadLines
+from foretwin.orchestrator.way.route import Route
+from foretwin.orchestrator.way.route_follower import Progress, RouteFollower
+from foretwin.telemetry.map_aid import RoadLine
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.road_graph import RoadGraph
 
 FAR_AHEAD_M = 3000.0
 ALTERNATIVES_M = 300.0

@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.drive import RoadUserKind
-from contracts.futures import RecordedRoadUser
-from contracts.scenario import Conduct
-from sim_worker.actors.crowd import Crowd
-from sim_worker.actors.kinds import KINDS
-from sim_worker.actors.path_table import Indices
-from sim_worker.actors.replay import Replay
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.futures import RecordedRoadUser
+from foretwin.contracts.scenario import Conduct
+from foretwin.sim_worker.actors.crowd import Crowd
+from foretwin.sim_worker.actors.kinds import KINDS
+from foretwin.sim_worker.actors.path_table import Indices
+from foretwin.sim_worker.actors.replay import Replay
+from foretwin.sim_worker.planners.path import FrenetPath
 
 KIND_NAMES: tuple[RoadUserKind, ...] = tuple(KINDS)
 

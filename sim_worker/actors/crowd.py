@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.actors.path_table import Indices
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.actors.path_table import Indices
 
 Flags = npt.NDArray[np.bool_]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from contracts.drive import RoadUserKind
+from foretwin.contracts.drive import RoadUserKind
 
 _SUMO = "Eclipse SUMO 1.28, defaults of vClass"
 _TARGETS = "Euro NCAP articulated target"

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.actors.crowd import Crowd, EgoBoxes
-from sim_worker.actors.path_table import Indices, PathTable
-from sim_worker.actors.right_of_way import PathRules
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.actors.crowd import Crowd, EgoBoxes
+from foretwin.sim_worker.actors.path_table import Indices, PathTable
+from foretwin.sim_worker.actors.right_of_way import PathRules
 
 TIME_GAP_S, STANDSTILL_GAP_M = 1.2, 2.0
 _SIGHT_M = 60.0

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.planners.path import SPACING_M, FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planners.path import SPACING_M, FrenetPath
 
 Indices = npt.NDArray[np.intp]
 

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.path_table import PathProjection, Place
-from sim_worker.actors.traffic import Traffic
-from sim_worker.planners.base import SeenUsers
-from sim_worker.planners.path import FrenetPoint
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.actors.path_table import PathProjection, Place
+from foretwin.sim_worker.actors.traffic import Traffic
+from foretwin.sim_worker.planners.base import SeenUsers
+from foretwin.sim_worker.planners.path import FrenetPoint
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 Flags = npt.NDArray[np.bool_]
 

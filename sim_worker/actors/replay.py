@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.futures import RecordedRoadUser
-from sim_worker.actors.path_table import Indices
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import RecordedRoadUser
+from foretwin.sim_worker.actors.path_table import Indices
 
 _AT_SAMPLE_S = 1e-9
 """So near to a sample's time is at it."""

@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.drive import SignalColour
-from contracts.frames import wrap_angle
-from contracts.world import Connection, World
-from sim_worker.actors.path_table import Indices
-from sim_worker.planners.base import SharedGround
-from sim_worker.planners.path import FrenetPath
-from world_gen.polyline import direction_at
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import SignalColour
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.world import Connection, World
+from foretwin.sim_worker.actors.path_table import Indices
+from foretwin.sim_worker.planners.base import SharedGround
+from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.world_gen.polyline import direction_at
 
 _ON_PATH_M, _ON_PATH_RAD = 1.5, 0.6
 _GREEN_KEEPS = ("turn_across", "u_turn", "merge_order")

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contracts.frames import wrap_angle
-from contracts.futures import SeenRoadUser
-from contracts.world import Lane
-from sim_worker.actors.cast import Player
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.roads import RoadNetwork
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.futures import SeenRoadUser
+from foretwin.contracts.world import Lane
+from foretwin.sim_worker.actors.cast import Player
+from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
 
 _LANE_WITHIN_M = 1.8
 _LANE_WITHIN_RAD = math.radians(35.0)

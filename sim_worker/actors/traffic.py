@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.actors.crowd import Crowd, EgoBoxes, Flags
-from sim_worker.actors.law_abiding import LawAbiding, Now
-from sim_worker.actors.path_table import Indices, PathTable
-from sim_worker.actors.replay import Replay
-from sim_worker.actors.right_of_way import PathRules
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.actors.crowd import Crowd, EgoBoxes, Flags
+from foretwin.sim_worker.actors.law_abiding import LawAbiding, Now
+from foretwin.sim_worker.actors.path_table import Indices, PathTable
+from foretwin.sim_worker.actors.replay import Replay
+from foretwin.sim_worker.actors.right_of_way import PathRules
 
 
 class Traffic:

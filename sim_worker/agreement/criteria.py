@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import SignalColour
-from contracts.vehicle import VehicleParameters
-from sim_worker.metrics.ground import DrivableGround
-from sim_worker.metrics.rollout import Flags, Rollout
-from sim_worker.metrics.route_rules import LineAhead, RouteRules
-from sim_worker.metrics.scene import Context, Scene
-from sim_worker.metrics.table import METRICS
-from sim_worker.metrics.violations import line_crossings
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import SignalColour
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.rollout import Flags, Rollout
+from foretwin.sim_worker.metrics.route_rules import LineAhead, RouteRules
+from foretwin.sim_worker.metrics.scene import Context, Scene
+from foretwin.sim_worker.metrics.table import METRICS
+from foretwin.sim_worker.metrics.violations import line_crossings
 
 CRITERIA = ("clearance", "drivable_area", "red_light", "stop_line", "comfort")
 LEAST_CLEARANCE_M = 0.2

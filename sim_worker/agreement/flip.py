@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from sim_worker.agreement.criteria import CRITERIA, Court, Users
-from sim_worker.metrics.rollout import Flags
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.sim_worker.agreement.criteria import CRITERIA, Court, Users
+from foretwin.sim_worker.metrics.rollout import Flags
+from foretwin.sim_worker.planners.path import FrenetPath
 
 DIRECTIONS = ("along", "across", "both")
 MOST_M = 10.0

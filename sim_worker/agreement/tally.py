@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim_worker.agreement.criteria import CRITERIA, Court, Verdicts, Window, verdicts
-from sim_worker.agreement.flip import DIRECTIONS, Flip, flips, gap_between
+from foretwin.sim_worker.agreement.criteria import CRITERIA, Court, Verdicts, Window, verdicts
+from foretwin.sim_worker.agreement.flip import DIRECTIONS, Flip, flips, gap_between
 
 OUTCOMES = ("agree_pass", "agree_fail", "too_pessimistic", "too_optimistic")
 """Too pessimistic: the simulation fails, the drive passed; too optimistic the other way round."""

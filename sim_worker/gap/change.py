@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.gap.consistency import Consistency
-from sim_worker.gap.pairs import Pairs
-from sim_worker.motion_record import PERIOD_S
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.gap.consistency import Consistency
+from foretwin.sim_worker.gap.pairs import Pairs
+from foretwin.sim_worker.motion_record import PERIOD_S
 
 _SHARE = 0.25
 """Of the mean departure: what counts as one."""

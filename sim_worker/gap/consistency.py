@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.gap.fitting import Follower, Line, follower, line_through
-from sim_worker.gap.pairs import Pairs
-from sim_worker.motion_record import PERIOD_S
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.gap.fitting import Follower, Line, follower, line_through
+from foretwin.sim_worker.gap.pairs import Pairs
+from foretwin.sim_worker.motion_record import PERIOD_S
 
 _MIN_TURN_RAD, _MIN_CURVATURE_PM = 0.012, 0.006
 _HARD_MPS2 = 1.2

@@ -8,18 +8,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.frames import wrap_angle
-from contracts.gap import GapSample, Manoeuvre
-from sim_worker.gap.free_run import (
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.gap import GapSample, Manoeuvre
+from foretwin.sim_worker.gap.free_run import (
     FreeRunner,
     accel_commands_from_motion,
     start_states,
     steering_signals,
 )
-from sim_worker.gap.manoeuvres import MANOEUVRES, manoeuvre_of
-from sim_worker.gap.measured_motion import MeasuredMotion
-from sim_worker.motion_record import PERIOD_S, MotionRecord
-from sim_worker.vehicle.lag import without_lags
+from foretwin.sim_worker.gap.manoeuvres import MANOEUVRES, manoeuvre_of
+from foretwin.sim_worker.gap.measured_motion import MeasuredMotion
+from foretwin.sim_worker.motion_record import PERIOD_S, MotionRecord
+from foretwin.sim_worker.vehicle.lag import without_lags
 
 HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from contracts.gap import Culprit, Evidence
+from foretwin.contracts.gap import Culprit, Evidence
 
 
 class Finding(NamedTuple):

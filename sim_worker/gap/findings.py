@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from contracts.gap import Evidence
-from sim_worker.gap.consistency import Consistency, Lag
-from sim_worker.gap.finding import Finding
-from sim_worker.gap.fitting import Follower, Line
+from foretwin.contracts.gap import Evidence
+from foretwin.sim_worker.gap.consistency import Consistency, Lag
+from foretwin.sim_worker.gap.finding import Finding
+from foretwin.sim_worker.gap.fitting import Follower, Line
 
 _DEGREES = 180.0 / math.pi
 _GAIN, _GAIN_SHARP = 0.2, 0.1

@@ -1,6 +1,6 @@
 """Straight lines through pairs of signals, with honest deviations, delays and saturation.
 
-Of seconds, many times a second. `sim_worker.identify` fits lines to minutes: its deviations take
+Of seconds, many times a second. `foretwin.sim_worker.identify` fits lines to minutes: its deviations take
 four stretches of three seconds at least and ten times as long, and its actuators follow with a lag,
 where here a pure delay must be found even if command and answer differ in sign, or 57 times.
 """
@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.motion_record import PERIOD_S
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.motion_record import PERIOD_S
 
 
 class Line(NamedTuple):

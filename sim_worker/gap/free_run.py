@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.motion_record import PERIOD_S, MotionRecord
-from sim_worker.seeding import kinematic_tire_angle, rear_slip_velocity
-from sim_worker.stage import Controls, Stage
-from sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.motion_record import PERIOD_S, MotionRecord
+from foretwin.sim_worker.seeding import kinematic_tire_angle, rear_slip_velocity
+from foretwin.sim_worker.stage import Controls, Stage
+from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 _TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 
 class JointFit(NamedTuple):

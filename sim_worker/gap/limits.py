@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from contracts.gap import GapAlarm, GapSample
+from foretwin.contracts.gap import GapAlarm, GapSample
 
 LIMITS_PER_S = {
     "along_m": 0.8,

@@ -6,8 +6,8 @@ from typing import get_args
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.gap import Manoeuvre
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.gap import Manoeuvre
 
 MANOEUVRES: tuple[Manoeuvre, ...] = get_args(Manoeuvre)
 _STANDS_MPS = 0.3

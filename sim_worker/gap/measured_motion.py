@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from sim_worker.motion_record import between_samples
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.sim_worker.motion_record import between_samples
 
 _LONGEST_GAP_S = 0.5
 

@@ -6,16 +6,16 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from contracts.drive import VehicleInfo, VehicleState
-from contracts.frames import LocalFrame
-from contracts.gap import GapAlarm, GapSample, Verdict
-from contracts.vehicle import VehicleParameters
-from sim_worker.gap.errors import HORIZONS_S, GapMeter
-from sim_worker.gap.free_run import FreeRunner
-from sim_worker.gap.limits import LIMITS_PER_S, GapLimits
-from sim_worker.gap.measured_motion import motion_on_grid
-from sim_worker.gap.verdict import Judge, without_manual_commands
-from sim_worker.motion_record import MotionRecorder
+from foretwin.contracts.drive import VehicleInfo, VehicleState
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.gap.errors import HORIZONS_S, GapMeter
+from foretwin.sim_worker.gap.free_run import FreeRunner
+from foretwin.sim_worker.gap.limits import LIMITS_PER_S, GapLimits
+from foretwin.sim_worker.gap.measured_motion import motion_on_grid
+from foretwin.sim_worker.gap.verdict import Judge, without_manual_commands
+from foretwin.sim_worker.motion_record import MotionRecorder
 
 _SECOND_NS = 1_000_000_000
 _STATE = "state"

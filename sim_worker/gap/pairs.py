@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.gap.free_run import Flags, FreeRunner, start_states, steering_signals
-from sim_worker.gap.push import BLOCK, PushBlocks, push_blocks
-from sim_worker.gap.run_memory import Rows, RunMemory
-from sim_worker.motion_record import PERIOD_S, MotionRecord
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.gap.free_run import Flags, FreeRunner, start_states, steering_signals
+from foretwin.sim_worker.gap.push import BLOCK, PushBlocks, push_blocks
+from foretwin.sim_worker.gap.run_memory import Rows, RunMemory
+from foretwin.sim_worker.motion_record import PERIOD_S, MotionRecord
 
 _RUN, _TAIL = round(1.0 / PERIOD_S), 2 * BLOCK
 """A run lasts a second, the end of which is compared: where it began is forgotten by then."""

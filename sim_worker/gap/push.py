@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.gap import Culprit, Evidence
-from sim_worker.gap.finding import Finding
-from sim_worker.gap.joint_fit import JointFit, joint_fit
-from sim_worker.motion_record import PERIOD_S, MotionRecord
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.gap import Culprit, Evidence
+from foretwin.sim_worker.gap.finding import Finding
+from foretwin.sim_worker.gap.joint_fit import JointFit, joint_fit
+from foretwin.sim_worker.motion_record import PERIOD_S, MotionRecord
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 BLOCK = round(0.2 / PERIOD_S)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 Stamps = np.ndarray[Any, np.dtype[np.int64]]

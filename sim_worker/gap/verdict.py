@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from contracts.drive import GnssFix, VehicleInfo
-from contracts.frames import LocalFrame
-from contracts.gap import Verdict
-from contracts.vehicle import VehicleParameters
-from sim_worker.gap.change import began_ns
-from sim_worker.gap.consistency import Consistency, consistency_of
-from sim_worker.gap.finding import Finding
-from sim_worker.gap.findings import findings_of
-from sim_worker.gap.free_run import FreeRunner
-from sim_worker.gap.pairs import Pairs, pairs_of
-from sim_worker.gap.push import PushTest
-from sim_worker.gap.run_memory import RunMemory
-from sim_worker.motion_record import MotionRecord, MotionRecorder
+from foretwin.contracts.drive import GnssFix, VehicleInfo
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.gap import Verdict
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.gap.change import began_ns
+from foretwin.sim_worker.gap.consistency import Consistency, consistency_of
+from foretwin.sim_worker.gap.finding import Finding
+from foretwin.sim_worker.gap.findings import findings_of
+from foretwin.sim_worker.gap.free_run import FreeRunner
+from foretwin.sim_worker.gap.pairs import Pairs, pairs_of
+from foretwin.sim_worker.gap.push import PushTest
+from foretwin.sim_worker.gap.run_memory import RunMemory
+from foretwin.sim_worker.motion_record import MotionRecord, MotionRecorder
 
 WINDOW_S, RECENT_S, EVERY_S = 6.0, 3.0, 0.2
 _EVERY_NS = round(EVERY_S * 1e9)

@@ -8,16 +8,16 @@ from collections.abc import Collection
 
 import msgspec
 
-from contracts.errors import UserError
-from contracts.tuning import (
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.tuning import (
     UNDERSTEER_GRADIENT,
     Identification,
     ParameterChange,
     ParameterEstimate,
 )
-from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.vehicle.parameters import check_vehicle, understeer_gradient
-from sim_worker.vehicle.plausible import PLAUSIBLE
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.sim_worker.vehicle.parameters import check_vehicle, understeer_gradient
+from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
 
 HALF_OF_95 = 1.96
 _STIFFNESS = "front_cornering_stiffness_npr"

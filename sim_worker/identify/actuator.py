@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.identify.regression import Fit, fit_linear
-from sim_worker.identify.smoothing import delayed, smoothed
-from sim_worker.motion_record import MotionRecord
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.identify.regression import Fit, fit_linear
+from foretwin.sim_worker.identify.smoothing import delayed, smoothed
+from foretwin.sim_worker.motion_record import MotionRecord
 
 WIDTH_S = 0.05
 MAX_DELAY_S = 0.6

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.motion_record import MotionRecord
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.motion_record import MotionRecord
 
 _REACH_M = 25.0
 """Roads keep their grade over such lengths; half of the fit's window."""

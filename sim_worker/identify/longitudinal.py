@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.identify.actuator import best_delay, delays
-from sim_worker.identify.regression import Fit, fit_linear
-from sim_worker.identify.single_track import SLOWEST_MPS, sideways
-from sim_worker.identify.smoothing import delayed, smoothed
-from sim_worker.motion_record import MotionRecord
-from sim_worker.vehicle.parameters import GRAVITY_MPS2
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.identify.actuator import best_delay, delays
+from foretwin.sim_worker.identify.regression import Fit, fit_linear
+from foretwin.sim_worker.identify.single_track import SLOWEST_MPS, sideways
+from foretwin.sim_worker.identify.smoothing import delayed, smoothed
+from foretwin.sim_worker.motion_record import MotionRecord
+from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
 
 WIDTH_S = 0.1
 DRIVE, BRAKE, DRAG, ROLLING, DELAY = range(5)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import msgspec
 
-from contracts.errors import UserError
-from contracts.tuning import (
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.tuning import (
     UNDERSTEER_GRADIENT,
     Identification,
     ParameterChange,
     ParameterEstimate,
     ParameterOrigin,
 )
-from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.identify.acceptance import HALF_OF_95, accepted, in_force, is_acceptable
-from sim_worker.vehicle.parameters import check_vehicle
-from sim_worker.vehicle.plausible import check_plausible
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.sim_worker.identify.acceptance import HALF_OF_95, accepted, in_force, is_acceptable
+from foretwin.sim_worker.vehicle.parameters import check_vehicle
+from foretwin.sim_worker.vehicle.plausible import check_plausible
 
 _MUCH_WIDER = 1.5
 STIFFNESS = "front_cornering_stiffness_npr"

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from contracts.tuning import Identification
-from contracts.vehicle import VehicleParameters
-from sim_worker.identify.steering import GYRO_BIAS, fit_steering
-from sim_worker.motion_record import MotionRecord
+from foretwin.contracts.tuning import Identification
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.identify.steering import GYRO_BIAS, fit_steering
+from foretwin.sim_worker.motion_record import MotionRecord
 
 _TAKEN, _LEFT = "#1f77b4", "#b0b0b0"
 

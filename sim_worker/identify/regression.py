@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 STRETCH_S = 6.0
 """Longer than a bend in town, which takes three to five seconds."""

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
 
 SLOWEST_MPS = 2.0
 """Below it, slips are lost in noise."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 
 def smoothed(values: Array, *, period_s: float, width_s: float, derivative: bool = False) -> Array:

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.identify.regression import Fit, fit_linear
-from sim_worker.identify.steering_signals import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.identify.regression import Fit, fit_linear
+from foretwin.sim_worker.identify.steering_signals import (
     ALIKE_S,
     GYRO_BIAS,
     INVERSE_RATIO,
@@ -27,8 +27,8 @@ from sim_worker.identify.steering_signals import (
     SteeringSignals,
     steering_signals,
 )
-from sim_worker.motion_record import MotionRecord
-from sim_worker.vehicle.parameters import understeer_gradient
+from foretwin.sim_worker.motion_record import MotionRecord
+from foretwin.sim_worker.vehicle.parameters import understeer_gradient
 
 __all__ = ["GYRO_BIAS", "INVERSE_RATIO", "OFFSET", "UNDERSTEER", "SteeringFit", "fit_steering"]
 

@@ -6,10 +6,10 @@ import itertools
 
 import numpy as np
 
-from contracts.tuning import SteeringMapBin
-from sim_worker.identify.regression import fit_linear
-from sim_worker.identify.steering import SteeringFit
-from sim_worker.motion_record import MotionRecord
+from foretwin.contracts.tuning import SteeringMapBin
+from foretwin.sim_worker.identify.regression import fit_linear
+from foretwin.sim_worker.identify.steering import SteeringFit
+from foretwin.sim_worker.motion_record import MotionRecord
 
 EDGES_MPS = (2.0, 5.0, 8.0, 11.0, 15.0, 20.0, 30.0, 45.0)
 _LEAST_TYRE_RAD = 0.01

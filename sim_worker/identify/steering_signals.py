@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.identify.single_track import SLOWEST_MPS, sideways
-from sim_worker.identify.smoothing import smoothed
-from sim_worker.motion_record import MotionRecord
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.identify.single_track import SLOWEST_MPS, sideways
+from foretwin.sim_worker.identify.smoothing import smoothed
+from foretwin.sim_worker.motion_record import MotionRecord
 
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 WIDTH_S = 0.1

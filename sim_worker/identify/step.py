@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.identify.steering import PLAY_RAD, SteeringFit
-from sim_worker.identify.steering_signals import (
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.identify.steering import PLAY_RAD, SteeringFit
+from foretwin.sim_worker.identify.steering_signals import (
     INVERSE_RATIO,
     OFFSET,
     TURNING,

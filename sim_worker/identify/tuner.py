@@ -10,26 +10,26 @@ from typing import Any
 
 import msgspec
 
-from contracts.drive import GnssFix
-from contracts.frames import LocalFrame
-from contracts.tuning import (
+from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.tuning import (
     UNDERSTEER_GRADIENT,
     Identification,
     ParameterChange,
     ParameterOrigin,
 )
-from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.identify.acceptance import in_force, is_acceptable
-from sim_worker.identify.parameters_in_force import STIFFNESS, ParametersInForce, std_of
-from sim_worker.identify.steering_signals import (
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.sim_worker.identify.acceptance import in_force, is_acceptable
+from foretwin.sim_worker.identify.parameters_in_force import STIFFNESS, ParametersInForce, std_of
+from foretwin.sim_worker.identify.steering_signals import (
     INVERSE_RATIO,
     OFFSET,
     UNDERSTEER,
     steering_signals,
 )
-from sim_worker.identify.step import BendsBefore, Step, bends_before, find_step
-from sim_worker.identify.window import examine
-from sim_worker.motion_record import MotionRecorder
+from foretwin.sim_worker.identify.step import BendsBefore, Step, bends_before, find_step
+from foretwin.sim_worker.identify.window import examine
+from foretwin.sim_worker.motion_record import MotionRecorder
 
 _PERIOD_S = 0.01
 _LEAST_S = 20.0

@@ -8,28 +8,28 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.tuning import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.tuning import (
     UNDERSTEER_GRADIENT,
     Identification,
     ParameterEstimate,
     SteeringMapBin,
 )
-from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.identify import longitudinal
-from sim_worker.identify.actuator import fit_following
-from sim_worker.identify.grade import grade_from_altitude
-from sim_worker.identify.steering import (
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.sim_worker.identify import longitudinal
+from foretwin.sim_worker.identify.actuator import fit_following
+from foretwin.sim_worker.identify.grade import grade_from_altitude
+from foretwin.sim_worker.identify.steering import (
     INVERSE_RATIO,
     OFFSET,
     UNDERSTEER,
     SteeringFit,
     fit_steering,
 )
-from sim_worker.identify.steering_map import steering_map
-from sim_worker.identify.step import TURNING_MPS2
-from sim_worker.motion_record import MotionRecord
-from sim_worker.vehicle.parameters import understeer_gradient
+from foretwin.sim_worker.identify.steering_map import steering_map
+from foretwin.sim_worker.identify.step import TURNING_MPS2
+from foretwin.sim_worker.motion_record import MotionRecord
+from foretwin.sim_worker.vehicle.parameters import understeer_gradient
 
 UNDERSTEER_NAME = UNDERSTEER_GRADIENT
 LEAST_TURNING_S, LEAST_STEERING_S = 5.0, 3.0

@@ -8,9 +8,9 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.planners.path import FrenetPath
 
 
 class SeenUsers(NamedTuple):
@@ -60,7 +60,7 @@ class KnownPlan(NamedTuple):
 class PlannerView(NamedTuple):
     """Everything a planner may know at one control tick; arrays have S rows.
 
-    `states` (S, 8) as `contracts.futures.STATE_COLUMNS`; `arc_m` and `offset_m` (S,) place
+    `states` (S, 8) as `foretwin.contracts.futures.STATE_COLUMNS`; `arc_m` and `offset_m` (S,) place
     base_link on `path`; `desired_offset_m` (S,) is the lateral offset to keep; `speed_factor` (S,)
     is how much faster than the nominal future this one likes everything, curves included;
     `lead_gap_m` (S,) from bumper to bumper, infinite without a lead, and `lead_speed_mps` (S,);

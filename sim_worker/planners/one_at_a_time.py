@@ -6,14 +6,14 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.planners.base import KnownPlan, PlannerOutput, PlannerView, SharedGround
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.planners.base import KnownPlan, PlannerOutput, PlannerView, SharedGround
+from foretwin.sim_worker.planners.path import FrenetPath
 
 
 class SeenUser(NamedTuple):
-    """One other road user; fields as in `sim_worker.planners.base.SeenUsers`."""
+    """One other road user; fields as in `foretwin.sim_worker.planners.base.SeenUsers`."""
 
     x_m: float
     y_m: float
@@ -28,7 +28,7 @@ class SeenUser(NamedTuple):
 
 
 class CarView(NamedTuple):
-    """What the planner of one car sees; fields as in `sim_worker.planners.base.PlannerView`."""
+    """What the planner of one car sees; fields as in `foretwin.sim_worker.planners.base.PlannerView`."""
 
     time_s: float
     x_m: float

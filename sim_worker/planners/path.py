@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker import compiled
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker import compiled
 
 SPACING_M = 1.0
 """Between nodes. As it is one metre, an arc length less that of the first node is a place."""

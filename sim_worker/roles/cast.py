@@ -7,16 +7,16 @@ from itertools import combinations
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import ControlCommand, VehicleState
-from contracts.frames import LocalFrame, target_from_source
-from contracts.roles import Correction, FollowLimits, Role
-from contracts.world import World
-from sim_worker.overlap import Rectangles, overlapping
-from sim_worker.roles.member import STEP_NS, CastMember, Member
-from sim_worker.roles.role_world import RoleWorld
-from sim_worker.roles.track import Measured
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.frames import LocalFrame, target_from_source
+from foretwin.contracts.roles import Correction, FollowLimits, Role
+from foretwin.contracts.world import World
+from foretwin.sim_worker.overlap import Rectangles, overlapping
+from foretwin.sim_worker.roles.member import STEP_NS, CastMember, Member
+from foretwin.sim_worker.roles.role_world import RoleWorld
+from foretwin.sim_worker.roles.track import Measured
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 Touches = frozenset[tuple[str, str]]
 """Sorted pairs of vehicle ids; `world` stands for what does not move."""

@@ -7,17 +7,17 @@ from typing import NamedTuple
 
 import msgspec
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import LocalFrame
-from contracts.roles import Correction, MirrorCast, OtherVehicle, Role, UseRoles
-from contracts.simulation import MirrorSample
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker.commands import STEP_BACK_NS, CommandMemory
-from sim_worker.roles.cast import Cast
-from sim_worker.roles.member import CastMember
-from sim_worker.roles.told import with_cast
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.roles import Correction, MirrorCast, OtherVehicle, Role, UseRoles
+from foretwin.contracts.simulation import MirrorSample
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.commands import STEP_BACK_NS, CommandMemory
+from foretwin.sim_worker.roles.cast import Cast
+from foretwin.sim_worker.roles.member import CastMember
+from foretwin.sim_worker.roles.told import with_cast
 
 _LOST_NS = 8_000_000_000
 """After a longer silence a twin that follows starts anew as well."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.roles import FollowLimits
-from sim_worker.vehicle.planar import TIMESTEP_S
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.roles import FollowLimits
+from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
 
 FASTEST_PACE_PER_S = 1.0 / (3.0 * TIMESTEP_S)
 """At a higher one a step would overrun the acceleration that it aims at."""

@@ -6,16 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import ControlCommand
-from contracts.frames import LocalFrame, wrap_angle
-from contracts.roles import FollowLimits, Role
-from contracts.vehicle import VehicleParameters
-from sim_worker.commands import CommandMemory
-from sim_worker.roles.follower import plane_follower
-from sim_worker.roles.track import Measured, Track
-from sim_worker.roles.twin_body import TwinBody
-from sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlCommand
+from foretwin.contracts.frames import LocalFrame, wrap_angle
+from foretwin.contracts.roles import FollowLimits, Role
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.commands import CommandMemory
+from foretwin.sim_worker.roles.follower import plane_follower
+from foretwin.sim_worker.roles.track import Measured, Track
+from foretwin.sim_worker.roles.twin_body import TwinBody
+from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
 
 STEP_NS = round(TIMESTEP_S * 1e9)
 _PASSES_OVER_S = 2.0

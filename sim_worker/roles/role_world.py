@@ -10,17 +10,17 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.roles import Role
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker.roles.twin_body import TwinBody
-from sim_worker.stage_model import world_spec
-from sim_worker.vehicle.clock import silence_step_clock
-from sim_worker.vehicle.lag import without_lags
-from sim_worker.vehicle.mujoco_log import log_mujoco_warnings
-from sim_worker.vehicle.planar import CHASSIS, box_centre_from_base_m, vehicle_spec
-from world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.roles import Role
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.roles.twin_body import TwinBody
+from foretwin.sim_worker.stage_model import world_spec
+from foretwin.sim_worker.vehicle.clock import silence_step_clock
+from foretwin.sim_worker.vehicle.lag import without_lags
+from foretwin.sim_worker.vehicle.mujoco_log import log_mujoco_warnings
+from foretwin.sim_worker.vehicle.planar import CHASSIS, box_centre_from_base_m, vehicle_spec
+from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
 
 WORLD = "world"
 """Name of what stands: buildings, islands, kerbs."""

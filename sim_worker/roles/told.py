@@ -5,12 +5,12 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import LocalFrame, target_from_source, wrap_angle
-from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
-from sim_worker.roles.cast import Cast
-from sim_worker.roles.member import Member
-from sim_worker.roles.track import Measured
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame, target_from_source, wrap_angle
+from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
+from foretwin.sim_worker.roles.cast import Cast
+from foretwin.sim_worker.roles.member import Member
+from foretwin.sim_worker.roles.track import Measured
 
 
 def plane_state(

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import LocalFrame, wrap_angle
-from contracts.vehicle import VehicleParameters
-from sim_worker.commands import TwinCommand, estimated_command
-from sim_worker.seeding import local_state
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import LocalFrame, wrap_angle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.commands import TwinCommand, estimated_command
+from foretwin.sim_worker.seeding import local_state
 
 LOST_AFTER_NS = 1_000_000_000
 """Who has not been measured for longer is not there any more."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.vehicle.actuation import Actuation, actuator_ids
-from sim_worker.vehicle.planar import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
+from foretwin.sim_worker.vehicle.planar import (
     JOINTS,
     TIMESTEP_S,
     base_from_cog,

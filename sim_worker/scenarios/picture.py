@@ -17,16 +17,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from contracts.arrays import Array
-from contracts.scenario import Scenario
-from contracts.world import World
-from sim_worker.overlap import Rectangles, corners
-from sim_worker.scenarios.picture_runs import Run
-from sim_worker.scenarios.roles import Cast
-from world_gen.export.picture_ground import draw_ground
-from world_gen.export.picture_marks import scale_bar
-from world_gen.export.picture_style import LANE_EDGE, LINE_COLOUR, View, view_around
-from world_gen.polyline import offset
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.world import World
+from foretwin.sim_worker.overlap import Rectangles, corners
+from foretwin.sim_worker.scenarios.picture_runs import Run
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.world_gen.export.picture_ground import draw_ground
+from foretwin.world_gen.export.picture_marks import scale_bar
+from foretwin.world_gen.export.picture_style import LANE_EDGE, LINE_COLOUR, View, view_around
+from foretwin.world_gen.polyline import offset
 
 EGO, PLANNED, OTHERS, STANDING, IMPACT = "#1f5fd0", "#0b8a4b", "#d62728", "#7a4b22", "#ffd400"
 _LEAST_HALF_M, _MOST_HALF_M, _MARGIN_M = 20.0, 75.0, 8.0

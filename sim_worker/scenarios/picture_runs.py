@@ -7,19 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.futures import FuturesJob, FuturesResult, PathAhead, Variant
-from contracts.scenario import Scenario
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker.futures import run_job
-from sim_worker.overlap import Rectangles, clearance
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.impact import Moving, ego_box, ego_rectangles, rectangles
-from sim_worker.scenarios.roles import Cast
-from sim_worker.stage import Stage
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.futures import FuturesJob, FuturesResult, PathAhead, Variant
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.futures import run_job
+from foretwin.sim_worker.overlap import Rectangles, clearance
+from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.scenarios.impact import Moving, ego_box, ego_rectangles, rectangles
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 STEP_S = 0.1
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.side_by_side import DisagreementKind
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.side_by_side import DisagreementKind
+from foretwin.sim_worker.planners.path import FrenetPath
 
 _LEAST_WAY_M = 3.0
 """Ways are compared as far as both went, and not at all where that is less."""

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
-from contracts.arrays import Array
-from contracts.drive import ControlMode
-from contracts.frames import GeoPoint
-from contracts.side_by_side import Aspect, Disagreement, DisagreementKind, DrivenSegment
-from sim_worker.side_by_side.departure import Departure
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlMode
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.side_by_side import Aspect, Disagreement, DisagreementKind, DrivenSegment
+from foretwin.sim_worker.side_by_side.departure import Departure
 
 BEGIN_NS = 400_000_000
 """Plans must be departed from for so long: one alone is a whim."""

@@ -10,12 +10,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import ControlMode, PlannedTrajectory, VehicleState, VehicleStatus
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.side_by_side import Disagreement, DrivenSegment
-from sim_worker.side_by_side.departure import Limits, departure, pace_kind, way_kind
-from sim_worker.side_by_side.segment import Course, Place, Segment, Waiting
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleState, VehicleStatus
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
+from foretwin.sim_worker.side_by_side.departure import Limits, departure, pace_kind, way_kind
+from foretwin.sim_worker.side_by_side.segment import Course, Place, Segment, Waiting
 
 HORIZON_S = 4.0
 """How much of a plan is compared: beyond, both have seen what nobody knew."""

@@ -11,11 +11,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from contracts.codec import encode
-from contracts.drive import GnssFix, SpeedSample
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from contracts.mailbox import Received
-from orchestrator.conductor import Conductor
+from foretwin.contracts.codec import encode
+from foretwin.contracts.drive import GnssFix, SpeedSample
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.contracts.mailbox import Received
+from foretwin.orchestrator.conductor import Conductor
 from tests.orchestrator.house import INFO, Builder, House, Worker
 
 

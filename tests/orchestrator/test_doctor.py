@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import doctor
-from orchestrator.doctor import Finding, examine
+from foretwin.orchestrator import doctor
+from foretwin.orchestrator.doctor import Finding, examine
 
 
 def findings() -> dict[str, Finding]:

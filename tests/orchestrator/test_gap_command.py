@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from contracts.drive import GnssFix, SpeedSample, VehicleInfo
-from contracts.frames import GeoPoint
-from orchestrator.cli import run
-from telemetry.mcap_file import create
-from telemetry.ros_messages import messages_from
+from foretwin.contracts.drive import GnssFix, SpeedSample, VehicleInfo
+from foretwin.contracts.frames import GeoPoint
+from foretwin.orchestrator.cli import run
+from foretwin.telemetry.mcap_file import create
+from foretwin.telemetry.ros_messages import messages_from
 from tests.sim_worker.faulty_standin import drive_of
 from tests.sim_worker.gap.test_verdict import END_S, SEED
 from tests.telemetry.standin_drive import FRAME

@@ -10,10 +10,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from contracts.drive import SpeedSample
-from orchestrator.cli import run
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.mcap_file import create
+from foretwin.contracts.drive import SpeedSample
+from foretwin.orchestrator.cli import run
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.mcap_file import create
 from tests.telemetry.standin_drive import whole_drive
 
 

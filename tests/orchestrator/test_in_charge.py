@@ -9,13 +9,13 @@ from typing import Any
 import msgspec
 import pytest
 
-from contracts.bus import Mailbox
-from contracts.memory_bus import MemoryBus
-from contracts.setup import Ros2Setup
-from orchestrator.in_charge import InCharge
-from orchestrator.plan import DrivePlan
-from orchestrator.processes import PROCESSES
-from telemetry.ros2.mapping import AUTOWARE, MappingFile, parse_mapping
+from foretwin.contracts.bus import Mailbox
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.contracts.setup import Ros2Setup
+from foretwin.orchestrator.in_charge import InCharge
+from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.processes import PROCESSES
+from foretwin.telemetry.ros2.mapping import AUTOWARE, MappingFile, parse_mapping
 from tests.orchestrator.trip import town_plan
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.codec import SchemaMismatch, encode
-from contracts.drive import DriveEnd, GnssFix, PlannedTrajectory
-from contracts.mailbox import Mailbox, Received
-from contracts.memory_bus import MemoryBus
-from orchestrator.intake import Intake
+from foretwin.contracts.codec import SchemaMismatch, encode
+from foretwin.contracts.drive import DriveEnd, GnssFix, PlannedTrajectory
+from foretwin.contracts.mailbox import Mailbox, Received
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.orchestrator.intake import Intake
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator import live_loop
-from orchestrator.live_loop import LiveLoop
-from orchestrator.rounds.pace import Pace
+from foretwin.orchestrator import live_loop
+from foretwin.orchestrator.live_loop import LiveLoop
+from foretwin.orchestrator.rounds.pace import Pace
 
 
 class Clock:

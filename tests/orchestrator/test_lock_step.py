@@ -9,14 +9,14 @@ from typing import Any
 import msgspec
 import pytest
 
-from contracts.codec import encode
-from contracts.drive import AdvanceReply, DriveEnd, GnssFix, SpeedSample
-from contracts.keys import alive_key
-from contracts.mailbox import Mailbox, Received, Request
-from contracts.simulation import MirrorSample, PlaneState
-from contracts.tuning import SetRequest
-from orchestrator import lock_step
-from orchestrator.lock_step import LockStepError, LockStepLoop
+from foretwin.contracts.codec import encode
+from foretwin.contracts.drive import AdvanceReply, DriveEnd, GnssFix, SpeedSample
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.mailbox import Mailbox, Received, Request
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.tuning import SetRequest
+from foretwin.orchestrator import lock_step
+from foretwin.orchestrator.lock_step import LockStepError, LockStepLoop
 from tests.orchestrator.house import AtOnce, House
 from tests.orchestrator.trip import START_NS
 

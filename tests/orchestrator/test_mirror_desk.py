@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from contracts.simulation import MirrorSample, PlaneState
-from orchestrator.instructions import Tell
-from orchestrator.mirror_desk import MirrorDesk
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.mirror_desk import MirrorDesk
 
 HERE = PlaneState(0.0, 0.0, 0.0, 0.0)
 

@@ -8,11 +8,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.world import World
-from orchestrator.instructions import NotReady, RoundIntent
-from orchestrator.mission import MissionSettings
-from orchestrator.way.road_index import RoadIndex
-from orchestrator.way.way_ahead import WayAhead
+from foretwin.contracts.world import World
+from foretwin.orchestrator.instructions import NotReady, RoundIntent
+from foretwin.orchestrator.mission import MissionSettings
+from foretwin.orchestrator.way.road_index import RoadIndex
+from foretwin.orchestrator.way.way_ahead import WayAhead
 from tests.orchestrator.berlin import berlin
 from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, junctions, road
 from tests.orchestrator.trip import Trip, states_along, town, town_line, town_world, world_named

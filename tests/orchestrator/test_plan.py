@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.errors import UserError
-from contracts.frames import geo_from_local, local_from_geo
-from orchestrator.config import ConfigError, DriveConfig
-from orchestrator.embedded import MAP_FILE
-from orchestrator.maps.opening import open_map
-from orchestrator.plan import make_plan, read_inputs
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.orchestrator.config import ConfigError, DriveConfig
+from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.orchestrator.maps.opening import open_map
+from foretwin.orchestrator.plan import make_plan, read_inputs
+from foretwin.world_gen.route_junctions import junctions_on_route
 from tests.orchestrator.trip import NOW, town, town_line, town_plan
 from tests.world_gen.sketch import Sketch
-from world_gen.route_junctions import junctions_on_route
 
 
 def inputs_for(folder: Path, **settings: object) -> object:
@@ -182,8 +182,8 @@ def test_of_a_large_map_the_surroundings_of_the_drive_are_read(
     }
     whole = inputs_for(tmp_path, **settings)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("orchestrator.plan.open_map", partial(open_map, large_bytes=1))
-    monkeypatch.setattr("orchestrator.plan.CORRIDOR_M", 300.0)
+    monkeypatch.setattr("foretwin.orchestrator.plan.open_map", partial(open_map, large_bytes=1))
+    monkeypatch.setattr("foretwin.orchestrator.plan.CORRIDOR_M", 300.0)
 
     part = inputs_for(tmp_path, **settings)
 

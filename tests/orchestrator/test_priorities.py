@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.priorities import gives_way
+from foretwin.orchestrator.priorities import gives_way
 
 WAITS = """
 import threading

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from contracts.mailbox import Mailbox
-from contracts.simulation import Event
-from orchestrator.progress import ProgressLine
-from orchestrator.rounds.pace import Pace
+from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.simulation import Event
+from foretwin.orchestrator.progress import ProgressLine
+from foretwin.orchestrator.rounds.pace import Pace
 from tests.orchestrator.house import House
 
 

@@ -12,15 +12,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
-from contracts.frames import geo_from_local
-from contracts.mailbox import Mailbox
-from contracts.memory_bus import MemoryBus
-from orchestrator.config import ConfigError, DriveConfig
-from orchestrator.ros2_mapping import read_ros2
-from orchestrator.route_desk import RouteDesk
-from orchestrator.way.route import Route
-from telemetry.ros2.mapping import AUTOWARE, MappingError
+from foretwin.contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
+from foretwin.contracts.frames import geo_from_local
+from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.orchestrator.config import ConfigError, DriveConfig
+from foretwin.orchestrator.ros2_mapping import read_ros2
+from foretwin.orchestrator.route_desk import RouteDesk
+from foretwin.orchestrator.way.route import Route
+from foretwin.telemetry.ros2.mapping import AUTOWARE, MappingError
 from tests.orchestrator.grid_map import FRAME
 from tests.orchestrator.trip import town_plan
 from tests.orchestrator.way.test_route_to_goal import EAST, NORTH, TOWN, degrees, pose

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import run
-from orchestrator.maps.opening import open_map
-from orchestrator.plan import EMBEDDED_MAP
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.reading import CATALOGUE, catalogue
+from foretwin.orchestrator.cli import run
+from foretwin.orchestrator.maps.opening import open_map
+from foretwin.orchestrator.plan import EMBEDDED_MAP
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.reading import CATALOGUE, catalogue
 
 MAP = str(EMBEDDED_MAP)
 

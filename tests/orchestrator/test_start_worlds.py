@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.mission import Mission, MissionSettings
-from orchestrator.start_worlds import junctions_at_start
-from orchestrator.way.way_ahead import WayAhead
+from foretwin.orchestrator.mission import Mission, MissionSettings
+from foretwin.orchestrator.start_worlds import junctions_at_start
+from foretwin.orchestrator.way.way_ahead import WayAhead
 from tests.orchestrator.trip import states_along, town, town_line
 
 

@@ -13,9 +13,9 @@ from types import SimpleNamespace as Namespace
 
 import pytest
 
-from contracts.setup import BusSetup, ProcessSetup
-from orchestrator.processes import PROCESSES, ProcessRow, row_of
-from orchestrator.supervisor import MAX_RESTARTS, FreshInterpreter, Supervisor, fold_stderr
+from foretwin.contracts.setup import BusSetup, ProcessSetup
+from foretwin.orchestrator.processes import PROCESSES, ProcessRow, row_of
+from foretwin.orchestrator.supervisor import MAX_RESTARTS, FreshInterpreter, Supervisor, fold_stderr
 from tests.contracts.bus_sides import DEADLINE_S
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.visits import VisitBook
+from foretwin.orchestrator.visits import VisitBook
 from tests.orchestrator.grid_map import FRAME, grid, junctions
 from tests.orchestrator.trip import world_named
 

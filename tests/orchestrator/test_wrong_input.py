@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import run
-from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
+from foretwin.orchestrator.cli import run
+from foretwin.orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
 
 GPX = """<?xml version="1.0"?>
 <gpx version="1.1" creator="test" xmlns="http://www.topografix.com/GPX/1/1"><trk><trkseg>

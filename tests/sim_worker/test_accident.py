@@ -7,16 +7,16 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from contracts.drive import RoadUserKind
-from sim_worker.accident import Accidents, run_accidents
-from sim_worker.accident_bodies import accident_bodies
-from sim_worker.accident_model import Impact
-from sim_worker.actors.kinds import KINDS
-from sim_worker.overlap import Rectangles, separations
-from sim_worker.touch import Touches, ego_rectangles, first_touches
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import cog_from_base
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.sim_worker.accident import Accidents, run_accidents
+from foretwin.sim_worker.accident_bodies import accident_bodies
+from foretwin.sim_worker.accident_model import Impact
+from foretwin.sim_worker.actors.kinds import KINDS
+from foretwin.sim_worker.overlap import Rectangles, separations
+from foretwin.sim_worker.touch import Touches, ego_rectangles, first_touches
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import cog_from_base
 from tests.sim_worker.rigid_impact import Body, impact
 
 CAR = load_vehicle()

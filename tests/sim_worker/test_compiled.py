@@ -12,22 +12,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from contracts.arrays import Array
-from contracts.futures import Faults, Variant
-from sim_worker import compiled
-from sim_worker.futures import run_job
-from sim_worker.metrics import compiled_pairs
-from sim_worker.metrics.curves import frechet_distance, warping_distance
-from sim_worker.planners import pure_pursuit_idm as idm
-from sim_worker.planners import registry
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.path import FrenetPath
-from sim_worker.planners.registry import load_planner
-from sim_worker.planners.tracking import pure_pursuit, turning_speed
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import base_from_cog
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import Faults, Variant
+from foretwin.sim_worker import compiled
+from foretwin.sim_worker.futures import run_job
+from foretwin.sim_worker.metrics import compiled_pairs
+from foretwin.sim_worker.metrics.curves import frechet_distance, warping_distance
+from foretwin.sim_worker.planners import pure_pursuit_idm as idm
+from foretwin.sim_worker.planners import registry
+from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.planners.registry import load_planner
+from foretwin.sim_worker.planners.tracking import pure_pursuit, turning_speed
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import base_from_cog
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 from tests.sim_worker.places import crossroads, job, turning_path
 
 KERNELS: dict[str, Any] = {

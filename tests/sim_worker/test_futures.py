@@ -9,14 +9,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.codec import content_bytes, write_message
-from contracts.futures import Faults, FuturesJob, FuturesResult, Variant
-from sim_worker.futures import result_digest, run_job
-from sim_worker.metrics.displacement import distinct_count
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.stage import Stage
-from sim_worker.variants import plan_variants
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.codec import content_bytes, write_message
+from foretwin.contracts.futures import Faults, FuturesJob, FuturesResult, Variant
+from foretwin.sim_worker.futures import result_digest, run_job
+from foretwin.sim_worker.metrics.displacement import distinct_count
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.variants import plan_variants
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import (
     box,
     crossroads,
@@ -99,10 +99,10 @@ def test_another_process_computes_the_same_bytes(
     write_message(question, tmp_path / "job")
     write_message(stage.world, tmp_path / "world")
     program = (
-        "import sys; from pathlib import Path; from contracts.codec import read_message;"
-        "from contracts.world import World; from contracts.futures import FuturesJob;"
-        "from sim_worker.futures import run_job, result_digest; from sim_worker.stage import Stage;"
-        "from sim_worker.vehicle.parameters import load_vehicle; d = Path(sys.argv[1]);"
+        "import sys; from pathlib import Path; from foretwin.contracts.codec import read_message;"
+        "from foretwin.contracts.world import World; from foretwin.contracts.futures import FuturesJob;"
+        "from foretwin.sim_worker.futures import run_job, result_digest; from foretwin.sim_worker.stage import Stage;"
+        "from foretwin.sim_worker.vehicle.parameters import load_vehicle; d = Path(sys.argv[1]);"
         "s = Stage(read_message(d / 'world', World), load_vehicle(), nsim=16);"
         "print(result_digest(run_job(read_message(d / 'job', FuturesJob), s)))"
     )
@@ -247,7 +247,7 @@ def test_a_diverged_future_is_marked_and_spoils_no_other(
 
 
 def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Variant, ...]) -> None:
-    from contracts.codec import decode, encode
+    from foretwin.contracts.codec import decode, encode
 
     result = run_job(job(round_of_64[:8]), stage)
     back = decode(encode(result), FuturesResult).message

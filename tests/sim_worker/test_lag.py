@@ -3,12 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.mirror_world import MirrorWorld
-from sim_worker.stage import Stage
-from sim_worker.vehicle.lag import ForceLag, lags_of_force
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.mirror_world import MirrorWorld
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.vehicle.lag import ForceLag, lags_of_force
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered, drive, seed, states
 
 CAR = load_vehicle()

@@ -7,12 +7,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import ControlCommand, VehicleState
-from contracts.frames import GeoPoint, LocalFrame, target_from_source
-from contracts.simulation import MirrorSample
-from sim_worker.mirror_world import GHOST, SHADOW, MirrorWorld
-from sim_worker.twin import Mirror
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source
+from foretwin.contracts.simulation import MirrorSample
+from foretwin.sim_worker.mirror_world import GHOST, SHADOW, MirrorWorld
+from foretwin.sim_worker.twin import Mirror
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered, states
 from tests.sim_worker.places import FRAME, crossroads, state_at
 

@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.bus import Mailbox, Received
-from contracts.drive import (
+from foretwin.contracts.bus import Mailbox, Received
+from foretwin.contracts.drive import (
     ControlCommand,
     GnssFix,
     HeadingSample,
     SpeedSample,
     VehicleInfo,
 )
-from contracts.frames import GeoPoint, geo_from_local
-from contracts.memory_bus import MemoryBus
-from contracts.setup import BusSetup, WorkerSetup
-from contracts.simulation import MirrorSample
-from sim_worker.mirror_process import MirrorWorker
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.estimator import StateEstimator
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.contracts.setup import BusSetup, WorkerSetup
+from foretwin.contracts.simulation import MirrorSample
+from foretwin.sim_worker.mirror_process import MirrorWorker
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.estimator import StateEstimator
 from tests.sim_worker.places import FRAME
 
 S = 1_000_000_000

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import (
+from foretwin.contracts.drive import (
     ControlCommand,
     HeadingSample,
     ImuSample,
@@ -15,8 +15,8 @@ from contracts.drive import (
     SteeringSample,
     VehicleStatus,
 )
-from contracts.frames import GeoPoint, LocalFrame
-from sim_worker.motion_record import MotionRecorder
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.sim_worker.motion_record import MotionRecorder
 
 FRAME = LocalFrame(GeoPoint(52.0, 13.0))
 START_NS = 1_767_225_600_000_000_000

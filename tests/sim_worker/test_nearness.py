@@ -9,16 +9,16 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from contracts.futures import Variant
-from contracts.provenance import Quantity
-from contracts.world import Building
-from sim_worker.futures import result_digest, run_job
-from sim_worker.nearness import NearStatics
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.stage import Stage
-from sim_worker.variants import plan_variants
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import Variant
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import Building
+from foretwin.sim_worker.futures import result_digest, run_job
+from foretwin.sim_worker.nearness import NearStatics
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.variants import plan_variants
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import box, crossroads, job, state_at
 
 CAR = load_vehicle()

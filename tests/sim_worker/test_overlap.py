@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_worker.overlap import Rectangles, clearance, corners, overlapping, separations
+from foretwin.sim_worker.overlap import Rectangles, clearance, corners, overlapping, separations
 
 near = st.floats(-8.0, 8.0)
 angle = st.floats(-7.0, 7.0)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_worker.vehicle.parameters import (
+from foretwin.sim_worker.vehicle.parameters import (
     DEFAULT_FILE,
     bundled_vehicles,
     load_vehicle,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.planners.path import FrenetPath
 
 ARC = np.linspace(0.0, 1.5 * math.pi, 200)
 CIRCLE = FrenetPath(20.0 * np.stack([np.sin(ARC), 1.0 - np.cos(ARC)], axis=1))

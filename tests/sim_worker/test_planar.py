@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle, understeer_gradient
-from sim_worker.vehicle.planar import base_from_cog, cog_from_base
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle, understeer_gradient
+from foretwin.sim_worker.vehicle.planar import base_from_cog, cog_from_base
 from tests.sim_worker.driving import altered, drive, seed, states
 
 CAR = load_vehicle()

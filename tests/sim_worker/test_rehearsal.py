@@ -10,21 +10,21 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint
-from contracts.futures import FuturesJob, FuturesResult, PathAhead, Variant
-from contracts.world import World
-from sim_worker.futures import result_digest, run_job
-from sim_worker.rehearsal import staged_cases
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.scenarios.roles import Cast
-from sim_worker.scene import SceneMaker
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.futures import FuturesJob, FuturesResult, PathAhead, Variant
+from foretwin.contracts.world import World
+from foretwin.sim_worker.futures import result_digest, run_job
+from foretwin.sim_worker.rehearsal import staged_cases
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scene import SceneMaker
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.test_real_junctions import SMALL, worlds_of
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
 

@@ -8,14 +8,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.codec import decode, encode
-from contracts.futures import FuturesJob, RecordedRoadUser, Variant
-from sim_worker.futures import result_digest, run_job
-from sim_worker.metrics.table import METRICS
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.codec import decode, encode
+from foretwin.contracts.futures import FuturesJob, RecordedRoadUser, Variant
+from foretwin.sim_worker.futures import result_digest, run_job
+from foretwin.sim_worker.metrics.table import METRICS
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 from tests.sim_worker.places import crossroads, happening, job, state_at
 
 CAR = load_vehicle()

@@ -6,13 +6,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import SignalState
-from contracts.futures import Faults, FuturesJob, PathAhead, SeenRoadUser, Variant
-from contracts.world import World
-from sim_worker.futures import run_job
-from sim_worker.scene import SceneMaker
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.drive import SignalState
+from foretwin.contracts.futures import Faults, FuturesJob, PathAhead, SeenRoadUser, Variant
+from foretwin.contracts.world import World
+from foretwin.sim_worker.futures import run_job
+from foretwin.sim_worker.scene import SceneMaker
+from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.actors.crossroads import crossroads as mapped_crossroads
 from tests.sim_worker.actors.crossroads import straight_on
 from tests.sim_worker.places import crossroads, happening, job, state_at

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim_worker.stage import Controls, Stage
-from sim_worker.vehicle.clock import silence_step_clock
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.stage import Controls, Stage
+from foretwin.sim_worker.vehicle.clock import silence_step_clock
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered, drive, seed, states
 from tests.sim_worker.places import box, crossroads
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from sim_worker.overlap import Rectangles, clearance
-from sim_worker.touch import Touches, ego_rectangles, first_touches, touched
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.overlap import Rectangles, clearance
+from foretwin.sim_worker.touch import Touches, ego_rectangles, first_touches, touched
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 CAR = load_vehicle()
 TICK_S = 0.05

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contracts.bus import Mailbox, Received, Reply, Request
-from contracts.gap import GapSample
-from contracts.mailbox import Item
-from contracts.memory_bus import MemoryBus
-from contracts.setup import BusSetup, TuningSetup
-from contracts.tuning import TuneReply, TuneRequest, UseVehicle
-from contracts.vehicle import VehicleParameters
-from orchestrator.tuning.parameter_desk import ParameterDesk
-from sim_worker.tuning import SAMPLES
-from sim_worker.tuning_process import TuningWorker
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.estimator import StateEstimator
-from telemetry.standin.source import START_STAMP_NS
+from foretwin.contracts.bus import Mailbox, Received, Reply, Request
+from foretwin.contracts.gap import GapSample
+from foretwin.contracts.mailbox import Item
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.contracts.setup import BusSetup, TuningSetup
+from foretwin.contracts.tuning import TuneReply, TuneRequest, UseVehicle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.tuning.parameter_desk import ParameterDesk
+from foretwin.sim_worker.tuning import SAMPLES
+from foretwin.sim_worker.tuning_process import TuningWorker
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.sim_worker.driving import altered
 from tests.telemetry.city_drive import city_drive
 from tests.telemetry.standin_drive import FRAME
@@ -158,7 +158,7 @@ def test_what_cannot_be_used_is_passed_over_and_the_question_answered() -> None:
     watched.step(2.0)
     nonsense = Received("speed", "k", b"nonsense", VehicleParameters)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sim_worker.tuning_process.log.exception", lambda *_: None)
+        patch.setattr("foretwin.sim_worker.tuning_process.log.exception", lambda *_: None)
         watched._worker.handle(nonsense)
     watched._published["speed"] += 1
     assert isinstance(watched.step(2.5), TuneReply)

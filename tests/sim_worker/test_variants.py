@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from contracts.futures import Faults
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.variants import plan_variants
+from foretwin.contracts.futures import Faults
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.variants import plan_variants
 
 
 def test_the_first_variant_is_neutral() -> None:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.frames import geo_from_local, local_from_geo
-from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
-from orchestrator.way.route import point_along
-from telemetry.logs import read_line
+from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
+from foretwin.orchestrator.way.route import point_along
+from foretwin.telemetry.logs import read_line
+from foretwin.world_gen.read_osm import read_map
 from tests.system.foretwin_command import foretwin
-from world_gen.read_osm import read_map
 
 SPEED_MPS = 9.0
 RATE_HZ = 5

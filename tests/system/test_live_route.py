@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.bus import ZenohBus
-from contracts.foreign_bus import ZenohForeignBus
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from orchestrator.plan import EMBEDDED_ROUTE
-from telemetry.logs import read_line
-from telemetry.ros2.mapping import AUTOWARE
-from telemetry.ros_parts import LANELET_ROUTE, header_from, point_from, ros_type, turn_from
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.foreign_bus import ZenohForeignBus
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.orchestrator.plan import EMBEDDED_ROUTE
+from foretwin.telemetry.logs import read_line
+from foretwin.telemetry.ros2.mapping import AUTOWARE
+from foretwin.telemetry.ros_parts import LANELET_ROUTE, header_from, point_from, ros_type, turn_from
 from tests.system.foretwin_command import log_lines, run_folder, started, wait_for
 from tests.system.ros2_car import Ros2Car
 from tests.telemetry.ros2.gateway_ground import cdr

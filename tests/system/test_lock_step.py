@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
+from foretwin.orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
 from tests.system.foretwin_command import Finished, foretwin
 
 BERLIN_LOG = "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt"

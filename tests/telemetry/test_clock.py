@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry.clock import ClockEstimator
+from foretwin.telemetry.clock import ClockEstimator
 
 START_NS = 1_700_000_000_000_000_000
 MONO_NS = 5_000_000_000

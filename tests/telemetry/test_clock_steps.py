@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from telemetry.clock import ClockEstimator
-from telemetry.clock_steps import ClockSteps
+from foretwin.telemetry.clock import ClockEstimator
+from foretwin.telemetry.clock_steps import ClockSteps
 
 START_NS = 1_700_000_000_000_000_000
 MONO_NS = 7_000_000_000

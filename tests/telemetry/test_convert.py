@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.convert import convert
-from telemetry.logs import LogError, open_log
+from foretwin.telemetry.convert import convert
+from foretwin.telemetry.logs import LogError, open_log
 from tests.telemetry.test_drive_mcap import assert_same
 
 GOOD = "point3 {} 3784144.3 901246.3 5037714.1 0 0 0 0 0 0 0 0 0\n"

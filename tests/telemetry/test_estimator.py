@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.drive import HeadingSample, SpeedSample
-from contracts.frames import wrap_angle
+from foretwin.contracts.drive import HeadingSample, SpeedSample
+from foretwin.contracts.frames import wrap_angle
 from tests.telemetry.position_track import (
     Sample,
     along,

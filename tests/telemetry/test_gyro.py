@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import ImuSample, SpeedSample
-from telemetry.gyro import Gyro
-from telemetry.kinematic_filter import YAW, KinematicFilter, X
-from telemetry.motion_track import MotionTrack
+from foretwin.contracts.drive import ImuSample, SpeedSample
+from foretwin.telemetry.gyro import Gyro
+from foretwin.telemetry.kinematic_filter import YAW, KinematicFilter, X
+from foretwin.telemetry.motion_track import MotionTrack
 from tests.telemetry.position_track import fix, info
 
 MS = 1_000_000

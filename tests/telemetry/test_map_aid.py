@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from contracts.drive import ImuSample, SpeedSample
-from contracts.frames import GeoPoint, geo_from_local
-from telemetry.estimator import StateEstimator
-from telemetry.kinematic_filter import GNSS_X, ROAD_OFFSET, SIZE, KinematicFilter, X, Y
-from telemetry.local_place import LocalPlace
-from telemetry.map_aid import MapAid, RoadLine
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ImuSample, SpeedSample
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.kinematic_filter import GNSS_X, ROAD_OFFSET, SIZE, KinematicFilter, X, Y
+from foretwin.telemetry.local_place import LocalPlace
+from foretwin.telemetry.map_aid import MapAid, RoadLine
 from tests.telemetry.position_track import FRAME, Sample, fix, info, xy
 
 PLACE = LocalPlace.around(FRAME.origin)

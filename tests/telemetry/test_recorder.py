@@ -13,18 +13,18 @@ from typing import Any
 
 import pytest
 
-from contracts.bus import Alive, Mailbox, Received, ZenohBus
-from contracts.drive import SpeedSample
-from contracts.keys import alive_key
-from contracts.memory_bus import MemoryBus
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup, RecorderSetup, write_setup
-from contracts.simulation import RunEnd
-from telemetry.logs import open_log
-from telemetry.logs.ros_log import read_drive
-from telemetry.mcap_file import DriveWriter, create
-from telemetry.recorder import RecorderProcess
-from telemetry.recording import Recording
+from foretwin.contracts.bus import Alive, Mailbox, Received, ZenohBus
+from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup, RecorderSetup, write_setup
+from foretwin.contracts.simulation import RunEnd
+from foretwin.telemetry.logs import open_log
+from foretwin.telemetry.logs.ros_log import read_drive
+from foretwin.telemetry.mcap_file import DriveWriter, create
+from foretwin.telemetry.recorder import RecorderProcess
+from foretwin.telemetry.recording import Recording
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.starvation import unhindered_wait_s
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
@@ -197,7 +197,7 @@ def started(tmp_path: Path) -> Iterator[tuple[ZenohBus, Mailbox, Any]]:
         bus.declare_alive(ORCHESTRATOR)
         landed = Mailbox(100)
         bus.watch_alive(RECORDER, landed)
-        command = [sys.executable, "-m", "telemetry.recorder", "--setup"]
+        command = [sys.executable, "-m", "foretwin.telemetry.recorder", "--setup"]
         process = subprocess.Popen([*command, str(tmp_path / "setup.json")])
         try:
             alive = landed.take(DEADLINE_S)
@@ -234,9 +234,9 @@ def test_the_process_ends_within_a_second_with_a_whole_file(
 def test_a_wrong_setup_is_told_without_a_traceback(tmp_path: Path) -> None:
     (tmp_path / "setup.json").write_text('{"run_id": 5}')
     done = subprocess.run(
-        [sys.executable, "-m", "telemetry.recorder", "--setup", str(tmp_path / "setup.json")],
+        [sys.executable, "-m", "foretwin.telemetry.recorder", "--setup", str(tmp_path / "setup.json")],
         capture_output=True, text=True, timeout=DEADLINE_S, check=False,
     )  # fmt: skip
     assert done.returncode == 2
-    assert "telemetry.recorder: Expected `str`, got `int` - at `$.run_id`" in done.stderr
+    assert "foretwin.telemetry.recorder: Expected `str`, got `int` - at `$.run_id`" in done.stderr
     assert "Traceback" not in done.stderr

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from contracts.drive import ImuSample, SpeedSample
-from telemetry.logs.ros_log import read_drive
-from telemetry.mcap_file import DriveWriter, create
-from telemetry.recording import Recording
+from foretwin.contracts.drive import ImuSample, SpeedSample
+from foretwin.telemetry.logs.ros_log import read_drive
+from foretwin.telemetry.mcap_file import DriveWriter, create
+from foretwin.telemetry.recording import Recording
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from contracts.drive import GnssFix, SpeedSample, VehicleState
-from telemetry.motion_track import MotionTrack
-from telemetry.reordering import WINDOW_NS, Reordering
+from foretwin.contracts.drive import GnssFix, SpeedSample, VehicleState
+from foretwin.telemetry.motion_track import MotionTrack
+from foretwin.telemetry.reordering import WINDOW_NS, Reordering
 from tests.telemetry.position_track import Sample, circle, fix, info
 
 

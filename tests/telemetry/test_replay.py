@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import GnssFix, SpeedSample, VehicleInfo
-from contracts.frames import GeoPoint
-from telemetry.replay import ReplaySource
+from foretwin.contracts.drive import GnssFix, SpeedSample, VehicleInfo
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.replay import ReplaySource
 
 SECOND_NS = 1_000_000_000
 START_NS = 50 * SECOND_NS

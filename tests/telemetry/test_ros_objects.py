@@ -10,25 +10,30 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame
-from telemetry.ros_commands import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.ros_commands import (
     ackermann_from_command,
     command_from_ackermann,
     command_from_control,
     control_from_command,
     state_from_odometry,
 )
-from telemetry.ros_motion import ros_from_state
-from telemetry.ros_objects import (
+from foretwin.telemetry.ros_motion import ros_from_state
+from foretwin.telemetry.ros_objects import (
     PlanarPose,
     detected_from_users,
     predicted_from_users,
     users_from_detected,
     users_from_predicted,
 )
-from telemetry.ros_parts import DETECTED_OBJECTS, PREDICTED_OBJECTS, TRAFFIC_LIGHTS, typestore
-from telemetry.ros_status import (
+from foretwin.telemetry.ros_parts import (
+    DETECTED_OBJECTS,
+    PREDICTED_OBJECTS,
+    TRAFFIC_LIGHTS,
+    typestore,
+)
+from foretwin.telemetry.ros_status import (
     StatusJoiner,
     gear_from_ros,
     group_number,
@@ -38,7 +43,12 @@ from telemetry.ros_status import (
     ros_from_status,
     signals_from_ros,
 )
-from telemetry.ros_transforms import TransformTree, clock_message, clock_ns_of, transform_message
+from foretwin.telemetry.ros_transforms import (
+    TransformTree,
+    clock_message,
+    clock_ns_of,
+    transform_message,
+)
 from tests.telemetry import drive_messages
 
 FRAME = LocalFrame(GeoPoint(52.5121, 13.3925, 34.0))

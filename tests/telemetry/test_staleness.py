@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from telemetry.staleness import Staleness
+from foretwin.telemetry.staleness import Staleness
 
 MS = 1_000_000
 

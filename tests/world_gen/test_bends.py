@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import LineString
 
+from foretwin.world_gen.bends import rounded_through, thinned, without_end_kinks
+from foretwin.world_gen.polyline import length
+from foretwin.world_gen.polyline_batch import Polylines
 from tests.world_gen.path_shape import bend_rad, tightest_radius_m
-from world_gen.bends import rounded_through, thinned, without_end_kinks
-from world_gen.polyline import length
-from world_gen.polyline_batch import Polylines
 
 NOTHING = np.full((1, 2), np.nan)
 

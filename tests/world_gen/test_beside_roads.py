@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point, Polygon
 
+from foretwin.world_gen.beside_roads import BesideIndex
+from foretwin.world_gen.sidewalks import sides_with_sidewalk
 from tests.world_gen.drawn_maps import STREET, crossing, world_of
-from world_gen.beside_roads import BesideIndex
-from world_gen.sidewalks import sides_with_sidewalk
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.osm_map import MapError
 from tests.world_gen.sketch import MANCHESTER, Sketch
-from world_gen.build_graph import build_road_graph
-from world_gen.osm_map import MapError
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.provenance import Quantity
-from world_gen.building_tags import (
+from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.building_tags import (
     HEIGHT_KEYS,
     building_extent,
     height_in_m,

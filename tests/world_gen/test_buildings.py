@@ -11,17 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.provenance import Quantity
-from contracts.world import Building
-from tests.world_gen.drawn_maps import drawn_map
-from world_gen.building_parts import Footprint
-from world_gen.buildings import (
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import Building
+from foretwin.world_gen.building_parts import Footprint
+from foretwin.world_gen.buildings import (
     FOOTPRINT_TOLERANCE_M,
     BuildingIndex,
     buildings_in_frame,
     footprints,
 )
+from tests.world_gen.drawn_maps import drawn_map
 
 SQUARE = {1: (0.0, 0.0), 2: (20.0, 0.0), 3: (20.0, 20.0), 4: (0.0, 20.0)}
 YARD = {5: (5.0, 5.0), 6: (15.0, 5.0), 7: (15.0, 15.0), 8: (5.0, 15.0)}

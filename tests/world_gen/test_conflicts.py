@@ -12,13 +12,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.world import Conflict, Connection, World
+from foretwin.contracts.world import Conflict, Connection, World
+from foretwin.world_gen.build import build_region
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.conflicts import SWEPT_HALF_WIDTH_M
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.read_osm import read_map
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, roundabout, world_of
-from world_gen.build import build_region
-from world_gen.build_graph import build_road_graph
-from world_gen.conflicts import SWEPT_HALF_WIDTH_M
-from world_gen.osm_map import OsmMap
-from world_gen.read_osm import read_map
 
 
 def star(bearings_deg: list[float], *, left_hand: bool = False, **tags: str) -> OsmMap:

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
-from world_gen.convex_parts import COLLISION_TOLERANCE_M, convex_cover, convex_parts
+from foretwin.world_gen.convex_parts import COLLISION_TOLERANCE_M, convex_cover, convex_parts
 
 L_SHAPE = np.array([[0, 0], [20, 0], [20, 6], [6, 6], [6, 20], [0, 20]], dtype=np.float64)
 

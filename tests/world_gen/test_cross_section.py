@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.provenance import Quantity
+from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.cross_section import cross_section, metres
 from tests.world_gen.road_edges import road as _road
-from world_gen.cross_section import cross_section, metres
 
 
 def test_two_way_road_keeps_right_around_its_way():

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from foretwin.world_gen.find_intersections import find_intersections
 from tests.world_gen.sketch import MANCHESTER, Sketch, off_centre_m, only, star
-from world_gen.find_intersections import find_intersections
 
 
 def dual_carriageway(sketch: Sketch, gap_m: float = 14.0) -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from contracts.world import World
+from foretwin.contracts.world import World
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.clusters import Surroundings, surroundings, world_frame
+from foretwin.world_gen.extent import Disc
+from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.lanes import LaneKey, build_lanes, join_straight_on
+from foretwin.world_gen.map_index import index_map
 from tests.world_gen.drawn_maps import drawn_map, world_of
-from world_gen.build_graph import build_road_graph
-from world_gen.clusters import Surroundings, surroundings, world_frame
-from world_gen.extent import Disc
-from world_gen.find_intersections import find_intersections
-from world_gen.lanes import LaneKey, build_lanes, join_straight_on
-from world_gen.map_index import index_map
 
 ONE_WAY = {"highway": "motorway", "oneway": "yes"}
 

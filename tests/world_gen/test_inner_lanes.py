@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.read_osm import read_map
 from tests.world_gen.drawn_maps import drawn_map, world_of
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.read_osm import read_map
 
 MAPS = Path(__file__).parents[1] / "data" / "junctions"
 

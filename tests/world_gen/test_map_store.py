@@ -14,16 +14,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.frames import GeoPoint, geo_from_local
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.map_index import index_map
+from foretwin.world_gen.map_store import MapStore, index_path
+from foretwin.world_gen.osm_map import LatLonBounds, MapError, OsmMap
+from foretwin.world_gen.read_osm import read_map
 from tests.world_gen.large_map import write_large_map
 from tests.world_gen.sketch import Sketch, star
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
-from world_gen.map_store import MapStore, index_path
-from world_gen.osm_map import LatLonBounds, MapError, OsmMap
-from world_gen.read_osm import read_map
 
 EVERYWHERE = LatLonBounds(-90.0, -180.0, 90.0, 180.0)
 

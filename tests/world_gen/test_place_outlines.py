@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
 
+from foretwin.world_gen import road_surface
+from foretwin.world_gen.place_outlines import Outlines
 from tests.world_gen.drawn_maps import GERMANY, crossing, drawn_map, world_of
-from world_gen import road_surface
-from world_gen.place_outlines import Outlines
 
 
 def place_of(world) -> Polygon:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from world_gen.polyline import (
+from foretwin.world_gen.polyline import (
     cut,
     length,
     locate,

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from world_gen import polyline
-from world_gen import polyline_batch as batch
-from world_gen.polyline_batch import Polylines
+from foretwin.world_gen import polyline
+from foretwin.world_gen import polyline_batch as batch
+from foretwin.world_gen.polyline_batch import Polylines
 
 coordinate = st.integers(-400, 400).map(lambda tenths: tenths / 10)
 points = st.tuples(coordinate, coordinate)

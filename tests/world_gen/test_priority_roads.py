@@ -6,8 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.frames import geo_from_local
-from contracts.world import World
+from foretwin.contracts.frames import geo_from_local
+from foretwin.contracts.world import World
+from foretwin.world_gen.osm_map import OsmMap
 from tests.world_gen.drawn_maps import (
     AVENUE,
     CROSS,
@@ -20,7 +21,6 @@ from tests.world_gen.drawn_maps import (
 from tests.world_gen.junction_truth import worlds_of
 from tests.world_gen.test_conflicts import conflict_of
 from tests.world_gen.truth_sheet import true_maps
-from world_gen.osm_map import OsmMap
 
 MAIN = {"highway": "tertiary", "name": "Street"}
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import osmium
 import pytest
 
-from contracts.frames import local_from_geo
+from foretwin.contracts.frames import local_from_geo
+from foretwin.world_gen.osm_map import MapError
+from foretwin.world_gen.read_osm import read_map
 from tests.world_gen.sketch import Sketch
-from world_gen.osm_map import MapError
-from world_gen.read_osm import read_map
 
 
 @pytest.fixture

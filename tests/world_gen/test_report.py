@@ -7,10 +7,10 @@ import json
 import msgspec
 import pytest
 
-from contracts.world import ATTRIBUTION, World
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.world_gen.report import JunctionReport, note_kind, report_of
+from foretwin.world_gen.report_values import SOURCE_CONFIDENCE, SUBJECT_WEIGHT, SubjectReport
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
-from world_gen.report import JunctionReport, note_kind, report_of
-from world_gen.report_values import SOURCE_CONFIDENCE, SUBJECT_WEIGHT, SubjectReport
 
 SQUARE = {20: (20.0, 20.0), 21: (35.0, 20.0), 22: (35.0, 35.0), 23: (20.0, 35.0)}
 

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from contracts.provenance import Quantity
-from world_gen.driving_side import side_at
-from world_gen.road_tags import directions, lane_counts, open_to_cars, road_layer, speed_limit
+from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.driving_side import side_at
+from foretwin.world_gen.road_tags import (
+    directions,
+    lane_counts,
+    open_to_cars,
+    road_layer,
+    speed_limit,
+)
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.road_graph import DirectedEdge, RoadGraph
+from foretwin.world_gen.route_junctions import junctions_on_route
 from tests.world_gen.sketch import Sketch
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.road_graph import DirectedEdge, RoadGraph
-from world_gen.route_junctions import junctions_on_route
 
 
 def route(graph: RoadGraph, nodes: list[int]) -> list[DirectedEdge]:

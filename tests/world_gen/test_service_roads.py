@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.clusters import surroundings, world_frame
+from foretwin.world_gen.connections import connect
+from foretwin.world_gen.extent import Disc
+from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.lanes import build_lanes
+from foretwin.world_gen.map_index import index_map
+from foretwin.world_gen.movements import movements
+from foretwin.world_gen.service_roads import with_roads, with_service_roads
 from tests.world_gen.drawn_maps import AVENUE, STREET, drawn_map
-from world_gen.build_graph import build_road_graph
-from world_gen.clusters import surroundings, world_frame
-from world_gen.connections import connect
-from world_gen.extent import Disc
-from world_gen.find_intersections import find_intersections
-from world_gen.lanes import build_lanes
-from world_gen.map_index import index_map
-from world_gen.movements import movements
-from world_gen.service_roads import with_roads, with_service_roads
 
 DRIVEWAY = {"highway": "service", "service": "driveway", "access": "private"}
 

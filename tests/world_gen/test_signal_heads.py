@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.map_index import index_map
 from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, crossing, drawn_map, world_of
 from tests.world_gen.plan_checks import check_plans
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
 
 LIGHT = {"highway": "traffic_signals"}
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.signal_plan import share_green
 from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, crossing, drawn_map, world_of
 from tests.world_gen.plan_checks import check_plans, plan_of
-from world_gen.osm_map import OsmMap
-from world_gen.signal_plan import share_green
 
 LIGHT = {"highway": "traffic_signals"}
 

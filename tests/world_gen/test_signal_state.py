@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import SignalState
-from contracts.signals import SignalGroup, SignalPhase, SignalPlan
-from tests.world_gen.drawn_maps import crossing, world_of
-from world_gen.signal_state import (
+from foretwin.contracts.drive import SignalState
+from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
+from foretwin.world_gen.signal_state import (
     LiveColour,
     colours_at,
     cycle_s,
     live_colours,
     world_colours_at,
 )
+from tests.world_gen.drawn_maps import crossing, world_of
 
 PLAN = SignalPlan(
     groups=(

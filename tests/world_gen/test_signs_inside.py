@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.frames import local_from_geo
-from contracts.provenance import Choice
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.provenance import Choice
+from foretwin.world_gen.osm_map import OsmMap
 from tests.world_gen.drawn_maps import crossing, drawn_map, roundabout, world_of
 from tests.world_gen.slip_roads import (
     SIGN,
@@ -18,7 +19,6 @@ from tests.world_gen.slip_roads import (
     slip_map,
     slip_world,
 )
-from world_gen.osm_map import OsmMap
 
 GIVE_WAY = {"highway": "give_way"}
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.world_gen.turn_curves import LEAD_M, turn_curves
 from tests.world_gen.path_shape import bend_rad, tightest_radius_m
-from world_gen.turn_curves import LEAD_M, turn_curves
 
 angles = st.floats(-math.pi, math.pi)
 

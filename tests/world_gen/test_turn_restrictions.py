@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.read_osm import read_map
+from foretwin.world_gen.turn_restrictions import read_turn_restrictions
 from tests.world_gen.drawn_maps import crossing, world_of
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.read_osm import read_map
-from world_gen.turn_restrictions import read_turn_restrictions
 
 FROM_WEST = ("w", 13, "from")
 VIA = ("n", 0, "via")

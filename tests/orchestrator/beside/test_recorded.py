@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from contracts.drive import GnssFix, VehicleInfo, VehicleState
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from orchestrator.beside import recorded
-from orchestrator.beside.recorded import LogBeside
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.logs.log import Declared, Log, Sample
+from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.orchestrator.beside import recorded
+from foretwin.orchestrator.beside.recorded import LogBeside
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.logs.log import Declared, Log, Sample
 
 START_NS = 1_700_000_000_000_000_000
 CAR = load_vehicle(None)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from contracts.errors import UserError
-from orchestrator.config import ConfigError, DriveConfig, VehicleBeside, load_config
-from orchestrator.plan import read_inputs
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.config import ConfigError, DriveConfig, VehicleBeside, load_config
+from foretwin.orchestrator.plan import read_inputs
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import (
+from foretwin.contracts.drive import (
     ControlCommand,
     GnssFix,
     RoadUser,
@@ -18,17 +18,17 @@ from contracts.drive import (
     VehicleInfo,
     VehicleState,
 )
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
-from contracts.mailbox import Mailbox
-from contracts.memory_bus import MemoryBus
-from contracts.roles import OtherVehicles, Role
-from orchestrator.beside.vehicles import VehiclesBeside
-from orchestrator.config import VehicleBeside
-from orchestrator.intake import Surroundings
-from orchestrator.plan import Beside
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import box_centre_from_base_m
-from telemetry.mcap_file import create
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.contracts.roles import OtherVehicles, Role
+from foretwin.orchestrator.beside.vehicles import VehiclesBeside
+from foretwin.orchestrator.config import VehicleBeside
+from foretwin.orchestrator.intake import Surroundings
+from foretwin.orchestrator.plan import Beside
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.telemetry.mcap_file import create
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
 

@@ -9,12 +9,12 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from contracts.keys import alive_key
-from contracts.mailbox import Mailbox, Reply
-from contracts.roles import UseRoles
-from contracts.tuning import SetReply, SetRequest
-from orchestrator.changes.command import ask_drive
-from orchestrator.changes.desk import Change, ChangeDesk, Made, RefusedError
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.mailbox import Mailbox, Reply
+from foretwin.contracts.roles import UseRoles
+from foretwin.contracts.tuning import SetReply, SetRequest
+from foretwin.orchestrator.changes.command import ask_drive
+from foretwin.orchestrator.changes.desk import Change, ChangeDesk, Made, RefusedError
 from tests.orchestrator.house import House, Process
 from tests.orchestrator.trip import START_NS
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from contracts.ports import free_endpoint
-from orchestrator.changes.command import newest_running, running_drive
-from orchestrator.cli import EXIT_USER, run
+from foretwin.contracts.ports import free_endpoint
+from foretwin.orchestrator.changes.command import newest_running, running_drive
+from foretwin.orchestrator.cli import EXIT_USER, run
 
 
 def _run(out: Path, name: str, exit_word: str, endpoint: str = "tcp/127.0.0.1:7447") -> Path:
@@ -53,7 +53,7 @@ def test_what_cannot_be_asked_ends_in_one_line(
 def test_a_drive_that_was_killed_is_told_apart(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("contracts.bus.CONNECT_S", 0.3)
+    monkeypatch.setattr("foretwin.contracts.bus.CONNECT_S", 0.3)
     folder = _run(tmp_path, "killed", "running", endpoint := free_endpoint())
     assert run(["set", "role.ego=twin", "--run", str(folder)]) == EXIT_USER
     (line,) = capsys.readouterr().err.splitlines()

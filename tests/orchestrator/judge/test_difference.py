@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from orchestrator.judge.difference import JudgedRun, difference_lines, difference_of
+from foretwin.orchestrator.judge.difference import JudgedRun, difference_lines, difference_of
 
 
 def disagreement(at_s: float, kind: str = "ads_stops") -> dict[str, Any]:

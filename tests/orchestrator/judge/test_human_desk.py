@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
-from contracts.frames import geo_from_local, local_from_geo
-from orchestrator.judge.human_desk import told
+from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
+from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.orchestrator.judge.human_desk import told
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import town
 

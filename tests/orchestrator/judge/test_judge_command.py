@@ -11,18 +11,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.codec import read_message
-from contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
-from contracts.provenance import Choice
-from contracts.world import StopLine, World
-from orchestrator.cli import run
-from orchestrator.config import DriveConfig
-from orchestrator.plan import EMBEDDED_MAP
-from telemetry.logs import open_log
-from telemetry.mcap_file import create
+from foretwin.contracts.codec import read_message
+from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleStatus
+from foretwin.contracts.provenance import Choice
+from foretwin.contracts.world import StopLine, World
+from foretwin.orchestrator.cli import run
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.plan import EMBEDDED_MAP
+from foretwin.telemetry.logs import open_log
+from foretwin.telemetry.mcap_file import create
+from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.trip import town_world
 from tests.system.foretwin_command import environment, foretwin
-from world_gen.world_store import WorldStore
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_a_forgotten_stop_sign_changes_the_verdict_of_a_recorded_drive(tmp_path:
     answers = []
     for options in (("--map", str(corrected)), ()):
         done = subprocess.run(
-            [sys.executable, "-m", "orchestrator", "judge", str(run), "--json", *options],
+            [sys.executable, "-P", "-m", "foretwin", "judge", str(run), "--json", *options],
             env=environment(tmp_path / "cache"), capture_output=True, text=True, timeout=300,
             check=False,
         )  # fmt: skip
@@ -143,7 +143,7 @@ def test_a_world_corrected_by_hand_changes_the_verdict_of_a_recorded_drive(tmp_p
         world = read_message(file, World)
         given.save(with_stop_lines(world) if world.intersection.id == "n4" else world)
     done = subprocess.run(
-        [sys.executable, "-m", "orchestrator", "judge", str(run), "--json",
+        [sys.executable, "-P", "-m", "foretwin", "judge", str(run), "--json",
          "--worlds", str(given.folder)],
         env=environment(tmp_path / "cache"), capture_output=True, text=True, timeout=300,
         check=False,

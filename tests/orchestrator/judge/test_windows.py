@@ -6,14 +6,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import RoadUser, RoadUsers, SignalState
-from contracts.frames import GeoPoint
-from contracts.futures import PathAhead
-from orchestrator.intake import Surroundings
-from orchestrator.judge.verdict_rows import agreement_lines, judged_row
-from orchestrator.judge.windows import WindowDesk, judge_in
-from sim_worker.agreement.tally import Judged
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.drive import RoadUser, RoadUsers, SignalState
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.futures import PathAhead
+from foretwin.orchestrator.intake import Surroundings
+from foretwin.orchestrator.judge.verdict_rows import agreement_lines, judged_row
+from foretwin.orchestrator.judge.windows import WindowDesk, judge_in
+from foretwin.sim_worker.agreement.tally import Judged
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, states_along, town_world
 
@@ -99,7 +99,7 @@ def test_a_corrected_world_changes_the_verdict_of_a_recorded_drive() -> None:
 
 
 def test_a_long_drive_keeps_no_more_windows_than_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("orchestrator.judge.windows.MOST_WINDOWS", 8)
+    monkeypatch.setattr("foretwin.orchestrator.judge.windows.MOST_WINDOWS", 8)
     stamps = [one.window.stamp_ns for one in driven().judged]
     assert 4 <= len(stamps) < 8
     assert set(np.diff(stamps)) == {2_000_000_000}

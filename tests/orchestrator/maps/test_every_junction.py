@@ -16,14 +16,14 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from orchestrator.maps.opening import open_map
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.orchestrator.maps.opening import open_map
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.export.choices import OPENDRIVE_VERSIONS, SIMULATORS
+from foretwin.world_gen.export.formats import FORMATS, ExportOptions
+from foretwin.world_gen.map_index import index_map
+from foretwin.world_gen.report import note_kind, report_of
 from tests.world_gen.export.judged_sample import QUOTA
-from world_gen.build import build_world
-from world_gen.export.choices import OPENDRIVE_VERSIONS, SIMULATORS
-from world_gen.export.formats import FORMATS, ExportOptions
-from world_gen.map_index import index_map
-from world_gen.report import note_kind, report_of
 
 NOTES = Path(__file__).parents[3] / "build" / "every_junction"
 PICTURES = ("png", "svg")

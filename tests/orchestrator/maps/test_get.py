@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import pytest
 
-from contracts.errors import UserError
-from orchestrator.maps.get import area_filter, get_map
-from world_gen.read_osm import read_map
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.maps.get import area_filter, get_map
+from foretwin.world_gen.read_osm import read_map
 
 BOX = "8.0,53.0,8.1,53.1"
 MAP = b"""<?xml version="1.0"?><osm version="0.6" generator="Overpass API">

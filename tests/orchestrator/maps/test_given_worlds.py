@@ -9,18 +9,18 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from contracts.errors import UserError
-from contracts.memory_bus import MemoryBus
-from contracts.simulation import BuildReply, BuildRequest
-from contracts.world import World
-from orchestrator.config import DriveConfig
-from orchestrator.maps.given_worlds import check_given_worlds, read_given_worlds
-from orchestrator.plan import read_inputs
-from orchestrator.processes import PROCESSES
-from orchestrator.world_builder import serve_builds
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.contracts.simulation import BuildReply, BuildRequest
+from foretwin.contracts.world import World
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.maps.given_worlds import check_given_worlds, read_given_worlds
+from foretwin.orchestrator.plan import read_inputs
+from foretwin.orchestrator.processes import PROCESSES
+from foretwin.orchestrator.world_builder import serve_builds
+from foretwin.world_gen.build import with_id
+from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.trip import town, town_plan, town_world
-from world_gen.build import with_id
-from world_gen.world_store import WorldStore
 
 
 def saved(folder: Path, *worlds: World) -> Path:

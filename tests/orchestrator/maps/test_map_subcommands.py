@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import run
-from orchestrator.plan import EMBEDDED_MAP
+from foretwin.orchestrator.cli import run
+from foretwin.orchestrator.plan import EMBEDDED_MAP
 
 
 def test_a_map_is_indexed_into_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

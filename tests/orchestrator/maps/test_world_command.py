@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from contracts.errors import UserError
-from contracts.world import World
-from orchestrator.cli import run
-from orchestrator.maps.choice import node_of_id
-from orchestrator.maps.opening import Clip, NodeClip, open_map, region_on_map
-from orchestrator.maps.world_files import FAILURES_FILE, write_each
-from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.orchestrator.cli import run
+from foretwin.orchestrator.maps.choice import node_of_id
+from foretwin.orchestrator.maps.opening import Clip, NodeClip, open_map, region_on_map
+from foretwin.orchestrator.maps.world_files import FAILURES_FILE, write_each
+from foretwin.orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.export.formats import FORMATS
+from foretwin.world_gen.intersections import Junction
+from foretwin.world_gen.osm_map import LatLonBounds
 from tests.world_gen.sketch import Sketch
-from world_gen.build import build_world
-from world_gen.export.formats import FORMATS
-from world_gen.intersections import Junction
-from world_gen.osm_map import LatLonBounds
 
 MAP = str(EMBEDDED_MAP)
 TOWN = "-30.004,44.998,-29.996,45.002"
@@ -261,7 +261,7 @@ def test_a_run_without_failures_leaves_no_list_of_an_earlier_one(tmp_path: Path)
 
 def test_help_needs_none_of_the_rooms() -> None:
     code = (
-        "import sys\nfrom orchestrator.cli import run\nrun(['world', '--help'])\n"
+        "import sys\nfrom foretwin.orchestrator.cli import run\nrun(['world', '--help'])\n"
         "heavy = {'numpy', 'mujoco', 'shapely', 'osmium', 'lxml', 'zenoh', 'rerun'}\n"
         "sys.exit(sorted(heavy & set(sys.modules)).__repr__() if heavy & set(sys.modules) else 0)"
     )

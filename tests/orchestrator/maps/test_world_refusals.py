@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import run
-from orchestrator.plan import EMBEDDED_MAP
-from world_gen.export.formats import FORMATS
+from foretwin.orchestrator.cli import run
+from foretwin.orchestrator.plan import EMBEDDED_MAP
+from foretwin.world_gen.export.formats import FORMATS
 
 MAP = str(EMBEDDED_MAP)
 

@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint
-from contracts.futures import FuturesJob, FuturesResult, Outcome, PathAhead, Trajectory
-from orchestrator.rounds.desk import RoundDesk, RoundOrder
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.futures import FuturesJob, FuturesResult, Outcome, PathAhead, Trajectory
+from foretwin.orchestrator.rounds.desk import RoundDesk, RoundOrder
 from tests.orchestrator.futures_rounds import nobody
 
 STATE = VehicleState(

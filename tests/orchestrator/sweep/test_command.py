@@ -15,10 +15,10 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from orchestrator.cli import run
-from orchestrator.sweep.command import crew_for, run_sweep
-from orchestrator.sweep.rows import schema_of
-from orchestrator.sweep.spec import load_spec
+from foretwin.orchestrator.cli import run
+from foretwin.orchestrator.sweep.command import crew_for, run_sweep
+from foretwin.orchestrator.sweep.rows import schema_of
+from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, Alone, small_sweep
 from tests.starvation import kept_waiting
 
@@ -119,7 +119,7 @@ def test_another_spec_is_refused_in_the_same_folder(
 def _pressed(spec: Path, out: Path) -> tuple[int, str]:
     """Start a sweep with one worker, press Ctrl-C after its first job; returns how it ended."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "orchestrator", "sweep", str(spec), "--out", str(out),
+        [sys.executable, "-P", "-m", "foretwin", "sweep", str(spec), "--out", str(out),
          "--workers", "1"],
         cwd=Path(__file__).parents[3], stderr=subprocess.PIPE, text=True,
         # A shell's background jobs, and all they start, ignore Ctrl-C.

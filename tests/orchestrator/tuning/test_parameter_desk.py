@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from contracts.tuning import Identification, ParameterEstimate, UseVehicle
-from orchestrator.changes.desk import RefusedError
-from orchestrator.tuning.by_hand import VehicleHandler
-from orchestrator.tuning.parameter_desk import ParameterDesk, change_text
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.tuning import Identification, ParameterEstimate, UseVehicle
+from foretwin.orchestrator.changes.desk import RefusedError
+from foretwin.orchestrator.tuning.by_hand import VehicleHandler
+from foretwin.orchestrator.tuning.parameter_desk import ParameterDesk, change_text
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 CAR = load_vehicle()
 EVERYBODY = ("mirror", "tuning", "w0")

@@ -4,11 +4,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.way.arrival import DWELL_S, EASING_S, USUAL_SHARE, DrivingPace, predict_arrivals
-from orchestrator.way.junctions_ahead import UpcomingJunction
-from orchestrator.way.route import Route
+from foretwin.orchestrator.way.arrival import (
+    DWELL_S,
+    EASING_S,
+    USUAL_SHARE,
+    DrivingPace,
+    predict_arrivals,
+)
+from foretwin.orchestrator.way.junctions_ahead import UpcomingJunction
+from foretwin.orchestrator.way.route import Route
+from foretwin.world_gen.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import grid, junctions
-from world_gen.road_graph import DirectedEdge
 
 TOWN = grid(12, 2)
 ROUTE = Route(tuple(DirectedEdge(TOWN.edges[index], False) for index in range(11)))

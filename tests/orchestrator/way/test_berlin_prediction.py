@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from orchestrator.way.cruise import CruiseSpeed
-from orchestrator.way.driving_path import driving_path
-from orchestrator.way.line_matching import match_line
-from orchestrator.way.route import extend_most_probable
-from sim_worker.planners.path import FrenetPath
+from foretwin.orchestrator.way.cruise import CruiseSpeed
+from foretwin.orchestrator.way.driving_path import driving_path
+from foretwin.orchestrator.way.line_matching import match_line
+from foretwin.orchestrator.way.route import extend_most_probable
+from foretwin.sim_worker.planners.path import FrenetPath
 from tests.orchestrator.berlin import Drive, berlin
 
 pytestmark = pytest.mark.real_data

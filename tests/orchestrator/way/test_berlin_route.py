@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.way.arrival import DrivingPace
-from orchestrator.way.line_matching import MatchedRoute, match_line
-from orchestrator.way.road_index import RoadIndex
+from foretwin.orchestrator.way.arrival import DrivingPace
+from foretwin.orchestrator.way.line_matching import MatchedRoute, match_line
+from foretwin.orchestrator.way.road_index import RoadIndex
 from tests.orchestrator.berlin import Drive, Replayed, berlin, replay
 
 pytestmark = pytest.mark.real_data

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.way.cruise import LEAD_S, CruiseSpeed
+from foretwin.orchestrator.way.cruise import LEAD_S, CruiseSpeed
 
 
 def after(speeds: list[float], *, step_s: float = 0.1) -> CruiseSpeed:

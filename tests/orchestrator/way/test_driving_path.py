@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.way.driving_path import (
+from foretwin.orchestrator.way.driving_path import (
     FAR_TURN_RADIUS_M,
     KERB_TURN_RADIUS_M,
     LANE_WIDTH_M,
     PathGeometry,
     driving_path,
 )
-from orchestrator.way.route import Route
+from foretwin.orchestrator.way.route import Route
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
 from tests.orchestrator.grid_map import graph_of, grid, road
-from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
 
 
 def route_over(graph: RoadGraph) -> Route:

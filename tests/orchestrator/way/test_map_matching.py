@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.frames import geo_from_local
-from orchestrator.way.line_matching import match_line
-from orchestrator.way.map_matching import MapMatcher, Match
-from orchestrator.way.road_index import RoadIndex, key_of
-from orchestrator.way.route import RouteError
+from foretwin.contracts.frames import geo_from_local
+from foretwin.orchestrator.way.line_matching import match_line
+from foretwin.orchestrator.way.map_matching import MapMatcher, Match
+from foretwin.orchestrator.way.road_index import RoadIndex, key_of
+from foretwin.orchestrator.way.route import RouteError
+from foretwin.world_gen.road_graph import RoadGraph
 from tests.orchestrator.grid_map import drive, graph_of, grid, headings, road
-from world_gen.road_graph import RoadGraph
 
 TOWN = grid(4, 3)
 INDEX = RoadIndex(TOWN)

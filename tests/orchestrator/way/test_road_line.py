@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.drive import VehicleState
-from contracts.frames import local_from_geo
-from contracts.world import DrivingSide
-from orchestrator.way.route import Route
-from orchestrator.way.way_ahead import WayAhead
-from telemetry.map_aid import RoadLine
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.world import DrivingSide
+from foretwin.orchestrator.way.route import Route
+from foretwin.orchestrator.way.way_ahead import WayAhead
+from foretwin.telemetry.map_aid import RoadLine
+from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge
 from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, node, road
 from tests.orchestrator.trip import states_along
-from world_gen.road_graph import DirectedEdge, RoadEdge
 
 ROUGH = {"position_std_m": 2.0, "yaw_std_rad": 0.01}
 STREET = road(0, 1, 2, [(0.0, 0.0), (300.0, 0.0)])

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.way.road_index import key_of
-from orchestrator.way.route import Route, RouteError, extend_most_probable, turn_angle
+from foretwin.orchestrator.way.road_index import key_of
+from foretwin.orchestrator.way.route import Route, RouteError, extend_most_probable, turn_angle
+from foretwin.world_gen.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import graph_of, grid, road
-from world_gen.road_graph import DirectedEdge
 
 TOWN = grid(4, 3)
 

@@ -3,12 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.way.map_matching import MapMatcher
-from orchestrator.way.road_index import RoadIndex
-from orchestrator.way.route import Route
-from orchestrator.way.route_follower import Progress, RouteFollower
+from foretwin.orchestrator.way.map_matching import MapMatcher
+from foretwin.orchestrator.way.road_index import RoadIndex
+from foretwin.orchestrator.way.route import Route
+from foretwin.orchestrator.way.route_follower import Progress, RouteFollower
+from foretwin.world_gen.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import drive, grid, headings, junctions
-from world_gen.road_graph import DirectedEdge
 
 TOWN = grid(5, 4)
 JUNCTIONS = junctions(TOWN)

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from contracts.drive import RoutePose
-from contracts.frames import GeoPoint, geo_from_local
-from orchestrator.way.road_index import RoadIndex, key_of
-from orchestrator.way.route import Route, RouteError
-from orchestrator.way.route_to_goal import WayFinder, away_m
+from foretwin.contracts.drive import RoutePose
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.orchestrator.way.road_index import RoadIndex, key_of
+from foretwin.orchestrator.way.route import Route, RouteError
+from foretwin.orchestrator.way.route_to_goal import WayFinder, away_m
+from foretwin.world_gen.road_graph import RoadGraph
 from tests.orchestrator.grid_map import BLOCK_M, FRAME, graph_of, grid, node, road
-from world_gen.road_graph import RoadGraph
 
 EAST, NORTH, WEST = 0.0, math.pi / 2.0, math.pi
 TOWN = grid(4, 3)

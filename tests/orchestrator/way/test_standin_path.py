@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.frames import local_from_geo
-from orchestrator.way.route import Route
-from orchestrator.way.standin_path import (
+from foretwin.contracts.frames import local_from_geo
+from foretwin.orchestrator.way.route import Route
+from foretwin.orchestrator.way.standin_path import (
     ACCEL_MPS2,
     BRAKE_MPS2,
     LATERAL_MPS2,
@@ -20,8 +20,8 @@ from orchestrator.way.standin_path import (
     standin_path,
     stop_signs,
 )
+from foretwin.world_gen.road_graph import DirectedEdge
 from tests.orchestrator.trip import town
-from world_gen.road_graph import DirectedEdge
 
 LIMIT_MPS = 50 / 3.6
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.frames import GeoPoint, LocalFrame, target_from_source
-from orchestrator.way.route import Route
-from orchestrator.way.way_ahead import MIN_PATH_M, WayAhead
+from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source
+from foretwin.orchestrator.way.route import Route
+from foretwin.orchestrator.way.way_ahead import MIN_PATH_M, WayAhead
+from foretwin.world_gen.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, junctions, road
 from tests.orchestrator.trip import states_along
-from world_gen.road_graph import DirectedEdge
 
 GRID = grid(5, 4)
 CORNERS = junctions(GRID)

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.world import Connection, World
-from sim_worker.actors.crowd import Crowd, EgoBoxes
-from sim_worker.actors.path_table import PathTable
-from sim_worker.actors.right_of_way import JunctionRules
-from sim_worker.actors.traffic import Traffic
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Connection, World
+from foretwin.sim_worker.actors.crowd import Crowd, EgoBoxes
+from foretwin.sim_worker.actors.path_table import PathTable
+from foretwin.sim_worker.actors.right_of_way import JunctionRules
+from foretwin.sim_worker.actors.traffic import Traffic
+from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.find_intersections import find_intersections
 from tests.world_gen.sketch import Sketch
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
 
 FAR_EGO = EgoBoxes(np.array([[900.0, 900.0, 0.0]]), np.zeros(1), 0, np.array([-500.0]), 4.5, 1.8)
 """An ego that is nowhere near."""

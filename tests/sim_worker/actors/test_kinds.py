@@ -6,8 +6,8 @@ from typing import get_args
 
 import pytest
 
-from contracts.drive import RoadUserKind
-from sim_worker.actors.kinds import KINDS
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.sim_worker.actors.kinds import KINDS
 
 
 def test_every_kind_has_traits() -> None:

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_worker.actors.path_table import PathTable
-from sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.actors.path_table import PathTable
+from foretwin.sim_worker.planners.path import FrenetPath
 
 CIRCLE = FrenetPath(
     np.stack([30.0 * np.cos(np.linspace(0, 2, 60)), 30.0 * np.sin(np.linspace(0, 2, 60))], axis=1)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from sim_worker.actors.cast import Player, casting
-from sim_worker.actors.path_table import PathTable
-from sim_worker.actors.perception import PerceptionFaults, Sight
-from sim_worker.actors.right_of_way import JunctionRules
-from sim_worker.actors.traffic import Traffic
-from sim_worker.planners.path import FrenetPath, FrenetPoint
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.actors.cast import Player, casting
+from foretwin.sim_worker.actors.path_table import PathTable
+from foretwin.sim_worker.actors.perception import PerceptionFaults, Sight
+from foretwin.sim_worker.actors.right_of_way import JunctionRules
+from foretwin.sim_worker.actors.traffic import Traffic
+from foretwin.sim_worker.planners.path import FrenetPath, FrenetPoint
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 CAR = load_vehicle()
 EGO_PATH = FrenetPath(np.array([[0.0, 0.0], [100.0, 0.0]]))

@@ -8,16 +8,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.futures import RecordedRoadUser
-from sim_worker.actors.cast import Player, casting
-from sim_worker.actors.path_table import PathTable
-from sim_worker.actors.perception import PerceptionFaults, Sight
-from sim_worker.actors.replay import Replay
-from sim_worker.actors.right_of_way import JunctionRules
-from sim_worker.actors.traffic import Traffic
-from sim_worker.planners.path import FrenetPath, FrenetPoint
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import RecordedRoadUser
+from foretwin.sim_worker.actors.cast import Player, casting
+from foretwin.sim_worker.actors.path_table import PathTable
+from foretwin.sim_worker.actors.perception import PerceptionFaults, Sight
+from foretwin.sim_worker.actors.replay import Replay
+from foretwin.sim_worker.actors.right_of_way import JunctionRules
+from foretwin.sim_worker.actors.traffic import Traffic
+from foretwin.sim_worker.planners.path import FrenetPath, FrenetPoint
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 SPEED_MPS, HEADING_RAD = 7.3, 0.4
 SAMPLES_S = np.array([0.5, 0.613, 0.9, 1.05, 3.05, 3.2, 4.0])

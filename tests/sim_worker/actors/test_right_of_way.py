@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from sim_worker.actors.right_of_way import JunctionRules
+from foretwin.sim_worker.actors.right_of_way import JunctionRules
 from tests.sim_worker.actors.crossroads import centre_arc, crossroads, path_of, straight_on
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)

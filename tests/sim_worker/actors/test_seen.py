@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.futures import SeenRoadUser
-from sim_worker.actors.seen import SeenActors
-from sim_worker.scenarios.roads import RoadNetwork
+from foretwin.contracts.futures import SeenRoadUser
+from foretwin.sim_worker.actors.seen import SeenActors
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from tests.sim_worker.places import crossroads
 
 SEEN = SeenActors(RoadNetwork(crossroads()))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim_worker.actors.crowd import EgoBoxes
+from foretwin.sim_worker.actors.crowd import EgoBoxes
 from tests.sim_worker.actors.crossroads import centre_arc, crossroads, run, straight_on, traffic
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)

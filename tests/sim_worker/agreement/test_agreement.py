@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.provenance import Choice
-from sim_worker.agreement.criteria import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Choice
+from foretwin.sim_worker.agreement.criteria import (
     CRITERIA,
     LEAST_CLEARANCE_M,
     Court,
@@ -20,11 +20,11 @@ from sim_worker.agreement.criteria import (
     Window,
     verdicts,
 )
-from sim_worker.agreement.flip import MOST_M, flips, gap_between, grown
-from sim_worker.agreement.tally import Judged, judged, tally
-from sim_worker.metrics.ground import TOLERANCE_M, DrivableGround
-from sim_worker.metrics.route_rules import RouteRules
-from sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.agreement.flip import MOST_M, flips, gap_between, grown
+from foretwin.sim_worker.agreement.tally import Judged, judged, tally
+from foretwin.sim_worker.metrics.ground import TOLERANCE_M, DrivableGround
+from foretwin.sim_worker.metrics.route_rules import RouteRules
+from foretwin.sim_worker.planners.path import FrenetPath
 from tests.sim_worker.metrics.junction import STOP_X, junction
 from tests.sim_worker.metrics.motions import (
     LENGTH_M,

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample
-from contracts.gap import Verdict
-from sim_worker.gap.verdict import Judge
-from telemetry.standin.source import START_STAMP_NS
+from foretwin.contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample
+from foretwin.contracts.gap import Verdict
+from foretwin.sim_worker.gap.verdict import Judge
+from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.sim_worker.faulty_standin import (
     CAR_FAULTS,
     DURATION_S,

@@ -13,14 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_worker.gap.errors import GapMeter
-from sim_worker.gap.free_run import FreeRunner
-from sim_worker.gap.limits import GapLimits
-from sim_worker.gap.measured_motion import motion_on_grid
-from sim_worker.motion_record import MotionRecorder
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.motion_track import MotionTrack
-from telemetry.standin.source import START_STAMP_NS
+from foretwin.sim_worker.gap.errors import GapMeter
+from foretwin.sim_worker.gap.free_run import FreeRunner
+from foretwin.sim_worker.gap.limits import GapLimits
+from foretwin.sim_worker.gap.measured_motion import motion_on_grid
+from foretwin.sim_worker.motion_record import MotionRecorder
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.motion_track import MotionTrack
+from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.telemetry.city_drive import phone_positions
 from tests.telemetry.phone_figures import town_drive, town_streets
 from tests.telemetry.standin_drive import FRAME

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from contracts.drive import GnssFix, VehicleInfo
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.gap import Verdict
-from sim_worker.gap.verdict import Judge
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.logs.geojson import geojson_lines
-from telemetry.logs.mcity import read_mcity
-from telemetry.logs.opening import open_log
+from foretwin.contracts.drive import GnssFix, VehicleInfo
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.gap import Verdict
+from foretwin.sim_worker.gap.verdict import Judge
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.logs.geojson import geojson_lines
+from foretwin.telemetry.logs.mcity import read_mcity
+from foretwin.telemetry.logs.opening import open_log
 
 DECLARATIONS = Path(__file__).parents[2] / "data" / "declarations"
 LOGS = {

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from sim_worker.gap.change import change_index
-from sim_worker.gap.finding import Finding
-from sim_worker.gap.push import PushBlocks, PushTest
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.gap.change import change_index
+from foretwin.sim_worker.gap.finding import Finding
+from foretwin.sim_worker.gap.push import PushBlocks, PushTest
 
 BLOCK_NS = 200_000_000
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from sim_worker.gap.consistency import consistency_of
-from sim_worker.gap.finding import Finding
-from sim_worker.gap.findings import findings_of
-from sim_worker.gap.pairs import Pairs
-from sim_worker.gap.push import PushBlocks
-from sim_worker.motion_record import PERIOD_S
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.gap.consistency import consistency_of
+from foretwin.sim_worker.gap.finding import Finding
+from foretwin.sim_worker.gap.findings import findings_of
+from foretwin.sim_worker.gap.pairs import Pairs
+from foretwin.sim_worker.gap.push import PushBlocks
+from foretwin.sim_worker.motion_record import PERIOD_S
 
 TIME_S = np.arange(301) * PERIOD_S
 TYRES_RAD = 0.12 * np.sin(1.3 * TIME_S)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_worker.gap.fitting import follower, line_through
-from sim_worker.motion_record import PERIOD_S
+from foretwin.sim_worker.gap.fitting import follower, line_through
+from foretwin.sim_worker.motion_record import PERIOD_S
 
 TIME_S = np.arange(400) * PERIOD_S
 ASKED = 0.2 * np.sin(1.7 * TIME_S) + 0.1 * np.sin(0.6 * TIME_S + 1.0)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from contracts.gap import GapSample
-from sim_worker.gap.limits import GapLimits
-from sim_worker.gap.manoeuvres import manoeuvre_of
+from foretwin.contracts.gap import GapSample
+from foretwin.sim_worker.gap.limits import GapLimits
+from foretwin.sim_worker.gap.manoeuvres import manoeuvre_of
 
 
 def sample(across_m: float, *, horizon_s: float = 2.0, independent: bool = True) -> GapSample:

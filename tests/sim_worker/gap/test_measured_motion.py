@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from contracts.frames import GeoPoint
-from sim_worker.gap.measured_motion import motion_on_grid
+from foretwin.contracts.frames import GeoPoint
+from foretwin.sim_worker.gap.measured_motion import motion_on_grid
 from tests.sim_worker.places import FRAME, state_at
 
 

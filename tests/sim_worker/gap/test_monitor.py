@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample, VehicleState
-from contracts.frames import GeoPoint, geo_from_local
-from contracts.gap import GapAlarm, GapSample, Verdict
-from sim_worker.gap.errors import GapMeter, gap_table
-from sim_worker.gap.free_run import FreeRunner
-from sim_worker.gap.measured_motion import motion_on_grid
-from sim_worker.gap.monitor import GapMonitor
-from sim_worker.motion_record import PERIOD_S, MotionRecorder
-from telemetry.estimator import StateEstimator
+from foretwin.contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample, VehicleState
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.sim_worker.gap.errors import GapMeter, gap_table
+from foretwin.sim_worker.gap.free_run import FreeRunner
+from foretwin.sim_worker.gap.measured_motion import motion_on_grid
+from foretwin.sim_worker.gap.monitor import GapMonitor
+from foretwin.sim_worker.motion_record import PERIOD_S, MotionRecorder
+from foretwin.telemetry.estimator import StateEstimator
 from tests.sim_worker.faulty_standin import drive_of, model_with
 from tests.sim_worker.gap.test_verdict import END_S, SEED
 from tests.telemetry.standin_drive import FRAME

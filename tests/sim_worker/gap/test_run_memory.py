@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.gap.run_memory import Rows, RunMemory
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.gap.run_memory import Rows, RunMemory
 
 
 class Runs:

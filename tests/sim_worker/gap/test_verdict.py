@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample
-from contracts.frames import GeoPoint
-from sim_worker.gap.verdict import Judge
+from foretwin.contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample
+from foretwin.contracts.frames import GeoPoint
+from foretwin.sim_worker.gap.verdict import Judge
 from tests.sim_worker.driving import altered
 from tests.sim_worker.faulty_standin import CAR_FAULTS, MODEL_FAULTS, drive_of, model_with
 from tests.sim_worker.gap.judging_faults import (

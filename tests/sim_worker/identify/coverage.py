@@ -22,14 +22,14 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.frames import geo_from_local
-from contracts.vehicle import VehicleParameters
-from sim_worker.identify.window import UNDERSTEER_NAME, identify
-from sim_worker.motion_record import MotionRecord
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
-from telemetry.standin.parameters import CarParameters, StandinParameters, read_parameters
-from telemetry.standin.path import DrivenPath
+from foretwin.contracts.frames import geo_from_local
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.identify.window import UNDERSTEER_NAME, identify
+from foretwin.sim_worker.motion_record import MotionRecord
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
+from foretwin.telemetry.standin.parameters import CarParameters, StandinParameters, read_parameters
+from foretwin.telemetry.standin.path import DrivenPath
 from tests.sim_worker.standin_drives import MINUTE_S, driven, estimate, recorded
 from tests.telemetry.standin_drive import FRAME
 

@@ -6,10 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from contracts.tuning import Identification, ParameterEstimate
-from sim_worker.identify.acceptance import accepted, vehicle_toml
-from sim_worker.identify.window import UNDERSTEER_NAME
-from sim_worker.vehicle.parameters import bundled_vehicles, load_vehicle, understeer_gradient
+from foretwin.contracts.tuning import Identification, ParameterEstimate
+from foretwin.sim_worker.identify.acceptance import accepted, vehicle_toml
+from foretwin.sim_worker.identify.window import UNDERSTEER_NAME
+from foretwin.sim_worker.vehicle.parameters import (
+    bundled_vehicles,
+    load_vehicle,
+    understeer_gradient,
+)
 
 
 def told(name: str, value: float, half: float, reason: str = "") -> Identification:

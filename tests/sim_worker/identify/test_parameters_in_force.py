@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.errors import UserError
-from contracts.tuning import Identification, ParameterEstimate
-from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.identify.parameters_in_force import ParametersInForce
-from sim_worker.vehicle.parameters import bundled_vehicles, load_vehicle
-from sim_worker.vehicle.plausible import PLAUSIBLE
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.tuning import Identification, ParameterEstimate
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.sim_worker.identify.parameters_in_force import ParametersInForce
+from foretwin.sim_worker.vehicle.parameters import bundled_vehicles, load_vehicle
+from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
 
 NAMES = [
     field.name for field in msgspec.structs.fields(VehicleParameters) if field.type is Parameter

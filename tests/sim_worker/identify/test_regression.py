@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from sim_worker.identify.regression import Fit, fit_linear
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.identify.regression import Fit, fit_linear
 
 TRUTH = np.array([0.06, -0.3])
 PERIOD_S = 0.05

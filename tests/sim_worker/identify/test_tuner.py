@@ -8,18 +8,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import ImuSample, SteeringSample
-from contracts.errors import UserError
-from contracts.tuning import Identification
-from sim_worker.identify.smoothing import smoothed
-from sim_worker.identify.steering import fit_steering
-from sim_worker.identify.steering_signals import TURNING, steering_signals
-from sim_worker.identify.step import bends_before, find_step
-from sim_worker.identify.tuner import Tuner
-from sim_worker.identify.window import UNDERSTEER_NAME, identify
-from sim_worker.vehicle.parameters import load_vehicle, understeer_gradient
-from telemetry.standin.parameters import read_parameters
-from telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.contracts.drive import ImuSample, SteeringSample
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.tuning import Identification
+from foretwin.sim_worker.identify.smoothing import smoothed
+from foretwin.sim_worker.identify.steering import fit_steering
+from foretwin.sim_worker.identify.steering_signals import TURNING, steering_signals
+from foretwin.sim_worker.identify.step import bends_before, find_step
+from foretwin.sim_worker.identify.tuner import Tuner
+from foretwin.sim_worker.identify.window import UNDERSTEER_NAME, identify
+from foretwin.sim_worker.vehicle.parameters import load_vehicle, understeer_gradient
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.sim_worker.identify.coverage import own_gradient, random_path
 from tests.sim_worker.standin_drives import (
     city_minute,

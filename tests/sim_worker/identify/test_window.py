@@ -8,12 +8,12 @@ import time
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.tuning import Identification
-from sim_worker.identify.window import UNDERSTEER_NAME, identify
-from sim_worker.motion_record import MotionRecord
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.standin.parameters import read_parameters
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.tuning import Identification
+from foretwin.sim_worker.identify.window import UNDERSTEER_NAME, identify
+from foretwin.sim_worker.motion_record import MotionRecord
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.standin.parameters import read_parameters
 from tests.sim_worker.standin_drives import city_minute, estimate, straight_minute
 
 CAR = read_parameters().car

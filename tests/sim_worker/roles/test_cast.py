@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.drive import VehicleState
-from contracts.roles import FollowLimits, Role
-from sim_worker.roles.cast import Cast
-from sim_worker.roles.member import CastMember, Member
-from sim_worker.roles.track import Measured
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.roles import FollowLimits, Role
+from foretwin.sim_worker.roles.cast import Cast
+from foretwin.sim_worker.roles.member import CastMember, Member
+from foretwin.sim_worker.roles.track import Measured
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import FRAME, box, crossroads, state_at
 
 CAR, VAN = load_vehicle(), load_vehicle("vw_vanagon")

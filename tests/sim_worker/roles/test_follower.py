@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_worker.roles.follower import Follower
+from foretwin.sim_worker.roles.follower import Follower
 
 STEP_S = 0.01
 LIMITS = st.tuples(st.floats(0.1, 5.0), st.floats(1.0, 20.0)).map(lambda a: (a[0], a[0] * a[1]))

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from contracts.drive import ControlCommand
-from contracts.roles import FollowLimits, UseRoles
-from contracts.simulation import MirrorSample
-from sim_worker.roles.cast import Cast
-from sim_worker.roles.member import CastMember
-from sim_worker.twin import Mirror
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.drive import ControlCommand
+from foretwin.contracts.roles import FollowLimits, UseRoles
+from foretwin.contracts.simulation import MirrorSample
+from foretwin.sim_worker.roles.cast import Cast
+from foretwin.sim_worker.roles.member import CastMember
+from foretwin.sim_worker.twin import Mirror
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
 from tests.sim_worker.places import FRAME, crossroads, state_at
 from tests.sim_worker.roles.test_cast import TICK_NS, weaving

@@ -7,19 +7,19 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from contracts.mailbox import Mailbox, Received, Request
-from contracts.memory_bus import MemoryBus
-from contracts.roles import (
+from foretwin.contracts.mailbox import Mailbox, Received, Request
+from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.contracts.roles import (
     CastVehicle,
     MirrorCast,
     OtherVehicle,
     OtherVehicles,
     UseRoles,
 )
-from contracts.setup import BusSetup, WorkerSetup
-from contracts.simulation import MirrorSample
-from sim_worker.mirror_process import MirrorWorker
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.setup import BusSetup, WorkerSetup
+from foretwin.contracts.simulation import MirrorSample
+from foretwin.sim_worker.mirror_process import MirrorWorker
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import FRAME, state_at
 
 VAN = CastVehicle(vehicle_id="van", vehicle=load_vehicle("vw_vanagon"))

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_worker.actors.kinds import KINDS
-from sim_worker.overlap import Rectangles, clearance, overlapping
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.impact import (
+from foretwin.sim_worker.actors.kinds import KINDS
+from foretwin.sim_worker.overlap import Rectangles, clearance, overlapping
+from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.sim_worker.scenarios.impact import (
     Impact,
     Moving,
     Span,
@@ -23,7 +23,7 @@ from sim_worker.scenarios.impact import (
     front_point,
     rectangles,
 )
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 BOX = ego_box(load_vehicle())
 REACH = Span(60.0, 140.0)

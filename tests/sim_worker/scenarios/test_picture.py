@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim_worker.overlap import clearance
-from sim_worker.scenarios.casting import Cast, cast
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.picture import told, write_case_picture
-from sim_worker.scenarios.picture_runs import heedless_run, planned_run
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.overlap import clearance
+from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.picture import told, write_case_picture
+from foretwin.sim_worker.scenarios.picture_runs import heedless_run, planned_run
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.draw_sheets import SHEETS
 from tests.sim_worker.scenarios.worlds import cross
 

@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from contracts.drive import ControlMode, PlannedTrajectory, VehicleState, VehicleStatus
-from contracts.frames import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleState, VehicleStatus
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     geo_from_local,
     geo_from_local_yaw,
 )
-from contracts.side_by_side import Disagreement, DrivenSegment
-from sim_worker.side_by_side.segment import Place
-from sim_worker.side_by_side.watch import HORIZON_S, SideBySide
+from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
+from foretwin.sim_worker.side_by_side.segment import Place
+from foretwin.sim_worker.side_by_side.watch import HORIZON_S, SideBySide
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 START_NS = 7_000_000_000
