@@ -1,6 +1,6 @@
 """Keys of others on Zenoh: raw bytes with attachments, and liveliness tokens that are not ours.
 
-The rules are those of `foretwin.contracts.bus`: what arrives lands in a Mailbox, no work on the bus's
+The rules are those of `bus`: what arrives lands in a Mailbox, no work on the bus's
 threads, use it as a context manager.
 """
 

@@ -31,7 +31,7 @@ class UseRoles(msgspec.Struct, frozen=True, kw_only=True):
 
 
 _MOST_JERK_PER_S = 60.0
-"""Beyond it, a physics step is too long for the law; see foretwin.sim_worker.roles.follower."""
+"""Beyond it, a physics step is too long for the law; see foretwin.sim_worker.mirror.follower."""
 
 
 class FollowLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -25,9 +25,9 @@ from foretwin.contracts.world import World
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.sim_worker.gym import JunctionVectorEnv
 from foretwin.world_gen.build import build_world
-from foretwin.world_gen.build_graph import build_road_graph
-from foretwin.world_gen.find_intersections import find_intersections
-from foretwin.world_gen.read_osm import read_map
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 
 Weights = npt.NDArray[np.float64]
 

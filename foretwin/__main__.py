@@ -11,7 +11,7 @@ def main() -> None:
     # Nothing here renders with MuJoCo, whose look for a window costs each process an interpreter.
     os.environ.setdefault("MUJOCO_GL", "disable")
 
-    from foretwin.orchestrator.cli import run
+    from foretwin.orchestrator.commands.cli import run
 
     sys.exit(run(sys.argv[1:]))
 

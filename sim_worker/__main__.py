@@ -10,7 +10,7 @@ from foretwin.contracts.setup import WorkerSetup
 
 ROLES = {
     "futures": ("foretwin.sim_worker.worker", "serve_futures"),
-    "mirror": ("foretwin.sim_worker.mirror_process", "serve_mirror"),
+    "mirror": ("foretwin.sim_worker.mirror.process", "serve_mirror"),
 }
 """Module and function of each role: the mirror starts without what plays futures."""
 

@@ -22,11 +22,11 @@ from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.futures import run_job
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
-from foretwin.sim_worker.scene import SceneMaker
-from foretwin.sim_worker.stage import Controls, Stage
 from foretwin.sim_worker.world_file import load_world
 
 NSIM = 32

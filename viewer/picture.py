@@ -1,4 +1,4 @@
-"""Pictures of a recording without a display: `python -m foretwin.viewer.picture RRD OUT.png --at 39`."""
+"""Pictures without a display: `python -m foretwin.viewer.picture RRD OUT.png --at 39`."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 from foretwin.contracts.codec import SchemaMismatch, read_message, write_message
 from foretwin.contracts.world import World
 from foretwin.world_gen.build import DEFAULT_RADIUS_M, GENERATOR_VERSION, build_world
-from foretwin.world_gen.intersections import Junction
-from foretwin.world_gen.map_index import MapIndex
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import MapIndex
 
 
 class CachedWorld(NamedTuple):

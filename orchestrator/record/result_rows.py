@@ -10,7 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import FuturesResult, Variant
 from foretwin.contracts.simulation import Comparison, HorizonError, PlanComparison
-from foretwin.orchestrator.rounds.desk import RoundDone
+from foretwin.orchestrator.rounds.dispatch import RoundDone
 from foretwin.sim_worker.metrics.displacement import distinct_count
 
 DISTINCT_M = 0.1

@@ -8,12 +8,12 @@ from typing import Any
 
 import msgspec
 
-from foretwin.orchestrator.conductor import Conductor
-from foretwin.orchestrator.mission import Mission
-from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.mission import Mission
+from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.drive.supervisor import Supervisor
 from foretwin.orchestrator.record.bookkeeping import percentile
 from foretwin.orchestrator.record.versions import versions
-from foretwin.orchestrator.supervisor import Supervisor
 
 RESERVED_BYTES = 65536
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from foretwin.orchestrator.judge.verdict_rows import agreement_lines
+from foretwin.orchestrator.agreement.verdict_rows import agreement_lines
 from foretwin.orchestrator.tuning.words import summary_lines
 
 DISAGREEMENTS_SHOWN = 12

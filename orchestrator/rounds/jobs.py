@@ -15,18 +15,18 @@ from foretwin.contracts.futures import CarPlan, FuturesJob, PathAhead, Variant
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.drive.intake import Surroundings
 from foretwin.orchestrator.instructions import RoundIntent
-from foretwin.orchestrator.intake import Surroundings
 from foretwin.orchestrator.rounds.fewer_futures import some_of
 from foretwin.orchestrator.rounds.seen_users import near_car
-from foretwin.orchestrator.way.way_ahead import PATH_BEHIND_M
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.orchestrator.routing.route_ahead import PATH_BEHIND_M
+from foretwin.sim_worker.futures.variants import cases_of, plan_variants
 from foretwin.sim_worker.scenarios.live import LiveScenarios
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.sim_worker.variants import cases_of, plan_variants
-from foretwin.world_gen.signal_state import LIVE_FOR_S
+from foretwin.world_gen.rules.signal_state import LIVE_FOR_S
 
 STEP_S = 0.1
 HEEDLESS_PLANNER = "constant_speed"

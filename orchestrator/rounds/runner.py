@@ -13,11 +13,11 @@ from foretwin.contracts.futures import Variant
 from foretwin.contracts.simulation import Comparison
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.orchestrator.agreement.verdict_rows import judged_row
+from foretwin.orchestrator.agreement.windows import WindowDesk
+from foretwin.orchestrator.drive.intake import LatestState, Surroundings
+from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import RoundIntent, Tell
-from foretwin.orchestrator.intake import LatestState, Surroundings
-from foretwin.orchestrator.judge.verdict_rows import judged_row
-from foretwin.orchestrator.judge.windows import WindowDesk
-from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
 from foretwin.orchestrator.record.result_rows import (
     comparison_row,
@@ -27,7 +27,7 @@ from foretwin.orchestrator.record.result_rows import (
 )
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.comparisons import ComparisonDesk
-from foretwin.orchestrator.rounds.desk import RoundDesk, RoundDone, RoundOrder
+from foretwin.orchestrator.rounds.dispatch import RoundDesk, RoundDone, RoundOrder
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
 from foretwin.orchestrator.rounds.views import round_view

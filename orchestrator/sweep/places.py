@@ -7,9 +7,9 @@ import numpy as np
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.sweep.plan import NotPlaced, PlacedHere, WorldPlaces
 from foretwin.orchestrator.sweep.spec import AS_RECORDED, Loaded
-from foretwin.sim_worker.planners.path import FrenetPath
 from foretwin.sim_worker.scenarios.live import LiveScenarios
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.roads import RoadNetwork

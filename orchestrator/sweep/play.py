@@ -14,6 +14,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import Faults, FuturesJob, PathAhead, Variant
 from foretwin.contracts.scenario import FAULTS, Scenario
 from foretwin.contracts.world import World
+from foretwin.orchestrator.sweep.future_rows import told, told_of_case
 from foretwin.orchestrator.sweep.places import places_in
 from foretwin.orchestrator.sweep.plan import Cell, SweepJob, WorldPlaces
 from foretwin.orchestrator.sweep.pool import Lost
@@ -26,12 +27,11 @@ from foretwin.orchestrator.sweep.spec import (
     STEP_S,
     Loaded,
 )
-from foretwin.orchestrator.sweep.told import told, told_of_case
-from foretwin.sim_worker.futures import run_job
-from foretwin.sim_worker.rehearsal import staged_cases
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.ego_dry_run import staged_cases
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.roles import Cast
-from foretwin.sim_worker.scene import SceneMaker
-from foretwin.sim_worker.stage import Stage
 from foretwin.sim_worker.worker import StageCache
 from foretwin.sim_worker.world_file import load_world
 

@@ -18,7 +18,7 @@ from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
-from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.road_users import (
     LONGEST_GAP_S,

@@ -12,9 +12,9 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Faults
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.maps.choice import node_of_id, parse_bbox
-from foretwin.orchestrator.maps.world_command import MAX_RADIUS_M, MIN_RADIUS_M
+from foretwin.orchestrator.commands.world import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, RecordedStart, read_drive
+from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
 from foretwin.sim_worker.metrics.table import METRICS
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario

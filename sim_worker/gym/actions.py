@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.tracking import pure_pursuit
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 

@@ -15,6 +15,7 @@ from foretwin.contracts.futures import FuturesJob, PathAhead
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.sim_worker.futures.play import Rows
 from foretwin.sim_worker.gym.actions import Control, action_size, commands
 from foretwin.sim_worker.gym.episodes import (
     Episodes,
@@ -25,7 +26,6 @@ from foretwin.sim_worker.gym.episodes import (
 from foretwin.sim_worker.gym.observation import Observation, feature_names, observe
 from foretwin.sim_worker.gym.reward import Reward, default_reward
 from foretwin.sim_worker.gym.rows import EpisodeRows, Flags, StepFacts
-from foretwin.sim_worker.play import Rows
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 KINDS = ("scenario", "job", "states")
@@ -35,7 +35,7 @@ CASE = "case"
 class Source(NamedTuple):
     """Where episodes come from: a scenario at a place, a job, or recorded states on a path.
 
-    See the functions of `foretwin.sim_worker.gym.episodes` that have these arguments; with `states`, a
+    See the functions of `gym.episodes` that have these arguments; with `states`, a
     scenario is optional.
     """
 

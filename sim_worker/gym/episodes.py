@@ -18,14 +18,14 @@ from foretwin.contracts.futures import FuturesJob, PathAhead, Variant
 from foretwin.contracts.scenario import EGO, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.places import Place, Unplaced
 from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.scenarios.staged import staged_start
-from foretwin.sim_worker.scene import SceneMaker
-from foretwin.sim_worker.seeding import local_state
+from foretwin.sim_worker.vehicle.seeding import local_state
 
 BEYOND_JUNCTION_M = 20.0
 """An episode at a place ends so far behind the junction."""

@@ -10,17 +10,17 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.actors.cast import Casting
-from foretwin.sim_worker.actors.perception import PerceptionFaults
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.collision_detection import touched
+from foretwin.sim_worker.futures.play import Play, Rows
+from foretwin.sim_worker.futures.scene import Aims, Scene
 from foretwin.sim_worker.gym.episodes import Episodes
 from foretwin.sim_worker.metrics.ground import DrivableGround
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
-from foretwin.sim_worker.play import Play, Rows
-from foretwin.sim_worker.scene import Aims, Scene
-from foretwin.sim_worker.stage import Stage
-from foretwin.sim_worker.touch import touched
-from foretwin.world_gen.signal_state import cycle_s
+from foretwin.sim_worker.road_users.cast import Casting
+from foretwin.sim_worker.road_users.perception import PerceptionFaults
+from foretwin.world_gen.rules.signal_state import cycle_s
 
 Flags = npt.NDArray[np.bool_]
 

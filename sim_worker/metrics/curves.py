@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker import compiled
+from foretwin.geometry import compiled
 from foretwin.sim_worker.metrics.displacement import known, nowhere
 from foretwin.sim_worker.metrics.rollout import Measure
 from foretwin.sim_worker.metrics.scene import Scene

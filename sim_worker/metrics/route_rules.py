@@ -8,7 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Conflict, Connection, LineControl, World
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
 
 _ON_PATH_M = 1.2
 """A connection whose middle stays this near to the path is the one that it takes."""

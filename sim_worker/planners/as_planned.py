@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.trajectory_tracking import Trajectories, check_trajectories, track
 

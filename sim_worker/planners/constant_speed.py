@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.tracking import (
     MAX_LATERAL_ACCEL_MPS2,
     pure_pursuit,

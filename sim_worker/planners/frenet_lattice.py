@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView, SeenUsers, rows_of
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView, SeenUsers, rows_of
 from foretwin.sim_worker.planners.lattice_choice import Planned, choose
 from foretwin.sim_worker.planners.lattice_rating import (
     MAX_ACCEL_MPS2,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs, walker_gap_m
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.tracking import front_from_base_m

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
-from foretwin.sim_worker.planners.base import PlannerView, SeenUsers, SharedGround, rows_of
+from foretwin.sim_worker.planner_interface import PlannerView, SeenUsers, SharedGround, rows_of
 from foretwin.sim_worker.planners.tracking import front_from_base_m
 
 Flags = npt.NDArray[np.bool_]

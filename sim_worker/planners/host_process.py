@@ -1,4 +1,4 @@
-"""`python -m foretwin.sim_worker.planners.host_process`: the process in which one foreign planner lives.
+"""`python -m foretwin.sim_worker.planners.host_process`: one foreign planner.
 
 It answers on the link that its worker gave it, and ends when that is closed or the worker is gone.
 """
@@ -14,7 +14,12 @@ import time
 from importlib.metadata import EntryPoint
 from typing import Any
 
-from foretwin.sim_worker.planners.base import Planner, PlannerView, RemembersWithinJob, SeenUsers
+from foretwin.sim_worker.planner_interface import (
+    Planner,
+    PlannerView,
+    RemembersWithinJob,
+    SeenUsers,
+)
 from foretwin.sim_worker.planners.host_link import (
     ANSWER,
     FAILURE,

@@ -15,7 +15,7 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.host_link import (
     ANSWER,
     FAILURE,

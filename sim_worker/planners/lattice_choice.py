@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.planners.base import PlannerView
+from foretwin.sim_worker.planner_interface import PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
 from foretwin.sim_worker.planners.lattice_rating import (
     LATERAL_ACCEL_MPS2,

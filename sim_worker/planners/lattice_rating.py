@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.planners.base import PlannerView
-from foretwin.sim_worker.planners.path import SPACING_M
+from foretwin.geometry.frenet_path import SPACING_M
+from foretwin.sim_worker.planner_interface import PlannerView
 from foretwin.sim_worker.planners.polynomials import Floats, Motions
 from foretwin.sim_worker.planners.prediction import Changes, courses
 from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m

@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker import compiled
-from foretwin.sim_worker.planners import tracking
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners import compiled, tracking
 from foretwin.sim_worker.planners.tracking import front_from_base_m
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 

@@ -1,7 +1,7 @@
 """Planners by name: those of foretwin, and any that an installed package offers.
 
 A package adds one with an entry point in the group `foretwin.planners` whose object is a class
-without arguments that follows `foretwin.sim_worker.planners.base.Planner`, or
+without arguments that follows `foretwin.sim_worker.planner_interface.Planner`, or
 `foretwin.sim_worker.planners.one_at_a_time.CarPlanner`. It lives in a process of its own.
 """
 
@@ -10,8 +10,8 @@ from __future__ import annotations
 import functools
 from importlib.metadata import entry_points
 
+from foretwin.sim_worker.planner_interface import Planner
 from foretwin.sim_worker.planners.as_planned import AsPlanned
-from foretwin.sim_worker.planners.base import Planner
 from foretwin.sim_worker.planners.constant_speed import ConstantSpeed
 from foretwin.sim_worker.planners.frenet_lattice import FrenetLattice
 from foretwin.sim_worker.planners.gap_acceptance import GapAcceptance

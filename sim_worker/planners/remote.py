@@ -17,7 +17,7 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.bus import Bus, Mailbox, Received
 from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
-from foretwin.sim_worker.planners.base import Planner, PlannerOutput, PlannerView, rows_of
+from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView, rows_of
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.trajectory_tracking import Trajectories, check_trajectories, track
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.planners.base import PlannerView
+from foretwin.sim_worker.planner_interface import PlannerView
 
 MIN_LOOKAHEAD_M = 4.0
 LOOKAHEAD_TIME_S = 0.6

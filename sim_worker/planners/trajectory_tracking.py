@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.tracking import lookahead_m, steer_towards
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 

@@ -10,9 +10,8 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.scenario import ActorPart
-from foretwin.sim_worker.actors.kinds import KINDS, KindTraits
-from foretwin.sim_worker.overlap import corners
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import corners
 from foretwin.sim_worker.scenarios.impact import (
     TOLERANCE_M,
     Moving,
@@ -24,6 +23,7 @@ from foretwin.sim_worker.scenarios.impact import (
 )
 from foretwin.sim_worker.scenarios.roles import CastActor, Meeting, Staging
 from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
 
 _CLEAR_M, _LANE_HALF_M = 0.3, 1.5
 """What is parked leaves the lane free, and a car's side by so much."""

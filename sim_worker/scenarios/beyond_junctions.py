@@ -13,12 +13,12 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import Lane
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import arc_lengths, points_at
 from foretwin.sim_worker.scenarios.places import Place
 from foretwin.sim_worker.scenarios.relations import ways_over
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way, own_way
-from foretwin.world_gen.polyline import arc_lengths, points_at
 
 _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
 _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")

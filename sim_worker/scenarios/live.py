@@ -15,8 +15,8 @@ import numpy as np
 
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.actors.cast import Player
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.road_users.cast import Player
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S
 from foretwin.sim_worker.scenarios.placement import passage_on_path, places_on_passage

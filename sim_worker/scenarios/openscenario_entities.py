@@ -10,8 +10,8 @@ from lxml import etree
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.scenario import EGO
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.actors.kinds import KINDS
 from foretwin.sim_worker.scenarios.roles import CastActor
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.world_gen.export.opendrive_elements import number
 from foretwin.world_gen.export.xml_text import legal
 

@@ -11,7 +11,7 @@ from lxml import etree
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.scenario import EGO
-from foretwin.sim_worker.planners.path import FrenetPath, PathPose
+from foretwin.geometry.frenet_path import FrenetPath, PathPose
 from foretwin.sim_worker.scenarios.openscenario_entities import reference_behind_centre_m
 from foretwin.sim_worker.scenarios.roles import Cast, CastActor
 from foretwin.world_gen.export.opendrive_elements import number

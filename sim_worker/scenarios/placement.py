@@ -13,7 +13,7 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import IntersectionSummary, World, WorldJunction
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.scenarios.beyond_junctions import other_places
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases

@@ -12,10 +12,10 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import ActorPart, Relation, TrafficTurn
 from foretwin.contracts.world import Crossing
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import length
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
 from foretwin.sim_worker.scenarios.ways import Way
-from foretwin.world_gen.polyline import length
 
 SIDE_RAD = (math.radians(30.0), math.radians(150.0))
 """Arms at these angles to the ego's own count as side arms."""

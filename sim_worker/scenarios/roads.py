@@ -12,6 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import TrafficTurn
 from foretwin.contracts.world import Connection, DrivingSide, Lane, World
+from foretwin.geometry.polyline import arc_lengths, length
 from foretwin.sim_worker.scenarios.walls import Walls
 from foretwin.sim_worker.scenarios.ways import (
     APPROACH_M,
@@ -23,7 +24,6 @@ from foretwin.sim_worker.scenarios.ways import (
     traffic_turn,
     turn_by_heading,
 )
-from foretwin.world_gen.polyline import arc_lengths, length
 
 _LONGEST_CHAIN = 16
 """Connections through one ring: more are a drive in circles."""

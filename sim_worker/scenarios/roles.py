@@ -9,12 +9,12 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.scenario import EGO, ActorPart, Conduct, Relation, Scenario
-from foretwin.sim_worker.actors.kinds import KINDS, KindTraits
+from foretwin.geometry.polyline import length
 from foretwin.sim_worker.scenarios.drawing import Values
 from foretwin.sim_worker.scenarios.impact import EgoBox, Impact, Moving
 from foretwin.sim_worker.scenarios.places import Place
 from foretwin.sim_worker.scenarios.ways import Way
-from foretwin.world_gen.polyline import length
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
 
 ALONG: tuple[Relation, ...] = ("ahead", "behind", "beside", "parked")
 """Relations of those who have no way of their own: they are on the ego's path or beside it."""

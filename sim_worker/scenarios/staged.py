@@ -13,8 +13,8 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.actors.cast import Player
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.road_users.cast import Player
 from foretwin.sim_worker.scenarios.beyond_junctions import other_places
 from foretwin.sim_worker.scenarios.casting import cast_all
 from foretwin.sim_worker.scenarios.placement import places_on_passage
@@ -22,7 +22,7 @@ from foretwin.sim_worker.scenarios.places import Place, Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.roles import Cast, CastActor
 from foretwin.sim_worker.scenarios.ways import Way
-from foretwin.sim_worker.seeding import kinematic_tire_angle, rear_slip_velocity
+from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_velocity
 
 _Case = tuple[object, ...]
 

@@ -7,7 +7,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import World
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
 
 
 class Walls:

@@ -11,8 +11,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import TrafficTurn
 from foretwin.contracts.world import DrivingSide
-from foretwin.sim_worker.planners.path import FrenetPath
-from foretwin.world_gen.polyline import arc_lengths
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import arc_lengths
 
 APPROACH_M, DEPARTURE_M = 150.0, 120.0
 """How far ways are led back and on along the lanes."""

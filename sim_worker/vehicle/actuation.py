@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker import compiled
+from foretwin.sim_worker.vehicle import compiled
 from foretwin.sim_worker.vehicle.lag import ForceLag, lags_of_force
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
 from foretwin.sim_worker.vehicle.planar import DRIVE, STEER, TYRE_FRONT, TYRE_REAR

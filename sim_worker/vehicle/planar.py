@@ -3,7 +3,7 @@
 The body origin is the centre of gravity, so that the mass matrix is diagonal; `base_from_cog` and
 `cog_from_base` convert to base_link, the rear-axle centre. A lateral tyre force is a velocity
 actuator at the axle, F = -(C / max(|u|, 1)) v_lat within ±limit, which implicit integration keeps
-stable at 10 ms down to standstill; `foretwin.sim_worker.vehicle.actuation` refreshes C and the limits.
+stable at 10 ms down to standstill; `vehicle.actuation` refreshes C and the limits.
 """
 
 from __future__ import annotations

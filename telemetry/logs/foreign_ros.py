@@ -1,6 +1,6 @@
 """Reader of MCAP files and bags with ROS messages that other programs wrote.
 
-Topics are chosen by message type, one topic per stream of foretwin.telemetry.ros_foreign: the first type
+Topics are chosen by message type, one topic per stream of `ros_messages.foreign`: the first type
 that occurs, and among its topics the one with the most messages. The stamp is that of the header,
 and the log time where that is 0. Plans and objects are read only where metadata `foretwin.frame` or
 a declaration tells the origin of their frame. Where static transforms lead from base_link to the
@@ -28,7 +28,7 @@ from foretwin.telemetry.logs.map_origin import RecordingDeclaration
 from foretwin.telemetry.logs.mcap_records import Contents, Record
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.logs.ros_recording import Recording, decoder
-from foretwin.telemetry.ros_foreign import (
+from foretwin.telemetry.ros_messages.foreign import (
     FOREIGN,
     POSE,
     Foreign,
@@ -36,9 +36,9 @@ from foretwin.telemetry.ros_foreign import (
     channel_of,
     stamp_of,
 )
-from foretwin.telemetry.ros_parts import BASE_FRAME, ODOMETRY, TF
-from foretwin.telemetry.ros_status import StatusJoiner
-from foretwin.telemetry.ros_transforms import TransformTree
+from foretwin.telemetry.ros_messages.parts import BASE_FRAME, ODOMETRY, TF
+from foretwin.telemetry.ros_messages.status import StatusJoiner
+from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 WINDOW_NS = 2_000_000_000
 """How late a message may lie in its file and still be put in order."""

@@ -25,7 +25,7 @@ from foretwin.contracts.frames import GeoPoint, wrap_angle
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
 from foretwin.telemetry.logs.merge import reordered
-from foretwin.telemetry.ros_foreign import NO_FIX
+from foretwin.telemetry.ros_messages.foreign import NO_FIX
 
 CHECKSUM_WRONG = "checksum wrong"
 NO_TIME = "sentence before any time"

@@ -28,8 +28,8 @@ from foretwin.telemetry.logs.map_origin import declared_of
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.logs.ros_bag import bag_recording
 from foretwin.telemetry.logs.ros_recording import Recording, decoder, mcap_recording
-from foretwin.telemetry.mcap_file import FORMAT_METADATA, FRAME_METADATA, INFO_METADATA
-from foretwin.telemetry.ros_messages import (
+from foretwin.telemetry.logs.write_mcap import FORMAT_METADATA, FRAME_METADATA, INFO_METADATA
+from foretwin.telemetry.ros_messages.table import (
     FRAME_TOPIC,
     INFO_TOPIC,
     TOPIC_PREFIX,

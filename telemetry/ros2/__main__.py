@@ -10,7 +10,7 @@ from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import Ros2Setup
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import listening_only, parse_mapping
-from foretwin.telemetry.ros_parts import typestore
+from foretwin.telemetry.ros_messages.parts import typestore
 
 log = logging.getLogger("foretwin.telemetry.ros2")
 

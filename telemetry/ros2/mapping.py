@@ -22,9 +22,8 @@ from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.names import Dialect, check_topic, dds_type
 from foretwin.telemetry.ros2.safety import Limits
 from foretwin.telemetry.ros2.virtual_objects import PlacedObject
-from foretwin.telemetry.ros_foreign import FOREIGN
-from foretwin.telemetry.ros_messages import TOPIC_PREFIX as OWN_PREFIX
-from foretwin.telemetry.ros_parts import (
+from foretwin.telemetry.ros_messages.foreign import FOREIGN
+from foretwin.telemetry.ros_messages.parts import (
     ACKERMANN,
     CLOCK,
     CONTROL,
@@ -34,6 +33,7 @@ from foretwin.telemetry.ros_parts import (
     PREDICTED_OBJECTS,
     TF,
 )
+from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 AUTOWARE = Path(__file__).with_name("autoware.toml")

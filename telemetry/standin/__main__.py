@@ -6,10 +6,10 @@ import sys
 from pathlib import Path
 
 from foretwin.contracts.setup import StandinSetup
+from foretwin.telemetry.processes.vehicle_process import main, run_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import read_path
 from foretwin.telemetry.standin.source import StandinSource
-from foretwin.telemetry.vehicle_process import main, run_vehicle
 
 
 def run(setup: StandinSetup) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 
 from foretwin.contracts.futures import FuturesJob, SeenRoadUser
 from foretwin.contracts.world import Building, World
+from foretwin.sim_worker.futures.variants import plan_variants
 from foretwin.sim_worker.metrics.table import METRICS
-from foretwin.sim_worker.variants import plan_variants
 from tests.benchmarks import scenes
 from tests.sim_worker.metrics.junction import junction
 from tests.sim_worker.places import box, job

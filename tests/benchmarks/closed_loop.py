@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from foretwin.contracts.futures import FuturesJob, FuturesResult
-from foretwin.sim_worker.futures import run_job
-from foretwin.sim_worker.scene import SceneMaker
-from foretwin.sim_worker.stage import Stage
-from foretwin.sim_worker.variants import plan_variants
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.futures.variants import plan_variants
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import scenes
 from tests.benchmarks.bare_loop import bare_loop

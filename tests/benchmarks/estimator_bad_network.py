@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from foretwin.contracts.drive import ImuSample, SpeedSample, SteeringSample
-from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s
 from tests.telemetry.impaired import BAD, ForeignClock, impaired
 from tests.telemetry.position_track import circle, fix, info

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import busy_junction, scenes
 from tests.benchmarks.bare_loop import bare_loop

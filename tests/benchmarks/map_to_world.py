@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 
 from foretwin.contracts.world import World
-from foretwin.orchestrator.maps.opening import open_map
+from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.world_gen.build import build_region
-from foretwin.world_gen.map_index import index_map
+from foretwin.world_gen.junctions.map_index import index_map
 from foretwin.world_gen.world_store import WorldStore
 
 NETWORK = "network"

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from foretwin.sim_worker.stage import Stage
+from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import busy_junction, scenes
 from tests.benchmarks.closed_loop import SECONDS, job_runner

@@ -21,7 +21,7 @@ from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import PrepareRequest
-from foretwin.sim_worker.variants import plan_variants
+from foretwin.sim_worker.futures.variants import plan_variants
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.world_store import WorldStore
 from tests.benchmarks import scenes

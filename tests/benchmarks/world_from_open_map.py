@@ -9,11 +9,11 @@ import osmium
 
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.world_gen.build import build_world
-from foretwin.world_gen.build_graph import build_road_graph
 from foretwin.world_gen.export.mjcf import world_spec
-from foretwin.world_gen.find_intersections import find_intersections
-from foretwin.world_gen.map_index import index_map
-from foretwin.world_gen.read_osm import read_map
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s
 
 REPEATS = 5

@@ -9,8 +9,8 @@ import numpy as np
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import DrivingSide, IntersectionSummary
-from foretwin.world_gen.intersections import Junction
-from foretwin.world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
 
 BLOCK_M = 100.0
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))

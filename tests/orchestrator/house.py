@@ -18,11 +18,11 @@ from foretwin.contracts.mailbox import Mailbox, Request
 from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.simulation import BuildReply, BuildRequest, PrepareReply, PrepareRequest
 from foretwin.contracts.world import World
-from foretwin.orchestrator.conductor import Conductor
-from foretwin.orchestrator.mission import Mission, MissionSettings
-from foretwin.orchestrator.plan import DrivePlan
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.mission import Mission, MissionSettings
+from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
-from foretwin.orchestrator.way.way_ahead import WayAhead
+from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.world_gen.world_store import WorldStore
 from tests.orchestrator.futures_rounds import nobody
 from tests.orchestrator.trip import START_NS, states_along, town, town_line, town_plan, town_world

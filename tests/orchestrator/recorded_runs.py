@@ -13,7 +13,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, RoadUsers, VehicleInfo
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.world import World
-from foretwin.telemetry.mcap_file import create
+from foretwin.telemetry.logs.write_mcap import create
 from foretwin.world_gen.world_store import WorldStore
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.log_commands import convert_log
+from foretwin.orchestrator.commands.recordings import convert_log
 
 GOOD = "point3 {} 3784144.3 901246.3 5037714.1 0 0 0 0 0 0 0 0 0\n"
 

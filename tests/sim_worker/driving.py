@@ -7,7 +7,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
-from foretwin.sim_worker.stage import Controls, Stage
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
 
 
 def altered(vehicle: VehicleParameters, **values: float) -> VehicleParameters:

@@ -11,7 +11,7 @@ import numpy as np
 from foretwin.contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample, SteeringSample
 from foretwin.contracts.frames import GeoPoint, geo_from_local
 from foretwin.contracts.tuning import Identification, ParameterEstimate
-from foretwin.sim_worker.motion_record import MotionRecord, MotionRecorder
+from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
 from foretwin.telemetry.standin.parameters import StandinParameters, read_parameters
 from foretwin.telemetry.standin.path import DrivenPath
 from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource

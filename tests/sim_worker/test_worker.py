@@ -22,10 +22,10 @@ from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
 from foretwin.contracts.tuning import UseVehicle
-from foretwin.sim_worker.futures import result_digest, run_job
-from foretwin.sim_worker.mirror_process import serve_mirror
-from foretwin.sim_worker.stage import Stage
-from foretwin.sim_worker.variants import plan_variants
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.worker import StageCache, serve_futures
 from tests.contracts.bus_sides import DEADLINE_S

@@ -16,7 +16,7 @@ from foretwin.contracts.foreign_bus import Arrived, ZenohForeignBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.telemetry.ros2.mapping import AUTOWARE
-from foretwin.telemetry.ros_parts import PREDICTED_OBJECTS, typestore
+from foretwin.telemetry.ros_messages.parts import PREDICTED_OBJECTS, typestore
 from tests.system.foretwin_command import run_folder, started, wait_for
 from tests.system.ros2_car import SPEED_MPS, Ros2Car
 

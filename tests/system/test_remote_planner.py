@@ -13,10 +13,10 @@ from foretwin.contracts.bus import Bus, Mailbox, ZenohBus
 from foretwin.contracts.futures import Variant
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
-from foretwin.sim_worker.futures import run_job
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
-from foretwin.sim_worker.stage import Stage
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S, python
 from tests.sim_worker.places import crossroads, job

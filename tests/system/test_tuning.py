@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from foretwin.contracts.vehicle import Parameter
-from foretwin.sim_worker.identify.acceptance import vehicle_toml
+from foretwin.sim_worker.analysis.identify.acceptance import vehicle_toml
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.system.foretwin_command import Finished, foretwin, log_lines
 

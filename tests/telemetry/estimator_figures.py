@@ -17,7 +17,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import HeadingSample
 from foretwin.contracts.frames import local_from_geo, wrap_angle
-from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.logs import open_log
 from tests.telemetry.city_drive import FRAME, antenna_xy, city_drive, phone_positions
 from tests.telemetry.city_errors import FOREIGN, Heard, heard, without

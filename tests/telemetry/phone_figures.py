@@ -18,8 +18,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import geo_from_local, wrap_angle
-from foretwin.telemetry.motion_noise import GNSS_CORRELATION_S, SPEED_SCALE_STD
-from foretwin.telemetry.motion_track import MotionTrack
+from foretwin.telemetry.estimator.motion_noise import GNSS_CORRELATION_S, SPEED_SCALE_STD
+from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath
 from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource

@@ -16,7 +16,7 @@ from foretwin.contracts.frames import (
     local_from_geo,
     local_from_geo_yaw,
 )
-from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator
 
 FRAME = LocalFrame(GeoPoint(52.51, 13.39, 0.0))
 Sample = tuple[str, Any]

@@ -13,10 +13,10 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from foretwin.contracts import drive
-from foretwin.telemetry.convert import Target, convert, target_of
 from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs.convert import Target, convert, target_of
 from foretwin.telemetry.logs.log import Sample
-from foretwin.telemetry.mcap_file import create
+from foretwin.telemetry.logs.write_mcap import create
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 from tests.telemetry.test_drive_mcap import assert_same
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.drive import GnssFix, HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.contracts.frames import GeoPoint
-from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.telemetry.position_track import (
     Sample,
     along,

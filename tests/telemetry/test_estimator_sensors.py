@@ -11,9 +11,9 @@ import pytest
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, wrap_angle
-from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.smoothing import SmoothedTrack, smooth_positions
 from foretwin.telemetry.logs import Log, open_log
-from foretwin.telemetry.smoothing import SmoothedTrack, smooth_positions
 from tests.telemetry.estimator_figures import boreas
 
 pytestmark = pytest.mark.real_data

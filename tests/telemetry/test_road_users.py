@@ -20,7 +20,7 @@ from foretwin.contracts.frames import (
 )
 from foretwin.telemetry.logs import LogError, open_road_users
 from foretwin.telemetry.logs.road_users import RoadUserTrack
-from foretwin.telemetry.mcap_file import create
+from foretwin.telemetry.logs.write_mcap import create
 
 HERE = LocalFrame(GeoPoint(42.300947, -83.698649))
 START_S = 1_688_680_000.0

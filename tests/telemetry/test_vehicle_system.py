@@ -113,7 +113,7 @@ def test_a_recorded_drive_runs_at_its_speed_and_leaves_at_the_end_of_the_run(
 ) -> None:
     log = gpx(ground.folder, seconds=20)
     setup = ReplaySetup(**ground.base(log=str(log), start_s=2.0, speed=20.0))
-    with running("foretwin.telemetry.replay", setup, ground.folder) as process:
+    with running("foretwin.telemetry.processes.replay", setup, ground.folder) as process:
         ground.wait_alive()
         process.send_signal(signal.SIGINT)
         assert ground.inbox.take(0.3) is None
@@ -162,14 +162,14 @@ def test_the_stand_in_in_lock_step_tells_what_it_has_published(ground: Ground) -
 @pytest.mark.parametrize(
     ("module", "fields"),
     [
-        ("foretwin.telemetry.replay", {"log": "nowhere.gpx"}),
+        ("foretwin.telemetry.processes.replay", {"log": "nowhere.gpx"}),
         ("foretwin.telemetry.standin", {"path_file": "no.json"}),
     ],
 )
 def test_a_missing_file_is_one_line_and_exit_2(
     ground: Ground, module: str, fields: dict[str, str]
 ) -> None:
-    kind = ReplaySetup if module == "foretwin.telemetry.replay" else StandinSetup
+    kind = ReplaySetup if module == "foretwin.telemetry.processes.replay" else StandinSetup
     with running(module, kind(**ground.base(**fields)), ground.folder) as process:
         _, errors = process.communicate(timeout=DEADLINE_S)
         assert process.returncode == 2

@@ -16,9 +16,9 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
-from foretwin.orchestrator.way.way_ahead import WayAhead
-from foretwin.telemetry.map_aid import RoadLine
-from foretwin.world_gen.road_graph import RoadEdge, RoadGraph
+from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.telemetry.estimator.map_aid import RoadLine
+from foretwin.world_gen.roads.road_graph import RoadEdge, RoadGraph
 from tests.orchestrator.grid_map import graph_of, road
 from tests.telemetry.standin_drive import FRAME
 

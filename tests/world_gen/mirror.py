@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from foretwin.contracts.frames import LocalFrame
-from foretwin.world_gen.driving_side import side_at
+from foretwin.world_gen.osm.driving_side import side_at
 from tests.data.junctions.draw import drawings
 from tests.data.junctions.drawing import BREMEN, LEEDS, Drawing
 from tests.world_gen.truth_sheet import TrueJunction, TrueMap

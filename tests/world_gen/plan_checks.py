@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from foretwin.contracts.signals import SignalPlan
 from foretwin.contracts.world import World
-from foretwin.world_gen.signal_plan import LEAST_GREEN_S
+from foretwin.world_gen.rules.signal_plan import LEAST_GREEN_S
 
 
 def plan_of(world: World) -> SignalPlan:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from foretwin.contracts.provenance import Quantity
-from foretwin.world_gen.road_graph import RoadEdge
+from foretwin.world_gen.roads.road_graph import RoadEdge
 
 
 def road(

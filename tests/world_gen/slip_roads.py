@@ -9,7 +9,7 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.world import Connection, StopLine, World
-from foretwin.world_gen.osm_map import OsmMap
+from foretwin.world_gen.osm.osm_map import OsmMap
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, Tags, drawn_map, world_of
 
 SIGN = 31

@@ -11,8 +11,8 @@ from shapely.geometry import LineString, Point, Polygon
 from foretwin.contracts.codec import content_bytes, decode, encode
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.world_gen.build import build_world
-from foretwin.world_gen.build_graph import build_road_graph
-from foretwin.world_gen.find_intersections import find_intersections
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import (
     AVENUE,
     ENGLAND,

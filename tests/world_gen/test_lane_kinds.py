@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.provenance import Quantity
-from foretwin.world_gen.cross_section import cross_section
+from foretwin.world_gen.lanes.cross_section import cross_section
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, world_of
 from tests.world_gen.road_edges import road
 

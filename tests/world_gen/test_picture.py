@@ -15,7 +15,7 @@ import pytest
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.world_gen.export.picture import write_picture
-from foretwin.world_gen.report import report_of
+from foretwin.world_gen.report.report import report_of
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
 
 HOUSE = {20: (10.0, 10.0), 21: (30.0, 10.0), 22: (30.0, 30.0), 23: (10.0, 30.0)}

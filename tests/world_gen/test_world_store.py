@@ -6,10 +6,10 @@ import pytest
 
 import foretwin.world_gen.world_store as world_store
 from foretwin.contracts.codec import content_bytes
-from foretwin.world_gen.build_graph import build_road_graph
-from foretwin.world_gen.find_intersections import find_intersections
-from foretwin.world_gen.map_index import index_map
-from foretwin.world_gen.service_roads import with_service_roads
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.service_roads import with_service_roads
 from foretwin.world_gen.world_store import WorldStore, cached_build
 from tests.world_gen.drawn_maps import crossing
 

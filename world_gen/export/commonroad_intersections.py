@@ -11,9 +11,9 @@ from lxml import etree
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Lane, World
+from foretwin.geometry.polyline import unit
 from foretwin.world_gen.export.commonroad_elements import IdCounter, ref
 from foretwin.world_gen.export.lanelets import indicated
-from foretwin.world_gen.polyline import unit
 
 LEFT_OF_RAD = math.radians(150.0)
 """Whoever comes from farther round does not come from the left but from ahead."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from foretwin.contracts.world import Connection, Crossing, DrivingSide, Lane, Turn
+from foretwin.geometry.polyline import left_of, unit
 from foretwin.world_gen.export.lane_borders import Borders
-from foretwin.world_gen.polyline import left_of, unit
 
 URBAN_MPS = 60.0 / 3.6
 """Roads on which one may drive faster count as outside towns."""

@@ -18,7 +18,8 @@ from shapely.geometry import Polygon
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Building, World
-from foretwin.world_gen.convex_parts import convex_cover, polygons_from
+from foretwin.geometry.reflex_cuts import polygons_of
+from foretwin.world_gen.buildings.convex_parts import convex_cover, polygons_from
 from foretwin.world_gen.export.solids import (
     BUILDING,
     GROUND,
@@ -31,7 +32,6 @@ from foretwin.world_gen.export.solids import (
     stops_cars,
 )
 from foretwin.world_gen.export.xml_text import in_comment
-from foretwin.world_gen.reflex_cuts import polygons_of
 
 STATIC = 1
 """Contype of buildings and islands; their conaffinity is VEHICLE."""

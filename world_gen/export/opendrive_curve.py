@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.world_gen.polyline import unit, without_repeats
+from foretwin.geometry.polyline import unit, without_repeats
 
 STRAIGHT_M = 3.0
 """Longer segments are taken for straight; the World samples its curves more densely."""

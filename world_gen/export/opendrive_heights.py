@@ -6,8 +6,8 @@ import heapq
 from collections.abc import Mapping, Sequence
 
 from foretwin.contracts.world import Road
+from foretwin.geometry.polyline import length
 from foretwin.world_gen.export.road_heights import LAYER_HEIGHT_M
-from foretwin.world_gen.polyline import length
 
 RAMP_SLOPE = 0.06
 """Mean slope of a ramp (RASt 06: at most 6 to 8 % on main roads)."""

@@ -15,10 +15,10 @@ from lxml import etree
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Crossing, StopLine, World
+from foretwin.geometry.polyline import left_of, unit
 from foretwin.world_gen.export.opendrive_elements import Version, number, text
 from foretwin.world_gen.export.opendrive_places import OdrNetwork
 from foretwin.world_gen.export.opendrive_roads import OdrRoad
-from foretwin.world_gen.polyline import left_of, unit
 
 STOP_LINE_M = 0.5
 """Breadth of a stop line (RMS-1, 1993)."""

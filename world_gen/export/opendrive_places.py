@@ -11,6 +11,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, Connection, DrivingSide, Lane, Road, World
+from foretwin.geometry.polyline import unit
 from foretwin.world_gen.export.opendrive_curve import curve_between, fit_curve
 from foretwin.world_gen.export.opendrive_roads import (
     Cubic,
@@ -22,7 +23,6 @@ from foretwin.world_gen.export.opendrive_roads import (
 )
 from foretwin.world_gen.export.opendrive_sidewalks import sidewalks_of
 from foretwin.world_gen.export.opendrive_tapers import taper
-from foretwin.world_gen.polyline import unit
 
 MIN_ROAD_M = 0.005
 """Where two lanes meet in one point a connecting road has this length: too short for a gap."""

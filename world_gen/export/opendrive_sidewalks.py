@@ -11,7 +11,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, Road, World
-from foretwin.world_gen.polyline import length, points_at
+from foretwin.geometry.polyline import length, points_at
 
 _BESIDE = re.compile(r"sidewalk:(?P<road>.+):(?P<side>left|right)(?:-\d+)?")
 """How the World names a sidewalk that belongs to a road, and the pieces that it is cut into."""

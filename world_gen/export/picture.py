@@ -25,7 +25,7 @@ from foretwin.world_gen.export.picture_marks import (
 )
 from foretwin.world_gen.export.picture_style import View, view_around
 from foretwin.world_gen.export.picture_traffic import draw_traffic
-from foretwin.world_gen.report import WorldReport, report_of
+from foretwin.world_gen.report.report import WorldReport, report_of
 
 _SIZE_IN = (20.0, 13.0)
 _DPI = 110

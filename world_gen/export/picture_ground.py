@@ -14,6 +14,7 @@ from matplotlib.path import Path as Outline
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import PROVENANCES, Provenance
 from foretwin.contracts.world import Area, Building, Crossing, Road, World
+from foretwin.geometry.polyline import left_of, offset
 from foretwin.world_gen.export.picture_style import (
     DASH,
     DECK_EDGE,
@@ -31,7 +32,6 @@ from foretwin.world_gen.export.picture_style import (
     TUNNEL,
     View,
 )
-from foretwin.world_gen.polyline import left_of, offset
 
 OVERHANG_M = 2.5
 """What begins higher is drawn see-through: cars pass below it."""

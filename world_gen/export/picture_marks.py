@@ -40,7 +40,7 @@ from foretwin.world_gen.export.picture_style import (
     WAITS,
     View,
 )
-from foretwin.world_gen.report import JunctionReport, WorldReport
+from foretwin.world_gen.report.report import JunctionReport, WorldReport
 
 _BUILDING, _GUESSED = "#f3cf8e", "#8a7762"
 _PANEL_COLUMNS, _PANEL_LINES = 84, 32

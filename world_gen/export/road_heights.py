@@ -8,8 +8,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Lane, World
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.export.lane_borders import Borders
-from foretwin.world_gen.polyline import arc_lengths
 
 LAYER_HEIGHT_M = 5.0
 """From one OSM layer to the next: a lorry's 4.5 m and a bridge deck."""

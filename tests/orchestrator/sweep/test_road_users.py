@@ -12,7 +12,7 @@ import pytest
 from foretwin.contracts.drive import RoadUser, RoadUsers
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
-from foretwin.orchestrator.sweep.command import run_sweep
+from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.sweep.folder import fingerprint_of
 from foretwin.orchestrator.sweep.plan import WorldPlaces, plan_sweep
 from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWorker

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.cli import run
+from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.sweep.spec import DEFAULT_METRICS, load_spec
 from foretwin.sim_worker.metrics.table import METRICS
 from foretwin.sim_worker.scenarios.reading import catalogue

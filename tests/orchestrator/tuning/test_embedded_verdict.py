@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.orchestrator.way.standin_path import standin_path
-from foretwin.sim_worker.gap.verdict import Judge
+from foretwin.orchestrator.routing.standin_path import standin_path
+from foretwin.sim_worker.analysis.gap.verdict import Judge
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath

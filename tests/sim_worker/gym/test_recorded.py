@@ -16,12 +16,12 @@ from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.futures import Faults, PathAhead, SeenRoadUser, Variant
 from foretwin.contracts.world import World
 from foretwin.sim_worker.gym import JunctionEnv, JunctionVectorEnv
-from foretwin.telemetry.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.logs.opening import open_log
 from foretwin.world_gen.build import build_world
-from foretwin.world_gen.build_graph import build_road_graph
-from foretwin.world_gen.find_intersections import find_intersections
-from foretwin.world_gen.read_osm import read_map
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.places import box, crossroads, happening, job, state_at, straight_path
 
 KEEP = np.zeros(1, np.float32)

@@ -13,9 +13,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.metrics.rollout import Rollout
 from foretwin.sim_worker.metrics.table import evaluate
-from foretwin.sim_worker.overlap import Rectangles, clearance
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
 
 FROZEN = json.loads((Path(__file__).parents[2] / "data/metrics/crime.json").read_text())

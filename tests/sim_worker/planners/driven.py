@@ -11,10 +11,15 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.overlap import Rectangles, clearance
-from foretwin.sim_worker.planners.base import Planner, PlannerView, RemembersWithinJob, SeenUsers
-from foretwin.sim_worker.planners.path import FrenetPath
-from foretwin.sim_worker.stage import Controls, Stage
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import Rectangles, clearance
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.planner_interface import (
+    Planner,
+    PlannerView,
+    RemembersWithinJob,
+    SeenUsers,
+)
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 

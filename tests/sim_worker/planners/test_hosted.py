@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.futures import Variant
-from foretwin.sim_worker.futures import run_job
-from foretwin.sim_worker.planners.base import Planner, RemembersWithinJob
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.planner_interface import Planner, RemembersWithinJob
 from foretwin.sim_worker.planners.hosted import ANSWER_S, HostedDriver, HostedPlanner, PlannerFailed
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.registry import check_planner, load_planner, planner_names
-from foretwin.sim_worker.stage import Stage
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.sim_worker.places import crossroads, job

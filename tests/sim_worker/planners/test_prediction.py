@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.planners.base import PlannerView
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.planner_interface import PlannerView
 from foretwin.sim_worker.planners.prediction import Changes, changes, courses
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import Other, at_rest_on, see, straight, view_of, walker

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.planner_interface import KnownPlan
 from foretwin.sim_worker.planners.as_planned import AsPlanned
-from foretwin.sim_worker.planners.base import KnownPlan
-from foretwin.sim_worker.planners.path import FrenetPath
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.reverse_pursuit import ReversePursuit
 from foretwin.sim_worker.vehicle.parameters import load_vehicle

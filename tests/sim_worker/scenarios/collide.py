@@ -12,8 +12,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.overlap import Rectangles, clearance, overlapping
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import Rectangles, clearance, overlapping
 from foretwin.sim_worker.scenarios.casting import Cast, CastActor
 
 TICK_S = 0.002

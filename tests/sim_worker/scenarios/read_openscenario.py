@@ -10,7 +10,7 @@ import numpy as np
 from lxml import etree
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.overlap import Rectangles
+from foretwin.geometry.rectangles import Rectangles
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario
-from foretwin.sim_worker.overlap import clearance
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import clearance
 from foretwin.sim_worker.scenarios.casting import Cast, cast, cast_all
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.placement import places

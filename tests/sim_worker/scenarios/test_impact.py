@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.sim_worker.actors.kinds import KINDS
-from foretwin.sim_worker.overlap import Rectangles, clearance, overlapping
-from foretwin.sim_worker.planners.path import FrenetPath
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import Rectangles, clearance, overlapping
 from foretwin.sim_worker.scenarios.impact import (
     Impact,
     Moving,
@@ -24,6 +23,7 @@ from foretwin.sim_worker.scenarios.impact import (
     rectangles,
 )
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
 BOX = ego_box(load_vehicle())
 REACH = Span(60.0, 140.0)

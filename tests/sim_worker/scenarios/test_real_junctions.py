@@ -21,10 +21,10 @@ from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_world
-from foretwin.world_gen.build_graph import build_road_graph
-from foretwin.world_gen.find_intersections import find_intersections
-from foretwin.world_gen.map_index import index_map
-from foretwin.world_gen.read_osm import read_map
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.scenarios.test_casting import check_impact
 
 pytestmark = pytest.mark.real_data

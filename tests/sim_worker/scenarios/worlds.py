@@ -8,7 +8,7 @@ import math
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.world import World
 from foretwin.world_gen.build import build_region
-from foretwin.world_gen.build_graph import build_road_graph
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, roundabout, world_of
 
 SIGNALS = {"highway": "traffic_signals"}

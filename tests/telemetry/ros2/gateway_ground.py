@@ -14,7 +14,7 @@ from foretwin.contracts.foreign_bus import Arrived
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.setup import BusSetup, Ros2Setup, write_setup
-from foretwin.telemetry.ros_parts import typestore
+from foretwin.telemetry.ros_messages.parts import typestore
 
 ROOT = Path(__file__).resolve().parents[3]
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
@@ -108,7 +108,7 @@ def steering(stamp_ns: int, angle_rad: float) -> bytes:
 
 def antenna_at(forward_m: float, left_m: float, up_m: float) -> bytes:
     """Return a TFMessage that places the frame `gnss` in base_link."""
-    from foretwin.telemetry.ros_transforms import transform_message
+    from foretwin.telemetry.ros_messages.transforms import transform_message
 
     place_m = (forward_m, left_m, up_m)
     message = transform_message(0, parent="base_link", child="gnss", place_m=place_m, yaw_rad=0.0)

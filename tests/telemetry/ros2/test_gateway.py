@@ -14,8 +14,8 @@ from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import parse_mapping
-from foretwin.telemetry.ros_foreign import FOREIGN
-from foretwin.telemetry.ros_parts import ODOMETRY, typestore, yaw_of
+from foretwin.telemetry.ros_messages.foreign import FOREIGN
+from foretwin.telemetry.ros_messages.parts import ODOMETRY, typestore, yaw_of
 from tests.telemetry.ros2.gateway_ground import (
     FIX_KEY,
     FRAME,

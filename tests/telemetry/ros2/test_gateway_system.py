@@ -19,7 +19,7 @@ from foretwin.contracts.foreign_bus import Arrived, ZenohForeignBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.simulation import MirrorSample, PlaneState
-from foretwin.telemetry.ros_parts import CONTROL, ODOMETRY, typestore
+from foretwin.telemetry.ros_messages.parts import CONTROL, ODOMETRY, typestore
 from tests.contracts.bus_sides import DEADLINE_S, python, take_until
 from tests.starvation import kept_waiting
 from tests.telemetry.ros2.gateway_ground import (

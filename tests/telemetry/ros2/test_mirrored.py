@@ -15,11 +15,16 @@ from foretwin.contracts.roles import Role
 from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
 from foretwin.contracts.towards_vehicle import Authority
 from foretwin.orchestrator.config import DriveConfig, VehicleBeside
-from foretwin.orchestrator.ros2_mapping import read_ros2
+from foretwin.orchestrator.drive.ros2_mapping import read_ros2
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import MappingError, parse_mapping
-from foretwin.telemetry.ros_parts import DETECTED_OBJECTS, PREDICTED_OBJECTS, typestore, yaw_of
+from foretwin.telemetry.ros_messages.parts import (
+    DETECTED_OBJECTS,
+    PREDICTED_OBJECTS,
+    typestore,
+    yaw_of,
+)
 from tests.telemetry.ros2.gateway_ground import RecordingForeign
 
 S = 10**9

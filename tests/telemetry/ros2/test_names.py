@@ -21,7 +21,7 @@ from foretwin.telemetry.ros2.names import (
     topic_tokens_key,
     type_hash,
 )
-from foretwin.telemetry.ros_definitions import DEFINITIONS
+from foretwin.telemetry.ros_messages.definitions import DEFINITIONS
 
 IMU = "sensor_msgs/msg/Imu"
 IMU_HASH = "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"

@@ -13,7 +13,13 @@ from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import parse_mapping
-from foretwin.telemetry.ros_parts import LANELET_ROUTE, header_from, point_from, ros_type, turn_from
+from foretwin.telemetry.ros_messages.parts import (
+    LANELET_ROUTE,
+    header_from,
+    point_from,
+    ros_type,
+    turn_from,
+)
 from tests.telemetry.ros2.gateway_ground import FRAME, RecordingForeign, cdr
 
 S = 10**9

@@ -16,7 +16,7 @@ from foretwin.contracts.bus import Mailbox, ZenohBus
 from foretwin.contracts.foreign_bus import Arrived, ZenohForeignBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
-from foretwin.telemetry.ros_parts import PREDICTED_OBJECTS, typestore
+from foretwin.telemetry.ros_messages.parts import PREDICTED_OBJECTS, typestore
 from tests.contracts.bus_sides import DEADLINE_S, python
 from tests.starvation import kept_waiting
 from tests.telemetry.ros2.gateway_ground import ROOT, gateway_process, mapping_text

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 from foretwin.contracts.world import World
 from foretwin.world_gen.build import build_world
-from foretwin.world_gen.build_graph import build_road_graph
-from foretwin.world_gen.find_intersections import find_intersections
-from foretwin.world_gen.intersections import Junction
-from foretwin.world_gen.map_index import index_map
-from foretwin.world_gen.read_osm import read_map
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 
 SEED = 20
 QUOTA = {

@@ -18,7 +18,7 @@ from foretwin.world_gen.export.geojson import write_geojson
 from foretwin.world_gen.export.picture_style import View
 from foretwin.world_gen.export.picture_traffic import draw_traffic
 from foretwin.world_gen.export.sdformat import write_sdf
-from foretwin.world_gen.report import report_of
+from foretwin.world_gen.report.report import report_of
 from tests.world_gen.export.lanelet2_file import written as written_lanelet2
 from tests.world_gen.export.test_opendrive import check_closed
 from tests.world_gen.export.test_opendrive import written as written_opendrive
