@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 import foretwin
 
 town = foretwin.open_map(sys.argv[1])
-junction = next(one for one in town.intersections if one.arms > 2)
+junction = next(one for one in town.intersections if one.kind == "crossing")
 world = town.world(junction.id)
 way = foretwin.ways_through(world)[0]
 car = foretwin.state_on(world, way, before_m=40.0)
