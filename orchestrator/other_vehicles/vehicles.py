@@ -22,7 +22,7 @@ from foretwin.orchestrator.other_vehicles.detected import DetectedBeside, moved_
 from foretwin.orchestrator.other_vehicles.live import LiveBeside
 from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, Source
 from foretwin.orchestrator.other_vehicles.recorded import LogBeside
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 SAME_WITHIN_M = 2.0
 """A detection whose centre is so near to that of a vehicle with telemetry of its own is it."""

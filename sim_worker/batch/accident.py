@@ -26,7 +26,7 @@ from foretwin.sim_worker.batch.accident_bodies import (
 )
 from foretwin.sim_worker.batch.accident_model import AccidentBatch, Crush, Impact
 from foretwin.sim_worker.batch.collision_detection import Indices, Touches
-from foretwin.sim_worker.vehicle.planar import base_from_cog, cog_from_base
+from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
 _STIFF, _STIFF_LOOK_S = Crush(400.0, 0.0005), 0.01
 _SOFT, _SOFT_LOOK_S = Crush(100.0, 0.0025), 0.025

@@ -21,7 +21,7 @@ from foretwin.geometry.rectangles import (
     overlapping,
     separations,
 )
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 Indices = npt.NDArray[np.intp]
 

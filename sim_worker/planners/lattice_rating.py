@@ -13,7 +13,7 @@ from foretwin.geometry.frenet_path import SPACING_M
 from foretwin.sim_worker.planner_interface import PlannerView
 from foretwin.sim_worker.planners.polynomials import Floats, Motions
 from foretwin.sim_worker.planners.prediction import Changes, courses
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 HORIZON_S, _INSTANTS = 4.0, 12
 _INSTANTS_S: Array = np.linspace(HORIZON_S / _INSTANTS, HORIZON_S, _INSTANTS)

@@ -28,7 +28,7 @@ from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.tracking import pure_pursuit, turning_speed
 from foretwin.sim_worker.vehicle import compiled
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import base_from_cog
+from foretwin.sim_worker.vehicle.reference_points import base_from_cog
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 from tests.sim_worker.places import crossroads, job, turning_path
 

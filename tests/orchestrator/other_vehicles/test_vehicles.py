@@ -27,7 +27,7 @@ from foretwin.orchestrator.drive.intake import Surroundings
 from foretwin.orchestrator.drive.plan import Beside
 from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.telemetry.logs.write_mcap import create
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
