@@ -12,7 +12,13 @@ import msgspec
 
 from contracts.errors import UserError
 from orchestrator.progress_bar import progress_bar
-from orchestrator.sweep.folder import FoundPlaces, SweepFolder, built_worlds, fingerprint_of
+from orchestrator.sweep.folder import (
+    FoundPlaces,
+    SweepFolder,
+    built_worlds,
+    fingerprint_of,
+    planner_origins,
+)
 from orchestrator.sweep.plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
 from orchestrator.sweep.play import PlaceQuestion, PlaySetup, failed_rows, start_worker
 from orchestrator.sweep.pool import Crew, Lost, Task
@@ -144,6 +150,7 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
     return {
         "complete": True,
         "spec": loaded.spec,
+        "planners": planner_origins(loaded.spec),
         "worlds": len(places.worlds),
         "jobs": len(plan.jobs),
         **counted.totals(),

@@ -11,9 +11,10 @@ import msgspec
 
 from contracts.errors import UserError
 from orchestrator.record.versions import versions
-from orchestrator.sweep.plan import WorldPlaces
+from orchestrator.sweep.plan import BACKWARDS_PLANNER, WorldPlaces
 from orchestrator.sweep.road_users import digest_of
-from orchestrator.sweep.spec import Loaded
+from orchestrator.sweep.spec import Loaded, SweepSpec
+from sim_worker.planners.registry import planner_origin
 from world_gen.build import GENERATOR_VERSION
 
 SUMMARY, PLAN, ROWS, WORLDS = "sweep.json", "places.msgpack", "rows", "worlds"
@@ -62,14 +63,16 @@ class SweepFolder:
             raise UserError(f"{summary}: is no summary of a sweep: {error}") from error
         if known != self.fingerprint:
             raise UserError(
-                f"--out {self.path}: holds a sweep of another spec, map or version; --fresh starts "
-                "anew, another --out keeps both"
+                f"--out {self.path}: holds a sweep of another spec, map, planner or version; "
+                "--fresh starts anew, another --out keeps both"
             )
 
     def begin(self, loaded: Loaded) -> None:
         """Note what the folder is for, where nothing is there yet."""
         if not (self.path / SUMMARY).is_file():
-            self.summarise({"complete": False, "spec": loaded.spec})
+            self.summarise(
+                {"complete": False, "spec": loaded.spec, "planners": planner_origins(loaded.spec)}
+            )
 
     def summarise(self, what: dict[str, Any]) -> dict[str, Any]:
         """Write the summary; returns the whole of it."""
@@ -107,6 +110,13 @@ def built_worlds(out: Path) -> Path:
     return out / WORLDS
 
 
+def planner_origins(spec: SweepSpec) -> dict[str, dict[str, str]]:
+    """Return what each planner of a sweep is made of, by name."""
+    # Egos that go backwards may be driven by one that the spec does not name.
+    names = sorted({*spec.planners, BACKWARDS_PLANNER})
+    return {name: planner_origin(name)._asdict() for name in names}
+
+
 def fingerprint_of(loaded: Loaded, source: str) -> str:
     """Return a hash of everything that decides the rows of a sweep."""
     # How long one waits for a job does not.
@@ -120,6 +130,7 @@ def fingerprint_of(loaded: Loaded, source: str) -> str:
         source,
         GENERATOR_VERSION,
         versions(),
+        planner_origins(loaded.spec),
     )
     return hashlib.sha256(msgspec.json.encode(parts)).hexdigest()
 

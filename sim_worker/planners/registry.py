@@ -8,7 +8,9 @@ without arguments that follows `sim_worker.planners.base.Planner`, or
 from __future__ import annotations
 
 import functools
-from importlib.metadata import entry_points
+import importlib.metadata
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 
 from sim_worker.planners.as_planned import AsPlanned
 from sim_worker.planners.base import Planner
@@ -16,6 +18,7 @@ from sim_worker.planners.constant_speed import ConstantSpeed
 from sim_worker.planners.frenet_lattice import FrenetLattice
 from sim_worker.planners.gap_acceptance import GapAcceptance
 from sim_worker.planners.hosted import HostedPlanner
+from sim_worker.planners.origin import PlannerOrigin, files_digest, origin_of
 from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from sim_worker.planners.remote import RemotePlanner
 from sim_worker.planners.reverse_pursuit import ReversePursuit
@@ -44,9 +47,13 @@ def load_planner(name: str) -> Planner:
     """Return the planner of that name; raises ValueError naming the known ones."""
     if name in _BUILT_IN:
         return _BUILT_IN[name]()
+    return HostedPlanner(name, _entry_point(name).value)
+
+
+def _entry_point(name: str) -> EntryPoint:
     for point in entry_points(group=GROUP):
         if point.name == name:
-            return HostedPlanner(name, point.value)
+            return point
     raise ValueError(f"unknown planner {name!r}; known: {', '.join(planner_names())}")
 
 
@@ -55,6 +62,15 @@ def check_planner(name: str) -> None:
     planner = load_planner.__wrapped__(name)
     if isinstance(planner, HostedPlanner):
         planner.close()
+
+
+def planner_origin(name: str) -> PlannerOrigin:
+    """Return what a planner is made of; raises ValueError naming the known ones."""
+    if name in _BUILT_IN:
+        # Those of foretwin share most of their modules: a change of one counts for all.
+        version = importlib.metadata.version("foretwin")
+        return PlannerOrigin("foretwin", version, files_digest([Path(__file__).parent]))
+    return origin_of(_entry_point(name))
 
 
 def drives_backwards(name: str) -> bool:
