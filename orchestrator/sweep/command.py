@@ -67,19 +67,20 @@ def crew_for(loaded: Loaded, out: Path, workers: int) -> Crew:
 
 def run_sweep(loaded: Loaded, out: Path, crew: Crew, *, fresh: bool = False) -> dict[str, Any]:
     """Play what is not yet played of a sweep, and return its summary as `sweep.json` has it."""
-    folder = SweepFolder(out, fingerprint_of(loaded, source_digest(loaded.spec)), fresh=fresh)
-    folder.begin(loaded)
-    places = folder.places() or _find_places(loaded, folder, crew)
-    plan = plan_sweep(loaded, places.worlds)
-    parts = Parts(folder.rows_dir, loaded.spec)
-    there = parts.done(plan.jobs)
-    started_s = time.monotonic()
-    _play([job for job in plan.jobs if job.number not in there], loaded, parts, crew)
-    return folder.summarise(
-        _summary(loaded, plan, places, parts)
-        | {"jobs_played": len(plan.jobs) - len(there),
-           "playing_s": round(time.monotonic() - started_s, 3)}
-    )  # fmt: skip
+    fingerprint = fingerprint_of(loaded, source_digest(loaded.spec))
+    with SweepFolder(out, fingerprint, fresh=fresh) as folder:
+        folder.begin(loaded)
+        places = folder.places() or _find_places(loaded, folder, crew)
+        plan = plan_sweep(loaded, places.worlds)
+        parts = Parts(folder.rows_dir, loaded.spec)
+        there = parts.done(plan.jobs)
+        started_s = time.monotonic()
+        _play([job for job in plan.jobs if job.number not in there], loaded, parts, crew)
+        return folder.summarise(
+            _summary(loaded, plan, places, parts)
+            | {"jobs_played": len(plan.jobs) - len(there),
+               "playing_s": round(time.monotonic() - started_s, 3)}
+        )  # fmt: skip
 
 
 def _find_places(loaded: Loaded, folder: SweepFolder, crew: Crew) -> FoundPlaces:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 
 from contracts.errors import UserError
 from orchestrator.record.versions import versions
+from orchestrator.sweep.lock import LOCK, folder_lock
 from orchestrator.sweep.plan import BACKWARDS_PLANNER, WorldPlaces
 from orchestrator.sweep.road_users import digest_of
 from orchestrator.sweep.spec import Loaded, SweepSpec
@@ -30,16 +32,30 @@ class FoundPlaces(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SweepFolder:
-    """One folder for one sweep; raises UserError where it holds something else."""
+    """One folder for one sweep, locked while it is entered.
+
+    Entering raises UserError where it holds something else or another process sweeps there.
+    """
 
     def __init__(self, path: Path, fingerprint: str, *, fresh: bool) -> None:
         self.path, self.fingerprint = path, fingerprint
-        if path.exists() and not path.is_dir():
-            raise UserError(f"--out {path}: is a file; a sweep writes into a folder")
-        if fresh:
-            _clear(path)
-        self._check()
-        self.worlds_dir.mkdir(parents=True, exist_ok=True)
+        self._fresh = fresh
+        self._held = ExitStack()
+
+    def __enter__(self) -> Self:
+        self._refuse_strangers()
+        self.path.mkdir(parents=True, exist_ok=True)
+        with ExitStack() as held:
+            held.enter_context(folder_lock(self.path))
+            if self._fresh:
+                _clear(self.path)
+            self._check()
+            self.worlds_dir.mkdir(exist_ok=True)
+            self._held = held.pop_all()
+        return self
+
+    def __exit__(self, *what: object) -> None:
+        self._held.close()
 
     @property
     def worlds_dir(self) -> Path:
@@ -51,11 +67,16 @@ class SweepFolder:
         """Return where the rows are."""
         return self.path / ROWS
 
+    def _refuse_strangers(self) -> None:
+        if self.path.exists() and not self.path.is_dir():
+            raise UserError(f"--out {self.path}: is a file; a sweep writes into a folder")
+        there = {entry.name for entry in self.path.iterdir()} if self.path.is_dir() else set()
+        if there and not {SUMMARY, LOCK} & there:
+            raise UserError(f"--out {self.path}: holds other files and no sweep")
+
     def _check(self) -> None:
         summary = self.path / SUMMARY
         if not summary.is_file():
-            if self.path.is_dir() and any(self.path.iterdir()):
-                raise UserError(f"--out {self.path}: holds other files and no sweep")
             return
         try:
             known = msgspec.json.decode(summary.read_bytes()).get("fingerprint")
