@@ -24,6 +24,8 @@ from sim_worker.planners.remote import RemotePlanner
 from sim_worker.planners.reverse_pursuit import ReversePursuit
 
 GROUP = "foretwin.planners"
+REMOTE = "remote"
+"""Of a worker on a bus alone: a driving stack in another process."""
 
 _BUILT_IN: dict[str, type[Planner]] = {
     "pure_pursuit_idm": PurePursuitIdm,
@@ -32,7 +34,7 @@ _BUILT_IN: dict[str, type[Planner]] = {
     "frenet_lattice": FrenetLattice,
     "as_planned": AsPlanned,
     "reverse_pursuit": ReversePursuit,
-    "remote": RemotePlanner,
+    REMOTE: RemotePlanner,
 }
 
 
