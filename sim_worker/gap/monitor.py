@@ -8,11 +8,11 @@ from typing import Any
 
 from contracts.drive import VehicleInfo, VehicleState
 from contracts.frames import LocalFrame
-from contracts.gap import GapAlarm, GapSample, Verdict
+from contracts.gap import ALARM_LIMITS_PER_S, GapAlarm, GapSample, Verdict
 from contracts.vehicle import VehicleParameters
 from sim_worker.gap.errors import HORIZONS_S, GapMeter
 from sim_worker.gap.free_run import FreeRunner
-from sim_worker.gap.limits import LIMITS_PER_S, GapLimits
+from sim_worker.gap.limits import GapLimits
 from sim_worker.gap.measured_motion import motion_on_grid
 from sim_worker.gap.verdict import Judge, without_manual_commands
 from sim_worker.motion_record import MotionRecorder
@@ -38,7 +38,7 @@ class GapMonitor:
         *,
         frame: LocalFrame,
         horizons_s: Sequence[float] = HORIZONS_S,
-        limits_per_s: Mapping[str, float] = LIMITS_PER_S,
+        limits_per_s: Mapping[str, float] = ALARM_LIMITS_PER_S,
     ) -> None:
         self._vehicle_id = info.vehicle_id
         self._frame = frame
