@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import msgspec
 
-from contracts.arrays import Array, Array32
-from contracts.drive import RoadUserKind, SignalState, VehicleState
-from contracts.scenario import Scenario
+from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
+from foretwin.contracts.scenario import Scenario
 
 STATE_COLUMNS = (
     "x_m", "y_m", "yaw_rad", "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2",

@@ -7,18 +7,18 @@ from typing import get_args
 
 import rerun as rr
 
-from contracts.gap import (
+from foretwin.contracts.gap import (
     ALARM_HORIZON_S,
     ALARM_LIMITS_PER_S,
     GapSample,
     Manoeuvre,
     Verdict,
 )
-from contracts.tuning import Identification, ParameterChange, ParameterEstimate
-from viewer.log_drive import LIMIT, PLAN
-from viewer.log_roles import REAL, TWIN
-from viewer.meshes import Colour
-from viewer.rows import Row, plain_text, static, table_cell
+from foretwin.contracts.tuning import Identification, ParameterChange, ParameterEstimate
+from foretwin.viewer.log_drive import LIMIT, PLAN
+from foretwin.viewer.log_roles import REAL, TWIN
+from foretwin.viewer.meshes import Colour
+from foretwin.viewer.rows import Row, plain_text, static, table_cell
 
 GAPS = {"across_m": 1.0, "along_m": 1.0, "yaw_deg": math.degrees(1.0)}
 _FIELDS = {"across_m": "across_m", "along_m": "along_m", "yaw_deg": "yaw_rad"}

@@ -10,14 +10,14 @@ from typing import Any, Self
 
 import msgspec
 
-from contracts.errors import UserError
-from orchestrator.record.versions import versions
-from orchestrator.sweep.lock import LOCK, folder_lock
-from orchestrator.sweep.plan import BACKWARDS_PLANNER, WorldPlaces
-from orchestrator.sweep.road_users import digest_of
-from orchestrator.sweep.spec import Loaded, SweepSpec
-from sim_worker.planners.registry import planner_origin
-from world_gen.build import GENERATOR_VERSION
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.record.versions import versions
+from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
+from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER, WorldPlaces
+from foretwin.orchestrator.sweep.road_users import digest_of
+from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec
+from foretwin.sim_worker.planners.registry import planner_origin
+from foretwin.world_gen.build import GENERATOR_VERSION
 
 SUMMARY, PLAN, ROWS, WORLDS = "sweep.json", "places.msgpack", "rows", "worlds"
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from contracts.errors import UserError
+from foretwin.contracts.errors import UserError
 
 LOCK = "sweep.lock"
 """Stays where it is: who removed it could remove another's."""

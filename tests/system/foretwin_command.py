@@ -49,7 +49,7 @@ def foretwin(out: Path, *arguments: str, timeout_s: float = 280.0) -> Finished:
 
 @contextmanager
 def started(
-    out: Path, *arguments: str, entry: tuple[str, str] = ("-m", "orchestrator")
+    out: Path, *arguments: str, entry: tuple[str, str] = ("-m", "foretwin")
 ) -> Iterator[subprocess.Popen[str]]:
     """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards.
 
@@ -59,7 +59,7 @@ def started(
     if "--tuning" not in arguments:
         arguments = (*arguments, "--tuning", "off")
     process = subprocess.Popen(
-        [sys.executable, *entry, "drive", "--view", "none", "--out", str(out),
+        [sys.executable, "-P", *entry, "drive", "--view", "none", "--out", str(out),
          *arguments],
         cwd=out.parent, env=environment(out.parent / "cache"), text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,

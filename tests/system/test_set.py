@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from contracts.errors import UserError
-from orchestrator.changes.command import newest_running
-from orchestrator.cli import EXIT_USER, run
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.commands.cli import EXIT_USER, run
+from foretwin.orchestrator.commands.set import newest_running
 from tests.system.foretwin_command import Finished, run_folder, started, wait_for
 
 HELD_AT_JOIN = """
 import sys, time
 from pathlib import Path
-from orchestrator.conductor import Conductor
+from foretwin.orchestrator.drive.conductor import Conductor
 
 join, folder = Conductor.join, Path.cwd()
 
@@ -27,7 +27,7 @@ def held(conductor):
     join(conductor)
 
 Conductor.join = held
-from orchestrator.__main__ import main
+from foretwin.__main__ import main
 
 sys.exit(main())
 """

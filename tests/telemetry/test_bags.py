@@ -12,12 +12,12 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame
-from telemetry.logs import LogError, open_log
-from telemetry.ros_motion import ros_from_state
-from telemetry.ros_objects import predicted_from_users
-from telemetry.ros_parts import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.ros_messages.motion import ros_from_state
+from foretwin.telemetry.ros_messages.objects import predicted_from_users
+from foretwin.telemetry.ros_messages.parts import (
     CONTROL_MODE_REPORT,
     GEAR_REPORT,
     NAV_SAT_FIX,
@@ -33,8 +33,8 @@ from telemetry.ros_parts import (
     twist_from,
     typestore,
 )
-from telemetry.ros_status import ros_from_signals
-from telemetry.ros_transforms import transform_message
+from foretwin.telemetry.ros_messages.status import ros_from_signals
+from foretwin.telemetry.ros_messages.transforms import transform_message
 from tests.telemetry import drive_messages
 from tests.telemetry.test_foreign_mcap import START_NS, ForeignFile, fix, velocity
 

@@ -14,13 +14,13 @@ from hypothesis import given, settings
 from mcap.reader import NonSeekingReader, make_reader
 from rosbags.highlevel import AnyReader
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.keys import TELEMETRY_CHANNELS
-from telemetry.logs import LogError, open_log
-from telemetry.logs.ros_log import read_drive
-from telemetry.mcap_file import create
-from telemetry.ros_messages import message_from, messages_from, written
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs.ros_log import read_drive
+from foretwin.telemetry.logs.write_mcap import create
+from foretwin.telemetry.ros_messages.table import message_from, messages_from, written
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix, VehicleState
-from contracts.frames import LocalFrame, local_from_geo, wrap_angle
-from telemetry.estimator import StateEstimator
-from telemetry.logs import open_log
-from telemetry.smoothing import SmoothedTrack, smooth_positions
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, wrap_angle
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.smoothing import SmoothedTrack, smooth_positions
+from foretwin.telemetry.logs import open_log
 
 pytestmark = pytest.mark.real_data
 END_NS = 262_000_000_000

@@ -8,12 +8,12 @@ from typing import Any
 import msgspec
 import pytest
 
-from contracts.gap import ALARM_HORIZON_S, GapSample
-from sim_worker.gap.limits import GapLimits
+from foretwin.contracts.gap import ALARM_HORIZON_S, GapSample
+from foretwin.sim_worker.analysis.gap.limits import GapLimits
+from foretwin.viewer.log_drive import DriveLog
+from foretwin.viewer.log_tuning import TuningLog
+from foretwin.viewer.rows import Row
 from tests.viewer import scene
-from viewer.log_drive import DriveLog
-from viewer.log_tuning import TuningLog
-from viewer.rows import Row
 
 QUIET = GapSample(
     vehicle_id="car", stamp_ns=1, horizon_s=ALARM_HORIZON_S, manoeuvre="curve", along_m=0.0,

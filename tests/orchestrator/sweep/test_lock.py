@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from contracts.errors import UserError
-from orchestrator.cli import run
-from orchestrator.sweep.lock import LOCK, folder_lock
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
 from tests.orchestrator.sweeps import small_sweep
 
 HOLDER = """
 import subprocess, sys
 from pathlib import Path
-from orchestrator.sweep.lock import folder_lock
+from foretwin.orchestrator.sweep.lock import folder_lock
 
 with folder_lock(Path(sys.argv[1])):
     child = subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"])

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from sim_worker.planners.origin import PlannerOrigin, files_digest
-from sim_worker.planners.registry import planner_names, planner_origin
+from foretwin.sim_worker.planners.origin import PlannerOrigin, files_digest
+from foretwin.sim_worker.planners.registry import planner_names, planner_origin
 from tests.sim_worker.planners.installed import install
 
 CODE = """

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from contracts.foreign_bus import Arrived
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.mailbox import Mailbox
-from contracts.setup import BusSetup, Ros2Setup, write_setup
-from telemetry.ros_parts import typestore
+from foretwin.contracts.foreign_bus import Arrived
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.setup import BusSetup, Ros2Setup, write_setup
+from foretwin.telemetry.ros_messages.parts import typestore
 
 ROOT = Path(__file__).resolve().parents[3]
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
@@ -108,7 +108,7 @@ def steering(stamp_ns: int, angle_rad: float) -> bytes:
 
 def antenna_at(forward_m: float, left_m: float, up_m: float) -> bytes:
     """Return a TFMessage that places the frame `gnss` in base_link."""
-    from telemetry.ros_transforms import transform_message
+    from foretwin.telemetry.ros_messages.transforms import transform_message
 
     place_m = (forward_m, left_m, up_m)
     message = transform_message(0, parent="base_link", child="gnss", place_m=place_m, yaw_rad=0.0)
@@ -181,7 +181,7 @@ def gateway_process(
         drive_frame=FRAME, towards_vehicle=flag,
     )  # fmt: skip
     write_setup(setup, file)
-    command = [sys.executable, "-m", "telemetry.ros2", "--setup", str(file)]
+    command = [sys.executable, "-m", "foretwin.telemetry.ros2", "--setup", str(file)]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
         try:
             yield process
