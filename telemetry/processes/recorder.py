@@ -24,7 +24,7 @@ from foretwin.contracts.keys import TELEMETRY_CHANNELS, alive_key
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
 from foretwin.telemetry.logs.write_mcap import create
-from foretwin.telemetry.processes.recording import SOURCE, Recording
+from foretwin.telemetry.processes.recording import SOURCE, DriveRecording
 from foretwin.telemetry.processes.vehicle_process import ORCHESTRATOR
 from foretwin.telemetry.processes.vehicle_process import main as process_main
 from foretwin.telemetry.ros_messages.parts import typestore
@@ -47,11 +47,11 @@ log = logging.getLogger("foretwin.telemetry.processes.recorder")
 
 
 class RecorderProcess:
-    """Carries messages from the bus to a Recording; `step` works a moment, `run` until the end."""
+    """Carries messages from the bus to a DriveRecording: `step` a moment, `run` until the end."""
 
     def __init__(
         self,
-        recording: Recording,
+        recording: DriveRecording,
         *,
         bus: Bus,
         run_id: str,
@@ -212,7 +212,7 @@ def record(setup: RecorderSetup) -> None:
     with ZenohBus(setup.bus) as bus:
         path = Path(setup.file)
         process = RecorderProcess(
-            Recording(lambda: create(path), name=path.name),
+            DriveRecording(lambda: create(path), name=path.name),
             bus=bus,
             run_id=setup.run_id,
             process_id=setup.process_id,
