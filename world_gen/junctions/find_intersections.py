@@ -65,7 +65,7 @@ def find_intersections(
     return tuple(found)
 
 
-class _Place(NamedTuple):
+class _JunctionDraft(NamedTuple):
     """A junction to be: its branchings, its roads and arms, all its graph nodes."""
 
     cluster: JunctionCluster
@@ -77,7 +77,7 @@ class _Place(NamedTuple):
 
 def _place(
     cluster: JunctionCluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph
-) -> _Place | None:
+) -> _JunctionDraft | None:
     """Return what meets at a cluster; None where no three roads do."""
     around = roads_of(cluster, roads, graph)
     if len(around.leaving) < 2 and cluster.ring is None:
@@ -89,11 +89,11 @@ def _place(
     if len(arms) < 3 and cluster.ring is None and not (mini and len(arms) == 2):
         return None
     between = [node for chain in around.inside for node in chain.inner_nodes]
-    return _Place(cluster, around, arms, mini, frozenset(cluster.nodes).union(between))
+    return _JunctionDraft(cluster, around, arms, mini, frozenset(cluster.nodes).union(between))
 
 
 def _junction(
-    place: _Place, centre: Array, lat_lon_deg: list[float], osm: OsmMap, graph: RoadGraph
+    place: _JunctionDraft, centre: Array, lat_lon_deg: list[float], osm: OsmMap, graph: RoadGraph
 ) -> Junction:
     cluster, around, arms, mini, nodes = place
     inner = {item.edge.index for chain in around.inside for item in chain.edges}
