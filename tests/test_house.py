@@ -20,7 +20,7 @@ TWICE = frozenset({
 def classes() -> dict[str, list[str]]:
     """Every class outside tests by its name: the files that define it, inner classes too."""
     found = defaultdict(list)
-    for path in tracked_files():
+    for path in sorted(set(tracked_files())):
         name = str(path.relative_to(ROOT))
         if path.suffix == ".py" and not name.startswith("tests/"):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
