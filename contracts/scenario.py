@@ -37,7 +37,7 @@ EGO = "ego"
 FAULTS = "faults"
 
 
-class Span(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Distribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What a number may be: one of `values`, or uniform from `min` to `max`, or, with `mean` and
     `std`, normal and cut to `min` and `max` where these are given."""
 
@@ -48,7 +48,7 @@ class Span(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     std: float | None = None
 
 
-Number = float | Span
+Number = float | Distribution
 """A number that is always the same, or one that differs from case to case."""
 
 

@@ -14,7 +14,7 @@ from foretwin.contracts.frames import GeoPoint, base_from_sensor
 from foretwin.telemetry.estimator.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
-from foretwin.telemetry.estimator.measured import Measured
+from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_corrections import STANDING_MPS, MotionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate
 from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
@@ -47,7 +47,7 @@ class MotionTrack:
         self._wheelbase_m = wheelbase_m
         self._lever = info.body_from_antenna_m or (0.0, 0.0, 0.0)
         self._gate = PositionGate()
-        self._measured = Measured(
+        self._measured = MotionSamples(
             steering_ratio=steering_ratio, steering_offset_rad=steering_offset_rad,
             skipped=self._gate.skipped,
         )  # fmt: skip

@@ -18,12 +18,12 @@ from foretwin.telemetry.estimator.kinematic_filter import (
     Y,
 )
 from foretwin.telemetry.estimator.map_aid import ALIKE_M
-from foretwin.telemetry.estimator.measured import Measured
+from foretwin.telemetry.estimator.measured import MotionSamples
 
 
 def moving_state(
     filter_: KinematicFilter,
-    measured: Measured,
+    measured: MotionSamples,
     *,
     vehicle_id: str,
     stamp_ns: int,
@@ -65,7 +65,7 @@ def moving_state(
 
 
 def unmoved_state(
-    measured: Measured,
+    measured: MotionSamples,
     *,
     vehicle_id: str,
     stamp_ns: int,

@@ -27,7 +27,7 @@ from foretwin.telemetry.logs.log import (
 from foretwin.telemetry.logs.map_origin import declared_of
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.logs.ros_bag import bag_recording
-from foretwin.telemetry.logs.ros_recording import Recording, decoder, mcap_recording
+from foretwin.telemetry.logs.ros_recording import RosRecording, decoder, mcap_recording
 from foretwin.telemetry.logs.write_mcap import FORMAT_METADATA, FRAME_METADATA, INFO_METADATA
 from foretwin.telemetry.ros_messages.table import (
     FRAME_TOPIC,
@@ -98,7 +98,7 @@ class _Told(NamedTuple):
         return msgspec.json.decode(self.frame_json, type=LocalFrame)
 
 
-def _open_own(recording: Recording, told: _Told) -> Log:
+def _open_own(recording: RosRecording, told: _Told) -> Log:
     path, contents = recording.path, recording.contents
     frame = told.frame()
     topics = {
@@ -144,7 +144,7 @@ def _open_own(recording: Recording, told: _Told) -> Log:
 
 
 def _own_samples(
-    recording: Recording,
+    recording: RosRecording,
     topics: set[str],
     decode: Decode,
     frame: LocalFrame | None,

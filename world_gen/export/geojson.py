@@ -24,7 +24,7 @@ Json = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class _Draft:
+class _FeatureDraft:
     """A feature whose rings (each (N, 2), in the World's frame) are still metres."""
 
     kind: str
@@ -76,7 +76,7 @@ def geojson_of(world: World) -> Json:
     }
 
 
-def _drafts(world: World) -> Iterable[_Draft]:
+def _drafts(world: World) -> Iterable[_FeatureDraft]:
     yield from _junctions(world)
     yield from _ways(world)
     yield from _control(world)
@@ -93,7 +93,7 @@ def _drafts(world: World) -> Iterable[_Draft]:
         yield _polygon("building", building.id, building.outline, building.holes, properties)
 
 
-def _junctions(world: World) -> Iterable[_Draft]:
+def _junctions(world: World) -> Iterable[_FeatureDraft]:
     for junction in world.junctions:
         summary = msgspec.to_builtins(junction.summary)
         properties = {
@@ -104,7 +104,7 @@ def _junctions(world: World) -> Iterable[_Draft]:
         }
         if junction.area is None:
             at = _local_point(world.frame, junction.summary.lat, junction.summary.lon)
-            yield _Draft("junction", junction.summary.id, "Point", (at,), properties)
+            yield _FeatureDraft("junction", junction.summary.id, "Point", (at,), properties)
         else:
             properties["area_source"] = junction.area.source
             yield _polygon(
@@ -113,7 +113,7 @@ def _junctions(world: World) -> Iterable[_Draft]:
             )  # fmt: skip
 
 
-def _ways(world: World) -> Iterable[_Draft]:
+def _ways(world: World) -> Iterable[_FeatureDraft]:
     for road in world.roads:
         yield _line(
             "road", road.id, road.reference_line,
@@ -152,7 +152,7 @@ def _ways(world: World) -> Iterable[_Draft]:
         )  # fmt: skip
 
 
-def _control(world: World) -> Iterable[_Draft]:
+def _control(world: World) -> Iterable[_FeatureDraft]:
     for line in world.stop_lines:
         properties = {
             "lane_id": line.lane_id, "connection_id": line.connection_id,
@@ -168,7 +168,7 @@ def _control(world: World) -> Iterable[_Draft]:
             },
         )  # fmt: skip
     for signal in world.signals:
-        yield _Draft(
+        yield _FeatureDraft(
             "signal", signal.id, "Point", (signal.position[None, :2],),
             {
                 "osm_node": signal.osm_node, "group_id": signal.group_id,
@@ -186,24 +186,24 @@ def _control(world: World) -> Iterable[_Draft]:
         if len(conflict.area) >= 3 and abs(_doubled_area(conflict.area)) > 1e-4:
             yield _polygon("conflict", name, conflict.area, (), properties)
         else:
-            yield _Draft("conflict", name, "Point", (conflict.point[None, :],), properties)
+            yield _FeatureDraft("conflict", name, "Point", (conflict.point[None, :],), properties)
 
 
 def _valued(name: str, value: Quantity | Choice) -> Json:
     return {name: value.value, f"{name}_source": value.source}
 
 
-def _line(kind: str, name: str, points: Array, properties: Json) -> _Draft:
-    return _Draft(kind, name, "LineString", (points,), properties)
+def _line(kind: str, name: str, points: Array, properties: Json) -> _FeatureDraft:
+    return _FeatureDraft(kind, name, "LineString", (points,), properties)
 
 
 def _polygon(
     kind: str, name: str, outline: Array, holes: Sequence[Array], properties: Json
-) -> _Draft:
+) -> _FeatureDraft:
     """Close the rings, counter-clockwise outside and clockwise inside (RFC 7946, section 3.1.6)."""
     rings = [_turned(outline, 1.0), *(_turned(hole, -1.0) for hole in holes)]
     closed = tuple(np.concatenate([ring, ring[:1]]) for ring in rings)
-    return _Draft(kind, name, "Polygon", closed, properties)
+    return _FeatureDraft(kind, name, "Polygon", closed, properties)
 
 
 def _turned(ring: Array, sign: float) -> Array:

@@ -12,9 +12,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.world import IntersectionSummary, JunctionKind
 from foretwin.world_gen.junctions.chains import CarRoads, car_roads
-from foretwin.world_gen.junctions.grouping import Cluster
+from foretwin.world_gen.junctions.grouping import JunctionCluster
 from foretwin.world_gen.junctions.intersections import Junction
-from foretwin.world_gen.junctions.junction_arms import Approach, ClusterRoads, approaches, roads_of
+from foretwin.world_gen.junctions.junction_arms import ArmChains, ClusterRoads, approaches, roads_of
 from foretwin.world_gen.junctions.junction_clusters import cluster_branchings
 from foretwin.world_gen.junctions.junction_control import control_of, lights_of
 from foretwin.world_gen.osm.osm_map import OsmMap
@@ -65,17 +65,19 @@ def find_intersections(
     return tuple(found)
 
 
-class _Place(NamedTuple):
+class _JunctionDraft(NamedTuple):
     """A junction to be: its branchings, its roads and arms, all its graph nodes."""
 
-    cluster: Cluster
+    cluster: JunctionCluster
     around: ClusterRoads
-    arms: tuple[Approach, ...]
+    arms: tuple[ArmChains, ...]
     mini: bool
     nodes: frozenset[int]
 
 
-def _place(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) -> _Place | None:
+def _place(
+    cluster: JunctionCluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph
+) -> _JunctionDraft | None:
     """Return what meets at a cluster; None where no three roads do."""
     around = roads_of(cluster, roads, graph)
     if len(around.leaving) < 2 and cluster.ring is None:
@@ -87,11 +89,11 @@ def _place(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) -> 
     if len(arms) < 3 and cluster.ring is None and not (mini and len(arms) == 2):
         return None
     between = [node for chain in around.inside for node in chain.inner_nodes]
-    return _Place(cluster, around, arms, mini, frozenset(cluster.nodes).union(between))
+    return _JunctionDraft(cluster, around, arms, mini, frozenset(cluster.nodes).union(between))
 
 
 def _junction(
-    place: _Place, centre: Array, lat_lon_deg: list[float], osm: OsmMap, graph: RoadGraph
+    place: _JunctionDraft, centre: Array, lat_lon_deg: list[float], osm: OsmMap, graph: RoadGraph
 ) -> Junction:
     cluster, around, arms, mini, nodes = place
     inner = {item.edge.index for chain in around.inside for item in chain.edges}
@@ -132,7 +134,7 @@ def _junction(
     )
 
 
-def _centre_xy_m(cluster: Cluster, graph: RoadGraph) -> tuple[float, float]:
+def _centre_xy_m(cluster: JunctionCluster, graph: RoadGraph) -> tuple[float, float]:
     """Return the mean of the core nodes, of a ring the middle of its line."""
     if cluster.ring is None:
         points = [graph.node_xy_m[node] for node in sorted(cluster.core)]
@@ -146,7 +148,7 @@ def _centre_xy_m(cluster: Cluster, graph: RoadGraph) -> tuple[float, float]:
     return float(centre[0]), float(centre[1])
 
 
-def _kind(cluster: Cluster, arms: tuple[Approach, ...], mini: bool) -> JunctionKind:
+def _kind(cluster: JunctionCluster, arms: tuple[ArmChains, ...], mini: bool) -> JunctionKind:
     if cluster.ring is not None:
         return "roundabout" if cluster.ring.kind == "roundabout" else "circular"
     if mini:
@@ -160,7 +162,7 @@ def _kind(cluster: Cluster, arms: tuple[Approach, ...], mini: bool) -> JunctionK
     return "crossing" if len(arms) > 4 else "other"
 
 
-def _is_merge(arms: tuple[Approach, ...]) -> bool:
+def _is_merge(arms: tuple[ArmChains, ...]) -> bool:
     """Tell whether one-way roads join to one, or one parts, without a turn."""
     if len(arms) != 3 or any(len(item.chains) != 1 for item in arms):
         return False
@@ -176,7 +178,7 @@ def _is_merge(arms: tuple[Approach, ...]) -> bool:
     return abs(math.remainder(a - b, math.tau)) <= MERGE_RAD
 
 
-def _has_through_road(arms: tuple[Approach, ...]) -> bool:
+def _has_through_road(arms: tuple[ArmChains, ...]) -> bool:
     """Tell whether one of three roads meets the other two from the side, as a stem does."""
     for stem in range(3):
         a, b = (arms[i].arm.bearing_rad for i in range(3) if i != stem)
@@ -187,7 +189,7 @@ def _has_through_road(arms: tuple[Approach, ...]) -> bool:
     return False
 
 
-def _is_staggered(arms: tuple[Approach, ...]) -> bool:
+def _is_staggered(arms: tuple[ArmChains, ...]) -> bool:
     """Tell whether a road of four does not go straight on, but meets the other with an offset."""
     pairings = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
 
@@ -206,7 +208,7 @@ def _is_staggered(arms: tuple[Approach, ...]) -> bool:
     return False
 
 
-def _name(cluster: Cluster, arms: tuple[Approach, ...], around: ClusterRoads) -> str:
+def _name(cluster: JunctionCluster, arms: tuple[ArmChains, ...], around: ClusterRoads) -> str:
     """Return the ring's own name, else the names of the roads that meet."""
     names = dict.fromkeys(item.arm.name for item in arms if item.arm.name)
     if cluster.ring is not None:

@@ -50,7 +50,7 @@ class _Ways(NamedTuple):
         )  # fmt: skip
 
 
-class _Cells(NamedTuple):
+class _CellContents(NamedTuple):
     ways: _Ways
     nodes: NodePositions
     node_texts: list[str]
@@ -129,7 +129,9 @@ def _unpacked(body: bytes) -> _Ways:
     )  # fmt: skip
 
 
-def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagReader) -> _Cells:
+def _read(
+    tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagReader
+) -> _CellContents:
     ways: list[_Ways] = []
     nodes: list[NodePositions] = []
     node_texts: list[str] = []
@@ -148,7 +150,7 @@ def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagRe
         elif kind == NOTES:
             lat, lon, words = unpack(body, str).split(" ", 2)
             note_places[words] = (int(lat) / UNITS_PER_DEG, int(lon) / UNITS_PER_DEG)
-    return _Cells(
+    return _CellContents(
         _joined(ways), NodePositions(*_columns(nodes, 3)), node_texts, relations, note_places
     )
 

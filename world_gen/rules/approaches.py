@@ -77,7 +77,7 @@ class Approach(msgspec.Struct, kw_only=True):
         return self.toward.edge.index, self.toward.reverse
 
 
-class _Draft(msgspec.Struct, frozen=True, kw_only=True):
+class _ApproachDraft(msgspec.Struct, frozen=True, kw_only=True):
     """What is known of an approach before the junction's roads are compared."""
 
     cluster: Cluster
@@ -117,7 +117,7 @@ def approaches(
         for leg in cluster.legs
     }
     whole = {id(junction) for junction in around.junctions}
-    drafts: dict[str, list[_Draft]] = {}
+    drafts: dict[str, list[_ApproachDraft]] = {}
     behind: dict[str, list[tuple[int, DirectedEdge]]] = {}
     for cluster in around.clusters:
         junction = cluster.junction
@@ -152,7 +152,7 @@ def approaches(
                     and m.node not in junction_lights
                 ]
             drafts.setdefault(junction.summary.id, []).append(
-                _Draft(
+                _ApproachDraft(
                     cluster=cluster,
                     toward=toward,
                     met=met,
@@ -190,7 +190,7 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
         ahead.signal_nodes = (*ahead.signal_nodes, node)
 
 
-def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
+def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approach]:
     junction = drafts[0].cluster.junction
     assert junction is not None
     kind, control = junction.summary.kind, junction.summary.control
@@ -241,7 +241,7 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
     return found
 
 
-def _for_all(drafts: list[_Draft]) -> bool:
+def _for_all(drafts: list[_ApproachDraft]) -> bool:
     """Return whether lights stop every road in, not only those who would hit pedestrians.
 
     A single light that is tagged on a crossing before the junction serves that crossing.
@@ -254,7 +254,7 @@ def _for_all(drafts: list[_Draft]) -> bool:
     )
 
 
-def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> Approach:
+def _approach(d: _ApproachDraft, standing: Standing, signalled: bool, for_all: bool) -> Approach:
     inside = d.sign is None and d.sign_inside is not None
     sign_nearer = (inside or d.sign is not None) and not d.lights
     if signalled and (d.lights or (for_all and not sign_nearer and standing.rank > Rank.YARD)):

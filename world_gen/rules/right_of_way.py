@@ -55,7 +55,7 @@ class Answer(NamedTuple):
     source: Provenance
 
 
-class Way(msgspec.Struct, kw_only=True):
+class ConnectionFacts(msgspec.Struct, kw_only=True):
     """What the rules ask about one connection."""
 
     id: str
@@ -145,7 +145,7 @@ def _ways(
     found: Sequence[Approach],
     signs: SignsInside,
     driving_side: DrivingSide,
-) -> list[Way]:
+) -> list[ConnectionFacts]:
     by_road: dict[tuple[int, bool], Approach] = {item.key: item for item in found}
     near = "right" if driving_side == "right" else "left"
     weight: Mapping[str, int] = {"straight": 0, near: 1, "u_turn": 3}
@@ -174,7 +174,7 @@ def _ways(
         kind = junction.summary.kind if junction is not None else "other"
         sign = next(iter(signs.get(c.id, ())), None)
         ways.append(
-            Way(
+            ConnectionFacts(
                 id=c.id,
                 turn_weight=weight.get(c.turn, 2),
                 on_the_spot=c.turn == "u_turn" and not c.movement.inside,
@@ -211,8 +211,8 @@ def _runs_along_main(
 
 
 def _answer(
-    a: Way,
-    b: Way,
+    a: ConnectionFacts,
+    b: ConnectionFacts,
     standing: tuple[Standing, Standing],
     angle: float,
     crossing: bool,
@@ -261,7 +261,7 @@ def _answer(
     return _beside(a, b)
 
 
-def _standing_at(way: Way, area: Array, point: Array, merging: bool) -> Standing:
+def _standing_at(way: ConnectionFacts, area: Array, point: Array, merging: bool) -> Standing:
     """Return the standing with which a path comes to the ground that it shares with another."""
     if way.sign is None or way.standing.rank < way.sign.rank:
         return way.standing
@@ -273,7 +273,7 @@ def _standing_at(way: Way, area: Array, point: Array, merging: bool) -> Standing
     return way.sign if reached_m > way.sign_m else way.standing
 
 
-def _passes(mover: Way, waiting: Way, driving_side: DrivingSide) -> bool:
+def _passes(mover: ConnectionFacts, waiting: ConnectionFacts, driving_side: DrivingSide) -> bool:
     """Return whether a driver on a mini-roundabout passes another one's entry."""
     turn = 1.0 if driving_side == "right" else -1.0
     entry = mover.heading + math.pi
@@ -282,13 +282,13 @@ def _passes(mover: Way, waiting: Way, driving_side: DrivingSide) -> bool:
     return 1e-3 < to_waiting < to_exit - 1e-3
 
 
-def _across(a: Way, b: Way) -> Answer:
+def _across(a: ConnectionFacts, b: ConnectionFacts) -> Answer:
     if a.turn_weight != b.turn_weight:
         return Answer(a.turn_weight > b.turn_weight, "turn_across", "inferred")
     return Answer(a.id > b.id, "turn_across" if a.turn_weight else "order", "default")
 
 
-def _beside(a: Way, b: Way) -> Answer:
+def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Answer:
     if a.turn_weight != b.turn_weight:
         return Answer(a.turn_weight > b.turn_weight, "merge_order", "inferred")
     if abs(a.bend_rad - b.bend_rad) > math.radians(1.0):
