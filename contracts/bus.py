@@ -1,7 +1,6 @@
 """The bus: publish, subscribe, ask, serve and watch over Zenoh.
 
-What arrives lands in a `contracts.mailbox.Mailbox`; `contracts.memory_bus` is the same without a
-network.
+What arrives lands in a `contracts.mailbox.Mailbox`.
 """
 
 from __future__ import annotations

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 from contracts.bus import Bus, Mailbox, Received, Request, ZenohBus
 from contracts.drive import SpeedSample
-from contracts.memory_bus import MemoryBus
 from contracts.ports import free_endpoint
 from contracts.setup import BusSetup
 from contracts.simulation import PrepareRequest
+from tests.contracts.memory_bus import MemoryBus
 
 DEADLINE_S = 120.0
 """Long: it costs nothing where all goes well, and a busy machine is no fault of the code."""

@@ -15,7 +15,6 @@ from contracts.frames import local_from_geo, local_from_geo_yaw
 from contracts.futures import FuturesJob, FuturesResult, Outcome, Trajectory
 from contracts.keys import alive_key
 from contracts.mailbox import Mailbox, Request
-from contracts.memory_bus import MemoryBus
 from contracts.simulation import BuildReply, BuildRequest, PrepareReply, PrepareRequest
 from contracts.world import World
 from orchestrator.conductor import Conductor
@@ -23,6 +22,7 @@ from orchestrator.mission import Mission, MissionSettings
 from orchestrator.plan import DrivePlan
 from orchestrator.record.results import ResultTables
 from orchestrator.way.way_ahead import WayAhead
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.futures_rounds import nobody
 from tests.orchestrator.trip import START_NS, states_along, town, town_line, town_plan, town_world
 from world_gen.world_store import WorldStore

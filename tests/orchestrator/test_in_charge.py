@@ -10,12 +10,12 @@ import msgspec
 import pytest
 
 from contracts.bus import Mailbox
-from contracts.memory_bus import MemoryBus
 from contracts.setup import Ros2Setup
 from orchestrator.in_charge import InCharge
 from orchestrator.plan import DrivePlan
 from orchestrator.processes import PROCESSES
 from telemetry.ros2.mapping import AUTOWARE, MappingFile, parse_mapping
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.trip import town_plan
 
 

@@ -8,8 +8,8 @@ import pytest
 from contracts.codec import SchemaMismatch, encode
 from contracts.drive import DriveEnd, GnssFix, PlannedTrajectory
 from contracts.mailbox import Mailbox, Received
-from contracts.memory_bus import MemoryBus
 from orchestrator.intake import Intake
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
 

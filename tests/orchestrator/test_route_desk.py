@@ -15,12 +15,12 @@ import pytest
 from contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
 from contracts.frames import geo_from_local
 from contracts.mailbox import Mailbox
-from contracts.memory_bus import MemoryBus
 from orchestrator.config import ConfigError, DriveConfig
 from orchestrator.ros2_mapping import read_ros2
 from orchestrator.route_desk import RouteDesk
 from orchestrator.way.route import Route
 from telemetry.ros2.mapping import AUTOWARE, MappingError
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.grid_map import FRAME
 from tests.orchestrator.trip import town_plan
 from tests.orchestrator.way.test_route_to_goal import EAST, NORTH, TOWN, degrees, pose

@@ -17,12 +17,12 @@ from contracts.drive import (
     VehicleInfo,
 )
 from contracts.frames import GeoPoint, geo_from_local
-from contracts.memory_bus import MemoryBus
 from contracts.setup import BusSetup, WorkerSetup
 from contracts.simulation import MirrorSample
 from sim_worker.mirror_process import MirrorWorker
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.estimator import StateEstimator
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.places import FRAME
 
 S = 1_000_000_000

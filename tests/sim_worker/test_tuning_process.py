@@ -12,7 +12,6 @@ import pytest
 from contracts.bus import Mailbox, Received, Reply, Request
 from contracts.gap import GapSample
 from contracts.mailbox import Item
-from contracts.memory_bus import MemoryBus
 from contracts.setup import BusSetup, TuningSetup
 from contracts.tuning import TuneReply, TuneRequest, UseVehicle
 from contracts.vehicle import VehicleParameters
@@ -22,6 +21,7 @@ from sim_worker.tuning_process import TuningWorker
 from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.estimator import StateEstimator
 from telemetry.standin.source import START_STAMP_NS
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
 from tests.telemetry.city_drive import city_drive
 from tests.telemetry.standin_drive import FRAME

@@ -16,7 +16,6 @@ from contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus, ask
 from contracts.codec import write_message
 from contracts.drive import ControlCommand
 from contracts.keys import alive_key
-from contracts.memory_bus import MemoryBus
 from contracts.ports import free_endpoint
 from contracts.process import ProcessLife
 from contracts.setup import BusSetup, WorkerSetup, write_setup
@@ -29,6 +28,7 @@ from sim_worker.variants import plan_variants
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.worker import StageCache, serve_futures
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
 from tests.sim_worker.places import FRAME, crossroads, job, state_at
 from tests.starvation import unhindered_wait_s

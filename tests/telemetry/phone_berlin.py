@@ -23,8 +23,8 @@ from contracts.frames import GeoPoint, geo_from_local, local_from_geo, local_fro
 from orchestrator.way.way_ahead import WayAhead
 from telemetry.logs.opening import open_log
 from telemetry.motion_track import MotionTrack
-from telemetry.smoothing import SmoothedTrack, smooth_positions
 from tests.telemetry.phone_figures import Errors
+from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 from tests.telemetry.town_map import MapSeer
 from world_gen.build_graph import build_road_graph
 from world_gen.read_osm import read_map

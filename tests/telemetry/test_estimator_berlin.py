@@ -14,7 +14,7 @@ from contracts.drive import GnssFix, VehicleState
 from contracts.frames import LocalFrame, local_from_geo, wrap_angle
 from telemetry.estimator import StateEstimator
 from telemetry.logs import open_log
-from telemetry.smoothing import SmoothedTrack, smooth_positions
+from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 
 pytestmark = pytest.mark.real_data
 END_NS = 262_000_000_000

@@ -13,8 +13,8 @@ from contracts.drive import VehicleState
 from contracts.frames import LocalFrame, local_from_geo, wrap_angle
 from telemetry.estimator import StateEstimator
 from telemetry.logs import Log, open_log
-from telemetry.smoothing import SmoothedTrack, smooth_positions
 from tests.telemetry.estimator_figures import boreas
+from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 
 pytestmark = pytest.mark.real_data
 DECLARATIONS = Path(__file__).parents[1] / "data" / "declarations"

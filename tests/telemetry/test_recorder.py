@@ -16,7 +16,6 @@ import pytest
 from contracts.bus import Alive, Mailbox, Received, ZenohBus
 from contracts.drive import SpeedSample
 from contracts.keys import alive_key
-from contracts.memory_bus import MemoryBus
 from contracts.ports import free_endpoint
 from contracts.setup import BusSetup, RecorderSetup, write_setup
 from contracts.simulation import RunEnd
@@ -26,6 +25,7 @@ from telemetry.mcap_file import DriveWriter, create
 from telemetry.recorder import RecorderProcess
 from telemetry.recording import Recording
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.contracts.memory_bus import MemoryBus
 from tests.starvation import unhindered_wait_s
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 

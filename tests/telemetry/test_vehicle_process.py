@@ -7,10 +7,10 @@ import pytest
 from contracts.bus import Mailbox, Received, Reply
 from contracts.drive import AdvanceReply, AdvanceRequest, DriveEnd, InfoRequest, VehicleInfo
 from contracts.keys import alive_key
-from contracts.memory_bus import MemoryBus
 from contracts.simulation import RunEnd
 from telemetry.replay import ReplaySource
 from telemetry.vehicle_process import VehicleProcess
+from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.test_replay import SECOND_NS, START_NS, RecordedMinute
 
 ORCHESTRATOR = alive_key(run="r", process="orchestrator")

@@ -16,6 +16,7 @@ import pytest
 from contracts.frames import local_from_geo
 from contracts.world import World
 from tests.world_gen.test_real_maps import MAPS
+from tests.world_gen.traffic_lights import TrafficLight, traffic_lights
 from world_gen.build import build_region, build_world
 from world_gen.build_graph import build_road_graph
 from world_gen.find_intersections import find_intersections
@@ -24,7 +25,6 @@ from world_gen.map_index import index_map
 from world_gen.osm_map import LatLonBounds, OsmMap
 from world_gen.read_osm import read_map
 from world_gen.road_graph import RoadGraph
-from world_gen.traffic_lights import TrafficLight, traffic_lights
 
 pytestmark = [pytest.mark.real_data, pytest.mark.judge]
 

@@ -20,7 +20,6 @@ from contracts.drive import (
 )
 from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from contracts.mailbox import Mailbox
-from contracts.memory_bus import MemoryBus
 from contracts.roles import OtherVehicles, Role
 from orchestrator.beside.vehicles import VehiclesBeside
 from orchestrator.config import VehicleBeside
@@ -29,6 +28,7 @@ from orchestrator.plan import Beside
 from sim_worker.vehicle.parameters import load_vehicle
 from sim_worker.vehicle.planar import box_centre_from_base_m
 from telemetry.mcap_file import create
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
 

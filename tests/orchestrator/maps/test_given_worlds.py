@@ -10,7 +10,6 @@ import msgspec
 import pytest
 
 from contracts.errors import UserError
-from contracts.memory_bus import MemoryBus
 from contracts.simulation import BuildReply, BuildRequest
 from contracts.world import World
 from orchestrator.config import DriveConfig
@@ -18,6 +17,7 @@ from orchestrator.maps.given_worlds import check_given_worlds, read_given_worlds
 from orchestrator.plan import read_inputs
 from orchestrator.processes import PROCESSES
 from orchestrator.world_builder import serve_builds
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.trip import town, town_plan, town_world
 from world_gen.build import with_id
 from world_gen.world_store import WorldStore

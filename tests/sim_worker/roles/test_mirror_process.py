@@ -8,7 +8,6 @@ import msgspec
 import pytest
 
 from contracts.mailbox import Mailbox, Received, Request
-from contracts.memory_bus import MemoryBus
 from contracts.roles import (
     CastVehicle,
     MirrorCast,
@@ -20,6 +19,7 @@ from contracts.setup import BusSetup, WorkerSetup
 from contracts.simulation import MirrorSample
 from sim_worker.mirror_process import MirrorWorker
 from sim_worker.vehicle.parameters import load_vehicle
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.places import FRAME, state_at
 
 VAN = CastVehicle(vehicle_id="van", vehicle=load_vehicle("vw_vanagon"))

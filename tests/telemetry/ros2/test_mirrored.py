@@ -10,7 +10,6 @@ import pytest
 
 from contracts.drive import VehicleState
 from contracts.frames import GeoPoint, LocalFrame
-from contracts.memory_bus import MemoryBus
 from contracts.roles import Role
 from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
 from contracts.towards_vehicle import Authority
@@ -20,6 +19,7 @@ from sim_worker.vehicle.parameters import load_vehicle
 from telemetry.ros2.gateway import Gateway
 from telemetry.ros2.mapping import MappingError, parse_mapping
 from telemetry.ros_parts import DETECTED_OBJECTS, PREDICTED_OBJECTS, typestore, yaw_of
+from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import RecordingForeign
 
 S = 10**9

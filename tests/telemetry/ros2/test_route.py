@@ -10,10 +10,10 @@ import pytest
 from contracts.bus import Mailbox
 from contracts.drive import RouteToGoal
 from contracts.frames import local_from_geo
-from contracts.memory_bus import MemoryBus
 from telemetry.ros2.gateway import Gateway
 from telemetry.ros2.mapping import parse_mapping
 from telemetry.ros_parts import LANELET_ROUTE, header_from, point_from, ros_type, turn_from
+from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import FRAME, RecordingForeign, cdr
 
 S = 10**9
