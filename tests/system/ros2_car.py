@@ -13,9 +13,9 @@ from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_ge
 from contracts.mailbox import Mailbox
 from orchestrator.plan import EMBEDDED_ROUTE
 from telemetry.logs import read_line
-from telemetry.ros_commands import velocity_report
 from telemetry.ros_parts import STEERING_REPORT, VELOCITY_REPORT, ros_type, time_from, typestore
 from telemetry.ros_sensors import ros_from_gnss
+from tests.telemetry.autoware_messages import velocity_report
 
 SPEED_MPS = 8.0
 REPORT_EVERY_S = 0.02

@@ -33,9 +33,8 @@ from telemetry.ros_parts import (
     twist_from,
     typestore,
 )
-from telemetry.ros_status import ros_from_signals
-from telemetry.ros_transforms import transform_message
 from tests.telemetry import drive_messages
+from tests.telemetry.autoware_messages import ros_from_signals, transform_message
 from tests.telemetry.test_foreign_mcap import START_NS, ForeignFile, fix, velocity
 
 MS = 10**6

@@ -18,10 +18,10 @@ from contracts import drive
 from contracts.frames import GeoPoint, LocalFrame
 from contracts.keys import TELEMETRY_CHANNELS
 from telemetry.logs import LogError, open_log
-from telemetry.logs.ros_log import read_drive
 from telemetry.mcap_file import create
-from telemetry.ros_messages import message_from, messages_from, written
+from telemetry.ros_messages import messages_from, written
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples
+from tests.telemetry.own_recordings import message_from, read_drive
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 

@@ -20,7 +20,6 @@ from contracts.ports import free_endpoint
 from contracts.setup import BusSetup, RecorderSetup, write_setup
 from contracts.simulation import RunEnd
 from telemetry.logs import open_log
-from telemetry.logs.ros_log import read_drive
 from telemetry.mcap_file import DriveWriter, create
 from telemetry.recorder import RecorderProcess
 from telemetry.recording import Recording
@@ -28,6 +27,7 @@ from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.memory_bus import MemoryBus
 from tests.starvation import unhindered_wait_s
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
+from tests.telemetry.own_recordings import read_drive
 
 ORCHESTRATOR = alive_key(run="r1", process="orchestrator")
 RECORDER = alive_key(run="r1", process="recorder")

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from contracts.drive import ImuSample, SpeedSample
-from telemetry.logs.ros_log import read_drive
 from telemetry.mcap_file import DriveWriter, create
 from telemetry.recording import Recording
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
+from tests.telemetry.own_recordings import read_drive
 
 
 class SmallDisk(io.BytesIO):
