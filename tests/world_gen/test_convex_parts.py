@@ -12,9 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
-from world_gen.convex_parts import COLLISION_TOLERANCE_M, convex_cover, convex_parts
+from world_gen.convex_parts import COLLISION_TOLERANCE_M, convex_cover
 
 L_SHAPE = np.array([[0, 0], [20, 0], [20, 6], [6, 6], [6, 20], [0, 20]], dtype=np.float64)
+
+
+def convex_parts(outline: np.ndarray, holes: tuple[np.ndarray, ...] = ()) -> list[np.ndarray]:
+    return convex_cover([(outline, holes)]).rings
 
 
 def _area(parts: list[np.ndarray]) -> float:
