@@ -14,7 +14,7 @@ from contracts.gap import GapAlarm, GapSample, Verdict
 from contracts.process import ProcessLife, run_process
 from contracts.setup import TuningSetup
 from contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
-from sim_worker.tuning import VehicleWatch
+from sim_worker.tuning import SAMPLES, VehicleWatch
 
 _DEPTH = 16384
 _IDLE_S = 0.2
@@ -26,7 +26,7 @@ _ASK_EVERY = 2000
 """Samples between two questions to a vehicle that has not said what it is."""
 _UNANNOUNCED_AFTER = 4000
 """Samples after which a vehicle that does not answer is taken as it is."""
-_CHANNELS = ("gnss", "imu", "speed", "heading", "steering", "control", "status", "state")
+_CHANNELS = (*SAMPLES, "state")
 """In the order in which messages with one stamp are taken."""
 _FINDINGS: dict[type, str] = {
     Identification: "identification", GapSample: "gap", GapAlarm: "gap_alarm", Verdict: "verdict",

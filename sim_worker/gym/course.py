@@ -28,7 +28,6 @@ from sim_worker.gym.rows import EpisodeRows, Flags, StepFacts
 from sim_worker.play import Rows
 from sim_worker.vehicle.parameters import load_vehicle
 
-KINDS = ("scenario", "job", "states")
 CASE = "case"
 
 
