@@ -1,6 +1,6 @@
 """The bus: publish, subscribe, ask, serve and watch over Zenoh.
 
-What arrives lands in a `contracts.mailbox.Mailbox`.
+What arrives lands in a `foretwin.contracts.mailbox.Mailbox`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any, Protocol, Self
 
 import msgspec
 
-from contracts.codec import decode, encode
-from contracts.keys import CHANNELS, Qos
-from contracts.keys import key as channel_key
-from contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
-from contracts.setup import BusSetup
+from foretwin.contracts.codec import decode, encode
+from foretwin.contracts.keys import CHANNELS, Qos
+from foretwin.contracts.keys import key as channel_key
+from foretwin.contracts.mailbox import Alive, Item, Mailbox, Received, Reply, Request
+from foretwin.contracts.setup import BusSetup
 
 __all__ = [
     "Alive",
@@ -51,7 +51,7 @@ class BusUnreachable(ConnectionError):  # noqa: N818
 
 
 class Bus(Protocol):
-    """What processes need of a bus; `ids` are those of `contracts.keys.key`."""
+    """What processes need of a bus; `ids` are those of `foretwin.contracts.keys.key`."""
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
         """Send one message; never raises for a lost link."""

@@ -13,7 +13,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import msgspec
 import numpy as np
 
-from contracts.arrays import array_from_wire, array_to_wire
+from foretwin.contracts.arrays import array_from_wire, array_to_wire
 
 SCHEMA_VERSION = 2
 MAGIC = b"FTw1"

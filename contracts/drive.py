@@ -10,8 +10,8 @@ from typing import Literal
 
 import msgspec
 
-from contracts.arrays import Array
-from contracts.frames import GeoPoint
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint
 
 TimeBase = Literal["utc", "boot", "log"]
 ControlMode = Literal["manual", "autonomous", "unknown"]

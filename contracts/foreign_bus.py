@@ -1,6 +1,6 @@
 """Keys of others on Zenoh: raw bytes with attachments, and liveliness tokens that are not ours.
 
-The rules are those of `contracts.bus`: what arrives lands in a Mailbox, no work on the bus's
+The rules are those of `bus`: what arrives lands in a Mailbox, no work on the bus's
 threads, use it as a context manager.
 """
 
@@ -9,9 +9,9 @@ from __future__ import annotations
 import time
 from typing import Any, NamedTuple, Protocol
 
-from contracts.bus import ZenohSession
-from contracts.mailbox import Mailbox
-from contracts.setup import BusSetup
+from foretwin.contracts.bus import ZenohSession
+from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.setup import BusSetup
 
 
 class Arrived(NamedTuple):

@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 import pyproj
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 
 class GeoPoint(msgspec.Struct, frozen=True):

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import msgspec
 
-from contracts.arrays import Array, Array32
-from contracts.drive import RoadUserKind, SignalState, VehicleState
-from contracts.scenario import Scenario
+from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
+from foretwin.contracts.scenario import Scenario
 
 STATE_COLUMNS = (
     "x_m", "y_m", "yaw_rad", "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2",
@@ -47,7 +47,7 @@ class Variant(msgspec.Struct, frozen=True, kw_only=True):
     """One alternative future: what differs from the nominal one (index 0).
 
     With `scenario_id`, one of the job's scenarios happens in it: `values` are its numbers, named
-    as in `contracts.scenario`, and `place_rank` says which of the places that fit the car's path,
+    as `Scenario` tells, and `place_rank` says which of the places that fit the car's path,
     modulo their number. With `place`, a place's name, it is staged there as the case says, away
     from any drive: the job's path is that place's, and the car starts where the case begins.
     """

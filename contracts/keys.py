@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts import (
+from foretwin.contracts import (
     drive,
     futures,
     gap,

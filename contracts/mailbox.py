@@ -14,8 +14,8 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from contracts.codec import Envelope, decode, encode
-from contracts.keys import CHANNELS
+from foretwin.contracts.codec import Envelope, decode, encode
+from foretwin.contracts.keys import CHANNELS
 
 _TURNS = 20
 

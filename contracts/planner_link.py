@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import msgspec
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 
 class PlannerScene(msgspec.Struct, frozen=True, kw_only=True):
     """S futures at one instant, in the World's frame; base_link is the rear axle's centre.
 
-    `states` (S, 8) as `contracts.futures.STATE_COLUMNS`. `road_users` (S, R, 7): x, y, yaw of box
+    `states` (S, 8) as `futures.STATE_COLUMNS`. `road_users` (S, R, 7): x, y, yaw of box
     centres, speed, length, width, and 1 for those who walk; NaN where there is none. `path_xy_m`
     (N, 2), about 1 m apart, and `speed_limit_mps` (N,), infinite where unknown, are where the
     navigation leads; `arc_m` and `offset_m` (S,) place base_link on it. `stop_arc_m` (S,) is

@@ -18,9 +18,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from contracts.bus import Alive, Bus, Mailbox, ZenohBus
-from contracts.keys import alive_key
-from contracts.setup import ProcessSetup, read_setup
+from foretwin.contracts.bus import Alive, Bus, Mailbox, ZenohBus
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.setup import ProcessSetup, read_setup
 
 _Setup = TypeVar("_Setup", bound=ProcessSetup)
 

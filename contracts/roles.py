@@ -6,8 +6,8 @@ from typing import Literal, get_args
 
 import msgspec
 
-from contracts.drive import ControlCommand, VehicleState
-from contracts.vehicle import VehicleParameters
+from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.vehicle import VehicleParameters
 
 Role = Literal["all", "twin", "shadow", "ghost"]
 """The twin is moved by physics under its vehicle's commands; the shadow stands where the vehicle
@@ -31,7 +31,7 @@ class UseRoles(msgspec.Struct, frozen=True, kw_only=True):
 
 
 _MOST_JERK_PER_S = 60.0
-"""Beyond it, a physics step is too long for the law; see sim_worker.roles.follower."""
+"""Beyond it, a physics step is too long for the law; see foretwin.sim_worker.mirror.follower."""
 
 
 class FollowLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

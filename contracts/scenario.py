@@ -12,8 +12,8 @@ from typing import Literal
 
 import msgspec
 
-from contracts.drive import RoadUserKind
-from contracts.world import Control, JunctionKind
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.world import Control, JunctionKind
 
 TrafficTurn = Literal["straight", "across", "near"]
 """Through a junction: straight on, across oncoming traffic, or to the side where one drives."""

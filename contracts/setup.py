@@ -7,10 +7,10 @@ from typing import TypeVar
 
 import msgspec
 
-from contracts.frames import LocalFrame
-from contracts.roles import MirrorCast
-from contracts.vehicle import VehicleParameters
-from contracts.world import ATTRIBUTION
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.roles import MirrorCast
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import ATTRIBUTION
 
 _Setup = TypeVar("_Setup", bound="ProcessSetup")
 

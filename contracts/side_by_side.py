@@ -6,8 +6,8 @@ from typing import Literal
 
 import msgspec
 
-from contracts.drive import ControlMode
-from contracts.frames import GeoPoint
+from foretwin.contracts.drive import ControlMode
+from foretwin.contracts.frames import GeoPoint
 
 Aspect = Literal["way", "pace"]
 DisagreementKind = Literal[

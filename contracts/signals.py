@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from contracts.arrays import Array
-from contracts.provenance import Provenance
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Provenance
 
 
 class Signal(msgspec.Struct, frozen=True, kw_only=True):

@@ -6,8 +6,8 @@ from typing import Literal
 
 import msgspec
 
-from contracts.arrays import Array32
-from contracts.roles import Role
+from foretwin.contracts.arrays import Array32
+from foretwin.contracts.roles import Role
 
 
 class PrepareRequest(msgspec.Struct, frozen=True, kw_only=True):

@@ -10,8 +10,8 @@ from typing import Literal
 
 import msgspec
 
-from contracts.gap import GapAlarm, GapSample, Verdict
-from contracts.vehicle import VehicleParameters
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.vehicle import VehicleParameters
 
 UNDERSTEER_GRADIENT = "understeer_gradient_rad_per_mps2"
 ParameterOrigin = Literal["file", "identified", "set", "rolled_back"]

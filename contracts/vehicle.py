@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from contracts.drive import RoadUserKind
+from foretwin.contracts.drive import RoadUserKind
 
 _VAN_M, _LORRY_M = 5.2, 7.0
 

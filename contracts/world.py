@@ -10,10 +10,10 @@ from typing import Literal
 
 import msgspec
 
-from contracts.arrays import Array
-from contracts.frames import LocalFrame
-from contracts.provenance import Choice, Provenance, Quantity
-from contracts.signals import Signal, SignalPlan
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.provenance import Choice, Provenance, Quantity
+from foretwin.contracts.signals import Signal, SignalPlan
 
 JunctionKind = Literal[
     "roundabout", "circular", "mini_roundabout", "crossing", "t_junction", "y_junction",

@@ -21,13 +21,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.world import World
-from orchestrator.embedded import MAP_FILE
-from sim_worker.gym import JunctionVectorEnv
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.read_osm import read_map
+from foretwin.contracts.world import World
+from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.sim_worker.gym import JunctionVectorEnv
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 
 Weights = npt.NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.bus import Bus, BusUnreachable, Mailbox, Received, ZenohBus
-from contracts.planner_link import PlannedMotions, PlannerScene
-from contracts.setup import BusSetup
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.bus import Bus, BusUnreachable, Mailbox, Received, ZenohBus
+from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
+from foretwin.contracts.setup import BusSetup
 
 TIME_S = np.linspace(0.0, 3.0, 16)
 ACCEL_MPS2, DECEL_MPS2, LATERAL_MPS2 = 1.5, 2.5, 2.0

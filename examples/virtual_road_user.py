@@ -15,11 +15,11 @@ import sys
 
 import numpy as np
 
-from contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
-from contracts.drive import RoadUser, RoadUsers
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from contracts.keys import alive_key, run_of_alive_key
-from contracts.setup import BusSetup
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus
+from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.keys import alive_key, run_of_alive_key
+from foretwin.contracts.setup import BusSetup
 
 PERIOD_NS = 100_000_000
 WAY_M, SPEED_MPS = 6.0, 1.4

@@ -9,9 +9,9 @@ from typing import Any, Literal
 
 import msgspec
 
-from contracts.errors import UserError
-from contracts.roles import Correction, FollowLimits, Role
-from orchestrator.tuning.choice import Tuning, TuningChoice, choose_tuning, processors
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.roles import Correction, FollowLimits, Role
+from foretwin.orchestrator.tuning.choice import Tuning, TuningChoice, choose_tuning, processors
 
 View = Literal["auto", "native", "web", "none"]
 MapAiding = Literal["auto", "off"]

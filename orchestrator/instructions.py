@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from contracts.futures import PathAhead
+from foretwin.contracts.futures import PathAhead
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,16 +1,16 @@
-"""`python -m sim_worker --setup FILE`: a worker of the role that its setup names."""
+"""`python -m foretwin.sim_worker --setup FILE`: a worker of the role that its setup names."""
 
 from __future__ import annotations
 
 from importlib import import_module
 
-from contracts.bus import Bus
-from contracts.process import ProcessLife, run_process
-from contracts.setup import WorkerSetup
+from foretwin.contracts.bus import Bus
+from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.setup import WorkerSetup
 
 ROLES = {
-    "futures": ("sim_worker.worker", "serve_futures"),
-    "mirror": ("sim_worker.mirror_process", "serve_mirror"),
+    "futures": ("foretwin.sim_worker.worker", "serve_futures"),
+    "mirror": ("foretwin.sim_worker.mirror.process", "serve_mirror"),
 }
 """Module and function of each role: the mirror starts without what plays futures."""
 

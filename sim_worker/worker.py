@@ -13,21 +13,21 @@ import msgspec
 import numpy as np
 import scipy.spatial  # noqa: F401  A search for many points needs it: not within the first job.
 
-from contracts.bus import Bus, Mailbox, Request
-from contracts.errors import one_line
-from contracts.frames import local_from_geo
-from contracts.futures import FuturesJob, FuturesResult
-from contracts.process import ProcessLife
-from contracts.setup import WorkerSetup
-from contracts.simulation import PrepareReply, PrepareRequest
-from contracts.tuning import UseVehicle
-from contracts.vehicle import VehicleParameters
-from sim_worker.futures import run_job
-from sim_worker.planners.registry import load_planner
-from sim_worker.planners.remote import RemotePlanner
-from sim_worker.scene import SceneMaker
-from sim_worker.stage import Controls, Stage
-from sim_worker.world_file import load_world
+from foretwin.contracts.bus import Bus, Mailbox, Request
+from foretwin.contracts.errors import one_line
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.futures import FuturesJob, FuturesResult
+from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.setup import WorkerSetup
+from foretwin.contracts.simulation import PrepareReply, PrepareRequest
+from foretwin.contracts.tuning import UseVehicle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.planners.registry import load_planner
+from foretwin.sim_worker.planners.remote import RemotePlanner
+from foretwin.sim_worker.world_file import load_world
 
 NSIM = 32
 """Simulations of a stage: two workers share a round of 64."""

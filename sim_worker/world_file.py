@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from contracts.codec import read_message
-from contracts.world import World
+from foretwin.contracts.codec import read_message
+from foretwin.contracts.world import World
 
 
 def load_world(worlds_dir: Path, world_id: str) -> World:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import re
 import subprocess
 import sys
@@ -11,7 +10,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("contracts", "telemetry", "world_gen", "sim_worker", "orchestrator", "viewer")
+ROOMS = (
+    "contracts", "geometry", "telemetry", "world_gen", "sim_worker", "orchestrator", "viewer",
+)  # fmt: skip
 LIMIT_LINES = 300
 
 MACHINE_PATH = re.compile(r"(?<![\w.~-])/(?:work|root|home)(?=/|\b)")
@@ -39,14 +40,16 @@ def texts() -> list[tuple[str, str]]:
     return found
 
 
-def test_only_our_distribution_owns_the_rooms() -> None:
-    owners = importlib.metadata.packages_distributions()
+def test_every_room_is_reached_by_its_one_name() -> None:
+    linked = {room: (ROOT / "foretwin" / room).resolve() for room in ROOMS}
 
-    strangers = {room: owners.get(room, []) for room in ROOMS}
+    assert linked == {room: ROOT / room for room in ROOMS}
 
-    assert {room: set(names) - {"foretwin"} for room, names in strangers.items()} == {
-        room: set() for room in ROOMS
-    }
+
+def test_no_room_is_imported_by_another_name() -> None:
+    bare = re.compile(rf"^\s*(?:import|from) (?:{'|'.join(ROOMS)})\b", re.MULTILINE)
+
+    assert [name for name, text in texts() if name.endswith(".py") and bare.search(text)] == []
 
 
 def test_rooms_import_only_what_the_table_allows() -> None:
@@ -98,7 +101,7 @@ def test_pins_are_exact() -> None:
 
 
 def test_the_command_line_starts_without_heavy_libraries() -> None:
-    code = "import sys, orchestrator.__main__; print(*sys.modules)"
+    code = "import sys, foretwin.__main__; print(*sys.modules)"
     run = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )

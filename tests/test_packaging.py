@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("contracts", "telemetry", "world_gen", "sim_worker", "orchestrator", "viewer")
+ROOMS = (
+    "contracts", "geometry", "telemetry", "world_gen", "sim_worker", "orchestrator", "viewer",
+)  # fmt: skip
 DATA_SUFFIXES = (".toml", ".osm", ".geojson", ".xml", ".json", ".msg")
 
 pytestmark = pytest.mark.judge
@@ -30,15 +32,16 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_wheel_holds_every_module_and_data_file(wheel: Path) -> None:
     held = set(zipfile.ZipFile(wheel).namelist())
     needed = {
-        str(path.relative_to(ROOT))
+        f"foretwin/{path.relative_to(ROOT)}"
         for room in ROOMS
         for path in (ROOT / room).rglob("*")
         if path.suffix in (*DATA_SUFFIXES, ".py")
     }
 
     assert needed - held == set()
-    assert "orchestrator/embedded/drawn_town.osm" in held
-    assert not any(name.startswith("tests/") for name in held)
+    assert "foretwin/orchestrator/embedded/drawn_town.osm" in held
+    assert {"foretwin/__init__.py", "foretwin/__main__.py", "foretwin/py.typed"} <= held
+    assert {name.split("/")[0].partition("-")[0] for name in held} == {"foretwin"}
     assert any(name.endswith("licenses/LICENSE") for name in held)
 
 
@@ -48,7 +51,7 @@ def test_wheel_installed_alone_finds_its_embedded_map(wheel: Path, tmp_path: Pat
     python = venv / "bin" / "python"
     subprocess.run([python, "-m", "pip", "install", "--quiet", "--no-deps", wheel], check=True)
     code = (
-        "from orchestrator.embedded import MAP_FILE, ROUTE_FILE;"
+        "from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE;"
         "print(MAP_FILE.is_file(), ROUTE_FILE.is_file(), MAP_FILE)"
     )
 

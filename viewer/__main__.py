@@ -1,4 +1,4 @@
-"""The viewer process: `python -m viewer --setup FILE`; `--open RRD` shows a recording."""
+"""The viewer process: `python -m foretwin.viewer --setup FILE`; `--open RRD` shows a recording."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from contracts.bus import Bus, Mailbox, Received, ask
-from contracts.drive import InfoRequest
-from contracts.process import ProcessLife, run_process
-from contracts.setup import ViewerSetup
-from viewer.blueprint import drive_blueprint
-from viewer.live_viewer import (
+from foretwin.contracts.bus import Bus, Mailbox, Received, ask
+from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.setup import ViewerSetup
+from foretwin.viewer.blueprint import drive_blueprint
+from foretwin.viewer.live_viewer import (
     HOST,
     NoViewerError,
     has_display,
@@ -25,10 +25,10 @@ from viewer.live_viewer import (
     offline_environment,
     rerun_program,
 )
-from viewer.monitor import RUN_CHANNELS, VEHICLE_CHANNELS, Monitor, read_world
-from viewer.recordings import copy_with_blueprint, is_complete
-from viewer.rows import Row
-from viewer.sinks import FileStream, LiveStream
+from foretwin.viewer.monitor import RUN_CHANNELS, VEHICLE_CHANNELS, Monitor, read_world
+from foretwin.viewer.recordings import copy_with_blueprint, is_complete
+from foretwin.viewer.rows import Row
+from foretwin.viewer.sinks import FileStream, LiveStream
 
 MAILBOX_DEPTH = 4096
 FLUSH_PERIOD_S = 0.9
@@ -179,7 +179,7 @@ def show(recording: Path) -> None:
     if not has_display():
         raise NoViewerError(
             f"no display to show {recording} on; "
-            f"`python -m viewer.picture {recording} OUT.png` renders a picture without one"
+            f"`python -m foretwin.viewer.picture {recording} OUT.png` renders a picture without one"
         )
     program = str(rerun_program())
     if not is_complete(recording):
@@ -192,7 +192,7 @@ def show(recording: Path) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the viewer; returns only where it cannot, with the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m viewer", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m foretwin.viewer", description=__doc__)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--setup", type=Path, metavar="FILE", help="a ViewerSetup as JSON")
     what.add_argument("--open", type=Path, metavar="RRD", help="show an existing recording")

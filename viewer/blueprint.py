@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import rerun as rr
 import rerun.blueprint as rrb
 
-from viewer.rows import TIMELINE
+from foretwin.viewer.rows import TIMELINE
 
 MainView = Literal["Intersection", "Chase", "Map"]
 DetailView = Literal["Comparison", "Scenarios", "Reality", "Parameters"]

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 
-from viewer.rows import TIMELINE, Row
+from foretwin.viewer.rows import TIMELINE, Row
 
 
 class _Cells(NamedTuple):

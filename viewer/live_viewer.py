@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from contracts.ports import LOOPBACK, free_port
+from foretwin.contracts.ports import LOOPBACK, free_port
 
 HOST = LOOPBACK
 PORT = 9876

@@ -7,13 +7,13 @@ import collections
 import numpy as np
 import rerun as rr
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix, PlannedTrajectory, VehicleState
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, wrap_angle
-from contracts.simulation import MirrorSample, PlaneState
-from viewer.log_roles import GHOST, SHADOW, TWIN, RolesLog, box_of, pose_of
-from viewer.meshes import Colour
-from viewer.rows import Row, static
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, PlannedTrajectory, VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, wrap_angle
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.viewer.log_roles import GHOST, SHADOW, TWIN, RolesLog, box_of, pose_of
+from foretwin.viewer.meshes import Colour
+from foretwin.viewer.rows import Row, static
 
 TRAIL: Colour = (126, 132, 144)
 PLAN: Colour = (88, 150, 255)

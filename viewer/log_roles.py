@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from contracts.arrays import Array
-from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
-from viewer.meshes import Colour
-from viewer.rows import Row, path_part, static
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
+from foretwin.viewer.meshes import Colour
+from foretwin.viewer.rows import Row, path_part, static
 
 REAL: Colour = (245, 246, 250)
 TWIN: Colour = (0, 200, 255)

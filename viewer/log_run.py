@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from contracts.simulation import Event, Progress, WorkerStatus
-from contracts.world import ATTRIBUTION
-from viewer.rows import Row, path_part, plain_text, static
+from foretwin.contracts.simulation import Event, Progress, WorkerStatus
+from foretwin.contracts.world import ATTRIBUTION
+from foretwin.viewer.rows import Row, path_part, plain_text, static
 
 WORKER_COLOURS = {
     "starting": 0x607D8BFF,

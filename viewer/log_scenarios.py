@@ -6,14 +6,14 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
-from contracts.arrays import Array, Array32
-from contracts.frames import LocalFrame, local_from_geo
-from contracts.side_by_side import Disagreement
-from contracts.simulation import Comparison, PlanComparison, RoundView
-from viewer.log_drive import PLAN
-from viewer.log_roles import TWIN
-from viewer.meshes import Colour
-from viewer.rows import Row, static, table_cell
+from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.side_by_side import Disagreement
+from foretwin.contracts.simulation import Comparison, PlanComparison, RoundView
+from foretwin.viewer.log_drive import PLAN
+from foretwin.viewer.log_roles import TWIN
+from foretwin.viewer.meshes import Colour
+from foretwin.viewer.rows import Row, static, table_cell
 
 SAFE, WATCH, CRITICAL = (56, 176, 92), (255, 184, 28), (234, 62, 56)
 NOMINAL: Colour = (250, 250, 255)

@@ -7,12 +7,12 @@ from typing import get_args
 
 import rerun as rr
 
-from contracts.gap import GapSample, Manoeuvre, Verdict
-from contracts.tuning import Identification, ParameterChange, ParameterEstimate
-from viewer.log_drive import LIMIT, PLAN
-from viewer.log_roles import REAL, TWIN
-from viewer.meshes import Colour
-from viewer.rows import Row, plain_text, static, table_cell
+from foretwin.contracts.gap import GapSample, Manoeuvre, Verdict
+from foretwin.contracts.tuning import Identification, ParameterChange, ParameterEstimate
+from foretwin.viewer.log_drive import LIMIT, PLAN
+from foretwin.viewer.log_roles import REAL, TWIN
+from foretwin.viewer.meshes import Colour
+from foretwin.viewer.rows import Row, plain_text, static, table_cell
 
 HORIZON_S = 2.0
 """The horizon whose gap is drawn; the run's tables hold all."""

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from contracts.arrays import Array
-from contracts.frames import LocalFrame, geo_from_local, target_from_source
-from contracts.provenance import Provenance
-from contracts.world import World
-from viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
-from viewer.rows import Row, path_part
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame, geo_from_local, target_from_source
+from foretwin.contracts.provenance import Provenance
+from foretwin.contracts.world import World
+from foretwin.viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
+from foretwin.viewer.rows import Row, path_part
 
 GROUND: Colour = (25, 28, 35)
 ROAD: Colour = (58, 61, 68)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 Colour = tuple[int, int, int]
 

@@ -7,24 +7,24 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from contracts.arrays import Array
-from contracts.codec import read_message
-from contracts.frames import LocalFrame
-from contracts.simulation import ActiveWorld, Event, WorldNotice
-from contracts.world import ATTRIBUTION, World
-from viewer import log_drive, log_roles, log_scenarios, log_tuning
-from viewer.log_drive import DriveLog
-from viewer.log_run import RunLog, rows_of_event
-from viewer.log_scenarios import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.codec import read_message
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.simulation import ActiveWorld, Event, WorldNotice
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.viewer import log_drive, log_roles, log_scenarios, log_tuning
+from foretwin.viewer.log_drive import DriveLog
+from foretwin.viewer.log_run import RunLog, rows_of_event
+from foretwin.viewer.log_scenarios import (
     no_futures,
     rows_of_comparison,
     rows_of_disagreement,
     rows_of_plan_comparison,
     rows_of_round,
 )
-from viewer.log_tuning import TuningLog
-from viewer.log_world import rows_of_world, world_centre
-from viewer.rows import Row
+from foretwin.viewer.log_tuning import TuningLog
+from foretwin.viewer.log_world import rows_of_world, world_centre
+from foretwin.viewer.rows import Row
 
 VEHICLE_CHANNELS = ("state", "gnss", "plan", "end")
 RUN_CHANNELS = (

@@ -1,4 +1,4 @@
-"""Pictures of a recording without a display: `python -m viewer.picture RRD OUT.png --at 39`."""
+"""Pictures without a display: `python -m foretwin.viewer.picture RRD OUT.png --at 39`."""
 
 from __future__ import annotations
 
@@ -13,16 +13,22 @@ from typing import NamedTuple
 import numpy as np
 from rerun.experimental import ViewerClient
 
-from contracts.ports import free_port
-from viewer.blueprint import DETAIL_VIEWS, MAIN_VIEWS, DetailView, MainView, drive_blueprint
-from viewer.live_viewer import (
+from foretwin.contracts.ports import free_port
+from foretwin.viewer.blueprint import (
+    DETAIL_VIEWS,
+    MAIN_VIEWS,
+    DetailView,
+    MainView,
+    drive_blueprint,
+)
+from foretwin.viewer.live_viewer import (
     NoViewerError,
     address,
     start_program,
     wait_until_it_answers,
 )
-from viewer.recordings import copy_with_blueprint
-from viewer.rows import TIMELINE
+from foretwin.viewer.recordings import copy_with_blueprint
+from foretwin.viewer.rows import TIMELINE
 
 SETTLE_S = 60.0
 POLL_S = 0.25
@@ -137,7 +143,7 @@ def _end(program: subprocess.Popen[bytes]) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Write one picture; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m viewer.picture", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m foretwin.viewer.picture", description=__doc__)
     parser.add_argument("recording", type=Path, metavar="RRD")
     parser.add_argument("out", type=Path, metavar="OUT.png")
     parser.add_argument("--at", type=float, metavar="S", help="drive time; default: the end")
@@ -152,7 +158,7 @@ def main(arguments: list[str] | None = None) -> int:
             size=(width, height),
         )  # fmt: skip
     except (OSError, ValueError) as problem:
-        print(f"viewer.picture: {problem}", file=sys.stderr)
+        print(f"foretwin.viewer.picture: {problem}", file=sys.stderr)
         return 2
     return 0
 

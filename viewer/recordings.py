@@ -9,8 +9,8 @@ from pathlib import Path
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
-from viewer.live_viewer import offline_environment, rerun_program
-from viewer.sinks import FLUSH_S, recording_stream
+from foretwin.viewer.live_viewer import offline_environment, rerun_program
+from foretwin.viewer.sinks import FLUSH_S, recording_stream
 
 MEND_S = 120.0
 

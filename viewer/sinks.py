@@ -12,8 +12,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from viewer.columns import send_rows
-from viewer.rows import APPLICATION_ID, TIMELINE, Row, plain_text
+from foretwin.viewer.columns import send_rows
+from foretwin.viewer.rows import APPLICATION_ID, TIMELINE, Row, plain_text
 
 LIVE_ROWS = 256
 LASTING_ROWS = 4096

@@ -7,24 +7,24 @@ import hashlib
 import msgspec
 import numpy as np
 
-from contracts.codec import content_bytes
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
-from contracts.world import Arm, IntersectionSummary, World, WorldJunction
-from world_gen.clusters import Surroundings, in_map, surroundings, world_frame
-from world_gen.connection_paths import draw_paths
-from world_gen.connections import ConnectionDraft, connect
-from world_gen.crossings import crossings
-from world_gen.extent import Disc, Rectangle
-from world_gen.find_intersections import find_intersections
-from world_gen.ground import Ground, ground_around
-from world_gen.intersections import Junction
-from world_gen.junction_rules import junction_rules
-from world_gen.lanes import LaneSet, build_lanes, join_straight_on
-from world_gen.map_index import MapIndex, index_map
-from world_gen.movements import movements
-from world_gen.osm_map import LatLonBounds, MapError, OsmMap
-from world_gen.road_graph import RoadGraph
-from world_gen.tram_tracks import tram_tracks
+from foretwin.contracts.codec import content_bytes
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.contracts.world import Arm, IntersectionSummary, World, WorldJunction
+from foretwin.world_gen.connections.connection_paths import draw_paths
+from foretwin.world_gen.connections.lane_connections import ConnectionDraft, connect
+from foretwin.world_gen.connections.movements import movements
+from foretwin.world_gen.extent import Disc, Rectangle
+from foretwin.world_gen.ground.crossings import crossings
+from foretwin.world_gen.ground.surroundings import Ground, ground_around
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import MapIndex, index_map
+from foretwin.world_gen.lanes.clusters import Surroundings, in_map, surroundings, world_frame
+from foretwin.world_gen.lanes.lane_curves import LaneSet, build_lanes, join_straight_on
+from foretwin.world_gen.lanes.tram_tracks import tram_tracks
+from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError, OsmMap
+from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.rules.junction_rules import junction_rules
 
 GENERATOR_VERSION = 7
 """Counts changes of what is built from the same map; part of every cache key."""

@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.frames import LocalFrame, geo_from_local
-from world_gen.polyline import arc_lengths, points_at
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame, geo_from_local
+from foretwin.geometry.polyline import arc_lengths, points_at
 
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 MIN_PIECE_M = 0.5

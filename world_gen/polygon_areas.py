@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from contracts.arrays import Array
-from contracts.provenance import Provenance
-from contracts.world import Area
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Provenance
+from foretwin.contracts.world import Area
 
 _POLYGON = 3
 

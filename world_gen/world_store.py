@@ -8,11 +8,11 @@ import os
 from pathlib import Path
 from typing import NamedTuple
 
-from contracts.codec import SchemaMismatch, read_message, write_message
-from contracts.world import World
-from world_gen.build import DEFAULT_RADIUS_M, GENERATOR_VERSION, build_world
-from world_gen.intersections import Junction
-from world_gen.map_index import MapIndex
+from foretwin.contracts.codec import SchemaMismatch, read_message, write_message
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import DEFAULT_RADIUS_M, GENERATOR_VERSION, build_world
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import MapIndex
 
 
 class CachedWorld(NamedTuple):

@@ -1,4 +1,4 @@
-"""Draws the embedded map and route: `python -m orchestrator.embedded.draw_town [FOLDER]`.
+"""Draws the embedded map and route: `python -m foretwin.orchestrator.embedded.draw_town [FOLDER]`.
 
 The town is invented and lies in the open Atlantic, so that nobody takes it for a real place.
 Coordinates below are metres east and north of the town's origin.
@@ -17,8 +17,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from orchestrator.embedded import MAP_FILE, ROUTE_FILE
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 
 ORIGIN = LocalFrame(GeoPoint(45.0, -30.0))
 NOTE = "drawn for foretwin, an invented town; not OpenStreetMap data"

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from contracts.simulation import Comparison, PlanComparison
-from orchestrator.rounds.desk import RoundDone
+from foretwin.contracts.simulation import Comparison, PlanComparison
+from foretwin.orchestrator.rounds.dispatch import RoundDone
 
 
 def percentile(values: list[float], q: float) -> float | None:

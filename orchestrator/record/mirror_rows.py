@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from contracts.simulation import MirrorSample, PlaneState, TwinCorrection
+from foretwin.contracts.simulation import MirrorSample, PlaneState, TwinCorrection
 
 _POSE = ("x_m", "y_m", "yaw_rad", "speed_mps")
 _CORRECTION = ("along_mps2", "across_mps2", "yaw_radps2")

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.futures import FuturesResult, Variant
-from contracts.simulation import Comparison, HorizonError, PlanComparison
-from orchestrator.rounds.desk import RoundDone
-from sim_worker.metrics.displacement import distinct_count
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import FuturesResult, Variant
+from foretwin.contracts.simulation import Comparison, HorizonError, PlanComparison
+from foretwin.orchestrator.rounds.dispatch import RoundDone
+from foretwin.sim_worker.metrics.displacement import distinct_count
 
 DISTINCT_M = 0.1
 

@@ -13,7 +13,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from contracts.errors import one_line
+from foretwin.contracts.errors import one_line
 
 log = logging.getLogger("results")
 

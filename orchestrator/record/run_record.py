@@ -8,12 +8,12 @@ from typing import Any
 
 import msgspec
 
-from orchestrator.conductor import Conductor
-from orchestrator.mission import Mission
-from orchestrator.plan import DrivePlan
-from orchestrator.record.bookkeeping import percentile
-from orchestrator.record.versions import versions
-from orchestrator.supervisor import Supervisor
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.mission import Mission
+from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.drive.supervisor import Supervisor
+from foretwin.orchestrator.record.bookkeeping import percentile
+from foretwin.orchestrator.record.versions import versions
 
 RESERVED_BYTES = 65536
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from orchestrator.judge.verdict_rows import agreement_lines
-from orchestrator.tuning.words import summary_lines
+from foretwin.orchestrator.agreement.verdict_rows import agreement_lines
+from foretwin.orchestrator.tuning.words import summary_lines
 
 DISAGREEMENTS_SHOWN = 12
 BEGINNING_S = 0.5

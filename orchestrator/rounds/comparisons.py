@@ -7,13 +7,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, target_from_source
-from contracts.simulation import Comparison
-from orchestrator.config import HORIZONS_S
-from orchestrator.rounds.desk import RoundDone
-from sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import (
+    LocalFrame,
+    local_from_geo,
+    local_from_geo_yaw,
+    target_from_source,
+)
+from foretwin.contracts.simulation import Comparison
+from foretwin.orchestrator.config import HORIZONS_S
+from foretwin.orchestrator.rounds.dispatch import RoundDone
+from foretwin.sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 
 LEAD_NS = 1_000_000_000
 """How much of the real track before a future's beginning goes into its comparison."""

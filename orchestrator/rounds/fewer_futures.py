@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from contracts.futures import Variant
+from foretwin.contracts.futures import Variant
 
 
 def some_of(variants: Sequence[Variant], count: int, *, turn: int) -> tuple[Variant, ...]:

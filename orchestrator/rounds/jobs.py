@@ -8,25 +8,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.drive import PlannedTrajectory, SignalState, VehicleState
-from contracts.errors import UserError
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.futures import CarPlan, FuturesJob, PathAhead, Variant
-from contracts.scenario import Scenario
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from orchestrator.config import DriveConfig
-from orchestrator.instructions import RoundIntent
-from orchestrator.intake import Surroundings
-from orchestrator.rounds.fewer_futures import some_of
-from orchestrator.rounds.seen_users import near_car
-from orchestrator.way.way_ahead import PATH_BEHIND_M
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.live import LiveScenarios
-from sim_worker.scenarios.reading import catalogue, find_scenario
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.variants import cases_of, plan_variants
-from world_gen.signal_state import LIVE_FOR_S
+from foretwin.contracts.drive import PlannedTrajectory, SignalState, VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.futures import CarPlan, FuturesJob, PathAhead, Variant
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.instructions import RoundIntent
+from foretwin.orchestrator.rounds.fewer_futures import some_of
+from foretwin.orchestrator.rounds.seen_users import near_car
+from foretwin.orchestrator.routing.route_ahead import PATH_BEHIND_M
+from foretwin.sim_worker.futures.variants import cases_of, plan_variants
+from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.world_gen.rules.signal_state import LIVE_FOR_S
 
 STEP_S = 0.1
 HEEDLESS_PLANNER = "constant_speed"

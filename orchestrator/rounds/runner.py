@@ -6,31 +6,31 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from contracts.bus import Bus, Mailbox, Reply
-from contracts.drive import PlannedTrajectory, VehicleState
-from contracts.futures import Variant
-from contracts.simulation import Comparison
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from orchestrator.instructions import RoundIntent, Tell
-from orchestrator.intake import LatestState, Surroundings
-from orchestrator.judge.verdict_rows import judged_row
-from orchestrator.judge.windows import WindowDesk
-from orchestrator.plan import DrivePlan
-from orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
-from orchestrator.record.result_rows import (
+from foretwin.contracts.bus import Bus, Mailbox, Reply
+from foretwin.contracts.drive import PlannedTrajectory, VehicleState
+from foretwin.contracts.futures import Variant
+from foretwin.contracts.simulation import Comparison
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.orchestrator.agreement.verdict_rows import judged_row
+from foretwin.orchestrator.agreement.windows import WindowDesk
+from foretwin.orchestrator.drive.intake import LatestState, Surroundings
+from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.instructions import RoundIntent, Tell
+from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
+from foretwin.orchestrator.record.result_rows import (
     comparison_row,
     future_rows,
     plan_row,
     round_row,
 )
-from orchestrator.record.results import ResultTables
-from orchestrator.rounds.comparisons import ComparisonDesk
-from orchestrator.rounds.desk import RoundDesk, RoundDone, RoundOrder
-from orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
-from orchestrator.rounds.pace import Pace, RoundPace
-from orchestrator.rounds.views import round_view
-from sim_worker.metrics.comparison import compare_plan
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.rounds.comparisons import ComparisonDesk
+from foretwin.orchestrator.rounds.dispatch import RoundDesk, RoundDone, RoundOrder
+from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
+from foretwin.orchestrator.rounds.pace import Pace, RoundPace
+from foretwin.orchestrator.rounds.views import round_view
+from foretwin.sim_worker.metrics.comparison import compare_plan
 
 JOB_TIMEOUT_S = 20.0
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.drive import RoadUsers, VehicleState
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.futures import SeenRoadUser
+from foretwin.contracts.drive import RoadUsers, VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.futures import SeenRoadUser
 
 _FRESH_NS = 500_000_000
 WITHIN_M = 120.0

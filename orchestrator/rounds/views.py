@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array, Array32
-from contracts.frames import LocalFrame, target_from_source
-from contracts.futures import Variant
-from contracts.simulation import RoundView
-from orchestrator.record.result_rows import RoundFutures
-from orchestrator.rounds.desk import RoundDone
+from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.frames import LocalFrame, target_from_source
+from foretwin.contracts.futures import Variant
+from foretwin.contracts.simulation import RoundView
+from foretwin.orchestrator.record.result_rows import RoundFutures
+from foretwin.orchestrator.rounds.dispatch import RoundDone
 
 VIEW_POINTS = 25
 SAFE_CLEARANCE_M = 10.0

@@ -9,12 +9,12 @@ from typing import Any
 
 import msgspec
 
-from contracts.errors import UserError
-from orchestrator.record.versions import versions
-from orchestrator.sweep.plan import WorldPlaces
-from orchestrator.sweep.road_users import digest_of
-from orchestrator.sweep.spec import Loaded
-from world_gen.build import GENERATOR_VERSION
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.record.versions import versions
+from foretwin.orchestrator.sweep.plan import WorldPlaces
+from foretwin.orchestrator.sweep.road_users import digest_of
+from foretwin.orchestrator.sweep.spec import Loaded
+from foretwin.world_gen.build import GENERATOR_VERSION
 
 SUMMARY, PLAN, ROWS, WORLDS = "sweep.json", "places.msgpack", "rows", "worlds"
 

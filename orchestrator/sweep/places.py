@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.frames import local_from_geo
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from orchestrator.sweep.plan import NotPlaced, PlacedHere, WorldPlaces
-from orchestrator.sweep.spec import AS_RECORDED, Loaded
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.live import LiveScenarios
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.roads import RoadNetwork
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.orchestrator.sweep.plan import NotPlaced, PlacedHere, WorldPlaces
+from foretwin.orchestrator.sweep.spec import AS_RECORDED, Loaded
+from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
 
 
 def places_in(world: World, loaded: Loaded) -> WorldPlaces:

@@ -13,9 +13,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import msgspec
 import numpy as np
 
-from contracts.errors import UserError
-from contracts.scenario import FAULTS, Scenario
-from orchestrator.sweep.spec import (
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.scenario import FAULTS, Scenario
+from foretwin.orchestrator.sweep.spec import (
     AIM_NAMES,
     AS_RECORDED,
     FACTORS,
@@ -24,8 +24,8 @@ from orchestrator.sweep.spec import (
     Loaded,
     SweepSpec,
 )
-from sim_worker.planners.registry import drives_backwards
-from sim_worker.scenarios.drawing import Values, draw_cases
+from foretwin.sim_worker.planners.registry import drives_backwards
+from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 
 MOST_CELLS = 5_000_000
 BACKWARDS_PLANNER = "reverse_pursuit"

@@ -8,32 +8,32 @@ from typing import Any
 
 import msgspec
 
-from contracts.drive import VehicleState
-from contracts.errors import one_line
-from contracts.frames import GeoPoint
-from contracts.futures import Faults, FuturesJob, PathAhead, Variant
-from contracts.scenario import FAULTS, Scenario
-from contracts.world import World
-from orchestrator.sweep.places import places_in
-from orchestrator.sweep.plan import Cell, SweepJob, WorldPlaces
-from orchestrator.sweep.pool import Lost
-from orchestrator.sweep.road_users import NOBODY, Others, others_at
-from orchestrator.sweep.rows import Row, blank_row
-from orchestrator.sweep.spec import (
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.errors import one_line
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.futures import Faults, FuturesJob, PathAhead, Variant
+from foretwin.contracts.scenario import FAULTS, Scenario
+from foretwin.contracts.world import World
+from foretwin.orchestrator.sweep.future_rows import told, told_of_case
+from foretwin.orchestrator.sweep.places import places_in
+from foretwin.orchestrator.sweep.plan import Cell, SweepJob, WorldPlaces
+from foretwin.orchestrator.sweep.pool import Lost
+from foretwin.orchestrator.sweep.road_users import NOBODY, Others, others_at
+from foretwin.orchestrator.sweep.rows import Row, blank_row
+from foretwin.orchestrator.sweep.spec import (
     AS_RECORDED,
     FAULT_NAMES,
     FUTURES_PER_JOB,
     STEP_S,
     Loaded,
 )
-from orchestrator.sweep.told import told, told_of_case
-from sim_worker.futures import run_job
-from sim_worker.rehearsal import staged_cases
-from sim_worker.scenarios.roles import Cast
-from sim_worker.scene import SceneMaker
-from sim_worker.stage import Stage
-from sim_worker.worker import StageCache
-from sim_worker.world_file import load_world
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.ego_dry_run import staged_cases
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.worker import StageCache
+from foretwin.sim_worker.world_file import load_world
 
 _KEPT_STAGES = 2
 

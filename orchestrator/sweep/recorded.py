@@ -11,16 +11,16 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from contracts.arrays import Array
-from contracts.drive import RoadUsers, VehicleState
-from contracts.errors import UserError
-from contracts.frames import LocalFrame, local_from_geo
-from contracts.futures import PathAhead
-from contracts.vehicle import VehicleParameters
-from orchestrator.sweep.road_users import RoadUserMode, among, named_log
-from telemetry.estimator import StateEstimator
-from telemetry.logs import open_log
-from telemetry.logs.road_users import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUsers, VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.logs import open_log
+from foretwin.telemetry.logs.road_users import (
     LONGEST_GAP_S,
     RoadUserLog,
     detections_of,

@@ -11,22 +11,22 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import RoadUser, RoadUsers, VehicleState
-from contracts.errors import UserError
-from contracts.frames import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     local_from_geo,
     local_from_geo_yaw,
 )
-from contracts.futures import RecordedRoadUser, SeenRoadUser
-from contracts.vehicle import VehicleParameters
-from orchestrator.rounds.seen_users import WITHIN_M, near_car
-from sim_worker.actors.kinds import KINDS
-from sim_worker.vehicle.planar import box_centre_from_base_m
-from telemetry.logs import open_road_users
-from telemetry.logs.road_users import RoadUserLog, RoadUserTrack
+from foretwin.contracts.futures import RecordedRoadUser, SeenRoadUser
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.rounds.seen_users import WITHIN_M, near_car
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
+from foretwin.telemetry.logs import open_road_users
+from foretwin.telemetry.logs.road_users import RoadUserLog, RoadUserTrack
 
 RoadUserMode = Literal["replayed", "predicted", "none"]
 

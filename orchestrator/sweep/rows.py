@@ -11,8 +11,8 @@ import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from orchestrator.sweep.plan import Cell, SweepJob
-from orchestrator.sweep.spec import SweepSpec
+from foretwin.orchestrator.sweep.plan import Cell, SweepJob
+from foretwin.orchestrator.sweep.spec import SweepSpec
 
 Row = dict[str, Any]
 

@@ -8,19 +8,19 @@ from typing import Literal
 
 import msgspec
 
-from contracts.errors import UserError
-from contracts.futures import Faults
-from contracts.scenario import Scenario
-from contracts.vehicle import VehicleParameters
-from orchestrator.maps.choice import node_of_id, parse_bbox
-from orchestrator.maps.world_command import MAX_RADIUS_M, MIN_RADIUS_M
-from orchestrator.sweep.recorded import WORLDS, Recorded, RecordedStart, read_drive
-from sim_worker.metrics.table import METRICS
-from sim_worker.planners.registry import check_planner
-from sim_worker.scenarios.reading import catalogue, find_scenario
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import TIMESTEP_S
-from telemetry.logs.road_users import RoadUserLog
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import Faults
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.commands.world import MAX_RADIUS_M, MIN_RADIUS_M
+from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, RecordedStart, read_drive
+from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
+from foretwin.sim_worker.metrics.table import METRICS
+from foretwin.sim_worker.planners.registry import check_planner
+from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
+from foretwin.telemetry.logs.road_users import RoadUserLog
 
 DEFAULT_METRICS = (
     "ttc", "pet", "thw", "drac", "required_deceleration", "impact_speed", "delta_v",

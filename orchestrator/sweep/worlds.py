@@ -9,16 +9,16 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from contracts.codec import SchemaMismatch
-from contracts.errors import UserError
-from orchestrator.maps.choice import junction_by_id, node_of_id, parse_bbox
-from orchestrator.maps.opening import NodeClip, open_map
-from orchestrator.sweep.spec import SweepSpec, worlds_folder
-from sim_worker.world_file import load_world
-from world_gen.intersections import Junction
-from world_gen.map_index import index_map
-from world_gen.osm_map import LatLonBounds
-from world_gen.world_store import WorldStore, cached_build
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.sweep.spec import SweepSpec, worlds_folder
+from foretwin.orchestrator.worlds.choice import junction_by_id, node_of_id, parse_bbox
+from foretwin.orchestrator.worlds.opening import NodeClip, open_map
+from foretwin.sim_worker.world_file import load_world
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.osm_map import LatLonBounds
+from foretwin.world_gen.world_store import WorldStore, cached_build
 
 _Choice = TypeVar("_Choice")
 SUFFIX = ".world"

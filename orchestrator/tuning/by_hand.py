@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from contracts.errors import UserError
-from orchestrator.changes.desk import Made, RefusedError
-from orchestrator.tuning.parameter_desk import ParameterDesk
-from sim_worker.identify.acceptance import in_force
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.runtime_configuration.handler import Made, RefusedError
+from foretwin.orchestrator.tuning.parameter_versions import ParameterDesk
+from foretwin.sim_worker.analysis.identify.acceptance import in_force
 
 _WORDS = ("pin", "unpin", "rollback")
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import msgspec
 
-from contracts.gap import GapAlarm, GapSample, Verdict
-from contracts.tuning import Identification, ParameterEstimate, TuneReply
-from contracts.vehicle import VehicleParameters
-from orchestrator.instructions import Tell
-from orchestrator.record.results import ResultTables
-from orchestrator.tuning.parameter_desk import departs
-from orchestrator.tuning.words import alarm_text, found_text, verdict_text
-from sim_worker.identify.acceptance import in_force, is_acceptable, is_left_open
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.tuning.parameter_versions import departs
+from foretwin.orchestrator.tuning.words import alarm_text, found_text, verdict_text
+from foretwin.sim_worker.analysis.identify.acceptance import in_force, is_acceptable, is_left_open
 
 HORIZON_S = 2.0
 """The horizon whose gap is told; the tables hold all."""

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from contracts.bus import Bus, Mailbox, Received, Reply
-from contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
-from orchestrator.events import EventDesk
-from orchestrator.instructions import Tell
-from orchestrator.intake import Intake
-from orchestrator.plan import DrivePlan
-from orchestrator.processes import MIRROR, TUNING
-from orchestrator.record.results import ResultTables
-from orchestrator.rounds.runner import RoundRunner
-from orchestrator.tuning.findings import Findings
-from orchestrator.tuning.parameter_desk import ParameterDesk, change_row, change_text
+from foretwin.contracts.bus import Bus, Mailbox, Received, Reply
+from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
+from foretwin.orchestrator.drive.events import EventDesk
+from foretwin.orchestrator.drive.intake import Intake
+from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.drive.processes import MIRROR, TUNING
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.rounds.runner import RoundRunner
+from foretwin.orchestrator.tuning.findings import Findings
+from foretwin.orchestrator.tuning.parameter_versions import ParameterDesk, change_row, change_text
 
 FINDINGS = ("identification", "gap", "gap_alarm", "verdict")
 """Channels of the process `tuning`; in lock step its answers bring the same, in order."""

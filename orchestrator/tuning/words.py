@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from contracts.gap import GapAlarm, Verdict
-from contracts.tuning import ParameterEstimate
+from foretwin.contracts.gap import GapAlarm, Verdict
+from foretwin.contracts.tuning import ParameterEstimate
 
 _QUANTITIES = {
     "along_m": ("position along", "m", 1.0),

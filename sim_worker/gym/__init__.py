@@ -5,9 +5,9 @@ Importing this registers `foretwin/Junction-v0`; it needs the extra `foretwin[gy
 
 from __future__ import annotations
 
-from sim_worker.gym.env import JunctionEnv
-from sim_worker.gym.registration import register
-from sim_worker.gym.vector_env import JunctionVectorEnv
+from foretwin.sim_worker.gym.env import JunctionEnv
+from foretwin.sim_worker.gym.registration import register
+from foretwin.sim_worker.gym.vector_env import JunctionVectorEnv
 
 __all__ = ["JunctionEnv", "JunctionVectorEnv"]
 

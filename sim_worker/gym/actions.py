@@ -6,10 +6,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import pure_pursuit
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.tracking import pure_pursuit
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 Control = Literal["free", "along_path"]
 """`free`: acceleration and tyre angle; `along_path`: acceleration, steered by pure pursuit."""

@@ -8,25 +8,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.errors import UserError
-from contracts.futures import FuturesJob, PathAhead
-from contracts.scenario import Scenario
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker.gym.actions import Control, action_size, commands
-from sim_worker.gym.episodes import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import FuturesJob, PathAhead
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.futures.play import Rows
+from foretwin.sim_worker.gym.actions import Control, action_size, commands
+from foretwin.sim_worker.gym.episodes import (
     Episodes,
     episodes_of_job,
     episodes_of_scenario,
     episodes_of_states,
 )
-from sim_worker.gym.observation import Observation, feature_names, observe
-from sim_worker.gym.reward import Reward, default_reward
-from sim_worker.gym.rows import EpisodeRows, Flags, StepFacts
-from sim_worker.play import Rows
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.gym.observation import Observation, feature_names, observe
+from foretwin.sim_worker.gym.reward import Reward, default_reward
+from foretwin.sim_worker.gym.rows import EpisodeRows, Flags, StepFacts
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 CASE = "case"
 
@@ -34,7 +34,7 @@ CASE = "case"
 class Source(NamedTuple):
     """Where episodes come from: a scenario at a place, a job, or recorded states on a path.
 
-    See the functions of `sim_worker.gym.episodes` that have these arguments; with `states`, a
+    See the functions of `gym.episodes` that have these arguments; with `states`, a
     scenario is optional.
     """
 

@@ -9,12 +9,12 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from contracts.errors import UserError
-from contracts.world import World
-from sim_worker.gym.course import CASE, Course, Source, told
-from sim_worker.gym.observation import Observation
-from sim_worker.gym.picture import Picture, draw_row
-from sim_worker.gym.spaces import action_space, observation_space, split_settings
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.sim_worker.gym.course import CASE, Course, Source, told
+from foretwin.sim_worker.gym.observation import Observation
+from foretwin.sim_worker.gym.picture import Picture, draw_row
+from foretwin.sim_worker.gym.spaces import action_space, observation_space, split_settings
 
 ONE = np.zeros(1, dtype=np.intp)
 

@@ -9,23 +9,23 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.codec import read_message
-from contracts.drive import VehicleState
-from contracts.errors import UserError
-from contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
-from contracts.futures import FuturesJob, PathAhead, Variant
-from contracts.scenario import EGO, Scenario
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.drawing import Values, draw_cases
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.places import Place, Unplaced
-from sim_worker.scenarios.reading import find_scenario
-from sim_worker.scenarios.staged import staged_start
-from sim_worker.scene import SceneMaker
-from sim_worker.seeding import local_state
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.codec import read_message
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.futures import FuturesJob, PathAhead, Variant
+from foretwin.contracts.scenario import EGO, Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.reading import find_scenario
+from foretwin.sim_worker.scenarios.staged import staged_start
+from foretwin.sim_worker.vehicle.seeding import local_state
 
 BEYOND_JUNCTION_M = 20.0
 """An episode at a place ends so far behind the junction."""
@@ -64,7 +64,7 @@ def episodes_of_scenario(
 ) -> Episodes:
     """Return cases of a scenario, an id of the catalogue or a file, at one of its places.
 
-    `values` fix what the scenario leaves open, named as in `contracts.scenario`; `cases` are drawn
+    `values` fix what the scenario leaves open, named as `Scenario` tells; `cases` are drawn
     with `cases_seed`, and others come up to `early_or_late_s` before or after they would meet a
     car that keeps its speed. `place` is a name or a number. Raises UserError where the scenario,
     the place or a value is unknown, or no case can be played.

@@ -10,12 +10,12 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from sim_worker.gym.rows import Sighting
-from sim_worker.planners.base import PlannerView
-from sim_worker.planners.tracking import front_from_base_m
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.sim_worker.gym.rows import Sighting
+from foretwin.sim_worker.planner_interface import PlannerView
+from foretwin.sim_worker.planners.tracking import front_from_base_m
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 Observation = npt.NDArray[np.float32]
 

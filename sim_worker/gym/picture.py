@@ -8,9 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from sim_worker.gym.rows import EpisodeRows
-from sim_worker.overlap import Rectangles, corners
-from sim_worker.touch import ego_rectangles
+from foretwin.geometry.rectangles import Rectangles, corners
+from foretwin.sim_worker.batch.collision_detection import ego_rectangles
+from foretwin.sim_worker.gym.rows import EpisodeRows
 
 Picture = npt.NDArray[np.uint8]
 

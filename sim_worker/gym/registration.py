@@ -5,7 +5,7 @@ from __future__ import annotations
 import gymnasium
 
 ID = "foretwin/Junction-v0"
-_MODULE = "sim_worker.gym"
+_MODULE = "foretwin.sim_worker.gym"
 
 
 def register() -> None:

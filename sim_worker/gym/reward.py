@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.gym.rows import StepFacts
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.gym.rows import StepFacts
 
 Reward = Callable[[StepFacts], Array]
 """From what happened to S cars in a step to what it is worth to each, (S,)."""

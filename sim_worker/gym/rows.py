@@ -7,20 +7,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.errors import UserError
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.cast import Casting
-from sim_worker.actors.perception import PerceptionFaults
-from sim_worker.gym.episodes import Episodes
-from sim_worker.metrics.ground import DrivableGround
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.giving_way import wait_arcs
-from sim_worker.play import Play, Rows
-from sim_worker.scene import Aims, Scene
-from sim_worker.stage import Stage
-from sim_worker.touch import touched
-from world_gen.signal_state import cycle_s
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.collision_detection import touched
+from foretwin.sim_worker.futures.play import Play, Rows
+from foretwin.sim_worker.futures.scene import Aims, Scene
+from foretwin.sim_worker.gym.episodes import Episodes
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.giving_way import wait_arcs
+from foretwin.sim_worker.road_users.cast import Casting
+from foretwin.sim_worker.road_users.perception import PerceptionFaults
+from foretwin.world_gen.rules.signal_state import cycle_s
 
 Flags = npt.NDArray[np.bool_]
 

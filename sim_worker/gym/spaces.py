@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.spaces import Box, Space
 
-from sim_worker.gym.course import Course, Source
+from foretwin.sim_worker.gym.course import Course, Source
 
 Floats: TypeAlias = Space[npt.NDArray[np.float32]]
 

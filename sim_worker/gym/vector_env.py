@@ -13,14 +13,14 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from contracts.errors import UserError
-from contracts.world import World
-from sim_worker.gym.course import CASE, Course, Source, told
-from sim_worker.gym.observation import Observation
-from sim_worker.gym.picture import Picture, draw_row
-from sim_worker.gym.rows import Flags
-from sim_worker.gym.spaces import action_space, observation_space, split_settings
-from sim_worker.play import Rows
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.sim_worker.futures.play import Rows
+from foretwin.sim_worker.gym.course import CASE, Course, Source, told
+from foretwin.sim_worker.gym.observation import Observation
+from foretwin.sim_worker.gym.picture import Picture, draw_row
+from foretwin.sim_worker.gym.rows import Flags
+from foretwin.sim_worker.gym.spaces import action_space, observation_space, split_settings
 
 MASK = "reset_mask"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 _STRAIGHT_RADPS = 1e-6
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.metrics.rollout import Flags, Measure
-from sim_worker.metrics.scene import Scene
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.metrics.rollout import Flags, Measure
+from foretwin.sim_worker.metrics.scene import Scene
 
 BOUNDS = MappingProxyType(
     {

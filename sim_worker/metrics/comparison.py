@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import PlannedTrajectory
-from contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from contracts.futures import PathAhead, Trajectory
-from contracts.simulation import Comparison, PlanComparison
-from sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
-from sim_worker.metrics.displacement import horizon_error
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import PlannedTrajectory
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.futures import PathAhead, Trajectory
+from foretwin.contracts.simulation import Comparison, PlanComparison
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
+from foretwin.sim_worker.metrics.displacement import horizon_error
 
 HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 _MAX_GAP_S = 1.5

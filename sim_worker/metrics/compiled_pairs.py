@@ -1,4 +1,4 @@
-"""What metrics ask of each road user at each instant, compiled: see `sim_worker.compiled`.
+"""What metrics ask of each road user at each instant, compiled: see `foretwin.geometry.compiled`.
 
 Fifty thousand pairs take longer through dozens of numpy calls than through a loop that leaves each
 as soon as nothing can come of it. Shapes are (S, N, R): futures, instants, road users.
@@ -11,8 +11,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.compiled import REAL, WHOLE, given, kernel, types
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.compiled import REAL, WHOLE, given, kernel, types
 
 _ALL, _SIZES, _ROWS, _LINE = given(3, "C"), given(3), given(2), given(1)
 _PICKED, _OUT_ROWS = types.Array(WHOLE, 1, "A", readonly=True), REAL[:, ::1]

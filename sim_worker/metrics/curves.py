@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker import compiled
-from sim_worker.metrics.displacement import known, nowhere
-from sim_worker.metrics.rollout import Measure
-from sim_worker.metrics.scene import Scene
+from foretwin.contracts.arrays import Array
+from foretwin.geometry import compiled
+from foretwin.sim_worker.metrics.displacement import known, nowhere
+from foretwin.sim_worker.metrics.rollout import Measure
+from foretwin.sim_worker.metrics.scene import Scene
 
 
 def cheapest_walks(curves: Array, reference: Array) -> Array:

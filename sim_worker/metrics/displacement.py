@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.simulation import HorizonError
-from sim_worker.metrics.rollout import Flags, Measure
-from sim_worker.metrics.scene import Scene
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.simulation import HorizonError
+from foretwin.sim_worker.metrics.rollout import Flags, Measure
+from foretwin.sim_worker.metrics.scene import Scene
 
 _Summary = Callable[["Displacements"], Array]
 _SEED_S = 1e-6

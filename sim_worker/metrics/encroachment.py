@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.metrics import compiled_pairs
-from sim_worker.metrics.rollout import Measure
-from sim_worker.metrics.scene import Scene
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.metrics import compiled_pairs
+from foretwin.sim_worker.metrics.rollout import Measure
+from foretwin.sim_worker.metrics.scene import Scene
 
 _CHUNK = 8
 """Steps whose bounding boxes are compared before their lines are."""

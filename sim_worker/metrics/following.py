@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.metrics import compiled_pairs
-from sim_worker.metrics.rollout import Measure
-from sim_worker.metrics.scene import Scene
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.metrics import compiled_pairs
+from foretwin.sim_worker.metrics.rollout import Measure
+from foretwin.sim_worker.metrics.scene import Scene
 
 Indices = npt.NDArray[np.intp]
 _SLOW_MPS = 1.0

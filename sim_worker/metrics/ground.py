@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.arrays import Array
-from contracts.world import Area, World
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Area, World
 
 TOLERANCE_M = 0.3
 """Beyond the edge this much is no violation: nuPlan, drivable_area_compliance."""

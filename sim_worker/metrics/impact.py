@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.metrics.rollout import Flags, Measure
-from sim_worker.metrics.scene import Scene
-from sim_worker.metrics.time_to_collision import Pairs, meeting
-from sim_worker.overlap import Rectangles, clearance
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.rectangles import Rectangles, clearance
+from foretwin.sim_worker.metrics.rollout import Flags, Measure
+from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.sim_worker.metrics.time_to_collision import Pairs, meeting
 
 _MAX_CLOSING_MPS = 100.0
 """Faster than any two road users approach each other."""

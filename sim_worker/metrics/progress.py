@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.metrics.rollout import Flags, Measure
-from sim_worker.metrics.scene import Scene
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.metrics.rollout import Flags, Measure
+from foretwin.sim_worker.metrics.scene import Scene
 
 _LOOK_AGAIN_M = 10.0
 """The path is searched near the place known last, so no farther than this between looks."""

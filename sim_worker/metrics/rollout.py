@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
 
 Flags = npt.NDArray[np.bool_]
 
@@ -16,7 +16,7 @@ Flags = npt.NDArray[np.bool_]
 class Rollout(NamedTuple):
     """Simulated or recorded motion, all in one plane frame.
 
-    `time_s` (N,); `states` (S, N, 8) of base_link as `contracts.futures.STATE_COLUMNS`; `users`
+    `time_s` (N,); `states` (S, N, 8) of base_link as `futures.STATE_COLUMNS`; `users`
     (S, N, R, 3) x, y, yaw of box centres, NaN where a road user is not there; `user_speed_mps`
     (S, N, R) along their yaw; `user_size_m` (S, R, 2) length and width; `valid` (S,) false where
     the simulation diverged or its planner failed.

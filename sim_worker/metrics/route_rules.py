@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.world import Conflict, Connection, LineControl, World
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Conflict, Connection, LineControl, World
+from foretwin.geometry.frenet_path import FrenetPath
 
 _ON_PATH_M = 1.2
 """A connection whose middle stays this near to the path is the one that it takes."""

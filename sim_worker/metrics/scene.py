@@ -11,14 +11,14 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.futures import STATE_COLUMNS
-from sim_worker.metrics.ground import DrivableGround
-from sim_worker.metrics.rollout import Flags, Measure, Rollout
-from sim_worker.metrics.route_rules import RouteRules
-from sim_worker.planners.path import FrenetPath
-from sim_worker.vehicle.planar import box_centre_from_base_m
-from world_gen.signal_state import LiveColour
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import STATE_COLUMNS
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.rollout import Flags, Measure, Rollout
+from foretwin.sim_worker.metrics.route_rules import RouteRules
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.world_gen.rules.signal_state import LiveColour
 
 _Kept = TypeVar("_Kept")
 _FUTURES_AT_ONCE = 8

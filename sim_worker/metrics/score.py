@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim_worker.metrics.comfort import comfortable
-from sim_worker.metrics.impact import at_fault_collision
-from sim_worker.metrics.progress import backwards, on_road, progress
-from sim_worker.metrics.rollout import Measure
-from sim_worker.metrics.scene import Scene
-from sim_worker.metrics.time_to_collision import ttc
+from foretwin.sim_worker.metrics.comfort import comfortable
+from foretwin.sim_worker.metrics.impact import at_fault_collision
+from foretwin.sim_worker.metrics.progress import backwards, on_road, progress
+from foretwin.sim_worker.metrics.rollout import Measure
+from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.sim_worker.metrics.time_to_collision import ttc
 
 TTC_WEIGHT, PROGRESS_WEIGHT, COMFORT_WEIGHT = 5.0, 5.0, 2.0
 TTC_BOUND_S = 1.0

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
-from sim_worker.metrics import (
+from foretwin.sim_worker.metrics import (
     comfort,
     curves,
     displacement,
@@ -18,8 +18,8 @@ from sim_worker.metrics import (
     time_to_collision,
     violations,
 )
-from sim_worker.metrics.rollout import Measure, Rollout
-from sim_worker.metrics.scene import Context, Scene
+from foretwin.sim_worker.metrics.rollout import Measure, Rollout
+from foretwin.sim_worker.metrics.scene import Context, Scene
 
 Need = Literal["path", "ground", "rules", "reference", "user_mass_kg"]
 """Fields of `Context` without which a metric cannot be computed."""

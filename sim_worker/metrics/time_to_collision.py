@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.metrics import compiled_pairs
-from sim_worker.metrics.rollout import Measure
-from sim_worker.metrics.scene import Scene
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.metrics import compiled_pairs
+from foretwin.sim_worker.metrics.rollout import Measure
+from foretwin.sim_worker.metrics.scene import Scene
 
 EXPOSED_BELOW_S = 1.5
 """Threshold τ* of the exposed and integrated times: Minderhoud and Bovy (2001), section 5."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import SignalColour
-from sim_worker.metrics.rollout import Flags, Measure
-from sim_worker.metrics.route_rules import PriorityConflict, RouteRules
-from sim_worker.metrics.scene import Scene
-from world_gen.signal_state import colours_at, parts_of_cycle
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import SignalColour
+from foretwin.sim_worker.metrics.rollout import Flags, Measure
+from foretwin.sim_worker.metrics.route_rules import PriorityConflict, RouteRules
+from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.world_gen.rules.signal_state import colours_at, parts_of_cycle
 
 HARD_BRAKING_MPS2 = 2.0
 """Who has priority and must brake harder was not given way to."""

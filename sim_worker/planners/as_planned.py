@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.planners.trajectory_tracking import Trajectories, check_trajectories, track
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.planners.trajectory_tracking import Trajectories, check_trajectories, track
 
 
 class AsPlanned:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import MAX_LATERAL_ACCEL_MPS2, pure_pursuit, turning_speed
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.tracking import (
+    MAX_LATERAL_ACCEL_MPS2,
+    pure_pursuit,
+    turning_speed,
+)
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 _TIME_CONSTANT_S = 1.0
 _LIMIT_MPS2 = 2.0

@@ -13,18 +13,18 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.planners.base import PlannerOutput, PlannerView, SeenUsers, rows_of
-from sim_worker.planners.lattice_choice import Planned, choose
-from sim_worker.planners.lattice_rating import (
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView, SeenUsers, rows_of
+from foretwin.sim_worker.planners.lattice_choice import Planned, choose
+from foretwin.sim_worker.planners.lattice_rating import (
     MAX_ACCEL_MPS2,
     MAX_DECEL_MPS2,
     still_free,
 )
-from sim_worker.planners.polynomials import Motions
-from sim_worker.planners.prediction import Changes, changes
-from sim_worker.planners.tracking import pure_pursuit
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.sim_worker.planners.polynomials import Motions
+from foretwin.sim_worker.planners.prediction import Changes, changes
+from foretwin.sim_worker.planners.tracking import pure_pursuit
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 REPLAN_S = 0.5
 _AT_ONCE_S, _LEAD_BRAKES_MPS2 = 0.15, 2.5

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.giving_way import wait_arcs, walker_gap_m
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.planners.tracking import front_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.giving_way import wait_arcs, walker_gap_m
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.planners.tracking import front_from_base_m
 
 DECIDE_S = 0.2
 

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from sim_worker.planners.base import PlannerView, SeenUsers, SharedGround, rows_of
-from sim_worker.planners.tracking import front_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.sim_worker.planner_interface import PlannerView, SeenUsers, SharedGround, rows_of
+from foretwin.sim_worker.planners.tracking import front_from_base_m
 
 Flags = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_worker.planners.base import PlannerOutput, PlannerView
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 
 READY, QUESTION, ANSWER, FAILURE = b"R", b"Q", b"A", b"F"
 _HEADER = struct.Struct("<cQ")

@@ -1,4 +1,4 @@
-"""`python -m sim_worker.planners.host_process`: the process in which one foreign planner lives.
+"""`python -m foretwin.sim_worker.planners.host_process`: one foreign planner.
 
 It answers on the link that its worker gave it, and ends when that is closed or the worker is gone.
 """
@@ -14,8 +14,13 @@ import time
 from importlib.metadata import EntryPoint
 from typing import Any
 
-from sim_worker.planners.base import Planner, PlannerView, RemembersWithinJob, SeenUsers
-from sim_worker.planners.host_link import (
+from foretwin.sim_worker.planner_interface import (
+    Planner,
+    PlannerView,
+    RemembersWithinJob,
+    SeenUsers,
+)
+from foretwin.sim_worker.planners.host_link import (
     ANSWER,
     FAILURE,
     READY,
@@ -25,7 +30,7 @@ from sim_worker.planners.host_link import (
     receive,
     send,
 )
-from sim_worker.planners.one_at_a_time import AnswersOne, OneAtATime
+from foretwin.sim_worker.planners.one_at_a_time import AnswersOne, OneAtATime
 
 _LOOK_S = 0.5
 

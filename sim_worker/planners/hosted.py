@@ -15,8 +15,8 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.host_link import (
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.host_link import (
     ANSWER,
     FAILURE,
     QUESTION,
@@ -32,7 +32,7 @@ START_S = 60.0
 FIRST_ANSWER_S, ANSWER_S = 1.0, 0.5
 _BUFFER_BYTES = 1 << 20
 
-log = logging.getLogger("sim_worker.planners")
+log = logging.getLogger("foretwin.sim_worker.planners")
 
 
 class PlannerFailed(RuntimeError):  # noqa: N818
@@ -117,7 +117,7 @@ class HostedPlanner:
         with theirs:
             process = subprocess.Popen(
                 [
-                    sys.executable, "-m", "sim_worker.planners.host_process",
+                    sys.executable, "-P", "-m", "foretwin.sim_worker.planners.host_process",
                     "--link", str(theirs.fileno()), "--parent", str(os.getpid()),
                     "--name", self._name, "--object", self._value,
                 ],

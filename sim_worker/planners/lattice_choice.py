@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.planners.base import PlannerView
-from sim_worker.planners.giving_way import wait_arcs
-from sim_worker.planners.lattice_rating import (
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planner_interface import PlannerView
+from foretwin.sim_worker.planners.giving_way import wait_arcs
+from foretwin.sim_worker.planners.lattice_rating import (
     LATERAL_ACCEL_MPS2,
     MAX_ACCEL_MPS2,
     MAX_DECEL_MPS2,
@@ -19,9 +19,16 @@ from sim_worker.planners.lattice_rating import (
     rate_across,
     rate_along,
 )
-from sim_worker.planners.polynomials import Floats, Motions, braked, joined, to_place, to_speed
-from sim_worker.planners.prediction import Changes
-from sim_worker.planners.tracking import front_from_base_m
+from foretwin.sim_worker.planners.polynomials import (
+    Floats,
+    Motions,
+    braked,
+    joined,
+    to_place,
+    to_speed,
+)
+from foretwin.sim_worker.planners.prediction import Changes
+from foretwin.sim_worker.planners.tracking import front_from_base_m
 
 _SPEED_SHARES = np.array([1.0, 0.8, 0.6, 0.35, 0.0])
 _SPEED_TIMES_S = np.array([2.5, 5.0])

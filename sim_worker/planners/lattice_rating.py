@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker.planners.base import PlannerView
-from sim_worker.planners.path import SPACING_M
-from sim_worker.planners.polynomials import Floats, Motions
-from sim_worker.planners.prediction import Changes, courses
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.frenet_path import SPACING_M
+from foretwin.sim_worker.planner_interface import PlannerView
+from foretwin.sim_worker.planners.polynomials import Floats, Motions
+from foretwin.sim_worker.planners.prediction import Changes, courses
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 HORIZON_S, _INSTANTS = 4.0, 12
 _INSTANTS_S: Array = np.linspace(HORIZON_S / _INSTANTS, HORIZON_S, _INSTANTS)

@@ -6,14 +6,19 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.planners.base import KnownPlan, PlannerOutput, PlannerView, SharedGround
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.planner_interface import (
+    KnownPlan,
+    PlannerOutput,
+    PlannerView,
+    SharedGround,
+)
 
 
 class SeenUser(NamedTuple):
-    """One other road user; fields as in `sim_worker.planners.base.SeenUsers`."""
+    """One other road user; fields as in `foretwin.sim_worker.planner_interface.SeenUsers`."""
 
     x_m: float
     y_m: float
@@ -28,7 +33,7 @@ class SeenUser(NamedTuple):
 
 
 class CarView(NamedTuple):
-    """What the planner of one car sees; fields as in `sim_worker.planners.base.PlannerView`."""
+    """What the planner of one car sees; fields as in `planner_interface.PlannerView`."""
 
     time_s: float
     x_m: float

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from sim_worker.planners.base import PlannerView, SeenUsers
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.planner_interface import PlannerView, SeenUsers
 
 _KEEPS_LANE = 0.34
 """The sine of the angle to the road within which one drives along it, either way."""

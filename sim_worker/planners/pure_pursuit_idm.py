@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from sim_worker import compiled
-from sim_worker.planners import tracking
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import front_from_base_m
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners import compiled, tracking
+from foretwin.sim_worker.planners.tracking import front_from_base_m
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 MAX_ACCEL_MPS2 = 1.5
 COMFORT_DECEL_MPS2 = 2.0

@@ -1,8 +1,8 @@
 """Planners by name: those of foretwin, and any that an installed package offers.
 
 A package adds one with an entry point in the group `foretwin.planners` whose object is a class
-without arguments that follows `sim_worker.planners.base.Planner`, or
-`sim_worker.planners.one_at_a_time.CarPlanner`. It lives in a process of its own.
+without arguments that follows `foretwin.sim_worker.planner_interface.Planner`, or
+`foretwin.sim_worker.planners.one_at_a_time.CarPlanner`. It lives in a process of its own.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ from __future__ import annotations
 import functools
 from importlib.metadata import entry_points
 
-from sim_worker.planners.as_planned import AsPlanned
-from sim_worker.planners.base import Planner
-from sim_worker.planners.constant_speed import ConstantSpeed
-from sim_worker.planners.frenet_lattice import FrenetLattice
-from sim_worker.planners.gap_acceptance import GapAcceptance
-from sim_worker.planners.hosted import HostedPlanner
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.planners.remote import RemotePlanner
-from sim_worker.planners.reverse_pursuit import ReversePursuit
+from foretwin.sim_worker.planner_interface import Planner
+from foretwin.sim_worker.planners.as_planned import AsPlanned
+from foretwin.sim_worker.planners.constant_speed import ConstantSpeed
+from foretwin.sim_worker.planners.frenet_lattice import FrenetLattice
+from foretwin.sim_worker.planners.gap_acceptance import GapAcceptance
+from foretwin.sim_worker.planners.hosted import HostedPlanner
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.planners.remote import RemotePlanner
+from foretwin.sim_worker.planners.reverse_pursuit import ReversePursuit
 
 GROUP = "foretwin.planners"
 

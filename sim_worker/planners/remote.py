@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.bus import Bus, Mailbox, Received
-from contracts.planner_link import PlannedMotions, PlannerScene
-from sim_worker.planners.base import Planner, PlannerOutput, PlannerView, rows_of
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.planners.trajectory_tracking import Trajectories, check_trajectories, track
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.bus import Bus, Mailbox, Received
+from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
+from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView, rows_of
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.planners.trajectory_tracking import Trajectories, check_trajectories, track
 
 ASK_EVERY_S = 0.1
 FIRST_ANSWER_S, ANSWER_S = 1.0, 0.5

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import front_from_base_m, steer_towards
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.tracking import front_from_base_m, steer_towards
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 _LOOKAHEAD_M, _LOOKAHEAD_S, _LOOKAHEAD_ASIDE = 1.2, 0.7, 1.0
 _ACCEL_MPS2, _DECEL_MPS2, _MAX_DECEL_MPS2 = 1.0, 1.0, 6.0

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.planners.base import PlannerView
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.planner_interface import PlannerView
 
 MIN_LOOKAHEAD_M = 4.0
 LOOKAHEAD_TIME_S = 0.6

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.tracking import lookahead_m, steer_towards
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners.tracking import lookahead_m, steer_towards
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 _NEAR_S = 3.0
 """A car is looked for on its trajectory within this time of where it should be."""

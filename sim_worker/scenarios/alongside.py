@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.scenario import ActorPart
-from sim_worker.actors.kinds import KINDS, KindTraits
-from sim_worker.overlap import corners
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.impact import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.scenario import ActorPart
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import corners
+from foretwin.sim_worker.scenarios.impact import (
     TOLERANCE_M,
     Moving,
     Touch,
@@ -22,8 +21,9 @@ from sim_worker.scenarios.impact import (
     front_point,
     gap_m,
 )
-from sim_worker.scenarios.roles import CastActor, Meeting, Staging
-from sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.scenarios.roles import CastActor, Meeting, Staging
+from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
 
 _CLEAR_M, _LANE_HALF_M = 0.3, 1.5
 """What is parked leaves the lane free, and a car's side by so much."""

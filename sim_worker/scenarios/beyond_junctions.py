@@ -9,16 +9,16 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.scenario import Scenario
-from contracts.world import Lane
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.places import Place
-from sim_worker.scenarios.relations import ways_over
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
-from world_gen.polyline import arc_lengths, points_at
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.world import Lane
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import arc_lengths, points_at
+from foretwin.sim_worker.scenarios.places import Place
+from foretwin.sim_worker.scenarios.relations import ways_over
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
 
 _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
 _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contracts.scenario import EGO, Scenario
-from contracts.vehicle import VehicleParameters
-from sim_worker.scenarios.alongside import (
+from foretwin.contracts.scenario import EGO, Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.scenarios.alongside import (
     Touched,
     along,
     backs_into_a_house,
@@ -19,11 +19,11 @@ from sim_worker.scenarios.alongside import (
     stands_in_a_house,
     stands_in_the_way,
 )
-from sim_worker.scenarios.drawing import Values
-from sim_worker.scenarios.impact import Moving, ego_box
-from sim_worker.scenarios.meeting import LEAST_TIME_S, incoming, meet
-from sim_worker.scenarios.places import Place, Unplaced
-from sim_worker.scenarios.roles import ALONG, Cast, CastActor, Meeting, Staging
+from foretwin.sim_worker.scenarios.drawing import Values
+from foretwin.sim_worker.scenarios.impact import Moving, ego_box
+from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S, incoming, meet
+from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor, Meeting, Staging
 
 __all__ = ["Cast", "CastActor", "cast", "cast_all"]
 

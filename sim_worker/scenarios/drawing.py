@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from contracts.arrays import Array
-from contracts.scenario import Scenario, Span
-from sim_worker.scenarios.reading import NamedNumber, numbers
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.scenario import Scenario, Span
+from foretwin.sim_worker.scenarios.reading import NamedNumber, numbers
 
 Values = dict[str, float]
 """Every number of one case, named `ego.speed_mps`, `<actor>.gap_m`, `faults.brake_gain`."""

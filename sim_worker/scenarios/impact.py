@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.kinds import KindTraits
-from sim_worker.overlap import Rectangles, overlapping
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import Rectangles, overlapping
+from foretwin.sim_worker.vehicle.road_user_kinds import KindTraits
 
 TOLERANCE_M = 0.08
 """How far from its plan the first touch may be, in place and from the front's point."""

@@ -13,18 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.scenario import Scenario
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.cast import Player
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.casting import cast
-from sim_worker.scenarios.meeting import LEAST_TIME_S
-from sim_worker.scenarios.placement import passage_on_path, places_on_passage
-from sim_worker.scenarios.places import Place, Unplaced
-from sim_worker.scenarios.roads import Passage, RoadNetwork
-from sim_worker.scenarios.roles import ALONG, Cast, CastActor
-from sim_worker.scenarios.staged import player_on
-from sim_worker.scenarios.ways import Way
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.road_users.cast import Player
+from foretwin.sim_worker.scenarios.casting import cast
+from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S
+from foretwin.sim_worker.scenarios.placement import passage_on_path, places_on_passage
+from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
+from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor
+from foretwin.sim_worker.scenarios.staged import player_on
+from foretwin.sim_worker.scenarios.ways import Way
 
 _LEAST_SPEED_MPS = 2.0
 """A car that stands is taken to set off with this speed."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from contracts.scenario import ActorPart
-from sim_worker.actors.kinds import KINDS
-from sim_worker.scenarios.impact import Moving, Span, find_impact
-from sim_worker.scenarios.roles import CastActor, Meeting, Staging
-from sim_worker.scenarios.ways import Way
+from foretwin.contracts.scenario import ActorPart
+from foretwin.sim_worker.scenarios.impact import Moving, Span, find_impact
+from foretwin.sim_worker.scenarios.roles import CastActor, Meeting, Staging
+from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
 LEAST_TIME_S = 0.8
 """Nothing is staged that is over sooner."""

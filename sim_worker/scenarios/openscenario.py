@@ -13,11 +13,11 @@ from pathlib import Path
 
 from lxml import etree
 
-from contracts.scenario import FAULTS, Scenario
-from contracts.vehicle import VehicleParameters
-from contracts.world import ATTRIBUTION, World
-from sim_worker.scenarios.openscenario_entities import actor_object, ego_object
-from sim_worker.scenarios.openscenario_motion import (
+from foretwin.contracts.scenario import FAULTS, Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.sim_worker.scenarios.openscenario_entities import actor_object, ego_object
+from foretwin.sim_worker.scenarios.openscenario_motion import (
     Motion,
     actor_motion,
     after,
@@ -25,10 +25,10 @@ from sim_worker.scenarios.openscenario_motion import (
     maneuver_group,
     starts,
 )
-from sim_worker.scenarios.roles import Cast
-from world_gen.export.opendrive import write_opendrive
-from world_gen.export.opendrive_elements import number
-from world_gen.export.xml_text import in_comment, legal
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.world_gen.export.opendrive import write_opendrive
+from foretwin.world_gen.export.opendrive_elements import number
+from foretwin.world_gen.export.xml_text import in_comment, legal
 
 UNSAID = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 

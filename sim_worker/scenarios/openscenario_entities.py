@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 from lxml import etree
 
-from contracts.drive import RoadUserKind
-from contracts.scenario import EGO
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.kinds import KINDS
-from sim_worker.scenarios.roles import CastActor
-from world_gen.export.opendrive_elements import number
-from world_gen.export.xml_text import legal
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.scenario import EGO
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.scenarios.roles import CastActor
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
+from foretwin.world_gen.export.opendrive_elements import number
+from foretwin.world_gen.export.xml_text import legal
 
 
 class Axles(NamedTuple):

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from lxml import etree
 
-from contracts.arrays import Array
-from contracts.scenario import EGO
-from sim_worker.planners.path import FrenetPath, PathPose
-from sim_worker.scenarios.openscenario_entities import reference_behind_centre_m
-from sim_worker.scenarios.roles import Cast, CastActor
-from world_gen.export.opendrive_elements import number
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.scenario import EGO
+from foretwin.geometry.frenet_path import FrenetPath, PathPose
+from foretwin.sim_worker.scenarios.openscenario_entities import reference_behind_centre_m
+from foretwin.sim_worker.scenarios.roles import Cast, CastActor
+from foretwin.world_gen.export.opendrive_elements import number
 
 _STEP_S, _SPACING_M = 0.1, 0.5
 _MOST_DRIFT_M = 0.06

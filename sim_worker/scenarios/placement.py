@@ -8,20 +8,20 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.scenario import Scenario
-from contracts.vehicle import VehicleParameters
-from contracts.world import IntersectionSummary, World, WorldJunction
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.beyond_junctions import other_places
-from sim_worker.scenarios.casting import cast
-from sim_worker.scenarios.drawing import Values, draw_cases
-from sim_worker.scenarios.places import Place, Placement, Unplaced
-from sim_worker.scenarios.relations import ways_of
-from sim_worker.scenarios.roads import Passage, RoadNetwork
-from sim_worker.scenarios.ways import Way, unlike_its_turn
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import IntersectionSummary, World, WorldJunction
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.scenarios.beyond_junctions import other_places
+from foretwin.sim_worker.scenarios.casting import cast
+from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
+from foretwin.sim_worker.scenarios.places import Place, Placement, Unplaced
+from foretwin.sim_worker.scenarios.relations import ways_of
+from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
+from foretwin.sim_worker.scenarios.ways import Way, unlike_its_turn
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 _ON_CONNECTION_M = 3.0
 """Who drives no farther on average from a connection's middle takes it."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from contracts.world import DrivingSide
-from sim_worker.scenarios.walls import Walls
-from sim_worker.scenarios.ways import Way
+from foretwin.contracts.world import DrivingSide
+from foretwin.sim_worker.scenarios.walls import Walls
+from foretwin.sim_worker.scenarios.ways import Way
 
 
 class Place(NamedTuple):

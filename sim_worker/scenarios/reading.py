@@ -12,8 +12,8 @@ from typing import get_args
 
 import msgspec
 
-from contracts.errors import UserError
-from contracts.scenario import (
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.scenario import (
     EGO,
     FAULTS,
     ActorPart,
@@ -215,7 +215,7 @@ def _words(message: str) -> str:
 
 
 def _known(part: str) -> str:
-    from contracts.scenario import Where
+    from foretwin.contracts.scenario import Where
 
     kinds: dict[str, type[msgspec.Struct]] = {
         "scenario": Scenario, "ego": EgoPart, "actors": ActorPart, "faults": FaultPart,
@@ -225,9 +225,9 @@ def _known(part: str) -> str:
 
 
 def _choices(field: str) -> str:
-    from contracts.drive import RoadUserKind
-    from contracts.scenario import Conduct, Setting, TrafficTurn
-    from contracts.world import Control, JunctionKind
+    from foretwin.contracts.drive import RoadUserKind
+    from foretwin.contracts.scenario import Conduct, Setting, TrafficTurn
+    from foretwin.contracts.world import Control, JunctionKind
 
     literals = {
         "turn": TrafficTurn, "relation": Relation, "conduct": Conduct, "kind": RoadUserKind,

@@ -8,14 +8,14 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.scenario import ActorPart, Relation, TrafficTurn
-from contracts.world import Crossing
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.roads import Passage, RoadNetwork
-from sim_worker.scenarios.ways import Way
-from world_gen.polyline import length
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.scenario import ActorPart, Relation, TrafficTurn
+from foretwin.contracts.world import Crossing
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import length
+from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
+from foretwin.sim_worker.scenarios.ways import Way
 
 SIDE_RAD = (math.radians(30.0), math.radians(150.0))
 """Arms at these angles to the ego's own count as side arms."""

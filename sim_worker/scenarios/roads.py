@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.scenario import TrafficTurn
-from contracts.world import Connection, DrivingSide, Lane, World
-from sim_worker.scenarios.walls import Walls
-from sim_worker.scenarios.ways import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.scenario import TrafficTurn
+from foretwin.contracts.world import Connection, DrivingSide, Lane, World
+from foretwin.geometry.polyline import arc_lengths, length
+from foretwin.sim_worker.scenarios.walls import Walls
+from foretwin.sim_worker.scenarios.ways import (
     APPROACH_M,
     DEPARTURE_M,
     Way,
@@ -23,7 +24,6 @@ from sim_worker.scenarios.ways import (
     traffic_turn,
     turn_by_heading,
 )
-from world_gen.polyline import arc_lengths, length
 
 _LONGEST_CHAIN = 16
 """Connections through one ring: more are a drive in circles."""

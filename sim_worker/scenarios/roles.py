@@ -6,15 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import RoadUserKind
-from contracts.scenario import ActorPart, Conduct, Relation, Scenario
-from sim_worker.actors.kinds import KINDS, KindTraits
-from sim_worker.scenarios.drawing import Values
-from sim_worker.scenarios.impact import EgoBox, Impact, Moving
-from sim_worker.scenarios.places import Place
-from sim_worker.scenarios.ways import Way
-from world_gen.polyline import length
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.scenario import ActorPart, Conduct, Relation, Scenario
+from foretwin.geometry.polyline import length
+from foretwin.sim_worker.scenarios.drawing import Values
+from foretwin.sim_worker.scenarios.impact import EgoBox, Impact, Moving
+from foretwin.sim_worker.scenarios.places import Place
+from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
 
 ALONG: tuple[Relation, ...] = ("ahead", "behind", "beside", "parked")
 """Relations of those who have no way of their own: they are on the ego's path or beside it."""

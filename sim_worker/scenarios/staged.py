@@ -10,19 +10,19 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.scenario import Scenario
-from contracts.vehicle import VehicleParameters
-from sim_worker.actors.cast import Player
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.beyond_junctions import other_places
-from sim_worker.scenarios.casting import cast_all
-from sim_worker.scenarios.placement import places_on_passage
-from sim_worker.scenarios.places import Place, Unplaced
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.scenarios.roles import Cast, CastActor
-from sim_worker.scenarios.ways import Way
-from sim_worker.seeding import kinematic_tire_angle, rear_slip_velocity
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.road_users.cast import Player
+from foretwin.sim_worker.scenarios.beyond_junctions import other_places
+from foretwin.sim_worker.scenarios.casting import cast_all
+from foretwin.sim_worker.scenarios.placement import places_on_passage
+from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.roles import Cast, CastActor
+from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_velocity
 
 _Case = tuple[object, ...]
 

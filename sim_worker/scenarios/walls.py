@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.world import World
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
 
 
 class Walls:

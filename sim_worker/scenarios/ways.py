@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.scenario import TrafficTurn
-from contracts.world import DrivingSide
-from sim_worker.planners.path import FrenetPath
-from world_gen.polyline import arc_lengths
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.scenario import TrafficTurn
+from foretwin.contracts.world import DrivingSide
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import arc_lengths
 
 APPROACH_M, DEPARTURE_M = 150.0, 120.0
 """How far ways are led back and on along the lanes."""

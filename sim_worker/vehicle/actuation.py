@@ -12,12 +12,12 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker import compiled
-from sim_worker.vehicle.lag import ForceLag, lags_of_force
-from sim_worker.vehicle.parameters import GRAVITY_MPS2
-from sim_worker.vehicle.planar import DRIVE, STEER, TYRE_FRONT, TYRE_REAR
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.vehicle import compiled
+from foretwin.sim_worker.vehicle.lag import ForceLag, lags_of_force
+from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
+from foretwin.sim_worker.vehicle.planar import DRIVE, STEER, TYRE_FRONT, TYRE_REAR
 
 _MIN_SPEED_MPS = 1.0
 """Below it tyres act as dampers: slip angles lose their meaning towards standstill."""

@@ -8,8 +8,8 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.vehicle import Parameter, VehicleParameters
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
 
 
 class ForceLag:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import msgspec
 
-from contracts.errors import UserError
-from contracts.vehicle import Parameter, VehicleParameters
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
 
 _FOLDER = Path(__file__).parent
 DEFAULT_FILE = _FOLDER / "bmw_320i.toml"

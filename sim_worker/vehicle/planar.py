@@ -3,7 +3,7 @@
 The body origin is the centre of gravity, so that the mass matrix is diagonal; `base_from_cog` and
 `cog_from_base` convert to base_link, the rear-axle centre. A lateral tyre force is a velocity
 actuator at the axle, F = -(C / max(|u|, 1)) v_lat within ±limit, which implicit integration keeps
-stable at 10 ms down to standstill; `sim_worker.vehicle.actuation` refreshes C and the limits.
+stable at 10 ms down to standstill; `vehicle.actuation` refreshes C and the limits.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import math
 import mujoco
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.vehicle.parameters import GRAVITY_MPS2
-from world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
+from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
 
 TIMESTEP_S = 0.01
 MAX_STEERING_DELAY_S = 1.0

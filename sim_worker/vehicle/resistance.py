@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
 
 
 def resistance_mps2(vehicle: VehicleParameters, speed_mps: Array) -> Array:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from telemetry.logs.log import Log, LogError
-from telemetry.logs.opening import open_log, open_road_users
-from telemetry.logs.route_line import RouteLine, line_of_log, read_line
+from foretwin.telemetry.logs.log import Log, LogError
+from foretwin.telemetry.logs.opening import open_log, open_road_users
+from foretwin.telemetry.logs.route_line import RouteLine, line_of_log, read_line
 
 __all__ = [
     "Log",

@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import (
     GnssFix,
     HeadingSample,
     ImuSample,
@@ -28,9 +28,9 @@ from contracts.drive import (
     SteeringSample,
     VehicleInfo,
 )
-from contracts.frames import GeoPoint, geo_from_ecef
-from telemetry.logs.log import Declared, Log, LogError, Sample
-from telemetry.logs.merge import merged
+from foretwin.contracts.frames import GeoPoint, geo_from_ecef
+from foretwin.telemetry.logs.log import Declared, Log, LogError, Sample
+from foretwin.telemetry.logs.merge import merged
 
 
 def is_comma2k19(folder: Path) -> bool:

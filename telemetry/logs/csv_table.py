@@ -1,4 +1,4 @@
-"""Reader of CSV files whose columns are declared (see telemetry.logs.declaration)."""
+"""Reader of CSV files whose columns are declared (see foretwin.telemetry.logs.declaration)."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 import pyproj
 
-from contracts import drive
-from contracts.arrays import Array
-from contracts.frames import GeoPoint, geo_from_ecef, wrap_angle
-from telemetry.logs import units
-from telemetry.logs.declaration import (
+from foretwin.contracts import drive
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint, geo_from_ecef, wrap_angle
+from foretwin.telemetry.logs import units
+from foretwin.telemetry.logs.declaration import (
     Declaration,
     HeadingSection,
     ImuSection,
@@ -30,9 +30,9 @@ from telemetry.logs.declaration import (
     read_declaration,
     sections_of,
 )
-from telemetry.logs.gpx import stamp_ns_from_iso
-from telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
-from telemetry.logs.merge import merged
+from foretwin.telemetry.logs.gpx import stamp_ns_from_iso
+from foretwin.telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+from foretwin.telemetry.logs.merge import merged
 
 Cells = list[str]
 Flags = npt.NDArray[np.bool_]

@@ -26,9 +26,9 @@ from typing import Literal
 
 import msgspec
 
-from contracts.drive import TimeBase
-from telemetry.logs import units
-from telemetry.logs.log import LogError
+from foretwin.contracts.drive import TimeBase
+from foretwin.telemetry.logs import units
+from foretwin.telemetry.logs.log import LogError
 
 
 class Column(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,6 +1,6 @@
 """Reader of MCAP files and bags with ROS messages that other programs wrote.
 
-Topics are chosen by message type, one topic per stream of telemetry.ros_foreign: the first type
+Topics are chosen by message type, one topic per stream of `ros_messages.foreign`: the first type
 that occurs, and among its topics the one with the most messages. The stamp is that of the header,
 and the log time where that is 0. Plans and objects are read only where metadata `foretwin.frame` or
 a declaration tells the origin of their frame. Where static transforms lead from base_link to the
@@ -14,17 +14,31 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from contracts import drive
-from contracts.frames import LocalFrame
-from telemetry.logs.log import FILE_CUT_SHORT, UNREADABLE_ROW, Declared, Log, LogError, Sample
-from telemetry.logs.map_origin import RecordingDeclaration
-from telemetry.logs.mcap_records import Contents, Record
-from telemetry.logs.merge import reordered
-from telemetry.logs.ros_recording import Recording, decoder
-from telemetry.ros_foreign import FOREIGN, POSE, Foreign, UnusableError, channel_of, stamp_of
-from telemetry.ros_parts import BASE_FRAME, ODOMETRY, TF
-from telemetry.ros_status import StatusJoiner
-from telemetry.ros_transforms import TransformTree
+from foretwin.contracts import drive
+from foretwin.contracts.frames import LocalFrame
+from foretwin.telemetry.logs.log import (
+    FILE_CUT_SHORT,
+    UNREADABLE_ROW,
+    Declared,
+    Log,
+    LogError,
+    Sample,
+)
+from foretwin.telemetry.logs.map_origin import RecordingDeclaration
+from foretwin.telemetry.logs.mcap_records import Contents, Record
+from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.logs.ros_recording import Recording, decoder
+from foretwin.telemetry.ros_messages.foreign import (
+    FOREIGN,
+    POSE,
+    Foreign,
+    UnusableError,
+    channel_of,
+    stamp_of,
+)
+from foretwin.telemetry.ros_messages.parts import BASE_FRAME, ODOMETRY, TF
+from foretwin.telemetry.ros_messages.status import StatusJoiner
+from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 WINDOW_NS = 2_000_000_000
 """How late a message may lie in its file and still be put in order."""

@@ -15,10 +15,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from contracts.drive import GnssFix
-from contracts.frames import GeoPoint
-from telemetry.logs.gpx import stamp_ns_from_iso
-from telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample, fixes_log
+from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.logs.gpx import stamp_ns_from_iso
+from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample, fixes_log
 
 _TIME_NAMES = ("coordTimes", "times")
 

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from contracts.drive import GnssFix
-from contracts.frames import GeoPoint
-from telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample, fixes_log
+from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample, fixes_log
 
 
 class GpxPoint(NamedTuple):

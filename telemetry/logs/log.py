@@ -11,12 +11,12 @@ from typing import Any
 
 import msgspec
 
-from contracts import drive
-from contracts.drive import VehicleInfo
-from contracts.errors import UserError
+from foretwin.contracts import drive
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.errors import UserError
 
 Sample = tuple[str, msgspec.Struct]
-"""Channel name of contracts.keys and its message."""
+"""Channel name of foretwin.contracts.keys and its message."""
 
 POSITION_NOT_FINITE = "position not finite"
 POSITION_ZERO = "position (0, 0)"

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import msgspec
 
-from contracts.drive import Vector3
-from contracts.frames import GeoPoint, LocalFrame
-from telemetry.logs.log import LogError
+from foretwin.contracts.drive import Vector3
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.logs.log import LogError
 
 
 class MapSection(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -15,7 +15,7 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from zstandard import ZstdError
 
-from telemetry.logs.log import LogError
+from foretwin.telemetry.logs.log import LogError
 
 # What the mcap package raises over bytes that are no MCAP, or no longer.
 _BROKEN = (McapError, EOFError, ValueError, KeyError, struct.error, ZstdError)

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import msgspec
 
-from contracts.drive import RoadUserKind
-from telemetry.logs.log import Declared, LogError
-from telemetry.logs.road_users import Detection
-from telemetry.logs.units import SPEED
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.telemetry.logs.log import Declared, LogError
+from foretwin.telemetry.logs.road_users import Detection
+from foretwin.telemetry.logs.units import SPEED
 
 _KINDS: dict[str, RoadUserKind] = {"2": "car", "10": "pedestrian"}
 DECLARED = Declared(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterable, Iterator
 
-from telemetry.logs.log import Sample
+from foretwin.telemetry.logs.log import Sample
 
 
 def stamp_ns_of(sample: Sample) -> int:

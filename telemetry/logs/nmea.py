@@ -20,12 +20,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from contracts import drive
-from contracts.frames import GeoPoint, wrap_angle
-from telemetry.logs import units
-from telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
-from telemetry.logs.merge import reordered
-from telemetry.ros_foreign import NO_FIX
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, wrap_angle
+from foretwin.telemetry.logs import units
+from foretwin.telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.ros_messages.foreign import NO_FIX
 
 CHECKSUM_WRONG = "checksum wrong"
 NO_TIME = "sentence before any time"

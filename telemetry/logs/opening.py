@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from contracts.drive import RoadUsers
-from telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
-from telemetry.logs.geojson import open_geojson
-from telemetry.logs.gpx import open_gpx
-from telemetry.logs.log import Log, LogError
-from telemetry.logs.mcity import DECLARED, is_mcity, read_mcity
-from telemetry.logs.nmea import is_nmea, open_nmea
-from telemetry.logs.road_users import LONGEST_GAP_S, RoadUserLog, detections_of, log_of_detections
-from telemetry.logs.smartloc import is_smartloc, open_smartloc
+from foretwin.contracts.drive import RoadUsers
+from foretwin.telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
+from foretwin.telemetry.logs.geojson import open_geojson
+from foretwin.telemetry.logs.gpx import open_gpx
+from foretwin.telemetry.logs.log import Log, LogError
+from foretwin.telemetry.logs.mcity import DECLARED, is_mcity, read_mcity
+from foretwin.telemetry.logs.nmea import is_nmea, open_nmea
+from foretwin.telemetry.logs.road_users import (
+    LONGEST_GAP_S,
+    RoadUserLog,
+    detections_of,
+    log_of_detections,
+)
+from foretwin.telemetry.logs.smartloc import is_smartloc, open_smartloc
 
 BAG_MAGIC, SQLITE_MAGIC = b"#ROSBAG V", b"SQLite format 3\0"
 
@@ -37,7 +42,7 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
         if is_comma2k19(path):
             return open_comma2k19(path)
         if (path / "metadata.yaml").is_file():
-            from telemetry.logs.ros_log import open_bag
+            from foretwin.telemetry.logs.ros_log import open_bag
 
             return open_bag(path, declaration=declaration)
         raise LogError(
@@ -49,11 +54,11 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
         raise LogError(f"{path}: the file is empty")
     suffix = path.suffix.lower()
     if head.startswith(b"\x89MCAP0") or suffix == ".mcap":
-        from telemetry.logs.ros_log import open_mcap
+        from foretwin.telemetry.logs.ros_log import open_mcap
 
         return open_mcap(path, declaration=declaration)
     if head.startswith((BAG_MAGIC, SQLITE_MAGIC)) or suffix in (".bag", ".db3"):
-        from telemetry.logs.ros_log import open_bag
+        from foretwin.telemetry.logs.ros_log import open_bag
 
         return open_bag(path, declaration=declaration)
     text = head.decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
@@ -66,7 +71,7 @@ def open_log(path: Path, *, declaration: Path | None = None) -> Log:
     if suffix in (".geojson", ".json") or text.startswith("{"):
         return open_geojson(path)
     if suffix == ".csv" or declaration is not None:
-        from telemetry.logs.csv_table import open_csv
+        from foretwin.telemetry.logs.csv_table import open_csv
 
         return open_csv(path, declaration=declaration)
     raise LogError(f"{path}: no known log; known are {KINDS}")

@@ -14,10 +14,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
-from contracts.drive import RoadUserKind, RoadUsers
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local_yaw, local_from_geo, wrap_angle
-from telemetry.logs.log import TIME_DOUBLED, VALUE_NOT_FINITE, Declared, fault_of_position
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUserKind, RoadUsers
+from foretwin.contracts.frames import (
+    GeoPoint,
+    LocalFrame,
+    geo_from_local_yaw,
+    local_from_geo,
+    wrap_angle,
+)
+from foretwin.telemetry.logs.log import TIME_DOUBLED, VALUE_NOT_FINITE, Declared, fault_of_position
 
 LONGEST_GAP_S = 1.0
 """Who is not seen for longer is taken to be away until seen again."""

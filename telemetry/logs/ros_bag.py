@@ -14,9 +14,9 @@ from rosbags.rosbag1 import ReaderError as Error1
 from rosbags.rosbag2 import Reader as Reader2
 from rosbags.rosbag2 import ReaderError as Error2
 
-from telemetry.logs.log import FILE_CUT_SHORT, LogError
-from telemetry.logs.mcap_records import Contents, Record
-from telemetry.logs.ros_recording import NO_DEFINITION, ROS1, Recording
+from foretwin.telemetry.logs.log import FILE_CUT_SHORT, LogError
+from foretwin.telemetry.logs.mcap_records import Contents, Record
+from foretwin.telemetry.logs.ros_recording import NO_DEFINITION, ROS1, Recording
 
 _ENCODINGS = {
     MessageDefinitionFormat.NONE: NO_DEFINITION,

@@ -13,16 +13,23 @@ from typing import NamedTuple
 
 import msgspec
 
-from contracts import drive
-from contracts.frames import LocalFrame
-from telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
-from telemetry.logs.log import FILE_CUT_SHORT, VALUE_NOT_FINITE, Declared, Log, LogError, Sample
-from telemetry.logs.map_origin import declared_of
-from telemetry.logs.merge import reordered
-from telemetry.logs.ros_bag import bag_recording
-from telemetry.logs.ros_recording import Recording, decoder, mcap_recording
-from telemetry.mcap_file import FORMAT_METADATA, FRAME_METADATA, INFO_METADATA
-from telemetry.ros_messages import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import LocalFrame
+from foretwin.telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
+from foretwin.telemetry.logs.log import (
+    FILE_CUT_SHORT,
+    VALUE_NOT_FINITE,
+    Declared,
+    Log,
+    LogError,
+    Sample,
+)
+from foretwin.telemetry.logs.map_origin import declared_of
+from foretwin.telemetry.logs.merge import reordered
+from foretwin.telemetry.logs.ros_bag import bag_recording
+from foretwin.telemetry.logs.ros_recording import Recording, decoder, mcap_recording
+from foretwin.telemetry.logs.write_mcap import FORMAT_METADATA, FRAME_METADATA, INFO_METADATA
+from foretwin.telemetry.ros_messages.table import (
     FRAME_TOPIC,
     INFO_TOPIC,
     TOPIC_PREFIX,
@@ -34,7 +41,7 @@ from telemetry.ros_messages import (
 def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
     """Open an MCAP file; raises LogError where it is none or holds no positions.
 
-    `declaration` is that of telemetry.logs.map_origin, for files of other programs.
+    `declaration` is that of foretwin.telemetry.logs.map_origin, for files of other programs.
     """
     recording = mcap_recording(path)
     metadata = recording.contents.metadata

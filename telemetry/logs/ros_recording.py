@@ -12,9 +12,9 @@ from typing import Any
 from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-from telemetry.logs.log import LogError
-from telemetry.logs.mcap_records import Contents, Record, read_contents, records
-from telemetry.ros_parts import schema_text, typestore
+from foretwin.telemetry.logs.log import LogError
+from foretwin.telemetry.logs.mcap_records import Contents, Record, read_contents, records
+from foretwin.telemetry.ros_messages.parts import schema_text, typestore
 
 NO_DEFINITION = ""
 """Schema encoding of bags that name types without defining them (ROS 2 before Iron)."""

@@ -7,11 +7,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix
-from telemetry.logs.geojson import geojson_lines
-from telemetry.logs.gpx import gpx_lines
-from telemetry.logs.log import Log, LogError, fault_of_position
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix
+from foretwin.telemetry.logs.geojson import geojson_lines
+from foretwin.telemetry.logs.gpx import gpx_lines
+from foretwin.telemetry.logs.log import Log, LogError, fault_of_position
 
 
 class RouteLine(msgspec.Struct, frozen=True, kw_only=True):

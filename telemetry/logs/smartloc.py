@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix, VehicleInfo
-from contracts.frames import GeoPoint, geo_from_ecef
-from telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, VehicleInfo
+from foretwin.contracts.frames import GeoPoint, geo_from_ecef
+from foretwin.telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
 
 KEYWORD = "point3"
 _COLUMNS = "point3 TIME_S X_M Y_M Z_M [9 covariances]"

@@ -1,18 +1,18 @@
-"""The gateway to ROS 2 as a process: `python -m telemetry.ros2 --setup FILE`."""
+"""The gateway to ROS 2 as a process: `python -m foretwin.telemetry.ros2 --setup FILE`."""
 
 from __future__ import annotations
 
 import logging
 
-from contracts.bus import Bus
-from contracts.foreign_bus import ZenohForeignBus
-from contracts.process import ProcessLife, run_process
-from contracts.setup import Ros2Setup
-from telemetry.ros2.gateway import Gateway
-from telemetry.ros2.mapping import listening_only, parse_mapping
-from telemetry.ros_parts import typestore
+from foretwin.contracts.bus import Bus
+from foretwin.contracts.foreign_bus import ZenohForeignBus
+from foretwin.contracts.process import ProcessLife, run_process
+from foretwin.contracts.setup import Ros2Setup
+from foretwin.telemetry.ros2.gateway import Gateway
+from foretwin.telemetry.ros2.mapping import listening_only, parse_mapping
+from foretwin.telemetry.ros_messages.parts import typestore
 
-log = logging.getLogger("telemetry.ros2")
+log = logging.getLogger("foretwin.telemetry.ros2")
 
 
 def serve(setup: Ros2Setup, bus: Bus, life: ProcessLife) -> None:

@@ -2,7 +2,7 @@
 
 One thread; what arrives waits in bounded mailboxes that forget the oldest. Nothing is repeated:
 each message towards the vehicle answers one fresh word of the orchestrator, so silence there is
-silence here, and the dead man of `telemetry.ros2.safety` shuts the gate besides.
+silence here, and the dead man of `foretwin.telemetry.ros2.safety` shuts the gate besides.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from contracts import drive, gap
-from contracts.bus import Bus, Mailbox, Received, Request
-from contracts.codec import SchemaMismatch
-from contracts.foreign_bus import ForeignBus
-from contracts.frames import LocalFrame
-from contracts.simulation import Event, MirrorSample
-from contracts.towards_vehicle import Authority, VehicleCommand
-from contracts.vehicle import VehicleParameters
-from telemetry.ros2.introduction import Introduction
-from telemetry.ros2.inwards import Inwards
-from telemetry.ros2.mapping import Mapping, OutRow, Source
-from telemetry.ros2.mirrored import MirroredObjects, without_own_twin
-from telemetry.ros2.outwards import Outwards
-from telemetry.ros2.safety import VehicleGate
-from telemetry.ros2.sender import RosSender
-from telemetry.ros2.told import Told
-from telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
+from foretwin.contracts import drive, gap
+from foretwin.contracts.bus import Bus, Mailbox, Received, Request
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.foreign_bus import ForeignBus
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.simulation import Event, MirrorSample
+from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.telemetry.ros2.introduction import Introduction
+from foretwin.telemetry.ros2.inwards import Inwards
+from foretwin.telemetry.ros2.mapping import Mapping, OutRow, Source
+from foretwin.telemetry.ros2.mirrored import MirroredObjects, without_own_twin
+from foretwin.telemetry.ros2.outwards import Outwards
+from foretwin.telemetry.ros2.safety import VehicleGate
+from foretwin.telemetry.ros2.sender import RosSender
+from foretwin.telemetry.ros2.told import Told
+from foretwin.telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
 
 _PORTION = 16
 """So many samples at most between two looks at the orchestrator's words."""
@@ -40,7 +40,7 @@ _STATE_EVERY_NS = 20_000_000
 _OBJECTS_EVERY_NS = 100_000_000
 _ROUTE_EVERY_NS = 1_000_000_000
 
-log = logging.getLogger("telemetry.ros2")
+log = logging.getLogger("foretwin.telemetry.ros2")
 
 
 class Gateway:

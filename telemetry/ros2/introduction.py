@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from contracts.bus import Request
-from contracts.drive import VehicleInfo
-from telemetry.logs.foreign_ros import time_base_of
-from telemetry.ros2.inwards import Inwards
-from telemetry.ros2.mapping import Mapping
+from foretwin.contracts.bus import Request
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.telemetry.logs.foreign_ros import time_base_of
+from foretwin.telemetry.ros2.inwards import Inwards
+from foretwin.telemetry.ros2.mapping import Mapping
 
 _WAITS_NS = 1_500_000_000
 

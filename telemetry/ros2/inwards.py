@@ -9,17 +9,17 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from contracts import drive
-from contracts.foreign_bus import Arrived
-from telemetry.logs.units import ANGLE, SPEED
-from telemetry.ros2.attachment import unpack
-from telemetry.ros2.mapping import InRow, Mapping
-from telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
-from telemetry.ros_foreign import FOREIGN, UnusableError, channel_of, stamp_of
-from telemetry.ros_motion import route_from_lanelets
-from telemetry.ros_parts import BASE_FRAME, CLOCK, LANELET_ROUTE, TF, typestore
-from telemetry.ros_status import StatusJoiner
-from telemetry.ros_transforms import TransformTree
+from foretwin.contracts import drive
+from foretwin.contracts.foreign_bus import Arrived
+from foretwin.telemetry.logs.units import ANGLE, SPEED
+from foretwin.telemetry.ros2.attachment import unpack
+from foretwin.telemetry.ros2.mapping import InRow, Mapping
+from foretwin.telemetry.ros2.names import bridge_key, parse_rmw_key, rmw_any_type_key
+from foretwin.telemetry.ros_messages.foreign import FOREIGN, UnusableError, channel_of, stamp_of
+from foretwin.telemetry.ros_messages.motion import route_from_lanelets
+from foretwin.telemetry.ros_messages.parts import BASE_FRAME, CLOCK, LANELET_ROUTE, TF, typestore
+from foretwin.telemetry.ros_messages.status import StatusJoiner
+from foretwin.telemetry.ros_messages.transforms import TransformTree
 
 Samples = list[tuple[str, msgspec.Struct]]
 

@@ -14,17 +14,16 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from contracts.drive import Vector3
-from contracts.errors import UserError
-from contracts.frames import GeoPoint, LocalFrame
-from telemetry.logs.units import ANGLE, SPEED
-from telemetry.ros2.mirrored import Mirrored
-from telemetry.ros2.names import Dialect, check_topic, dds_type
-from telemetry.ros2.safety import Limits
-from telemetry.ros2.virtual_objects import PlacedObject
-from telemetry.ros_foreign import FOREIGN
-from telemetry.ros_messages import TOPIC_PREFIX as OWN_PREFIX
-from telemetry.ros_parts import (
+from foretwin.contracts.drive import Vector3
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.logs.units import ANGLE, SPEED
+from foretwin.telemetry.ros2.mirrored import Mirrored
+from foretwin.telemetry.ros2.names import Dialect, check_topic, dds_type
+from foretwin.telemetry.ros2.safety import Limits
+from foretwin.telemetry.ros2.virtual_objects import PlacedObject
+from foretwin.telemetry.ros_messages.foreign import FOREIGN
+from foretwin.telemetry.ros_messages.parts import (
     ACKERMANN,
     CLOCK,
     CONTROL,
@@ -34,6 +33,7 @@ from telemetry.ros_parts import (
     PREDICTED_OBJECTS,
     TF,
 )
+from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 AUTOWARE = Path(__file__).with_name("autoware.toml")

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 
-from contracts.drive import RoadUser, RoadUsers
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
-from contracts.simulation import MirrorSample, PlaneState
-from contracts.vehicle import VehicleParameters, kind_by_length
-from telemetry.ros2.virtual_objects import LIVES_NS, UnfitError
+from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
+from foretwin.telemetry.ros2.virtual_objects import LIVES_NS, UnfitError
 
 OWN_TWIN = "twin of the car"
 """The id of the car's own twin among road users."""

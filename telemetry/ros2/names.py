@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from telemetry.ros_parts import typestore
+from foretwin.telemetry.ros_messages.parts import typestore
 
 Dialect = Literal["rmw_zenoh", "ros2dds"]
 EntityKind = Literal["NN", "MP", "MS", "SS", "SC"]

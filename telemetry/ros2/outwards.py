@@ -6,16 +6,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
-from contracts.simulation import MirrorSample
-from contracts.towards_vehicle import VehicleCommand
-from telemetry.ros2.mapping import DIAGNOSTICS, Mapping, OutRow, Source
-from telemetry.ros_commands import ackermann_from_command, control_from_command
-from telemetry.ros_motion import ros_from_state
-from telemetry.ros_objects import detected_from_users, predicted_from_users
-from telemetry.ros_parts import CLOCK, CONTROL, DETECTED_OBJECTS, header_from, ros_type, time_from
-from telemetry.ros_parts import typestore as ros_types
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.simulation import MirrorSample
+from foretwin.contracts.towards_vehicle import VehicleCommand
+from foretwin.telemetry.ros2.mapping import DIAGNOSTICS, Mapping, OutRow, Source
+from foretwin.telemetry.ros_messages.commands import ackermann_from_command, control_from_command
+from foretwin.telemetry.ros_messages.motion import ros_from_state
+from foretwin.telemetry.ros_messages.objects import detected_from_users, predicted_from_users
+from foretwin.telemetry.ros_messages.parts import (
+    CLOCK,
+    CONTROL,
+    DETECTED_OBJECTS,
+    header_from,
+    ros_type,
+    time_from,
+)
+from foretwin.telemetry.ros_messages.parts import typestore as ros_types
 
 DRIVE_FRAME = "foretwin_drive"
 """The frame of what goes out where the mapping does not place `map`: the drive's own plane."""

@@ -13,7 +13,7 @@ from typing import Literal
 
 import msgspec
 
-from contracts.towards_vehicle import VehicleCommand
+from foretwin.contracts.towards_vehicle import VehicleCommand
 
 DEAD_MAN_NS = 150_000_000
 """Without a fresh word of the orchestrator for so long, nothing goes out any more."""

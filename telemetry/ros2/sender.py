@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable
 
 import msgspec
 
-from contracts.foreign_bus import ForeignBus
-from telemetry.ros2.attachment import Attachment, pack
-from telemetry.ros2.mapping import InRow, Mapping, OutRow
-from telemetry.ros2.names import (
+from foretwin.contracts.foreign_bus import ForeignBus
+from foretwin.telemetry.ros2.attachment import Attachment, pack
+from foretwin.telemetry.ros2.mapping import InRow, Mapping, OutRow
+from foretwin.telemetry.ros2.names import (
     Entity,
     EntityKind,
     QosProfile,

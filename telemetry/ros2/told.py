@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from contracts.gap import GapAlarm, Verdict
-from contracts.simulation import Event
-from telemetry.ros2.outwards import Level
-from telemetry.ros2.safety import VehicleGate
+from foretwin.contracts.gap import GapAlarm, Verdict
+from foretwin.contracts.simulation import Event
+from foretwin.telemetry.ros2.outwards import Level
+from foretwin.telemetry.ros2.safety import VehicleGate
 
 
 class Told:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.drive import RoadUser, RoadUserKind, RoadUsers
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.drive import RoadUser, RoadUserKind, RoadUsers
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 
 _MOST_SPEED_MPS, _MOST_SIZE_M = 100.0, 50.0
 _STEP_BACK_NS = 1_000_000_000

@@ -1,15 +1,15 @@
-"""The stand-in car on the live keys: `python -m telemetry.standin --setup FILE`."""
+"""The stand-in car on the live keys: `python -m foretwin.telemetry.standin --setup FILE`."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-from contracts.setup import StandinSetup
-from telemetry.standin.parameters import read_parameters
-from telemetry.standin.path import read_path
-from telemetry.standin.source import StandinSource
-from telemetry.vehicle_process import main, run_vehicle
+from foretwin.contracts.setup import StandinSetup
+from foretwin.telemetry.processes.vehicle_process import main, run_vehicle
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.path import read_path
+from foretwin.telemetry.standin.source import StandinSource
 
 
 def run(setup: StandinSetup) -> None:
@@ -28,4 +28,4 @@ def run(setup: StandinSetup) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:], StandinSetup, run, program="telemetry.standin"))
+    sys.exit(main(sys.argv[1:], StandinSetup, run, program="foretwin.telemetry.standin"))

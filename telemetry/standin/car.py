@@ -14,8 +14,8 @@ from vehiclemodels.init_mb import init_mb
 from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
-from contracts.arrays import Array
-from telemetry.standin.parameters import CarParameters
+from foretwin.contracts.arrays import Array
+from foretwin.telemetry.standin.parameters import CarParameters
 
 STEP_S = 0.005
 """One Runge-Kutta step of a fast car; samples fall on its multiples."""

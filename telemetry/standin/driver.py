@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from telemetry.standin.car import CarMotion
-from telemetry.standin.parameters import CarParameters, DriverParameters
-from telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.car import CarMotion
+from foretwin.telemetry.standin.parameters import CarParameters, DriverParameters
+from foretwin.telemetry.standin.path import DrivenPath
 
 _NEAR_STOP_M = 0.4
 _STANDING_MPS = 0.02

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from contracts.errors import UserError
+from foretwin.contracts.errors import UserError
 
 DEFAULT_FILE = Path(__file__).with_name("standin.toml")
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.errors import UserError
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from telemetry.standin.parameters import DriverParameters
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.telemetry.standin.parameters import DriverParameters
 
 _SPACING_M = 0.5
 _CREEP_MPS = 1.5

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import (
     GnssFix,
     ImuSample,
     PlannedTrajectory,
@@ -16,11 +16,11 @@ from contracts.drive import (
     SteeringSample,
     VehicleStatus,
 )
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
-from telemetry.standin.car import CarMotion
-from telemetry.standin.driver import PlanPoint
-from telemetry.standin.parameters import CarParameters, SensorParameters
-from telemetry.standin.path import DrivenPath
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.telemetry.standin.car import CarMotion
+from foretwin.telemetry.standin.driver import PlanPoint
+from foretwin.telemetry.standin.parameters import CarParameters, SensorParameters
+from foretwin.telemetry.standin.path import DrivenPath
 
 _GRAVITY_MPS2 = 9.80665
 

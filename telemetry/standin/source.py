@@ -8,14 +8,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from contracts.drive import ControlCommand, VehicleInfo, VehicleState
-from contracts.errors import UserError
-from contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
-from telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
-from telemetry.standin.driver import Driver, DriverCommand
-from telemetry.standin.parameters import StandinParameters
-from telemetry.standin.path import DrivenPath
-from telemetry.standin.sensors import SCHEDULE, Sensors, planned_trajectory, status
+from foretwin.contracts.drive import ControlCommand, VehicleInfo, VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
+from foretwin.telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
+from foretwin.telemetry.standin.driver import Driver, DriverCommand
+from foretwin.telemetry.standin.parameters import StandinParameters
+from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.sensors import SCHEDULE, Sensors, planned_trajectory, status
 
 START_STAMP_NS = 1_767_225_600_000_000_000
 """2026-01-01T00:00:00Z: every stand-in drive begins then, so that its stamps repeat."""

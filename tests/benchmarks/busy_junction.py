@@ -7,10 +7,10 @@ import math
 import msgspec
 import numpy as np
 
-from contracts.futures import FuturesJob, SeenRoadUser
-from contracts.world import Building, World
-from sim_worker.metrics.table import METRICS
-from sim_worker.variants import plan_variants
+from foretwin.contracts.futures import FuturesJob, SeenRoadUser
+from foretwin.contracts.world import Building, World
+from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.metrics.table import METRICS
 from tests.benchmarks import scenes
 from tests.sim_worker.metrics.junction import junction
 from tests.sim_worker.places import box, job

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from contracts.futures import FuturesJob, FuturesResult
-from sim_worker.futures import run_job
-from sim_worker.scene import SceneMaker
-from sim_worker.stage import Stage
-from sim_worker.variants import plan_variants
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.futures import FuturesJob, FuturesResult
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import scenes
 from tests.benchmarks.bare_loop import bare_loop
 from tests.benchmarks.measuring import Measurement, cpu_seconds

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from contracts.drive import ImuSample, SpeedSample, SteeringSample
-from telemetry.estimator import StateEstimator
+from foretwin.contracts.drive import ImuSample, SpeedSample, SteeringSample
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s
 from tests.telemetry.impaired import BAD, ForeignClock, impaired
 from tests.telemetry.position_track import circle, fix, info

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import busy_junction, scenes
 from tests.benchmarks.bare_loop import bare_loop
 from tests.benchmarks.closed_loop import SECONDS, job_runner

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim_worker.gym import JunctionEnv, JunctionVectorEnv
-from sim_worker.stage import Controls
+from foretwin.sim_worker.batch.batch_simulation import Controls
+from foretwin.sim_worker.gym import JunctionEnv, JunctionVectorEnv
 from tests.benchmarks.measuring import Measurement, cpu_seconds
 from tests.sim_worker.scenarios.worlds import ring
 

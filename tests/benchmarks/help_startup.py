@@ -18,6 +18,6 @@ def measure() -> Measurement:
 
     value, baseline = float("inf"), float("inf")
     for _ in range(REPEATS):
-        value = min(value, wall_minimum_s(lambda: run("-m", "orchestrator", "--help"), repeats=1))
+        value = min(value, wall_minimum_s(lambda: run("-m", "foretwin", "--help"), repeats=1))
         baseline = min(baseline, wall_minimum_s(lambda: run("-c", "pass"), repeats=1))
     return Measurement(value, "s", baseline)

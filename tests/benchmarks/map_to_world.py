@@ -10,11 +10,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from contracts.world import World
-from orchestrator.maps.opening import open_map
-from world_gen.build import build_region
-from world_gen.map_index import index_map
-from world_gen.world_store import WorldStore
+from foretwin.contracts.world import World
+from foretwin.orchestrator.worlds.opening import open_map
+from foretwin.world_gen.build import build_region
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.world_store import WorldStore
 
 NETWORK = "network"
 

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import busy_junction, scenes
 from tests.benchmarks.closed_loop import SECONDS, job_runner
 from tests.benchmarks.measuring import Measurement, UnavailableError, cpu_seconds

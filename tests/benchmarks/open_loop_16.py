@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.world import World
-from sim_worker.stage import Controls, Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.world import World
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import scenes
 from tests.benchmarks.bare_loop import bare_loop
 from tests.benchmarks.measuring import Measurement, cpu_seconds

@@ -7,12 +7,12 @@ import math
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.futures import FuturesJob, PathAhead, Variant
-from contracts.provenance import Quantity
-from contracts.world import Area, Building, IntersectionSummary, World
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.futures import FuturesJob, PathAhead, Variant
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import Area, Building, IntersectionSummary, World
 
 FUTURES = 64
 HORIZON_S = 8.0

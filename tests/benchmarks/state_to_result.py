@@ -14,19 +14,19 @@ from typing import Any
 
 import zenoh
 
-from contracts.bus import Bus, Mailbox, Reply, ZenohBus, ask, zenoh_config
-from contracts.codec import encode
-from contracts.futures import FuturesJob
-from contracts.keys import alive_key
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup, WorkerSetup, write_setup
-from contracts.simulation import PrepareRequest
-from sim_worker.variants import plan_variants
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.bus import Bus, Mailbox, Reply, ZenohBus, ask, zenoh_config
+from foretwin.contracts.codec import encode
+from foretwin.contracts.futures import FuturesJob
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
+from foretwin.contracts.simulation import PrepareRequest
+from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.world_store import WorldStore
 from tests.benchmarks import scenes
 from tests.benchmarks.measuring import Measurement
 from tests.contracts.bus_sides import python, take, take_until
-from world_gen.world_store import WorldStore
 
 ROUNDS = 20
 BARE_ROUNDS = 200
@@ -37,8 +37,8 @@ BARE_KEY = "foretwin/bench/bare"
 ANSWERER = """
 import sys
 import zenoh
-from contracts.bus import zenoh_config
-from contracts.setup import BusSetup
+from foretwin.contracts.bus import zenoh_config
+from foretwin.contracts.setup import BusSetup
 answer = bytes(int(sys.argv[3]))
 
 def reply(query):
@@ -109,7 +109,9 @@ def _worker(folder: Path, bus: BusSetup, process_id: str) -> Iterator[None]:
         drive_frame=scenes.street(buildings=0).frame,
     )
     write_setup(setup, file)
-    with subprocess.Popen([sys.executable, "-m", "sim_worker", "--setup", str(file)]) as process:
+    with subprocess.Popen(
+        [sys.executable, "-m", "foretwin.sim_worker", "--setup", str(file)]
+    ) as process:
         try:
             yield
         finally:

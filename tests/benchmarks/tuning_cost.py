@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim_worker.stage import Stage
-from sim_worker.tuning import SAMPLES, VehicleWatch
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.estimator import StateEstimator
+from foretwin.sim_worker.analysis.tuning import SAMPLES, VehicleWatch
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s
 from tests.orchestrator.trip import town_world
 from tests.sim_worker.driving import altered

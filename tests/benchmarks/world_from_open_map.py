@@ -7,14 +7,14 @@ from pathlib import Path
 
 import osmium
 
-from orchestrator.embedded import MAP_FILE
+from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.export.mjcf import world_spec
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.benchmarks.measuring import Measurement, cpu_minimum_s
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.export.mjcf import world_spec
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
-from world_gen.read_osm import read_map
 
 REPEATS = 5
 SAMPLE = 12

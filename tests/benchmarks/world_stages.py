@@ -11,14 +11,14 @@ from typing import TypeVar
 import numpy as np
 import shapely
 
-from orchestrator.maps.opening import open_map
+from foretwin.orchestrator.worlds.opening import open_map
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.buildings.convex_parts import convex_cover
+from foretwin.world_gen.buildings.footprints import buildings_in_frame
+from foretwin.world_gen.export.mjcf import world_spec
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import MapIndex, index_map
 from tests.benchmarks.measuring import Measurement, UnavailableError
-from world_gen.build import build_world
-from world_gen.buildings import buildings_in_frame
-from world_gen.convex_parts import convex_cover
-from world_gen.export.mjcf import world_spec
-from world_gen.intersections import Junction
-from world_gen.map_index import MapIndex, index_map
 
 BUDGET_S = 0.25
 PARTS = 1_000

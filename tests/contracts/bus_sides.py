@@ -11,11 +11,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from contracts.bus import Bus, Mailbox, Received, Request, ZenohBus
-from contracts.drive import SpeedSample
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from contracts.simulation import PrepareRequest
+from foretwin.contracts.bus import Bus, Mailbox, Received, Request, ZenohBus
+from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.simulation import PrepareRequest
 from tests.contracts.memory_bus import MemoryBus
 
 DEADLINE_S = 120.0
@@ -23,9 +23,9 @@ DEADLINE_S = 120.0
 
 ROUTER = """
 import sys
-from contracts.bus import ZenohBus
-from contracts.setup import BusSetup
-from contracts.simulation import PrepareRequest
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.simulation import PrepareRequest
 with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True):
     print("ready", flush=True)
     sys.stdin.read()
@@ -33,9 +33,9 @@ with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True):
 
 MEMBER = """
 import sys
-from contracts.bus import Mailbox, ZenohBus
-from contracts.setup import BusSetup
-from contracts.simulation import PrepareRequest
+from foretwin.contracts.bus import Mailbox, ZenohBus
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.simulation import PrepareRequest
 with ZenohBus(BusSetup(endpoint=sys.argv[1])) as bus:
     bus.declare_alive(sys.argv[2])
     bus.serve("prepare", Mailbox(1), run="r1", process="w0")

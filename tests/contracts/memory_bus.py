@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
-from contracts.codec import SchemaMismatch, decode, encode
-from contracts.keys import CHANNELS
-from contracts.keys import key as channel_key
-from contracts.mailbox import Alive, Mailbox, Received, Reply, Request
+from foretwin.contracts.codec import SchemaMismatch, decode, encode
+from foretwin.contracts.keys import CHANNELS
+from foretwin.contracts.keys import key as channel_key
+from foretwin.contracts.mailbox import Alive, Mailbox, Received, Reply, Request
 
 
 def _matches(pattern: str, full_key: str) -> bool:

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from contracts.bus import Alive, Mailbox, Reply, ask
-from contracts.codec import SchemaMismatch
-from contracts.drive import SpeedSample
-from contracts.keys import alive_key
-from contracts.simulation import PrepareReply, PrepareRequest
+from foretwin.contracts.bus import Alive, Mailbox, Reply, ask
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from tests.contracts.bus_sides import (
     DEADLINE_S,
     Sides,

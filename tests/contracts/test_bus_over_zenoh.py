@@ -7,12 +7,12 @@ from contextlib import ExitStack
 
 import pytest
 
-from contracts.bus import BusUnreachable, Mailbox, ZenohBus, zenoh_config
-from contracts.drive import SpeedSample
-from contracts.keys import alive_key
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from contracts.simulation import PrepareRequest
+from foretwin.contracts.bus import BusUnreachable, Mailbox, ZenohBus, zenoh_config
+from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.simulation import PrepareRequest
 from tests.contracts.bus_sides import (
     DEADLINE_S,
     MEMBER,
@@ -120,7 +120,7 @@ def test_a_question_that_is_never_answered_times_out() -> None:
 
 
 def test_no_router_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("contracts.bus.CONNECT_S", 0.5)
+    monkeypatch.setattr("foretwin.contracts.bus.CONNECT_S", 0.5)
     endpoint = free_endpoint()
 
     with pytest.raises(BusUnreachable, match=f"no Zenoh router at {endpoint}"):

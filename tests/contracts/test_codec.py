@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.codec import (
+from foretwin.contracts.codec import (
     SCHEMA_VERSION,
     SchemaMismatch,
     content_bytes,
@@ -20,12 +20,12 @@ from contracts.codec import (
     read_message,
     write_message,
 )
-from contracts.drive import GnssFix, PlannedTrajectory, SpeedSample
-from contracts.frames import GeoPoint
-from contracts.futures import FuturesResult
-from contracts.keys import CHANNELS
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
+from foretwin.contracts.drive import GnssFix, PlannedTrajectory, SpeedSample
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.futures import FuturesResult
+from foretwin.contracts.keys import CHANNELS
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
 from tests.contracts.messages import messages, same
 
 KINDS = {channel.kind for channel in CHANNELS.values()}

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.frames import (
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     base_from_sensor,

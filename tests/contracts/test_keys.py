@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.keys import (
+from foretwin.contracts.keys import (
     CHANNELS,
     PREFIX,
     TELEMETRY_CHANNELS,

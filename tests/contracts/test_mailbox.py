@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.mailbox import Mailbox
+from foretwin.contracts.mailbox import Mailbox
 from tests.contracts.bus_sides import DEADLINE_S
 
 

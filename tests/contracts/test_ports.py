@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from contracts.ports import LOOPBACK, free_endpoint, free_port
+from foretwin.contracts.ports import LOOPBACK, free_endpoint, free_port
 
 
 def test_a_free_port_can_be_listened_on_and_is_none_that_connections_are_given() -> None:

@@ -11,19 +11,19 @@ from pathlib import Path
 
 import pytest
 
-from contracts.bus import Alive, Mailbox, ZenohBus
-from contracts.keys import alive_key
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup, ProcessSetup, write_setup
-from contracts.simulation import RunEnd
+from foretwin.contracts.bus import Alive, Mailbox, ZenohBus
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup, ProcessSetup, write_setup
+from foretwin.contracts.simulation import RunEnd
 from tests.contracts.bus_sides import DEADLINE_S, take
 
 RUN = {"run": "r1"}
 
 WAITER = """
 import time
-from contracts.process import run_process
-from contracts.setup import ProcessSetup
+from foretwin.contracts.process import run_process
+from foretwin.contracts.setup import ProcessSetup
 
 def serve(setup, bus, life):
     life.ready()
@@ -34,8 +34,8 @@ run_process(ProcessSetup, serve)
 """
 
 FAILER = """
-from contracts.process import run_process
-from contracts.setup import ProcessSetup
+from foretwin.contracts.process import run_process
+from foretwin.contracts.setup import ProcessSetup
 
 def serve(setup, bus, life):
     raise RuntimeError("the wheels came off")

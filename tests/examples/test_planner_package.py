@@ -13,12 +13,12 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from contracts.futures import Variant
-from sim_worker.futures import run_job
-from sim_worker.planners.hosted import HostedPlanner
-from sim_worker.planners.registry import load_planner, planner_names
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.futures import Variant
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.planners.hosted import HostedPlanner
+from foretwin.sim_worker.planners.registry import load_planner, planner_names
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import crossroads, happening, job
 from tests.system.foretwin_command import REPOSITORY
 
@@ -77,7 +77,7 @@ def pip_installed(folder: Path) -> Path:
 def test_pip_installs_it(tmp_path: Path) -> None:
     target = pip_installed(tmp_path)
     code = (
-        "from sim_worker.planners.registry import check_planner, planner_names;"
+        "from foretwin.sim_worker.planners.registry import check_planner, planner_names;"
         "check_planner('calm'); check_planner('calm_one'); print(*planner_names())"
     )
     said = subprocess.run(
@@ -90,7 +90,7 @@ def test_pip_installs_it(tmp_path: Path) -> None:
 @pytest.mark.judge
 def test_a_drive_takes_it_by_name(tmp_path: Path) -> None:
     target = pip_installed(tmp_path)
-    drive = [sys.executable, "-m", "orchestrator", "drive", "--view", "none", "--end", "9"]
+    drive = [sys.executable, "-P", "-m", "foretwin", "drive", "--view", "none", "--end", "9"]
     drive += ["--speed", "max", "--futures", "12", "--rate", "0.5", "--out", str(tmp_path / "runs")]
     done = subprocess.run(
         [*drive, "--planner", "calm"], cwd=tmp_path, capture_output=True, text=True, timeout=240.0,

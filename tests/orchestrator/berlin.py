@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.frames import local_from_geo, local_from_geo_yaw
-from orchestrator.way.junctions_ahead import PassedJunction
-from orchestrator.way.map_matching import MapMatcher, Match
-from orchestrator.way.route import Route
-from orchestrator.way.route_follower import Progress, RouteFollower
-from telemetry.estimator import StateEstimator
-from telemetry.logs.opening import open_log
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.intersections import Junction
-from world_gen.read_osm import read_map
-from world_gen.road_graph import RoadGraph
+from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw
+from foretwin.orchestrator.routing.junctions_ahead import PassedJunction
+from foretwin.orchestrator.routing.map_matching import MapMatcher, Match
+from foretwin.orchestrator.routing.route import Route
+from foretwin.orchestrator.routing.route_follower import Progress, RouteFollower
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.logs.opening import open_log
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.road_graph import RoadGraph
 
 
 @dataclass(frozen=True, kw_only=True)

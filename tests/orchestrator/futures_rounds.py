@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.futures import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import (
     FuturesJob,
     FuturesResult,
     Outcome,
@@ -14,7 +14,7 @@ from contracts.futures import (
     Trajectory,
     Variant,
 )
-from orchestrator.rounds.desk import RoundDone, RoundOrder
+from foretwin.orchestrator.rounds.dispatch import RoundDone, RoundOrder
 from tests.orchestrator.trip import START_NS, states_along, town_world
 
 TIME_S = np.arange(81) * 0.1

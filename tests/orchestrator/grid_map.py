@@ -6,11 +6,11 @@ import itertools
 
 import numpy as np
 
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from contracts.provenance import Quantity
-from contracts.world import DrivingSide, IntersectionSummary
-from world_gen.intersections import Junction
-from world_gen.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import DrivingSide, IntersectionSummary
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
 
 BLOCK_M = 100.0
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))

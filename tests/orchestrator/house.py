@@ -9,23 +9,23 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from contracts.codec import read_message
-from contracts.drive import DriveEnd, GnssFix, VehicleInfo, VehicleState
-from contracts.frames import local_from_geo, local_from_geo_yaw
-from contracts.futures import FuturesJob, FuturesResult, Outcome, Trajectory
-from contracts.keys import alive_key
-from contracts.mailbox import Mailbox, Request
-from contracts.simulation import BuildReply, BuildRequest, PrepareReply, PrepareRequest
-from contracts.world import World
-from orchestrator.conductor import Conductor
-from orchestrator.mission import Mission, MissionSettings
-from orchestrator.plan import DrivePlan
-from orchestrator.record.results import ResultTables
-from orchestrator.way.way_ahead import WayAhead
+from foretwin.contracts.codec import read_message
+from foretwin.contracts.drive import DriveEnd, GnssFix, VehicleInfo, VehicleState
+from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw
+from foretwin.contracts.futures import FuturesJob, FuturesResult, Outcome, Trajectory
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.mailbox import Mailbox, Request
+from foretwin.contracts.simulation import BuildReply, BuildRequest, PrepareReply, PrepareRequest
+from foretwin.contracts.world import World
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.mission import Mission, MissionSettings
+from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.world_gen.world_store import WorldStore
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.futures_rounds import nobody
 from tests.orchestrator.trip import START_NS, states_along, town, town_line, town_plan, town_world
-from world_gen.world_store import WorldStore
 
 INFO = VehicleInfo(
     vehicle_id="ego", time_base="log", start_stamp_ns=START_NS, body_from_antenna_m=(0.0, 0.0, 0.0)

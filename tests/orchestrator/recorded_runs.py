@@ -9,12 +9,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix, RoadUsers, VehicleInfo
-from contracts.frames import GeoPoint
-from contracts.world import World
-from telemetry.mcap_file import create
-from world_gen.world_store import WorldStore
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, RoadUsers, VehicleInfo
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.world import World
+from foretwin.telemetry.logs.write_mcap import create
+from foretwin.world_gen.world_store import WorldStore
 
 
 def write_run(

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from orchestrator.sweep.play import PlaySetup, SweepWorker
-from orchestrator.sweep.pool import Task
-from orchestrator.sweep.spec import Loaded, worlds_folder
+from foretwin.orchestrator.sweep.play import PlaySetup, SweepWorker
+from foretwin.orchestrator.sweep.pool import Task
+from foretwin.orchestrator.sweep.spec import Loaded, worlds_folder
+from foretwin.world_gen.world_store import WorldStore
 from tests.sim_worker.scenarios.worlds import cross
-from world_gen.world_store import WorldStore
 
 SMALL = """
 worlds = "{worlds}"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.config import ConfigError, DriveConfig, load_config, parse_speed
+from foretwin.orchestrator.config import ConfigError, DriveConfig, load_config, parse_speed
 
 
 def test_flags_lie_over_the_file(tmp_path: Path) -> None:

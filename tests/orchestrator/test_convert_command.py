@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from contracts.errors import UserError
-from orchestrator.log_commands import convert_log
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.commands.recordings import convert_log
 
 GOOD = "point3 {} 3784144.3 901246.3 5037714.1 0 0 0 0 0 0 0 0 0\n"
 

@@ -11,12 +11,12 @@ import osmium
 import pytest
 from shapely.geometry import LineString, Polygon
 
-from contracts.frames import local_from_geo
-from orchestrator.embedded import MAP_FILE, ROUTE_FILE
-from orchestrator.embedded.draw_town import NOTE, ORIGIN, RING_CENTRE, write
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.read_osm import read_map
+from foretwin.contracts.frames import local_from_geo
+from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
+from foretwin.orchestrator.embedded.draw_town import NOTE, ORIGIN, RING_CENTRE, write
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 
 
 class Town:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from contracts.errors import UserError
-from orchestrator.config import DriveConfig, load_config
-from orchestrator.plan import read_inputs
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.standin.parameters import read_parameters
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.config import DriveConfig, load_config
+from foretwin.orchestrator.drive.plan import read_inputs
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.standin.parameters import read_parameters
 
 TUNING = Path(__file__).parents[2] / "examples" / "tuning"
 

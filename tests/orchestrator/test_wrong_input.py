@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import run
-from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
+from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 
 GPX = """<?xml version="1.0"?>
 <gpx version="1.1" creator="test" xmlns="http://www.topografix.com/GPX/1/1"><trk><trkseg>
@@ -51,7 +51,7 @@ def test_a_missing_map(tmp_path: Path, town_log: Path, capsys: pytest.CaptureFix
 
 
 def test_a_missing_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    refused(["--map", str(EMBEDDED_MAP), "--log", "no.gpx"], "no.gpx", tmp_path, capsys)
+    refused(["--map", str(MAP_FILE), "--log", "no.gpx"], "no.gpx", tmp_path, capsys)
 
 
 def test_an_empty_map(tmp_path: Path, town_log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -62,18 +62,18 @@ def test_an_empty_map(tmp_path: Path, town_log: Path, capsys: pytest.CaptureFixt
 
 def test_a_map_of_another_place(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     away = gpx(tmp_path / "away.gpx", lat=10.0, lon=10.0)
-    refused(["--map", str(EMBEDDED_MAP), "--log", str(away)], "holds no position", tmp_path, capsys)
+    refused(["--map", str(MAP_FILE), "--log", str(away)], "holds no position", tmp_path, capsys)
 
 
 def test_a_log_without_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     timeless = gpx(tmp_path / "timeless.gpx", lat=45.0, lon=-30.003, times=False)
-    refused(["--map", str(EMBEDDED_MAP), "--log", str(timeless)], "timeless.gpx", tmp_path, capsys)
+    refused(["--map", str(MAP_FILE), "--log", str(timeless)], "timeless.gpx", tmp_path, capsys)
 
 
 def test_a_table_without_declared_units(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = tmp_path / "table.csv"
     table.write_text("t,lat,lon,v\n0,45.0,-30.003,3\n1,45.0,-30.0029,3\n")
-    refused(["--map", str(EMBEDDED_MAP), "--log", str(table)], "table.csv", tmp_path, capsys)
+    refused(["--map", str(MAP_FILE), "--log", str(table)], "table.csv", tmp_path, capsys)
 
 
 def test_an_unknown_planner_names_the_known(
@@ -84,7 +84,7 @@ def test_an_unknown_planner_names_the_known(
 
 def test_a_route_off_the_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     away = gpx(tmp_path / "route.gpx", lat=10.0, lon=10.0)
-    refused(["--map", str(EMBEDDED_MAP), "--route", str(away)], "off the map", tmp_path, capsys)
+    refused(["--map", str(MAP_FILE), "--route", str(away)], "off the map", tmp_path, capsys)
 
 
 def test_a_vehicle_file_that_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -97,7 +97,7 @@ def test_a_window_without_positions(
     tmp_path: Path, town_log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     refused(
-        ["--map", str(EMBEDDED_MAP), "--log", str(town_log), "--start", "500"],
+        ["--map", str(MAP_FILE), "--log", str(town_log), "--start", "500"],
         "town.gpx",
         tmp_path,
         capsys,
@@ -108,21 +108,21 @@ def test_an_unknown_flag_and_format(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert run(["drive", "--warp"]) == 2
     assert "--warp" in capsys.readouterr().err
     out = tmp_path / "w.stl"
-    code = run(["world", str(EMBEDDED_MAP), "--at", "45,-30", "--format", "stl", "--out", str(out)])
+    code = run(["world", str(MAP_FILE), "--at", "45,-30", "--format", "stl", "--out", str(out)])
     assert code == 2
     assert "mjcf, sdf, opendrive" in capsys.readouterr().err
 
 
 def test_a_place_without_a_junction(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = str(tmp_path / "w.xml")
-    assert run(["world", str(EMBEDDED_MAP), "--at", "46,-30", "--out", out]) == 2
+    assert run(["world", str(MAP_FILE), "--at", "46,-30", "--out", out]) == 2
     assert "nearest intersection" in capsys.readouterr().err
 
 
 def test_the_embedded_route_is_listed_in_driving_order(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    code = run(["intersections", str(EMBEDDED_MAP), "--route", str(EMBEDDED_ROUTE), "--json"])
+    code = run(["intersections", str(MAP_FILE), "--route", str(ROUTE_FILE), "--json"])
     listed = capsys.readouterr().out
     assert code == 0
     kinds = [line.split('"')[3] for line in listed.splitlines() if '"kind"' in line]

@@ -12,23 +12,23 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     geo_from_local,
     geo_from_local_yaw,
     local_from_geo,
 )
-from contracts.world import World
-from orchestrator.config import DriveConfig
-from orchestrator.instructions import BuildWorld, Instruction, Tell, UseWorld
-from orchestrator.mission import Mission, MissionSettings
-from orchestrator.plan import DriveInputs, DrivePlan, make_plan, read_inputs
-from orchestrator.way.way_ahead import WayAhead
+from foretwin.contracts.world import World
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.drive.mission import Mission, MissionSettings
+from foretwin.orchestrator.drive.plan import DriveInputs, DrivePlan, make_plan, read_inputs
+from foretwin.orchestrator.instructions import BuildWorld, Instruction, Tell, UseWorld
+from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.world_gen.build import build_world
 from tests.orchestrator.grid_map import headings
-from world_gen.build import build_world
 
 NOW = datetime.datetime(2030, 1, 2, 3, 4, 5)
 START_NS = 5_000_000_000

@@ -16,7 +16,7 @@ from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 from vehiclemodels.vehicle_dynamics_st import vehicle_dynamics_st
 from vehiclemodels.vehicle_parameters import setup_vehicle_parameters
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 Kind = Literal["single-track", "multi-body"]
 NUMBERS = {"ford_escort": 1, "bmw_320i": 2, "vw_vanagon": 3}

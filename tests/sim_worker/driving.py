@@ -5,9 +5,9 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import Parameter, VehicleParameters
-from sim_worker.stage import Controls, Stage
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
 
 
 def altered(vehicle: VehicleParameters, **values: float) -> VehicleParameters:

@@ -13,14 +13,20 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.drive import ControlCommand, ImuSample, SpeedSample, SteeringSample, VehicleInfo
-from contracts.frames import geo_from_local
-from contracts.vehicle import VehicleParameters
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.standin.car import STEP_S
-from telemetry.standin.parameters import read_parameters
-from telemetry.standin.path import DrivenPath
-from telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.contracts.drive import (
+    ControlCommand,
+    ImuSample,
+    SpeedSample,
+    SteeringSample,
+    VehicleInfo,
+)
+from foretwin.contracts.frames import geo_from_local
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.standin.car import STEP_S
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.sim_worker.driving import altered
 from tests.telemetry.standin_drive import FRAME
 

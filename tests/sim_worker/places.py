@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
-from contracts.futures import FuturesJob, PathAhead, Variant
-from contracts.provenance import Quantity
-from contracts.world import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.futures import FuturesJob, PathAhead, Variant
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import (
     Area,
     Building,
     Connection,
@@ -20,8 +20,8 @@ from contracts.world import (
     World,
     WorldJunction,
 )
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.reading import catalogue
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 
 class Body(NamedTuple):

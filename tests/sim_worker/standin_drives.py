@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample, SteeringSample
-from contracts.frames import GeoPoint, geo_from_local
-from contracts.tuning import Identification, ParameterEstimate
-from sim_worker.motion_record import MotionRecord, MotionRecorder
-from telemetry.standin.parameters import StandinParameters, read_parameters
-from telemetry.standin.path import DrivenPath
-from telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample, SteeringSample
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.contracts.tuning import Identification, ParameterEstimate
+from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
+from foretwin.telemetry.standin.parameters import StandinParameters, read_parameters
+from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.telemetry.city_drive import city_drive
 from tests.telemetry.standin_drive import FRAME, Drive
 

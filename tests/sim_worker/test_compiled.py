@@ -12,27 +12,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from contracts.arrays import Array
-from contracts.futures import Faults, Variant
-from sim_worker import compiled
-from sim_worker.futures import run_job
-from sim_worker.metrics import compiled_pairs
-from sim_worker.metrics.curves import cheapest_walks
-from sim_worker.planners import pure_pursuit_idm as idm
-from sim_worker.planners import registry
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.path import FrenetPath
-from sim_worker.planners.registry import load_planner
-from sim_worker.planners.tracking import pure_pursuit, turning_speed
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import base_from_cog
-from sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import Faults, Variant
+from foretwin.geometry import compiled as compiled_geometry
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.metrics import compiled_pairs
+from foretwin.sim_worker.metrics.curves import cheapest_walks
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners import compiled as compiled_pursuit
+from foretwin.sim_worker.planners import pure_pursuit_idm as idm
+from foretwin.sim_worker.planners import registry
+from foretwin.sim_worker.planners.registry import load_planner
+from foretwin.sim_worker.planners.tracking import pure_pursuit, turning_speed
+from foretwin.sim_worker.vehicle import compiled
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import base_from_cog
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 from tests.sim_worker.places import crossroads, job, turning_path
 
 KERNELS: dict[str, Any] = {
     name: kernel
-    for module in (compiled, compiled_pairs)
+    for module in (compiled_geometry, compiled, compiled_pursuit, compiled_pairs)
     for name, kernel in vars(module).items()
     if hasattr(kernel, "signatures")
 }
@@ -110,7 +112,7 @@ def test_where_no_cache_can_be_written_it_is_compiled_for_this_process(
 
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
 
-    @compiled.kernel(compiled.REAL, compiled.REAL)
+    @compiled_geometry.kernel(compiled_geometry.REAL, compiled_geometry.REAL)
     def twice(number: float) -> float:
         return 2.0 * number
 

@@ -3,13 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.futures import Variant
-from sim_worker.futures import run_job
-from sim_worker.planners import registry
-from sim_worker.planners.base import PlannerOutput, PlannerView
-from sim_worker.planners.registry import load_planner, planner_names
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.futures import Variant
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
+from foretwin.sim_worker.planners import registry
+from foretwin.sim_worker.planners.registry import load_planner, planner_names
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import crossroads, happening, job, state_at, turning_path
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
 from tests.sim_worker.vehicle_fidelity import STOPS, fidelity, lateral_cases, understeer_errors
 

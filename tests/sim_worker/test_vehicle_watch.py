@@ -8,12 +8,12 @@ from typing import Any
 import msgspec
 import pytest
 
-from contracts.drive import SpeedSample
-from contracts.gap import GapSample
-from sim_worker.tuning import SAMPLES, VehicleWatch
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.estimator import StateEstimator
-from telemetry.standin.source import START_STAMP_NS
+from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.gap import GapSample
+from foretwin.sim_worker.analysis.tuning import SAMPLES, VehicleWatch
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.telemetry.city_drive import city_drive
 from tests.telemetry.standin_drive import FRAME
 

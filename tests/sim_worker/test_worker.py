@@ -12,21 +12,21 @@ from typing import Any
 import msgspec
 import pytest
 
-from contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus, ask
-from contracts.codec import write_message
-from contracts.drive import ControlCommand
-from contracts.keys import alive_key
-from contracts.ports import free_endpoint
-from contracts.process import ProcessLife
-from contracts.setup import BusSetup, WorkerSetup, write_setup
-from contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
-from contracts.tuning import UseVehicle
-from sim_worker.futures import result_digest, run_job
-from sim_worker.mirror_process import serve_mirror
-from sim_worker.stage import Stage
-from sim_worker.variants import plan_variants
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.worker import StageCache, serve_futures
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus, ask
+from foretwin.contracts.codec import write_message
+from foretwin.contracts.drive import ControlCommand
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
+from foretwin.contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
+from foretwin.contracts.tuning import UseVehicle
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.mirror.process import serve_mirror
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.worker import StageCache, serve_futures
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
@@ -175,7 +175,7 @@ def test_a_worker_process_over_zenoh_answers_logs_and_leaves(folder: Path) -> No
         alive = Mailbox(8)
         bus.watch_alive(alive_key(run="r1", process="w0"), alive)
         process = subprocess.Popen(
-            [sys.executable, "-m", "sim_worker", "--setup", str(folder / "setup.json")],
+            [sys.executable, "-m", "foretwin.sim_worker", "--setup", str(folder / "setup.json")],
             env={**os.environ, "PYTHONWARNINGS": "error"},
         )
         try:

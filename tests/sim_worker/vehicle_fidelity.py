@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.stage import Controls, Stage
-from sim_worker.vehicle.parameters import GRAVITY_MPS2, load_vehicle, understeer_gradient
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2, load_vehicle, understeer_gradient
 from tests.sim_worker import commonroad_drives
 from tests.sim_worker.commonroad_drives import NUMBERS, Drive, Kind
 from tests.sim_worker.driving import altered, seed, states

@@ -56,7 +56,7 @@ def started(out: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     if "--tuning" not in arguments:
         arguments = (*arguments, "--tuning", "off")
     process = subprocess.Popen(
-        [sys.executable, "-m", "orchestrator", "drive", "--view", "none", "--out", str(out),
+        [sys.executable, "-P", "-m", "foretwin", "drive", "--view", "none", "--out", str(out),
          *arguments],
         cwd=out.parent, env=environment(out.parent / "cache"), text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,

@@ -7,14 +7,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from contracts import drive
-from contracts.foreign_bus import Arrived, ZenohForeignBus
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
-from contracts.mailbox import Mailbox
-from orchestrator.plan import EMBEDDED_ROUTE
-from telemetry.logs import read_line
-from telemetry.ros_parts import STEERING_REPORT, VELOCITY_REPORT, ros_type, time_from, typestore
-from telemetry.ros_sensors import ros_from_gnss
+from foretwin.contracts import drive
+from foretwin.contracts.foreign_bus import Arrived, ZenohForeignBus
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.contracts.mailbox import Mailbox
+from foretwin.orchestrator.embedded import ROUTE_FILE
+from foretwin.telemetry.logs import read_line
+from foretwin.telemetry.ros_messages.parts import (
+    STEERING_REPORT,
+    VELOCITY_REPORT,
+    ros_type,
+    time_from,
+    typestore,
+)
+from foretwin.telemetry.ros_messages.sensors import ros_from_gnss
 from tests.telemetry.autoware_messages import velocity_report
 
 SPEED_MPS = 8.0
@@ -37,7 +43,7 @@ class Ros2Car:
         self.heard = Mailbox(100_000)
         for key in listens_to:
             bus.subscribe(key, self.heard)
-        line_deg = read_line(EMBEDDED_ROUTE).lat_lon_deg
+        line_deg = read_line(ROUTE_FILE).lat_lon_deg
         self._frame = LocalFrame(GeoPoint(float(line_deg[0, 0]), float(line_deg[0, 1])))
         self._xy_m = local_from_geo(self._frame, line_deg[:, 0], line_deg[:, 1])
         steps_m = np.hypot(*np.diff(self._xy_m, axis=0).T)

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.frames import geo_from_local, local_from_geo
-from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
-from orchestrator.way.route import point_along
-from telemetry.logs import read_line
+from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
+from foretwin.orchestrator.routing.route import point_along
+from foretwin.telemetry.logs import read_line
+from foretwin.world_gen.osm.read_osm import read_map
 from tests.system.foretwin_command import foretwin
-from world_gen.read_osm import read_map
 
 SPEED_MPS = 9.0
 RATE_HZ = 5
@@ -22,8 +22,8 @@ NOT_FINITE, ZEROS, JUMPS = (40, 41, 90), (60, 120), (75,)
 
 def dirty_gpx(path: Path) -> Path:
     """Write the embedded route driven at 9 m/s for 45 s, with what receivers do to it."""
-    frame = read_map(EMBEDDED_MAP).frame
-    line = read_line(EMBEDDED_ROUTE)
+    frame = read_map(MAP_FILE).frame
+    line = read_line(ROUTE_FILE)
     route = local_from_geo(frame, line.lat_deg, line.lon_deg)
     points = []
     for number in range(DRIVE_S * RATE_HZ):
@@ -53,7 +53,7 @@ def dirty_gpx(path: Path) -> Path:
 def test_dirty_positions_are_counted_and_the_drive_goes_on(tmp_path: Path) -> None:
     log = dirty_gpx(tmp_path / "dirty.gpx")
     run = foretwin(
-        tmp_path / "runs", "--map", str(EMBEDDED_MAP), "--log", str(log), "--speed", "max",
+        tmp_path / "runs", "--map", str(MAP_FILE), "--log", str(log), "--speed", "max",
         "--futures", "4", "--rate", "1",
     )  # fmt: skip
     assert run.code == 0, run.screen

@@ -10,7 +10,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 from mcap.reader import make_reader
 
-from orchestrator.cli import run as command
+from foretwin.orchestrator.commands.cli import run as command
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import (
     child_pids,

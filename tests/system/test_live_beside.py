@@ -10,13 +10,13 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from contracts.bus import ZenohBus
-from contracts.drive import GnssFix, SpeedSample
-from contracts.foreign_bus import Arrived, ZenohForeignBus
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from telemetry.ros2.mapping import AUTOWARE
-from telemetry.ros_parts import PREDICTED_OBJECTS, typestore
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.drive import GnssFix, SpeedSample
+from foretwin.contracts.foreign_bus import Arrived, ZenohForeignBus
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.telemetry.ros2.mapping import AUTOWARE
+from foretwin.telemetry.ros_messages.parts import PREDICTED_OBJECTS, typestore
 from tests.system.foretwin_command import run_folder, started, wait_for
 from tests.system.ros2_car import SPEED_MPS, Ros2Car
 

@@ -10,15 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.bus import ZenohBus
-from contracts.foreign_bus import ZenohForeignBus
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from orchestrator.plan import EMBEDDED_ROUTE
-from telemetry.logs import read_line
-from telemetry.ros2.mapping import AUTOWARE
-from telemetry.ros_parts import LANELET_ROUTE, header_from, point_from, ros_type, turn_from
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.foreign_bus import ZenohForeignBus
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.orchestrator.embedded import ROUTE_FILE
+from foretwin.telemetry.logs import read_line
+from foretwin.telemetry.ros2.mapping import AUTOWARE
+from foretwin.telemetry.ros_messages.parts import (
+    LANELET_ROUTE,
+    header_from,
+    point_from,
+    ros_type,
+    turn_from,
+)
 from tests.system.foretwin_command import log_lines, run_folder, started, wait_for
 from tests.system.ros2_car import Ros2Car
 from tests.telemetry.ros2.gateway_ground import cdr
@@ -48,7 +54,7 @@ def lanelet_route(line_deg: np.ndarray, map_frame: LocalFrame) -> bytes:
 @pytest.mark.timeout(180)
 def test_the_route_of_the_driving_stack_is_taken_and_followed(tmp_path: Path) -> None:
     endpoint = free_endpoint()
-    line_deg = read_line(EMBEDDED_ROUTE).lat_lon_deg
+    line_deg = read_line(ROUTE_FILE).lat_lon_deg
     origin = GeoPoint(float(line_deg[0, 0]), float(line_deg[0, 1]))
     place = f"[map]\nlat_deg = {origin.lat_deg!r}\nlon_deg = {origin.lon_deg!r}\n\n[[in]]"
     text = AUTOWARE.read_text(encoding="utf-8").replace("[[in]]", place, 1)

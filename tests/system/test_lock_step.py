@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.plan import EMBEDDED_MAP, EMBEDDED_ROUTE
+from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
 from tests.system.foretwin_command import Finished, foretwin
 
 BERLIN_LOG = "drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt"
@@ -89,7 +89,7 @@ def test_a_recording_replays_to_the_same_futures(drives: Drives, tmp_path: Path)
     driven, _ = drives
     assert driven.run is not None
     again = foretwin(
-        tmp_path / "again", *SMALL, "--map", str(EMBEDDED_MAP), "--route", str(EMBEDDED_ROUTE),
+        tmp_path / "again", *SMALL, "--map", str(MAP_FILE), "--route", str(ROUTE_FILE),
         "--log", str(driven.run / "drive.mcap"),
     )  # fmt: skip
     assert again.code == 0, again.screen

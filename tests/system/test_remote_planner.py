@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from contracts.bus import Bus, Mailbox, ZenohBus
-from contracts.futures import Variant
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from sim_worker.futures import run_job
-from sim_worker.planners.registry import load_planner
-from sim_worker.planners.remote import RemotePlanner
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.bus import Bus, Mailbox, ZenohBus
+from foretwin.contracts.futures import Variant
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.planners.registry import load_planner
+from foretwin.sim_worker.planners.remote import RemotePlanner
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S, python
 from tests.sim_worker.places import crossroads, job
 from tests.sim_worker.planners.driven import at_rest_on, drive, straight

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from contracts.bus import ZenohBus
-from contracts.foreign_bus import ZenohForeignBus
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from telemetry.ros2.mapping import AUTOWARE
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.foreign_bus import ZenohForeignBus
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.telemetry.ros2.mapping import AUTOWARE
 from tests.starvation import kept_waiting
 from tests.system.foretwin_command import started
 from tests.system.ros2_car import Ros2Car

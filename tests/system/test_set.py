@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import EXIT_USER, run
+from foretwin.orchestrator.commands.cli import EXIT_USER, run
 from tests.system.foretwin_command import Finished, run_folder, started, wait_for
 
 SMALL = ("--speed", "max", "--futures", "6", "--workers", "1", "--rate", "0.5", "--end", "10")

@@ -9,9 +9,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from contracts.vehicle import Parameter
-from sim_worker.identify.acceptance import vehicle_toml
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.vehicle import Parameter
+from foretwin.sim_worker.analysis.identify.acceptance import vehicle_toml
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.system.foretwin_command import Finished, foretwin, log_lines
 
 HIDDEN_RATIO = 15.3

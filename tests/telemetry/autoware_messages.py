@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from contracts import drive
-from telemetry.ros_parts import (
+from foretwin.contracts import drive
+from foretwin.telemetry.ros_messages.parts import (
     BASE_FRAME,
     CONTROL_MODE_REPORT,
     GEAR_REPORT,

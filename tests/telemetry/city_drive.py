@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix, VehicleState
-from contracts.frames import GeoPoint, geo_from_local, local_from_geo, local_from_geo_yaw
-from telemetry.standin.parameters import read_parameters
-from telemetry.standin.path import DrivenPath
-from telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, VehicleState
+from foretwin.contracts.frames import GeoPoint, geo_from_local, local_from_geo, local_from_geo_yaw
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.telemetry.standin_drive import FRAME, Drive
 
 Sample = tuple[str, Any]

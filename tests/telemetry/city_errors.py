@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import wrap_angle
-from telemetry.estimator import StateEstimator
-from telemetry.standin.source import START_STAMP_NS
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import wrap_angle
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.telemetry.city_drive import Sample, city_drive, xy_of
 from tests.telemetry.impaired import BAD, ForeignClock, Network, impaired
 

@@ -8,8 +8,8 @@ import msgspec
 import numpy as np
 from hypothesis import strategies as st
 
-from contracts import drive
-from contracts.frames import GeoPoint
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint
 
 START_NS = 1_772_359_200_000_000_123
 INFO = drive.VehicleInfo(

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import HeadingSample
-from contracts.frames import local_from_geo, wrap_angle
-from telemetry.estimator import StateEstimator
-from telemetry.logs import open_log
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import HeadingSample
+from foretwin.contracts.frames import local_from_geo, wrap_angle
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.logs import open_log
 from tests.telemetry.city_drive import FRAME, antenna_xy, city_drive, phone_positions
 from tests.telemetry.city_errors import FOREIGN, Heard, heard, without
 from tests.telemetry.impaired import PERFECT, Network

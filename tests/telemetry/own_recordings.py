@@ -8,12 +8,12 @@ from pathlib import Path
 
 import msgspec
 
-from contracts.frames import LocalFrame
-from telemetry.logs.log import Sample
-from telemetry.logs.ros_recording import mcap_recording
-from telemetry.mcap_file import FRAME_METADATA
-from telemetry.ros_messages import kind_of, message_of
-from telemetry.ros_parts import typestore
+from foretwin.contracts.frames import LocalFrame
+from foretwin.telemetry.logs.log import Sample
+from foretwin.telemetry.logs.ros_recording import mcap_recording
+from foretwin.telemetry.logs.write_mcap import FRAME_METADATA
+from foretwin.telemetry.ros_messages.parts import typestore
+from foretwin.telemetry.ros_messages.table import kind_of, message_of
 
 
 def read_drive(path: Path) -> Iterator[Sample]:

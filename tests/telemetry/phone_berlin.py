@@ -18,17 +18,17 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.drive import GnssFix, ImuSample, SpeedSample, VehicleInfo
-from contracts.frames import GeoPoint, geo_from_local, local_from_geo, local_from_geo_yaw
-from orchestrator.way.way_ahead import WayAhead
-from telemetry.logs.opening import open_log
-from telemetry.motion_track import MotionTrack
+from foretwin.contracts.drive import GnssFix, ImuSample, SpeedSample, VehicleInfo
+from foretwin.contracts.frames import GeoPoint, geo_from_local, local_from_geo, local_from_geo_yaw
+from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.telemetry.estimator.motion_track import MotionTrack
+from foretwin.telemetry.logs.opening import open_log
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.road_graph import RoadGraph
 from tests.telemetry.phone_figures import Errors
 from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 from tests.telemetry.town_map import MapSeer
-from world_gen.build_graph import build_road_graph
-from world_gen.read_osm import read_map
-from world_gen.road_graph import RoadGraph
 
 ON_MAP_S = 262.0
 """So long the drive stays within the map's bounds."""

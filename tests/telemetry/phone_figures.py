@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import geo_from_local, wrap_angle
-from telemetry.motion_noise import GNSS_CORRELATION_S, SPEED_SCALE_STD
-from telemetry.motion_track import MotionTrack
-from telemetry.standin.parameters import read_parameters
-from telemetry.standin.path import DrivenPath
-from telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import geo_from_local, wrap_angle
+from foretwin.telemetry.estimator.motion_noise import GNSS_CORRELATION_S, SPEED_SCALE_STD
+from foretwin.telemetry.estimator.motion_track import MotionTrack
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.telemetry.city_drive import antenna_xy, phone_positions, xy_of
 from tests.telemetry.standin_drive import FRAME, Drive
 from tests.telemetry.town_map import Leg, MapSeer, seer

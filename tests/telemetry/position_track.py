@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from contracts.drive import GnssFix, VehicleInfo, VehicleState
-from contracts.frames import (
+from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     geo_from_local,
     local_from_geo,
     local_from_geo_yaw,
 )
-from telemetry.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator
 
 FRAME = LocalFrame(GeoPoint(52.51, 13.39, 0.0))
 Sample = tuple[str, Any]

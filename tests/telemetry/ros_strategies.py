@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
 
-from telemetry.ros_parts import typestore
+from foretwin.telemetry.ros_messages.parts import typestore
 
 _INTEGERS = {
     f"{sign}int{bits}": (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 _MOVING_MPS = 0.5
 

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from telemetry.standin.parameters import read_parameters
-from telemetry.standin.path import DrivenPath
-from telemetry.standin.source import StandinSource
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.source import StandinSource
 
 FRAME = LocalFrame(GeoPoint(52.51, 13.39))
 STOP_AT_M = 75.0

@@ -12,12 +12,12 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame
-from telemetry.logs import LogError, open_log
-from telemetry.ros_motion import ros_from_state
-from telemetry.ros_objects import predicted_from_users
-from telemetry.ros_parts import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.ros_messages.motion import ros_from_state
+from foretwin.telemetry.ros_messages.objects import predicted_from_users
+from foretwin.telemetry.ros_messages.parts import (
     CONTROL_MODE_REPORT,
     GEAR_REPORT,
     NAV_SAT_FIX,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs import LogError, open_log
 
 
 def save(path: Path, array: object) -> None:

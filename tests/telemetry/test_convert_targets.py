@@ -12,11 +12,11 @@ import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from contracts import drive
-from telemetry.convert import Target, convert, target_of
-from telemetry.logs import LogError, open_log
-from telemetry.logs.log import Sample
-from telemetry.mcap_file import create
+from foretwin.contracts import drive
+from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs.convert import Target, convert, target_of
+from foretwin.telemetry.logs.log import Sample
+from foretwin.telemetry.logs.write_mcap import create
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 from tests.telemetry.test_drive_mcap import assert_same
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from contracts.frames import LocalFrame, local_from_geo
-from telemetry.logs import LogError, open_log
+from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.telemetry.logs import LogError, open_log
 
 DECLARATION = """
 reference_point = "antenna on the roof"

@@ -14,12 +14,12 @@ from hypothesis import given, settings
 from mcap.reader import NonSeekingReader, make_reader
 from rosbags.highlevel import AnyReader
 
-from contracts import drive
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.keys import TELEMETRY_CHANNELS
-from telemetry.logs import LogError, open_log
-from telemetry.mcap_file import create
-from telemetry.ros_messages import messages_from, written
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs.write_mcap import create
+from foretwin.telemetry.ros_messages.table import messages_from, written
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples
 from tests.telemetry.own_recordings import message_from, read_drive
 

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.drive import GnssFix, VehicleState
-from contracts.frames import LocalFrame, local_from_geo, wrap_angle
-from telemetry.estimator import StateEstimator
-from telemetry.logs import open_log
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, wrap_angle
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.logs import open_log
 from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 
 pytestmark = pytest.mark.real_data

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.drive import GnssFix, HeadingSample, ImuSample, SpeedSample, SteeringSample
-from contracts.frames import GeoPoint
-from telemetry.estimator import StateEstimator
+from foretwin.contracts.drive import GnssFix, HeadingSample, ImuSample, SpeedSample, SteeringSample
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.telemetry.position_track import (
     Sample,
     along,

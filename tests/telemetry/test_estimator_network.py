@@ -7,8 +7,8 @@ import functools
 import numpy as np
 import pytest
 
-from contracts.frames import local_from_geo
-from telemetry.standin.source import START_STAMP_NS
+from foretwin.contracts.frames import local_from_geo
+from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.telemetry.city_drive import (
     FRAME,
     LONG_BEND_FROM_M,

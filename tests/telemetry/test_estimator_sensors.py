@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from contracts.frames import LocalFrame, local_from_geo, wrap_angle
-from telemetry.estimator import StateEstimator
-from telemetry.logs import Log, open_log
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, wrap_angle
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.logs import Log, open_log
 from tests.telemetry.estimator_figures import boreas
 from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 

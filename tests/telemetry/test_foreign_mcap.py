@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from contracts import drive
-from contracts.frames import GeoPoint
-from telemetry.logs import LogError, open_log
-from telemetry.ros_messages import messages_from
-from telemetry.ros_parts import (
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.ros_messages.parts import (
     header_from,
     ros_type,
     schema_text,
@@ -23,6 +22,7 @@ from telemetry.ros_parts import (
     typestore,
     vector_from,
 )
+from foretwin.telemetry.ros_messages.table import messages_from
 
 START_NS = 1_772_359_200_000_000_000
 LAG_NS = 30_000_000

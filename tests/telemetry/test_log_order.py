@@ -7,10 +7,10 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import GnssFix, SignalState, SpeedSample
-from contracts.frames import GeoPoint
-from telemetry.logs.log import Sample, screened
-from telemetry.logs.merge import merged, reordered, stamp_ns_of
+from foretwin.contracts.drive import GnssFix, SignalState, SpeedSample
+from foretwin.contracts.frames import GeoPoint
+from foretwin.telemetry.logs.log import Sample, screened
+from foretwin.telemetry.logs.merge import merged, reordered, stamp_ns_of
 
 
 def speed(stamp_ns: int) -> Sample:

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.logs import Log, LogError, open_log
-from telemetry.logs.nmea import CHECKSUM_WRONG, Sentence, sentence_of
+from foretwin.telemetry.logs import Log, LogError, open_log
+from foretwin.telemetry.logs.nmea import CHECKSUM_WRONG, Sentence, sentence_of
 
 NOON_NS = 1_772_366_400 * 10**9
 """2026-03-01T12:00:00Z."""
@@ -68,7 +68,7 @@ def test_minutes_knots_and_course(tmp_path: Path) -> None:
 
 @given(st.floats(0.0, 359.999))
 def test_degrees_clockwise_from_north_become_yaw_from_east(course_deg: float) -> None:
-    from telemetry.logs.nmea import _yaw_rad
+    from foretwin.telemetry.logs.nmea import _yaw_rad
 
     yaw = _yaw_rad(repr(course_deg))
     assert -math.pi <= yaw <= math.pi

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from contracts.arrays import Array
-from contracts.frames import GeoPoint, LocalFrame, local_from_geo
-from telemetry.logs import Log, open_log, open_road_users
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.telemetry.logs import Log, open_log, open_road_users
 
 DECLARATIONS = Path(__file__).parents[1] / "data" / "declarations"
 STEP_S, HALF_WINDOW = 0.1, 10

@@ -11,9 +11,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import GnssFix
-from contracts.frames import LocalFrame, local_from_geo, wrap_angle
-from telemetry.logs import Log, LogError, line_of_log, open_log, read_line
+from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.frames import LocalFrame, local_from_geo, wrap_angle
+from foretwin.telemetry.logs import Log, LogError, line_of_log, open_log, read_line
 
 DECLARATIONS = Path(__file__).parents[1] / "data" / "declarations"
 

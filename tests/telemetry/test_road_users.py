@@ -9,12 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from contracts.drive import RoadUser, RoadUsers, VehicleInfo
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo, wrap_angle
-from telemetry.logs import LogError, open_road_users
-from telemetry.logs.road_users import RoadUserTrack
-from telemetry.mcap_file import create
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleInfo
+from foretwin.contracts.frames import (
+    GeoPoint,
+    LocalFrame,
+    geo_from_local,
+    local_from_geo,
+    wrap_angle,
+)
+from foretwin.telemetry.logs import LogError, open_road_users
+from foretwin.telemetry.logs.road_users import RoadUserTrack
+from foretwin.telemetry.logs.write_mcap import create
 
 HERE = LocalFrame(GeoPoint(42.300947, -83.698649))
 START_S = 1_688_680_000.0

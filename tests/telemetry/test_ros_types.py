@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry import ros_parts
-from telemetry.ros_parts import ros_type, time_from, typestore
+from foretwin.telemetry.ros_messages import parts as ros_parts
+from foretwin.telemetry.ros_messages.parts import ros_type, time_from, typestore
 from tests.telemetry.ros_strategies import messages
 
 KINDS = (

@@ -6,8 +6,8 @@ import math
 import msgspec
 import pytest
 
-from telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
-from telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
+from foretwin.telemetry.standin.parameters import read_parameters
 
 
 def drive(car: MultiBodyCar, duration_s: float, *, accel: float, wheel: float) -> list[CarMotion]:

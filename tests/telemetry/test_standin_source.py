@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.codec import content_bytes
-from contracts.drive import GnssFix, PlannedTrajectory, VehicleState
-from contracts.frames import local_from_geo, local_from_geo_yaw, wrap_angle
-from telemetry.standin.parameters import read_parameters
-from telemetry.standin.path import DrivenPath, read_path
+from foretwin.contracts.codec import content_bytes
+from foretwin.contracts.drive import GnssFix, PlannedTrajectory, VehicleState
+from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, wrap_angle
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.path import DrivenPath, read_path
 from tests.telemetry.standin_drive import FRAME, STOP_AT_M, new_source, whole_drive, wished_path
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from telemetry.logs import LogError, line_of_log, open_log, read_line
+from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
 
 GPX = """<?xml version="1.0"?>
 <gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1">

@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from contracts.bus import Mailbox, Received, ZenohBus, ask
-from contracts.drive import AdvanceRequest, DriveEnd, InfoRequest
-from contracts.keys import TELEMETRY_CHANNELS, alive_key
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup, ProcessSetup, ReplaySetup, StandinSetup, write_setup
-from contracts.simulation import RunEnd
+from foretwin.contracts.bus import Mailbox, Received, ZenohBus, ask
+from foretwin.contracts.drive import AdvanceRequest, DriveEnd, InfoRequest
+from foretwin.contracts.keys import TELEMETRY_CHANNELS, alive_key
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup, ProcessSetup, ReplaySetup, StandinSetup, write_setup
+from foretwin.contracts.simulation import RunEnd
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.starvation import kept_waiting
 from tests.telemetry.standin_drive import wished_path
@@ -113,7 +113,7 @@ def test_a_recorded_drive_runs_at_its_speed_and_leaves_at_the_end_of_the_run(
 ) -> None:
     log = gpx(ground.folder, seconds=20)
     setup = ReplaySetup(**ground.base(log=str(log), start_s=2.0, speed=20.0))
-    with running("telemetry.replay", setup, ground.folder) as process:
+    with running("foretwin.telemetry.processes.replay", setup, ground.folder) as process:
         ground.wait_alive()
         process.send_signal(signal.SIGINT)
         assert ground.inbox.take(0.3) is None
@@ -140,7 +140,7 @@ def test_the_stand_in_in_lock_step_tells_what_it_has_published(ground: Ground) -
         json.dumps({name: values.tolist() for name, values in wish._asdict().items()})
     )
     setup = StandinSetup(**ground.base(path_file=str(path_file), end_s=1.0, speed=None))
-    with running("telemetry.standin", setup, ground.folder) as process:
+    with running("foretwin.telemetry.standin", setup, ground.folder) as process:
         ground.wait_alive()
         ground.ready()
         info = ask(ground.bus, "info", InfoRequest(), timeout_s=DEADLINE_S, vehicle="car")
@@ -161,12 +161,15 @@ def test_the_stand_in_in_lock_step_tells_what_it_has_published(ground: Ground) -
 
 @pytest.mark.parametrize(
     ("module", "fields"),
-    [("telemetry.replay", {"log": "nowhere.gpx"}), ("telemetry.standin", {"path_file": "no.json"})],
+    [
+        ("foretwin.telemetry.processes.replay", {"log": "nowhere.gpx"}),
+        ("foretwin.telemetry.standin", {"path_file": "no.json"}),
+    ],
 )
 def test_a_missing_file_is_one_line_and_exit_2(
     ground: Ground, module: str, fields: dict[str, str]
 ) -> None:
-    kind = ReplaySetup if module == "telemetry.replay" else StandinSetup
+    kind = ReplaySetup if module == "foretwin.telemetry.processes.replay" else StandinSetup
     with running(module, kind(**ground.base(**fields)), ground.folder) as process:
         _, errors = process.communicate(timeout=DEADLINE_S)
         assert process.returncode == 2

@@ -14,13 +14,13 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import VehicleState
-from orchestrator.way.way_ahead import WayAhead
-from telemetry.map_aid import RoadLine
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.telemetry.estimator.map_aid import RoadLine
+from foretwin.world_gen.roads.road_graph import RoadEdge, RoadGraph
 from tests.orchestrator.grid_map import graph_of, road
 from tests.telemetry.standin_drive import FRAME
-from world_gen.road_graph import RoadEdge, RoadGraph
 
 LANE_M = 3.0
 CORNER_RAD = 0.5

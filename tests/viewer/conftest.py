@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from contracts.bus import Mailbox, ZenohBus
-from contracts.codec import write_message
-from contracts.keys import alive_key
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup, ViewerSetup, write_setup
+from foretwin.contracts.bus import Mailbox, ZenohBus
+from foretwin.contracts.codec import write_message
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup, ViewerSetup, write_setup
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 
@@ -53,7 +53,7 @@ class ViewerRun:
         alive = Mailbox(8)
         self.bus.watch_alive(alive_key(run=RUN, process="viewer"), alive)
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "viewer", "--setup", str(folder / "viewer.json")]
+            [sys.executable, "-m", "foretwin.viewer", "--setup", str(folder / "viewer.json")]
         )
         assert alive.take(DEADLINE_S) is not None, "the viewer never said that it is ready"
 

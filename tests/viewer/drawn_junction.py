@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.provenance import Choice, Quantity
-from contracts.signals import Signal
-from contracts.world import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.provenance import Choice, Quantity
+from foretwin.contracts.signals import Signal
+from foretwin.contracts.world import (
     Area,
     Building,
     Connection,

@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.drive import DriveEnd, GnssFix, PlannedTrajectory, VehicleState
-from contracts.frames import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import DriveEnd, GnssFix, PlannedTrajectory, VehicleState
+from foretwin.contracts.frames import (
     GeoPoint,
     LocalFrame,
     geo_from_local,
     geo_from_local_yaw,
     target_from_source,
 )
-from contracts.simulation import (
+from foretwin.contracts.simulation import (
     ActiveWorld,
     Comparison,
     Event,

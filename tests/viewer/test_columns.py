@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
+from foretwin.viewer.blueprint import drive_blueprint
+from foretwin.viewer.rows import Row
+from foretwin.viewer.sinks import MOST_WAITING, FileStream
 from tests.viewer.readback import Recorded
-from viewer.blueprint import drive_blueprint
-from viewer.rows import Row
-from viewer.sinks import MOST_WAITING, FileStream
 
 
 def recorded(path: Path, rows: list[Row]) -> Recorded:

@@ -7,11 +7,11 @@ from typing import Any
 import msgspec
 import pytest
 
-from contracts.roles import Role
-from contracts.simulation import MirroredVehicle, MirrorSample, TwinCorrection
+from foretwin.contracts.roles import Role
+from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, TwinCorrection
+from foretwin.viewer.log_roles import CARS, RolesLog
+from foretwin.viewer.rows import Row
 from tests.viewer import scene
-from viewer.log_roles import CARS, RolesLog
-from viewer.rows import Row
 
 DRAWN = TwinCorrection(along_mps2=0.5, across_mps2=-0.25, yaw_radps2=0.0)
 

@@ -8,10 +8,16 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.frames import target_from_source
+from foretwin.contracts.frames import target_from_source
+from foretwin.viewer.log_world import (
+    BUILDING,
+    offset_left,
+    rows_of_world,
+    world_centre,
+    zebra_stripes,
+)
+from foretwin.viewer.meshes import Polygon, flat_mesh, prism_mesh, triangulate
 from tests.viewer import scene
-from viewer.log_world import BUILDING, offset_left, rows_of_world, world_centre, zebra_stripes
-from viewer.meshes import Polygon, flat_mesh, prism_mesh, triangulate
 
 RADII = st.lists(st.floats(2.0, 30.0), min_size=3, max_size=24)
 

@@ -11,17 +11,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.codec import SchemaMismatch
-from contracts.gap import Evidence, GapSample, Verdict
-from contracts.side_by_side import Disagreement
-from contracts.simulation import ActiveWorld, Event, WorldNotice
-from contracts.tuning import Identification, ParameterChange, ParameterEstimate
-from contracts.world import World
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.gap import Evidence, GapSample, Verdict
+from foretwin.contracts.side_by_side import Disagreement
+from foretwin.contracts.simulation import ActiveWorld, Event, WorldNotice
+from foretwin.contracts.tuning import Identification, ParameterChange, ParameterEstimate
+from foretwin.contracts.world import World
+from foretwin.viewer.live_viewer import NoViewerError, live_viewer
+from foretwin.viewer.log_scenarios import CRITICAL, SAFE, criticality_colours, scenario_table
+from foretwin.viewer.monitor import Monitor, read_world
+from foretwin.viewer.rows import Row, plain_text
 from tests.viewer import scene
-from viewer.live_viewer import NoViewerError, live_viewer
-from viewer.log_scenarios import CRITICAL, SAFE, criticality_colours, scenario_table
-from viewer.monitor import Monitor, read_world
-from viewer.rows import Row, plain_text
 
 
 def _monitor(load_world: Any = lambda _id: scene.junction()) -> Monitor:

@@ -1,4 +1,4 @@
-"""`python -m viewer --open` and its errors: one line each, exit code 2."""
+"""`python -m foretwin.viewer --open` and its errors: one line each, exit code 2."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from viewer.__main__ import main
-from viewer.live_viewer import offline_environment
+from foretwin.viewer.__main__ import main
+from foretwin.viewer.live_viewer import offline_environment
 
 
 def test_a_missing_recording_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -26,7 +26,7 @@ def test_without_a_display_a_picture_is_offered(
     assert main(["--open", str(recording)]) == 2
     told = capsys.readouterr().err
     assert told.count("\n") == 1
-    assert "viewer.picture" in told
+    assert "foretwin.viewer.picture" in told
 
 
 def test_the_viewer_is_kept_from_the_internet(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,15 +11,15 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from foretwin.viewer.blueprint import GAP_VIEWS, drive_blueprint
+from foretwin.viewer.log_drive import LIMIT
+from foretwin.viewer.log_roles import TWIN
+from foretwin.viewer.log_scenarios import CRITICAL
+from foretwin.viewer.log_world import ROAD
+from foretwin.viewer.monitor import Monitor
+from foretwin.viewer.picture import Picture, has_vulkan, main, take_picture
+from foretwin.viewer.sinks import FileStream
 from tests.viewer import scene
-from viewer.blueprint import GAP_VIEWS, drive_blueprint
-from viewer.log_drive import LIMIT
-from viewer.log_roles import TWIN
-from viewer.log_scenarios import CRITICAL
-from viewer.log_world import ROAD
-from viewer.monitor import Monitor
-from viewer.picture import Picture, has_vulkan, main, take_picture
-from viewer.sinks import FileStream
 
 pytestmark = pytest.mark.picture
 SIZE = (1200, 800)

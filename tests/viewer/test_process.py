@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from contracts.bus import Mailbox
-from contracts.codec import MAGIC
-from contracts.drive import VehicleInfo
-from contracts.keys import alive_key
-from contracts.keys import key as channel_key
-from contracts.ports import free_port
-from contracts.simulation import RunEnd
+from foretwin.contracts.bus import Mailbox
+from foretwin.contracts.codec import MAGIC
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.keys import key as channel_key
+from foretwin.contracts.ports import free_port
+from foretwin.contracts.simulation import RunEnd
+from foretwin.viewer.live_viewer import address, start_program, wait_until_it_answers
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 from tests.viewer.conftest import RUN, ViewerRun, wait_until
 from tests.viewer.readback import Recorded
-from viewer.live_viewer import address, start_program, wait_until_it_answers
 
 StartViewer = Callable[..., ViewerRun]
 
@@ -83,8 +83,8 @@ def test_sigterm_completes_the_file(start_viewer: StartViewer) -> None:
 
 
 def test_the_file_is_complete_when_the_orchestrator_is_lost(start_viewer: StartViewer) -> None:
-    from contracts.bus import ZenohBus
-    from contracts.setup import ViewerSetup, read_setup
+    from foretwin.contracts.bus import ZenohBus
+    from foretwin.contracts.setup import ViewerSetup, read_setup
 
     run = start_viewer()
     setup = read_setup(run.recording.parent / "viewer.json", ViewerSetup)

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from rerun.chunk import RrdReader
 
+from foretwin.viewer.blueprint import drive_blueprint
+from foretwin.viewer.monitor import Monitor
+from foretwin.viewer.recordings import copy_with_blueprint, is_complete
+from foretwin.viewer.sinks import FileStream
 from tests.viewer import scene
 from tests.viewer.readback import Recorded
-from viewer.blueprint import drive_blueprint
-from viewer.monitor import Monitor
-from viewer.recordings import copy_with_blueprint, is_complete
-from viewer.sinks import FileStream
 
 
 @pytest.fixture

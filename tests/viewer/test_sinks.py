@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from contracts.ports import free_port
+from foretwin.contracts.ports import free_port
+from foretwin.viewer.blueprint import drive_blueprint
+from foretwin.viewer.live_viewer import address, start_program, wait_until_it_answers
+from foretwin.viewer.rows import Row
+from foretwin.viewer.sinks import LIVE_ROWS, FileStream, LiveStream
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.starvation import KeptWaiting, kept_waiting
 from tests.viewer.conftest import wait_until
 from tests.viewer.readback import Recorded
-from viewer.blueprint import drive_blueprint
-from viewer.live_viewer import address, start_program, wait_until_it_answers
-from viewer.rows import Row
-from viewer.sinks import LIVE_ROWS, FileStream, LiveStream
 
 HEAVY = rr.Points3D(np.zeros((150_000, 3), dtype=np.float32))
 """1.8 MB: a frozen window takes about 200 MB before `log` blocks."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from contracts.world import World
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.export.mjcf import world_spec
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
-from world_gen.osm_map import OsmMap
-from world_gen.read_osm import read_map
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.export.mjcf import world_spec
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 
 
 class Built(NamedTuple):

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
-from contracts.world import ATTRIBUTION, World
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.osm_map import LatLonBounds, OsmMap, OsmMember, OsmRelation, OsmWay
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap, OsmMember, OsmRelation, OsmWay
+from foretwin.world_gen.roads.build_graph import build_road_graph
 
 GERMANY, ENGLAND = GeoPoint(52.0, 10.0), GeoPoint(53.0, -1.5)
 Tags = Mapping[str, str]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from hypothesis import strategies as st
 
-from contracts.world import World
+from foretwin.contracts.world import World
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, drawn_map, world_of
 
 ARM_M = 110.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contracts.world import Connection, Lane, World, WorldJunction
+from foretwin.contracts.world import Connection, Lane, World, WorldJunction
 from tests.world_gen.truth_sheet import TrueJunction
 
 COLUMNS = ("kind", "control", "arms", "lanes", "movements", "turns", "ring", "yields")

@@ -9,14 +9,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from contracts.world import World
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.osm.osm_map import MapError
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.junction_score import COLUMNS, Score, score
 from tests.world_gen.truth_sheet import TrueJunction, TrueMap, true_maps
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.osm_map import MapError
-from world_gen.read_osm import read_map
 
 
 def worlds_of(truth: TrueMap) -> list[World]:

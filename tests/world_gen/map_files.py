@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.world_gen.osm.map_store import MapStore
+from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError, OsmMap
+from foretwin.world_gen.osm.read_osm import read_map
 from tests.world_gen.sketch import Sketch, star
-from world_gen.map_store import MapStore
-from world_gen.osm_map import LatLonBounds, MapError, OsmMap
-from world_gen.read_osm import read_map
 
 EVERYWHERE = LatLonBounds(-90.0, -180.0, 90.0, 180.0)
 

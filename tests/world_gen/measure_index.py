@@ -13,8 +13,8 @@ import sys
 import time
 from pathlib import Path
 
-from world_gen import build_map_store, node_spool, opl_stream
-from world_gen.map_store import MapStore
+from foretwin.world_gen.osm import build_map_store, node_spool, opl_stream
+from foretwin.world_gen.osm.map_store import MapStore
 
 
 def main() -> None:

@@ -6,11 +6,11 @@ import dataclasses
 import re
 from pathlib import Path
 
-from contracts.frames import LocalFrame
+from foretwin.contracts.frames import LocalFrame
+from foretwin.world_gen.osm.driving_side import side_at
 from tests.data.junctions.draw import drawings
 from tests.data.junctions.drawing import BREMEN, LEEDS, Drawing
 from tests.world_gen.truth_sheet import TrueJunction, TrueMap
-from world_gen.driving_side import side_at
 
 OTHER = {
     "left": "right",

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from world_gen.bends import rounded_through
-from world_gen.polyline_batch import Polylines
-from world_gen.turn_curves import turn_curves
+from foretwin.geometry.bends import rounded_through
+from foretwin.geometry.polyline_batch import Polylines
+from foretwin.geometry.turn_curves import turn_curves
 
 
 def bend_rad(u: np.ndarray, v: np.ndarray) -> float:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from contracts.signals import SignalPlan
-from contracts.world import World
-from world_gen.signal_plan import LEAST_GREEN_S
+from foretwin.contracts.signals import SignalPlan
+from foretwin.contracts.world import World
+from foretwin.world_gen.rules.signal_plan import LEAST_GREEN_S
 
 
 def plan_of(world: World) -> SignalPlan:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contracts.provenance import Quantity
-from world_gen.road_graph import RoadEdge
+from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.roads.road_graph import RoadEdge
 
 
 def road(

@@ -6,13 +6,13 @@ import math
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.intersections import Junction
-from world_gen.osm_map import OsmMap
-from world_gen.read_osm import read_map
-from world_gen.road_graph import RoadGraph
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.road_graph import RoadGraph
 
 NORTH_SEA_COAST = GeoPoint(53.5, 8.1)
 MANCHESTER = GeoPoint(53.45, -2.3)

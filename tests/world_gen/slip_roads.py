@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import shapely
 
-from contracts.arrays import Array
-from contracts.frames import local_from_geo
-from contracts.world import Connection, StopLine, World
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.world import Connection, StopLine, World
+from foretwin.world_gen.osm.osm_map import OsmMap
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, Tags, drawn_map, world_of
-from world_gen.osm_map import OsmMap
 
 SIGN = 31
 _WAY = np.array([[0.0, -30.0], [4.0, -14.0], [13.0, -5.0], [30.0, 0.0]])

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError
+from foretwin.world_gen.osm.read_osm import read_map
 from tests.world_gen.chain import build_all
 from tests.world_gen.map_files import both_ways, crossing, file_of, refused
-from world_gen.osm_map import LatLonBounds, MapError
-from world_gen.read_osm import read_map
 
 
 def pbf_of(path: Path, options: str = "pbf") -> bytes:

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point, Polygon
 
-from contracts.codec import content_bytes, decode, encode
-from contracts.world import ATTRIBUTION, World
+from foretwin.contracts.codec import content_bytes, decode, encode
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import (
     AVENUE,
     ENGLAND,
@@ -20,9 +23,6 @@ from tests.world_gen.drawn_maps import (
     world_of,
 )
 from tests.world_gen.sketch import star
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
 
 TURNS = {"straight": 4, "left": 4, "right": 4}
 

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from world_gen.extent import Disc, Rectangle, stretches_inside
-from world_gen.polyline import cut, points_at
+from foretwin.geometry.polyline import cut, points_at
+from foretwin.world_gen.extent import Disc, Rectangle, stretches_inside
 
 DETOUR = np.array([[-4.0, 0.0], [0.0, 0.0], [0.0, 20.0], [1.0, 20.0], [1.0, 0.0], [4.0, 0.0]])
 THROUGH = np.array([[-50.0, 3.0], [50.0, 3.0]])

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from contracts.errors import UserError
-from contracts.frames import GeoPoint
-from contracts.world import World
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.world import World
 from tests.world_gen.chain import build_all
 from tests.world_gen.sketch import MANCHESTER, NORTH_SEA_COAST, Sketch
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from contracts.world import World
+from foretwin.contracts.world import World
 from tests.data.junctions.draw import draw_all
 from tests.world_gen.junction_score import COLUMNS, Score, score
 from tests.world_gen.junction_truth import score_map, table, worlds_of

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.provenance import Quantity
+from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.lanes.cross_section import cross_section
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, world_of
 from tests.world_gen.road_edges import road
-from world_gen.cross_section import cross_section
 
 
 def _kinds(tags, *, forward=1, backward=1, side="right") -> list[str]:

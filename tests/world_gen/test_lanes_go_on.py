@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contracts.world import World
+from foretwin.contracts.world import World
 from tests.world_gen.drawn_maps import STREET, drawn_map, world_of
 
 WIDE = {"highway": "secondary", "name": "Street"}

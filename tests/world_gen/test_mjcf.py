@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from contracts.world import ATTRIBUTION, World
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE, world_spec, write_mjcf
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
-from world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE, world_spec, write_mjcf
 
 L_BUILDING = {
     "extra_nodes": {

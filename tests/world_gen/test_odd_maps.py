@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from contracts.frames import GeoPoint
+from foretwin.contracts.frames import GeoPoint
+from foretwin.world_gen.osm.map_store import MapStore
+from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError
+from foretwin.world_gen.osm.read_osm import read_map
 from tests.world_gen.chain import build_all
 from tests.world_gen.map_files import both_ways, crossing, file_of, refused, with_more
 from tests.world_gen.sketch import Sketch, star
-from world_gen.map_store import MapStore
-from world_gen.osm_map import LatLonBounds, MapError
-from world_gen.read_osm import read_map
 
 
 def test_positions_that_are_not_on_earth(tmp_path: Path) -> None:

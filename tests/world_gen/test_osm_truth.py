@@ -13,18 +13,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.frames import local_from_geo
-from contracts.world import World
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import build_region, build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.road_graph import RoadGraph
 from tests.world_gen.test_real_maps import MAPS
 from tests.world_gen.traffic_lights import TrafficLight, traffic_lights
-from world_gen.build import build_region, build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.intersections import Junction
-from world_gen.map_index import index_map
-from world_gen.osm_map import LatLonBounds, OsmMap
-from world_gen.read_osm import read_map
-from world_gen.road_graph import RoadGraph
 
 pytestmark = [pytest.mark.real_data, pytest.mark.judge]
 

@@ -12,11 +12,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.errors import UserError
-from contracts.world import ATTRIBUTION, World
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.world_gen.export.picture import write_picture
+from foretwin.world_gen.report.report import report_of
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
-from world_gen.export.picture import write_picture
-from world_gen.report import report_of
 
 HOUSE = {20: (10.0, 10.0), 21: (30.0, 10.0), 22: (30.0, 30.0), 23: (10.0, 30.0)}
 BRIDGE = {30: (-60.0, 60.0), 31: (60.0, 60.0)}

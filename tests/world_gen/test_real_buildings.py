@@ -10,11 +10,15 @@ import numpy.typing as npt
 import pytest
 import shapely
 
+from foretwin.world_gen.buildings.convex_parts import convex_cover
+from foretwin.world_gen.buildings.footprints import (
+    SILHOUETTE_TOLERANCE_M,
+    BuildingIndex,
+    buildings_in_frame,
+)
+from foretwin.world_gen.export.mjcf import world_spec
+from foretwin.world_gen.osm.read_osm import read_map
 from tests.world_gen.drawn_maps import crossing, world_of
-from world_gen.buildings import SILHOUETTE_TOLERANCE_M, BuildingIndex, buildings_in_frame
-from world_gen.convex_parts import convex_cover
-from world_gen.export.mjcf import world_spec
-from world_gen.read_osm import read_map
 
 pytestmark = pytest.mark.real_data
 

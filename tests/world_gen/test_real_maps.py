@@ -10,14 +10,14 @@ import numpy as np
 import osmium
 import pytest
 
-from contracts.frames import geo_from_ecef, local_from_geo
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.intersections import Junction
-from world_gen.osm_map import OsmMap
-from world_gen.read_osm import read_map
-from world_gen.road_graph import RoadGraph
-from world_gen.road_tags import CAR_CLASSES
+from foretwin.contracts.frames import geo_from_ecef, local_from_geo
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.road_tags import CAR_CLASSES
 
 pytestmark = pytest.mark.real_data
 

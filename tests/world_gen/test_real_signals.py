@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.world import World
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import build_region, build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.plan_checks import check_plans, plan_of
-from world_gen.build import build_region, build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
-from world_gen.osm_map import LatLonBounds, OsmMap
-from world_gen.read_osm import read_map
 
 MAPS = {
     "berlin": "osm-berlin-mitte/berlin-mitte.osm",

@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString
 
-from contracts.codec import content_bytes, decode, encode
-from contracts.world import Lane, Road, World
+from foretwin.contracts.codec import content_bytes, decode, encode
+from foretwin.contracts.world import Lane, Road, World
+from foretwin.geometry.turn_curves import LEAST_RADIUS_M
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.export.mjcf import world_spec
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import MapIndex, index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
 from tests.world_gen.slip_roads import check_lines
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.export.mjcf import world_spec
-from world_gen.find_intersections import find_intersections
-from world_gen.intersections import Junction
-from world_gen.map_index import MapIndex, index_map
-from world_gen.read_osm import read_map
-from world_gen.turn_curves import LEAST_RADIUS_M
 
 MAPS = {
     "berlin": "osm-berlin-mitte/berlin-mitte.osm",

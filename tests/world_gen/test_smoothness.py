@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString
 
-from contracts.world import Connection, World
+from foretwin.contracts.world import Connection, World
 from tests.world_gen.drawn_stars import stars, world_of_star
 from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
 

@@ -12,14 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.frames import local_from_geo
-from contracts.world import IntersectionSummary
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.world import IntersectionSummary
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.sketch import Sketch
 from tests.world_gen.test_real_maps import MAPS
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.osm_map import OsmMap
-from world_gen.read_osm import read_map
 
 EDITS = st.lists(
     st.tuples(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-import world_gen.world_store as world_store
-from contracts.codec import content_bytes
+import foretwin.world_gen.world_store as world_store
+from foretwin.contracts.codec import content_bytes
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.service_roads import with_service_roads
+from foretwin.world_gen.world_store import WorldStore, cached_build
 from tests.world_gen.drawn_maps import crossing
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
-from world_gen.service_roads import with_service_roads
-from world_gen.world_store import WorldStore, cached_build
 
 
 @pytest.fixture(scope="module")

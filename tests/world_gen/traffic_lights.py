@@ -7,9 +7,9 @@ from typing import Literal
 
 import msgspec
 
-from world_gen.intersections import Junction
-from world_gen.osm_map import OsmMap
-from world_gen.road_tags import is_car_road
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.roads.road_tags import is_car_road
 
 LightRole = Literal["junction", "pedestrians", "road"]
 """`road`: drivers stop for it, but not at a junction for cars that the map holds.

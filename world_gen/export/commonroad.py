@@ -16,16 +16,16 @@ import numpy as np
 from lxml import etree
 from shapely.geometry import Polygon
 
-from contracts.arrays import Array
-from contracts.world import Building, Connection, Crossing, Lane, LaneKind, Road, World
-from world_gen.export.commonroad_elements import IdCounter, child, points, put, ref
-from world_gen.export.commonroad_intersections import intersections
-from world_gen.export.commonroad_lights import traffic_lights
-from world_gen.export.commonroad_signs import DEFAULT_COUNTRY, traffic_signs
-from world_gen.export.lane_borders import Borders, lane_borders
-from world_gen.export.lane_markings import Marking, lane_markings
-from world_gen.export.lanelets import URBAN_MPS, crosswalk_edges, is_marked, narrower_lane
-from world_gen.export.xml_text import in_comment
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Building, Connection, Crossing, Lane, LaneKind, Road, World
+from foretwin.world_gen.export.commonroad_elements import IdCounter, child, points, put, ref
+from foretwin.world_gen.export.commonroad_intersections import intersections
+from foretwin.world_gen.export.commonroad_lights import traffic_lights
+from foretwin.world_gen.export.commonroad_signs import DEFAULT_COUNTRY, traffic_signs
+from foretwin.world_gen.export.lane_borders import Borders, lane_borders
+from foretwin.world_gen.export.lane_markings import Marking, lane_markings
+from foretwin.world_gen.export.lanelets import URBAN_MPS, crosswalk_edges, is_marked, narrower_lane
+from foretwin.world_gen.export.xml_text import in_comment
 
 VERSION = "2020a"
 TIME_STEP_S = 0.1

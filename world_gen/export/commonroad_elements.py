@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 
 class IdCounter:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from contracts.arrays import Array
-from contracts.world import Connection, Lane, World
-from world_gen.export.commonroad_elements import IdCounter, ref
-from world_gen.export.lanelets import indicated
-from world_gen.polyline import unit
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Connection, Lane, World
+from foretwin.geometry.polyline import unit
+from foretwin.world_gen.export.commonroad_elements import IdCounter, ref
+from foretwin.world_gen.export.lanelets import indicated
 
 LEFT_OF_RAD = math.radians(150.0)
 """Whoever comes from farther round does not come from the left but from ahead."""

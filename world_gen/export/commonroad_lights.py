@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 from lxml import etree
 
-from contracts.signals import SignalPlan
-from contracts.world import Turn, World
-from world_gen.export.commonroad_elements import IdCounter, child, position
-from world_gen.export.lanelets import indicated
+from foretwin.contracts.signals import SignalPlan
+from foretwin.contracts.world import Turn, World
+from foretwin.world_gen.export.commonroad_elements import IdCounter, child, position
+from foretwin.world_gen.export.lanelets import indicated
 
 _DIRECTIONS: Mapping[frozenset[Turn], str] = {
     frozenset({"right"}): "right",

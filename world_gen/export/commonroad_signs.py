@@ -7,10 +7,10 @@ from typing import Any, Literal
 
 from lxml import etree
 
-from contracts.arrays import Array
-from contracts.world import Connection, Lane, World
-from world_gen.export.commonroad_elements import IdCounter, child, position
-from world_gen.export.lane_borders import Borders
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Connection, Lane, World
+from foretwin.world_gen.export.commonroad_elements import IdCounter, child, position
+from foretwin.world_gen.export.lane_borders import Borders
 
 SignName = Literal["stop", "give_way", "priority", "max_speed"]
 DEFAULT_COUNTRY = "ZAM"

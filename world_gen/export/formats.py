@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from world_gen.export.choices import OpenDriveVersion, Simulator, VehicleKind
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.world_gen.export.choices import OpenDriveVersion, Simulator, VehicleKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,45 +35,45 @@ class Format:
 
 # Writers are imported when they are used: each needs libraries that the others do not.
 def _mjcf(world: World, path: Path, _: ExportOptions) -> None:
-    from world_gen.export.mjcf import write_mjcf
+    from foretwin.world_gen.export.mjcf import write_mjcf
 
     write_mjcf(world, path)
 
 
 def _sdf(world: World, path: Path, options: ExportOptions) -> None:
-    from world_gen.export.sdformat import write_sdf
-    from world_gen.export.sdformat_vehicles import place_vehicles
+    from foretwin.world_gen.export.sdformat import write_sdf
+    from foretwin.world_gen.export.sdformat_vehicles import place_vehicles
 
     vehicles = place_vehicles(world, options.vehicles, options.vehicle) if options.vehicle else ()
     write_sdf(world, path, simulator=options.simulator, vehicles=vehicles)
 
 
 def _opendrive(world: World, path: Path, options: ExportOptions) -> None:
-    from world_gen.export.opendrive import write_opendrive
+    from foretwin.world_gen.export.opendrive import write_opendrive
 
     write_opendrive(world, path, version=options.opendrive_version)
 
 
 def _lanelet2(world: World, path: Path, _: ExportOptions) -> None:
-    from world_gen.export.lanelet2 import write_lanelet2
+    from foretwin.world_gen.export.lanelet2 import write_lanelet2
 
     write_lanelet2(world, path)
 
 
 def _commonroad(world: World, path: Path, _: ExportOptions) -> None:
-    from world_gen.export.commonroad import write_commonroad
+    from foretwin.world_gen.export.commonroad import write_commonroad
 
     write_commonroad(world, path)
 
 
 def _geojson(world: World, path: Path, _: ExportOptions) -> None:
-    from world_gen.export.geojson import write_geojson
+    from foretwin.world_gen.export.geojson import write_geojson
 
     write_geojson(world, path)
 
 
 def _picture(world: World, path: Path, _: ExportOptions) -> None:
-    from world_gen.export.picture import write_picture
+    from foretwin.world_gen.export.picture import write_picture
 
     write_picture(world, path)
 

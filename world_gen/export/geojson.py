@@ -11,10 +11,10 @@ import msgspec
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.frames import LocalFrame, geo_from_local, local_from_geo
-from contracts.provenance import Choice, Quantity
-from contracts.world import World
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame, geo_from_local, local_from_geo
+from foretwin.contracts.provenance import Choice, Quantity
+from foretwin.contracts.world import World
 
 DEGREE_DIGITS = 9
 """A nanodegree is 0.1 mm: files keep the millimetres of a World."""

@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.world import Connection, Lane, World
-from world_gen.export.parallels import filled, parallel, untangled
-from world_gen.polyline import arc_lengths, left_of, unit
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Connection, Lane, World
+from foretwin.geometry.polyline import arc_lengths, left_of, unit
+from foretwin.world_gen.export.parallels import filled, parallel, untangled
 
 BLEND_M = 10.0
 """Over this length a border bends to the point where another road's border takes over."""

@@ -7,9 +7,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.world import Lane, Road, World
-from world_gen.export.lane_borders import Borders
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Lane, Road, World
+from foretwin.world_gen.export.lane_borders import Borders
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")

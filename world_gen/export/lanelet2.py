@@ -10,22 +10,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from contracts.world import Connection, Crossing, Lane, LaneKind, World
-from world_gen.export.lane_borders import Borders, lane_borders
-from world_gen.export.lane_markings import SIDES, lane_markings
-from world_gen.export.lanelet2_markings import VIRTUAL, border_tags
-from world_gen.export.lanelet2_orientation import oriented
-from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
-from world_gen.export.lanelet2_rules import LaneletRules, add_rules
-from world_gen.export.lanelet2_surroundings import add_intersection_areas, add_surroundings
-from world_gen.export.lanelets import (
+from foretwin.contracts.world import Connection, Crossing, Lane, LaneKind, World
+from foretwin.world_gen.export.lane_borders import Borders, lane_borders
+from foretwin.world_gen.export.lane_markings import SIDES, lane_markings
+from foretwin.world_gen.export.lanelet2_markings import VIRTUAL, border_tags
+from foretwin.world_gen.export.lanelet2_orientation import oriented
+from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
+from foretwin.world_gen.export.lanelet2_rules import LaneletRules, add_rules
+from foretwin.world_gen.export.lanelet2_surroundings import add_intersection_areas, add_surroundings
+from foretwin.world_gen.export.lanelets import (
     URBAN_MPS,
     crosswalk_edges,
     indicated,
     is_marked,
     narrower_lane,
 )
-from world_gen.export.road_heights import RoadHeights
+from foretwin.world_gen.export.road_heights import RoadHeights
 
 AUTOWARE_MAP_NAME = "lanelet2_map.osm"
 """A map of this name gets the projector file under the name that Autoware looks for beside it."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from world_gen.export.lane_markings import Marking
-from world_gen.export.lanelet2_primitives import Tags
+from foretwin.world_gen.export.lane_markings import Marking
+from foretwin.world_gen.export.lanelet2_primitives import Tags
 
 VIRTUAL: Tags = {"type": "virtual"}
 _TYPES = {

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from world_gen.export.lane_borders import Borders
-from world_gen.export.parallels import filled
-from world_gen.polyline import arc_lengths, left_of, points_at, unit
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import arc_lengths, left_of, points_at, unit
+from foretwin.world_gen.export.lane_borders import Borders
+from foretwin.world_gen.export.parallels import filled
 
 _SHARES = (0.35, 0.65, 0.2, 0.8, 0.1, 0.9, 0.04, 0.96)
 """Where else on a line its middle point may lie, as shares of its length."""

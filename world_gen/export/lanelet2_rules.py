@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.signals import Signal, SignalPlan
-from contracts.world import Conflict, Connection, Lane, StopLine, World
-from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
-from world_gen.polyline import left_of
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.signals import Signal, SignalPlan
+from foretwin.contracts.world import Conflict, Connection, Lane, StopLine, World
+from foretwin.geometry.polyline import left_of
+from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
 
 LIGHT_WIDTH_M = 0.35
 LIGHT_HEIGHT_M = 0.9

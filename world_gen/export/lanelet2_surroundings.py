@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import shapely
 from shapely.geometry import Polygon
 
-from contracts.arrays import Array
-from contracts.world import World
-from world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import World
+from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
 
 
 def add_surroundings(world: World, drawn: Lanelet2Map) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from contracts.world import Connection, Crossing, DrivingSide, Lane, Turn
-from world_gen.export.lane_borders import Borders
-from world_gen.polyline import left_of, unit
+from foretwin.contracts.world import Connection, Crossing, DrivingSide, Lane, Turn
+from foretwin.geometry.polyline import left_of, unit
+from foretwin.world_gen.export.lane_borders import Borders
 
 URBAN_MPS = 60.0 / 3.6
 """Roads on which one may drive faster count as outside towns."""

@@ -16,10 +16,11 @@ import numpy.typing as npt
 import shapely
 from shapely.geometry import Polygon
 
-from contracts.arrays import Array
-from contracts.world import Building, World
-from world_gen.convex_parts import convex_cover, polygons_from
-from world_gen.export.solids import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Building, World
+from foretwin.geometry.reflex_cuts import polygons_of
+from foretwin.world_gen.buildings.convex_parts import convex_cover, polygons_from
+from foretwin.world_gen.export.solids import (
     BUILDING,
     GROUND,
     ISLAND,
@@ -30,8 +31,7 @@ from world_gen.export.solids import (
     island_height_m,
     stops_cars,
 )
-from world_gen.export.xml_text import in_comment
-from world_gen.reflex_cuts import polygons_of
+from foretwin.world_gen.export.xml_text import in_comment
 
 STATIC = 1
 """Contype of buildings and islands; their conaffinity is VEHICLE."""

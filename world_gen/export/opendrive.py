@@ -6,14 +6,14 @@ from pathlib import Path
 
 from lxml import etree
 
-from contracts.frames import LocalFrame
-from contracts.world import ATTRIBUTION, World
-from world_gen.export.opendrive_elements import Version, number, road_element, text
-from world_gen.export.opendrive_junctions import junction_elements, ring_elements
-from world_gen.export.opendrive_objects import add_objects
-from world_gen.export.opendrive_places import network_of
-from world_gen.export.opendrive_signals import add_signals
-from world_gen.export.xml_text import in_comment
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.world_gen.export.opendrive_elements import Version, number, road_element, text
+from foretwin.world_gen.export.opendrive_junctions import junction_elements, ring_elements
+from foretwin.world_gen.export.opendrive_objects import add_objects
+from foretwin.world_gen.export.opendrive_places import network_of
+from foretwin.world_gen.export.opendrive_signals import add_signals
+from foretwin.world_gen.export.xml_text import in_comment
 
 
 def write_opendrive(world: World, path: Path, *, version: Version = "1.8") -> None:
@@ -52,7 +52,7 @@ def opendrive_element(world: World, *, version: Version = "1.8") -> etree._Eleme
 
 
 def proj_of(frame: LocalFrame) -> str:
-    """Return the PROJ string of a local frame (see `contracts.frames`)."""
+    """Return the PROJ string of a local frame (see `foretwin.contracts.frames`)."""
     return (
         f"+proj=tmerc +lat_0={frame.origin.lat_deg!r} +lon_0={frame.origin.lon_deg!r} "
         "+k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m"

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from world_gen.polyline import unit, without_repeats
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import unit, without_repeats
 
 STRAIGHT_M = 3.0
 """Longer segments are taken for straight; the World samples its curves more densely."""

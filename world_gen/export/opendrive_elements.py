@@ -7,10 +7,10 @@ from typing import Literal
 
 from lxml import etree
 
-from contracts.world import DrivingSide, Lane
-from world_gen.export.opendrive_curve import Curve
-from world_gen.export.opendrive_roads import Cubic, OdrLane, OdrRoad
-from world_gen.export.xml_text import legal
+from foretwin.contracts.world import DrivingSide, Lane
+from foretwin.world_gen.export.opendrive_curve import Curve
+from foretwin.world_gen.export.opendrive_roads import Cubic, OdrLane, OdrRoad
+from foretwin.world_gen.export.xml_text import legal
 
 Version = Literal["1.8", "1.4"]
 LANE_TYPE = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping, Sequence
 
-from contracts.world import Road
-from world_gen.export.road_heights import LAYER_HEIGHT_M
-from world_gen.polyline import length
+from foretwin.contracts.world import Road
+from foretwin.geometry.polyline import length
+from foretwin.world_gen.export.road_heights import LAYER_HEIGHT_M
 
 RAMP_SLOPE = 0.06
 """Mean slope of a ramp (RASt 06: at most 6 to 8 % on main roads)."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from lxml import etree
 
-from contracts.world import World
-from world_gen.export.opendrive_elements import Version, text
-from world_gen.export.opendrive_places import OdrJunction, OdrNetwork
-from world_gen.export.opendrive_signals import Controller
+from foretwin.contracts.world import World
+from foretwin.world_gen.export.opendrive_elements import Version, text
+from foretwin.world_gen.export.opendrive_places import OdrJunction, OdrNetwork
+from foretwin.world_gen.export.opendrive_signals import Controller
 
 RING_KINDS = ("roundabout", "circular", "mini_roundabout")
 

@@ -13,12 +13,12 @@ import numpy as np
 import shapely
 from lxml import etree
 
-from contracts.arrays import Array
-from contracts.world import Crossing, StopLine, World
-from world_gen.export.opendrive_elements import Version, number, text
-from world_gen.export.opendrive_places import OdrNetwork
-from world_gen.export.opendrive_roads import OdrRoad
-from world_gen.polyline import left_of, unit
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Crossing, StopLine, World
+from foretwin.geometry.polyline import left_of, unit
+from foretwin.world_gen.export.opendrive_elements import Version, number, text
+from foretwin.world_gen.export.opendrive_places import OdrNetwork
+from foretwin.world_gen.export.opendrive_roads import OdrRoad
 
 STOP_LINE_M = 0.5
 """Breadth of a stop line (RMS-1, 1993)."""

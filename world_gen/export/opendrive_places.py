@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.world import Area, Connection, DrivingSide, Lane, Road, World
-from world_gen.export.opendrive_curve import curve_between, fit_curve
-from world_gen.export.opendrive_roads import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Area, Connection, DrivingSide, Lane, Road, World
+from foretwin.geometry.polyline import unit
+from foretwin.world_gen.export.opendrive_curve import curve_between, fit_curve
+from foretwin.world_gen.export.opendrive_roads import (
     Cubic,
     End,
     OdrLane,
@@ -20,9 +21,8 @@ from world_gen.export.opendrive_roads import (
     roads_of,
     runs_along,
 )
-from world_gen.export.opendrive_sidewalks import sidewalks_of
-from world_gen.export.opendrive_tapers import taper
-from world_gen.polyline import unit
+from foretwin.world_gen.export.opendrive_sidewalks import sidewalks_of
+from foretwin.world_gen.export.opendrive_tapers import taper
 
 MIN_ROAD_M = 0.005
 """Where two lanes meet in one point a connecting road has this length: too short for a gap."""

@@ -8,11 +8,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.world import DrivingSide, Lane, Road, World
-from world_gen.export.opendrive_curve import Curve, fit_curve
-from world_gen.export.opendrive_heights import heights_of, node_of
-from world_gen.export.opendrive_sidewalks import Sidewalk
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import DrivingSide, Lane, Road, World
+from foretwin.world_gen.export.opendrive_curve import Curve, fit_curve
+from foretwin.world_gen.export.opendrive_heights import heights_of, node_of
+from foretwin.world_gen.export.opendrive_sidewalks import Sidewalk
 
 GAP_M = 0.01
 """Lanes farther apart than this have a strip without traffic between them."""

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from contracts.arrays import Array
-from contracts.world import Area, Road, World
-from world_gen.polyline import length, points_at
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Area, Road, World
+from foretwin.geometry.polyline import length, points_at
 
 _BESIDE = re.compile(r"sidewalk:(?P<road>.+):(?P<side>left|right)(?:-\d+)?")
 """How the World names a sidewalk that belongs to a road, and the pieces that it is cut into."""

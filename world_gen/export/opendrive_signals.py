@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from lxml import etree
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.signals import Signal
-from contracts.world import DrivingSide, Lane, StopLine, World
-from world_gen.export.opendrive_elements import Version, number
-from world_gen.export.opendrive_places import OdrJunction, OdrNetwork
-from world_gen.export.opendrive_roads import OdrRoad
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.signals import Signal
+from foretwin.contracts.world import DrivingSide, Lane, StopLine, World
+from foretwin.world_gen.export.opendrive_elements import Version, number
+from foretwin.world_gen.export.opendrive_places import OdrJunction, OdrNetwork
+from foretwin.world_gen.export.opendrive_roads import OdrRoad
 
 SIGN_BESIDE_M = 0.6
 SIGN_HEIGHT_M = 2.65

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 
-from contracts.world import Connection, DrivingSide, Lane
-from world_gen.export.opendrive_curve import Curve, curve_between
-from world_gen.export.opendrive_roads import Cubic, End, OdrLane, OdrRoad, Pose
+from foretwin.contracts.world import Connection, DrivingSide, Lane
+from foretwin.world_gen.export.opendrive_curve import Curve, curve_between
+from foretwin.world_gen.export.opendrive_roads import Cubic, End, OdrLane, OdrRoad, Pose
 
 
 def taper(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contracts.arrays import Array
-from world_gen.polyline import left_of
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import left_of
 
 _MITRE_LIMIT = 2.0
 _SHORTEST_M = 0.002

@@ -11,11 +11,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from contracts.arrays import Array
-from contracts.errors import UserError
-from contracts.world import World
-from world_gen.export.picture_ground import draw_ground
-from world_gen.export.picture_marks import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.world_gen.export.picture_ground import draw_ground
+from foretwin.world_gen.export.picture_marks import (
     draw_height_scale,
     draw_legend,
     draw_panel,
@@ -23,9 +23,9 @@ from world_gen.export.picture_marks import (
     number_junctions,
     scale_bar,
 )
-from world_gen.export.picture_style import View, view_around
-from world_gen.export.picture_traffic import draw_traffic
-from world_gen.report import WorldReport, report_of
+from foretwin.world_gen.export.picture_style import View, view_around
+from foretwin.world_gen.export.picture_traffic import draw_traffic
+from foretwin.world_gen.report.report import WorldReport, report_of
 
 _SIZE_IN = (20.0, 13.0)
 _DPI = 110

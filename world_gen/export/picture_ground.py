@@ -11,10 +11,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.path import Path as Outline
 
-from contracts.arrays import Array
-from contracts.provenance import PROVENANCES, Provenance
-from contracts.world import Area, Building, Crossing, Road, World
-from world_gen.export.picture_style import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import PROVENANCES, Provenance
+from foretwin.contracts.world import Area, Building, Crossing, Road, World
+from foretwin.geometry.polyline import left_of, offset
+from foretwin.world_gen.export.picture_style import (
     DASH,
     DECK_EDGE,
     GROUND,
@@ -31,7 +32,6 @@ from world_gen.export.picture_style import (
     TUNNEL,
     View,
 )
-from world_gen.polyline import left_of, offset
 
 OVERHANG_M = 2.5
 """What begins higher is drawn see-through: cars pass below it."""

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from contracts.frames import local_from_geo
-from contracts.world import World, WorldJunction
-from world_gen.export.picture_style import (
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.world import World, WorldJunction
+from foretwin.world_gen.export.picture_style import (
     BICYCLE,
     BUS,
     CROSSING_CONFLICT,
@@ -40,7 +40,7 @@ from world_gen.export.picture_style import (
     WAITS,
     View,
 )
-from world_gen.report import JunctionReport, WorldReport
+from foretwin.world_gen.report.report import JunctionReport, WorldReport
 
 _BUILDING, _GUESSED = "#f3cf8e", "#8a7762"
 _PANEL_COLUMNS, _PANEL_LINES = 84, 32

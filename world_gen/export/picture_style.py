@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import Normalize
 
-from contracts.arrays import Array
-from contracts.provenance import Provenance
-from contracts.world import Turn
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Provenance
+from foretwin.contracts.world import Turn
 
 GROUND, ROAD, JUNCTION, KERB, SIDEWALK = "#e9ece4", "#c9ccd1", "#b9bdc4", "#7c828a", "#d9d3c7"
 LANE_EDGE, LANE, BUS, BICYCLE, TRAM, RING = (

@@ -10,10 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
-from contracts.arrays import Array
-from contracts.provenance import Provenance
-from contracts.world import Conflict, Connection, Lane, StopLine, Turn, World, YieldRule
-from world_gen.export.picture_style import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.provenance import Provenance
+from foretwin.contracts.world import Conflict, Connection, Lane, StopLine, Turn, World, YieldRule
+from foretwin.geometry.polyline import direction_at, left_of, length, offset, points_at, unit
+from foretwin.world_gen.export.picture_style import (
     BICYCLE,
     BUS,
     CROSSING_CONFLICT,
@@ -30,7 +31,6 @@ from world_gen.export.picture_style import (
     WAITS,
     View,
 )
-from world_gen.polyline import direction_at, left_of, length, offset, points_at, unit
 
 ARROW_SPACING_M = 24.0
 _KIND_COLOUR: Mapping[str, str] = {"bus": BUS, "bicycle": BICYCLE, "tram": TRAM}

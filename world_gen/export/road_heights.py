@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.world import Connection, Lane, World
-from world_gen.export.lane_borders import Borders
-from world_gen.polyline import arc_lengths
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Connection, Lane, World
+from foretwin.geometry.polyline import arc_lengths
+from foretwin.world_gen.export.lane_borders import Borders
 
 LAYER_HEIGHT_M = 5.0
 """From one OSM layer to the next: a lorry's 4.5 m and a bridge deck."""

@@ -14,19 +14,19 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from contracts.arrays import Array
-from contracts.world import Area, World
-from world_gen.export.choices import SIMULATORS, Simulator
-from world_gen.export.sdformat_plugins import HEADING_DEG, world_plugins
-from world_gen.export.sdformat_shapes import (
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Area, World
+from foretwin.world_gen.export.choices import SIMULATORS, Simulator
+from foretwin.world_gen.export.sdformat_plugins import HEADING_DEG, world_plugins
+from foretwin.world_gen.export.sdformat_shapes import (
     Element,
     StaticLink,
     child,
     extrusions,
     numbers,
 )
-from world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
-from world_gen.export.solids import (
+from foretwin.world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
+from foretwin.world_gen.export.solids import (
     BUILDING,
     GROUND,
     ISLAND,
@@ -37,7 +37,7 @@ from world_gen.export.solids import (
     island_height_m,
     stops_cars,
 )
-from world_gen.export.xml_text import in_comment
+from foretwin.world_gen.export.xml_text import in_comment
 
 SDF_VERSION = "1.7"
 NAMESPACE = "urn:foretwin:sdformat"

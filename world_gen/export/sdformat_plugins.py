@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from contracts.vehicle import VehicleParameters
-from world_gen.export.choices import Simulator
-from world_gen.export.sdformat_shapes import Element, child, numbers, pose
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.world_gen.export.choices import Simulator
+from foretwin.world_gen.export.sdformat_shapes import Element, child, numbers, pose
 
 HEADING_DEG: Mapping[str, str] = {"classic": "180", "gazebo": "0"}
 """Gazebo Classic takes its local axes for west and south (gazebo-classic issue 2022): turned by

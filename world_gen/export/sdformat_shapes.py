@@ -11,8 +11,8 @@ import shapely
 from lxml import etree
 from shapely.geometry import Polygon
 
-from contracts.arrays import Array
-from world_gen.export.solids import Rgba
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.export.solids import Rgba
 
 Element = etree._Element
 

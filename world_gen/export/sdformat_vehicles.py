@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contracts.vehicle import VehicleParameters
-from contracts.world import World
-from world_gen.export.choices import Simulator, VehicleKind
-from world_gen.export.sdformat_plugins import ackermann_plugin, gps_sensor
-from world_gen.export.sdformat_shapes import Element, child, material, numbers, pose
-from world_gen.export.solids import Rgba
-from world_gen.polyline import direction_at, length, points_at
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.geometry.polyline import direction_at, length, points_at
+from foretwin.world_gen.export.choices import Simulator, VehicleKind
+from foretwin.world_gen.export.sdformat_plugins import ackermann_plugin, gps_sensor
+from foretwin.world_gen.export.sdformat_shapes import Element, child, material, numbers, pose
+from foretwin.world_gen.export.solids import Rgba
 
 WHEEL_RADIUS_M, WHEEL_WIDTH_M = 0.33, 0.2
 """Assumed, as vehicle parameters do not have them: a 205/55 R16 tyre, rounded."""

@@ -5,8 +5,8 @@ Apart from both, so that neither writer loads the other's libraries.
 
 from __future__ import annotations
 
-from contracts.world import Area
-from world_gen.islands import RING_ISLAND
+from foretwin.contracts.world import Area
+from foretwin.world_gen.ground.islands import RING_ISLAND
 
 Rgba = tuple[float, float, float, float]
 

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 
 Point = tuple[float, float]
 

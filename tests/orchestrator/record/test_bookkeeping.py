@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.simulation import Comparison, HorizonError
-from orchestrator.record.bookkeeping import (
+from foretwin.contracts.simulation import Comparison, HorizonError
+from foretwin.orchestrator.record.bookkeeping import (
     ComparisonCount,
     FuturesCount,
     TelemetryCount,

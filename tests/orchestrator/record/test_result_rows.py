@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
-from orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
-from orchestrator.record.result_rows import (
+from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
+from foretwin.orchestrator.record.mirror_rows import mirror_row, mirrored_rows, touch_rows
+from foretwin.orchestrator.record.result_rows import (
     comparison_row,
     future_rows,
     plan_row,
     round_row,
 )
-from orchestrator.record.results import TABLES
-from orchestrator.rounds.views import round_view
+from foretwin.orchestrator.record.results import TABLES
+from foretwin.orchestrator.rounds.views import round_view
 from tests.orchestrator.futures_rounds import round_done, straight, variants
 from tests.orchestrator.trip import START_NS, town_world
 from tests.viewer.scene import drive

@@ -8,7 +8,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from orchestrator.record.results import QUEUE_DEPTH, TABLES, ResultTables
+from foretwin.orchestrator.record.results import QUEUE_DEPTH, TABLES, ResultTables
 
 
 def event(number: int) -> dict[str, object]:

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from orchestrator.record.run_record import run_record, versions, write_record
-from orchestrator.record.summary import summary_text
-from orchestrator.supervisor import FreshInterpreter, Supervisor
+from foretwin.orchestrator.drive.supervisor import FreshInterpreter, Supervisor
+from foretwin.orchestrator.record.run_record import run_record, versions, write_record
+from foretwin.orchestrator.record.summary import summary_text
 from tests.orchestrator.house import House
 
 PROMISED = {

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.simulation import Comparison
-from orchestrator.rounds.comparisons import ComparisonDesk
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.simulation import Comparison
+from foretwin.orchestrator.rounds.comparisons import ComparisonDesk
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, states_along
 

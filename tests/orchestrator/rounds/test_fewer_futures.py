@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.futures import Variant
-from orchestrator.rounds.fewer_futures import some_of
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.variants import plan_variants
+from foretwin.contracts.futures import Variant
+from foretwin.orchestrator.rounds.fewer_futures import some_of
+from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.scenarios.reading import catalogue
 
 ALL = plan_variants(
     count=64, seed=0, planners=["pure_pursuit_idm"], scenarios=tuple(catalogue().values())[:12]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.rounds.pace import (
+from foretwin.orchestrator.rounds.pace import (
     CALM_PERIODS,
     COLD_ROUNDS,
     LATE_ROUNDS,

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.drive import PlannedTrajectory
-from contracts.frames import geo_from_local, geo_from_local_yaw, local_from_geo
-from contracts.frames import local_from_geo_yaw as to_local_yaw
+from foretwin.contracts.drive import PlannedTrajectory
+from foretwin.contracts.frames import geo_from_local, geo_from_local_yaw, local_from_geo
+from foretwin.contracts.frames import local_from_geo_yaw as to_local_yaw
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import town
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.simulation import Event
-from orchestrator.rounds.jobs import planners_of
-from orchestrator.rounds.pace import Pace
+from foretwin.contracts.simulation import Event
+from foretwin.orchestrator.rounds.jobs import planners_of
+from foretwin.orchestrator.rounds.pace import Pace
 from tests.orchestrator.house import House
 
 

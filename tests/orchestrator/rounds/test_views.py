@@ -6,10 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.futures import RoadUserTracks, Variant
-from orchestrator.record.result_rows import future_rows
-from orchestrator.rounds.desk import RoundDone
-from orchestrator.rounds.views import round_view
+from foretwin.contracts.futures import RoadUserTracks, Variant
+from foretwin.orchestrator.record.result_rows import future_rows
+from foretwin.orchestrator.rounds.dispatch import RoundDone
+from foretwin.orchestrator.rounds.views import round_view
 from tests.orchestrator.futures_rounds import TIME_S, round_done, straight
 from tests.orchestrator.trip import town_world
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.sweep.plan import (
+from foretwin.orchestrator.sweep.plan import (
     PlacedHere,
     WorldPlaces,
     cases_of,
@@ -14,8 +14,8 @@ from orchestrator.sweep.plan import (
     planners_for,
     with_parameters,
 )
-from orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, SweepSpec, check_spec
-from sim_worker.scenarios.reading import catalogue
+from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, SweepSpec, check_spec
+from foretwin.sim_worker.scenarios.reading import catalogue
 
 
 def _loaded(**settings: object) -> Loaded:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.sweep.pool import ATTEMPTS, Crew, Lost, Task
+from foretwin.orchestrator.sweep.pool import ATTEMPTS, Crew, Lost, Task
 
 WAIT_S = 60.0
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contracts.errors import UserError
-from contracts.frames import geo_from_local, local_from_geo
-from orchestrator.sweep.plan import WorldPlaces, plan_sweep
-from orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWorker
-from orchestrator.sweep.recorded import Recorded
-from orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.orchestrator.sweep.plan import WorldPlaces, plan_sweep
+from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWorker
+from foretwin.orchestrator.sweep.recorded import Recorded
+from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
 from tests.orchestrator.recorded_runs import write_run
 from tests.sim_worker.scenarios.worlds import cross
 

@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contracts.drive import RoadUser, RoadUsers
-from contracts.errors import UserError
-from contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
-from orchestrator.sweep.command import run_sweep
-from orchestrator.sweep.folder import fingerprint_of
-from orchestrator.sweep.plan import WorldPlaces, plan_sweep
-from orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWorker
-from orchestrator.sweep.recorded import Recorded
-from orchestrator.sweep.road_users import others_at
-from orchestrator.sweep.rows import Row
-from orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import box_centre_from_base_m
-from telemetry.logs import open_road_users
+from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.orchestrator.commands.sweep import run_sweep
+from foretwin.orchestrator.sweep.folder import fingerprint_of
+from foretwin.orchestrator.sweep.plan import WorldPlaces, plan_sweep
+from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWorker
+from foretwin.orchestrator.sweep.recorded import Recorded
+from foretwin.orchestrator.sweep.road_users import others_at
+from foretwin.orchestrator.sweep.rows import Row
+from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.telemetry.logs import open_road_users
 from tests.orchestrator.recorded_runs import write_run
 from tests.orchestrator.sweeps import Alone
 from tests.sim_worker.scenarios.worlds import cross

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from contracts.errors import UserError
-from orchestrator.cli import run
-from orchestrator.sweep.spec import DEFAULT_METRICS, load_spec
-from sim_worker.metrics.table import METRICS
-from sim_worker.scenarios.reading import catalogue
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.sweep.spec import DEFAULT_METRICS, load_spec
+from foretwin.sim_worker.metrics.table import METRICS
+from foretwin.sim_worker.scenarios.reading import catalogue
 
 
 def _written(folder: Path, text: str) -> Path:

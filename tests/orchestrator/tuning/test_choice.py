@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.config import DriveConfig
-from orchestrator.tuning.choice import Tuning, choose_tuning, processors
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.tuning.choice import Tuning, choose_tuning, processors
 
 
 @pytest.mark.parametrize(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from contracts.frames import GeoPoint, LocalFrame
-from orchestrator.way.standin_path import standin_path
-from sim_worker.gap.verdict import Judge
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.standin.parameters import read_parameters
-from telemetry.standin.path import DrivenPath
-from telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.orchestrator.routing.standin_path import standin_path
+from foretwin.sim_worker.analysis.gap.verdict import Judge
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.telemetry.standin.path import DrivenPath
+from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
 from tests.orchestrator.trip import town
 from tests.sim_worker.driving import altered
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from contracts.gap import Evidence, GapAlarm, GapSample, Verdict
-from contracts.tuning import Identification, ParameterEstimate, TuneReply
-from orchestrator.instructions import Tell
-from orchestrator.record.results import ResultTables
-from orchestrator.tuning.findings import Findings
-from orchestrator.tuning.words import summary_lines
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.gap import Evidence, GapAlarm, GapSample, Verdict
+from foretwin.contracts.tuning import Identification, ParameterEstimate, TuneReply
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.tuning.findings import Findings
+from foretwin.orchestrator.tuning.words import summary_lines
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 CAR = load_vehicle()
 

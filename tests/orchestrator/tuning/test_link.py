@@ -9,10 +9,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from contracts.futures import FuturesJob
-from contracts.keys import alive_key
-from contracts.mailbox import Mailbox, Reply, Request
-from contracts.tuning import (
+from foretwin.contracts.futures import FuturesJob
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.mailbox import Mailbox, Reply, Request
+from foretwin.contracts.tuning import (
     Identification,
     ParameterEstimate,
     SetReply,

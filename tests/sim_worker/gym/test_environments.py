@@ -12,10 +12,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from contracts.errors import UserError
-from sim_worker.gym import JunctionEnv, JunctionVectorEnv
-from sim_worker.gym.registration import ID
-from sim_worker.gym.rows import StepFacts
+from foretwin.contracts.errors import UserError
+from foretwin.sim_worker.gym import JunctionEnv, JunctionVectorEnv
+from foretwin.sim_worker.gym.registration import ID
+from foretwin.sim_worker.gym.rows import StepFacts
 from tests.sim_worker.scenarios.worlds import cross, ring
 
 ROWS = 5

@@ -23,7 +23,7 @@ def test_gymnasium_is_imported_by_the_environments_alone() -> None:
 def test_the_command_line_and_the_worker_do_without_it() -> None:
     code = (
         "import sys; sys.modules['gymnasium'] = None;"
-        "import orchestrator.__main__, sim_worker.worker, sim_worker.futures"
+        "import foretwin.__main__, foretwin.sim_worker.worker, foretwin.sim_worker.futures.run_job"
     )
 
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

@@ -9,20 +9,20 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.codec import encode
-from contracts.drive import VehicleState
-from contracts.errors import UserError
-from contracts.frames import local_from_geo
-from contracts.futures import Faults, PathAhead, SeenRoadUser, Variant
-from contracts.world import World
-from sim_worker.gym import JunctionEnv, JunctionVectorEnv
-from telemetry.estimator import StateEstimator
-from telemetry.logs.opening import open_log
+from foretwin.contracts.codec import encode
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.futures import Faults, PathAhead, SeenRoadUser, Variant
+from foretwin.contracts.world import World
+from foretwin.sim_worker.gym import JunctionEnv, JunctionVectorEnv
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.logs.opening import open_log
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.places import box, crossroads, happening, job, state_at, straight_path
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.read_osm import read_map
 
 KEEP = np.zeros(1, np.float32)
 STATES = (state_at(-50.0, -1.5, speed=8.0), state_at(-40.0, -1.3, speed=7.0, yaw=0.02))

@@ -9,13 +9,13 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from contracts.provenance import Choice
-from contracts.signals import SignalGroup, SignalPhase, SignalPlan
-from contracts.world import Arm, Conflict, StopLine, World, WorldJunction
-from sim_worker.metrics.ground import DrivableGround
-from sim_worker.metrics.route_rules import RouteRules
-from sim_worker.metrics.scene import Context
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.provenance import Choice
+from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
+from foretwin.contracts.world import Arm, Conflict, StopLine, World, WorldJunction
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.route_rules import RouteRules
+from foretwin.sim_worker.metrics.scene import Context
 from tests.sim_worker.places import crossroads, straight_path
 
 GREEN_S, AMBER_S, ALL_RED_S = 10.0, 3.0, 2.0

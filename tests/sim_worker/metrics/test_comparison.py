@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import PlannedTrajectory
-from contracts.frames import geo_from_local, geo_from_local_yaw
-from contracts.futures import Trajectory
-from sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
-from sim_worker.metrics.comparison import (
+from foretwin.contracts.drive import PlannedTrajectory
+from foretwin.contracts.frames import geo_from_local, geo_from_local_yaw
+from foretwin.contracts.futures import Trajectory
+from foretwin.sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
+from foretwin.sim_worker.metrics.comparison import (
     ActualTrack,
     NominalTrack,
     compare_nominal,
     compare_plan,
 )
-from sim_worker.metrics.displacement import distinct_count, horizon_error
+from foretwin.sim_worker.metrics.displacement import distinct_count, horizon_error
 from tests.sim_worker.places import FRAME, straight_path
 
 TIME_S = np.arange(0.0, 8.01, 0.1)

@@ -6,11 +6,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from sim_worker.metrics import compiled_pairs, encroachment, following
-from sim_worker.metrics.rollout import Rollout
-from sim_worker.metrics.scene import Scene
-from sim_worker.metrics.time_to_collision import Pairs, meeting, ttc_series
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.metrics import compiled_pairs, encroachment, following
+from foretwin.sim_worker.metrics.rollout import Rollout
+from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.sim_worker.metrics.time_to_collision import Pairs, meeting, ttc_series
 from tests.sim_worker.metrics.motions import VEHICLE, times
 
 FUTURES, USERS = 3, 4

@@ -11,13 +11,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_worker.metrics.curves import cheapest_walks
-from sim_worker.metrics.displacement import (
+from foretwin.sim_worker.metrics.curves import cheapest_walks
+from foretwin.sim_worker.metrics.displacement import (
     displacements,
     relative_pose_error,
 )
-from sim_worker.metrics.scene import Context
-from sim_worker.metrics.table import evaluate
+from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import Mover, rollout, steady_poses, times
 
 FROZEN = json.loads((Path(__file__).parents[2] / "data/metrics/evo.json").read_text())

@@ -10,13 +10,13 @@ import pytest
 import shapely
 from scipy.signal import savgol_filter
 
-from contracts.world import Area
-from sim_worker.metrics import comfort
-from sim_worker.metrics.ground import DrivableGround
-from sim_worker.metrics.rollout import Rollout
-from sim_worker.metrics.scene import Context
-from sim_worker.metrics.table import METRICS, computable, evaluate
-from sim_worker.planners.path import FrenetPath
+from foretwin.contracts.world import Area
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.metrics import comfort
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.rollout import Rollout
+from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.table import METRICS, computable, evaluate
 from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context
 from tests.sim_worker.metrics.motions import LENGTH_M, Mover, rollout, times
 from tests.sim_worker.places import box, crossroads, turning_path

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_worker.metrics.rollout import Rollout
-from sim_worker.metrics.scene import Context
-from sim_worker.metrics.table import evaluate
-from sim_worker.overlap import Rectangles, clearance
+from foretwin.geometry.rectangles import Rectangles, clearance
+from foretwin.sim_worker.metrics.rollout import Rollout
+from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
 
 HALF_M = LENGTH_M / 2

@@ -6,14 +6,14 @@ import functools
 
 import numpy as np
 
-from contracts.world import Connection, World
-from sim_worker.actors.right_of_way import JunctionRules
-from sim_worker.metrics.ground import DrivableGround
-from sim_worker.metrics.route_rules import RouteRules
-from sim_worker.metrics.scene import Context
-from sim_worker.metrics.table import evaluate
-from tests.sim_worker.actors.crossroads import path_of
+from foretwin.contracts.world import Connection, World
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.route_rules import RouteRules
+from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.table import evaluate
+from foretwin.sim_worker.road_users.right_of_way import JunctionRules
 from tests.sim_worker.metrics.motions import Mover, rollout, times
+from tests.sim_worker.road_users.crossroads import path_of
 from tests.world_gen.slip_roads import lines_inside, slip_world
 
 SPEED_MPS = 10.0

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from sim_worker.metrics.rollout import Rollout
-from sim_worker.metrics.table import evaluate
-from sim_worker.overlap import Rectangles, clearance
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.rectangles import Rectangles, clearance
+from foretwin.sim_worker.metrics.rollout import Rollout
+from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
 
 FROZEN = json.loads((Path(__file__).parents[2] / "data/metrics/crime.json").read_text())

@@ -8,15 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import wrap_angle
-from contracts.vehicle import VehicleParameters
-from sim_worker.overlap import Rectangles, clearance
-from sim_worker.planners.base import Planner, PlannerView, RemembersWithinJob, SeenUsers
-from sim_worker.planners.path import FrenetPath
-from sim_worker.stage import Controls, Stage
-from sim_worker.vehicle.parameters import load_vehicle
-from sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import Rectangles, clearance
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.planner_interface import (
+    Planner,
+    PlannerView,
+    RemembersWithinJob,
+    SeenUsers,
+)
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 
 TICK_S = 0.05
 

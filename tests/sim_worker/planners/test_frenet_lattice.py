@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from sim_worker.planners.base import SharedGround
-from sim_worker.planners.constant_speed import ConstantSpeed
-from sim_worker.planners.frenet_lattice import FrenetLattice
-from sim_worker.planners.lattice_choice import choose
-from sim_worker.planners.path import FrenetPath
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.planner_interface import SharedGround
+from foretwin.sim_worker.planners.constant_speed import ConstantSpeed
+from foretwin.sim_worker.planners.frenet_lattice import FrenetLattice
+from foretwin.sim_worker.planners.lattice_choice import choose
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import (
     Other,
     at_rest_on,

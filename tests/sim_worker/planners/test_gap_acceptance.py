@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from sim_worker.planners.base import SharedGround
-from sim_worker.planners.gap_acceptance import GapAcceptance
-from sim_worker.planners.giving_way import CRITICAL_GAP_S, ground_lines
-from sim_worker.planners.path import FrenetPath
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.planner_interface import SharedGround
+from foretwin.sim_worker.planners.gap_acceptance import GapAcceptance
+from foretwin.sim_worker.planners.giving_way import CRITICAL_GAP_S, ground_lines
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import (
     Drive,
     Other,

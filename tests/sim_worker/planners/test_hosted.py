@@ -9,14 +9,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from contracts.futures import Variant
-from sim_worker.futures import run_job
-from sim_worker.planners.base import Planner, RemembersWithinJob
-from sim_worker.planners.hosted import ANSWER_S, HostedDriver, HostedPlanner, PlannerFailed
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.planners.registry import check_planner, load_planner, planner_names
-from sim_worker.stage import Stage
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.futures import Variant
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.planner_interface import Planner, RemembersWithinJob
+from foretwin.sim_worker.planners.hosted import ANSWER_S, HostedDriver, HostedPlanner, PlannerFailed
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.planners.registry import check_planner, load_planner, planner_names
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.sim_worker.places import crossroads, job
 from tests.sim_worker.planners.driven import Other, at_rest_on, see, straight, view_of
@@ -28,7 +28,7 @@ VEHICLE = load_vehicle()
 CODE = """
 import os, time
 import numpy as np
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 
 class Steady(PurePursuitIdm):
     pass

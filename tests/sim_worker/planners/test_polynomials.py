@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_worker.planners.polynomials import braked, joined, to_place, to_speed
+from foretwin.sim_worker.planners.polynomials import braked, joined, to_place, to_speed
 
 VALUES = st.floats(-20.0, 20.0)
 TIMES = st.floats(0.5, 6.0)

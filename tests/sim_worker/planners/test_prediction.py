@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from sim_worker.planners.base import PlannerView
-from sim_worker.planners.path import FrenetPath
-from sim_worker.planners.prediction import Changes, changes, courses
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.planner_interface import PlannerView
+from foretwin.sim_worker.planners.prediction import Changes, changes, courses
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import Other, at_rest_on, see, straight, view_of, walker
 
 VEHICLE = load_vehicle()

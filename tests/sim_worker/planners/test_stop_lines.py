@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import at_rest_on, drive, straight, view_of
 
 VEHICLE = load_vehicle()

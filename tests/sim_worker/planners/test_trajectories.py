@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from contracts.arrays import Array
-from sim_worker.planners.as_planned import AsPlanned
-from sim_worker.planners.base import KnownPlan
-from sim_worker.planners.path import FrenetPath
-from sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
-from sim_worker.planners.reverse_pursuit import ReversePursuit
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.planner_interface import KnownPlan
+from foretwin.sim_worker.planners.as_planned import AsPlanned
+from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
+from foretwin.sim_worker.planners.reverse_pursuit import ReversePursuit
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import Other, at_rest_on, drive, straight, view_of, walker
 
 VEHICLE = load_vehicle()

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.vehicle import VehicleParameters
-from sim_worker.overlap import Rectangles, clearance, overlapping
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.casting import Cast, CastActor
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import Rectangles, clearance, overlapping
+from foretwin.sim_worker.scenarios.casting import Cast, CastActor
 
 TICK_S = 0.002
 

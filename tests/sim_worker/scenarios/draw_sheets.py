@@ -22,11 +22,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from contracts.scenario import Scenario
-from contracts.world import ATTRIBUTION, World
-from sim_worker.scenarios.casting import Cast, cast
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.picture import (
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.sim_worker.futures.case_picture import (
     EGO,
     IMPACT,
     OTHERS,
@@ -36,15 +34,15 @@ from sim_worker.scenarios.picture import (
     draw_case_legend,
     told,
 )
-from sim_worker.scenarios.picture_runs import heedless_run, planned_run
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.vehicle.parameters import load_vehicle
-from tests.sim_worker.scenarios.worlds import motorway, race_track
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.export.picture_style import (
+from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
+from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.export.picture_style import (
     GROUND,
     ISLAND,
     JUNCTION,
@@ -53,9 +51,11 @@ from world_gen.export.picture_style import (
     View,
     view_around,
 )
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
-from world_gen.read_osm import read_map
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
+from tests.sim_worker.scenarios.worlds import motorway, race_track
 
 SEED = 11
 MAPS = {

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from contracts.arrays import Array
-from sim_worker.overlap import Rectangles
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.rectangles import Rectangles
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,16 +10,16 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from contracts.scenario import ActorPart, EgoPart, Scenario
-from sim_worker.overlap import clearance
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.casting import Cast, cast, cast_all
-from sim_worker.scenarios.drawing import Values, draw_cases
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.places import Place, Unplaced
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.scenarios.ways import lengthened
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import clearance
+from foretwin.sim_worker.scenarios.casting import Cast, cast, cast_all
+from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.ways import lengthened
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.collide import actor_boxes, ego_boxes, first_collision
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
 

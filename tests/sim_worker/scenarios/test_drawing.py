@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.scenario import ActorPart, EgoPart, Scenario, Span
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.reading import catalogue
+from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario, Span
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.reading import catalogue
 
 
 def scenario(ego: Span | float = 5.0, other: Span | float = 8.0, **more: int) -> Scenario:

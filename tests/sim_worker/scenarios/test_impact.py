@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_worker.actors.kinds import KINDS
-from sim_worker.overlap import Rectangles, clearance, overlapping
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.impact import (
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import Rectangles, clearance, overlapping
+from foretwin.sim_worker.scenarios.impact import (
     Impact,
     Moving,
     Span,
@@ -23,7 +22,8 @@ from sim_worker.scenarios.impact import (
     front_point,
     rectangles,
 )
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
 BOX = ego_box(load_vehicle())
 REACH = Span(60.0, 140.0)

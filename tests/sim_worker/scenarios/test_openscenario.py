@@ -11,23 +11,23 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from contracts.world import World
-from sim_worker.actors.kinds import KINDS
-from sim_worker.overlap import overlapping, separations
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.casting import Cast, cast
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.openscenario import openscenario_element, write_openscenario
-from sim_worker.scenarios.openscenario_entities import AXLES
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.rectangles import overlapping, separations
+from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.openscenario import openscenario_element, write_openscenario
+from foretwin.sim_worker.scenarios.openscenario_entities import AXLES
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
+from foretwin.world_gen.export.opendrive import write_opendrive
 from tests.sim_worker.scenarios.read_openscenario import ScenarioFile
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.judges import judges_python
 from tests.world_gen.export.read_opendrive import OpenDriveFile
-from world_gen.export.opendrive import write_opendrive
 
 VEHICLE = load_vehicle()
 WORLDS = {

@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 import shapely
 
-from contracts.frames import wrap_angle
-from contracts.scenario import ActorPart, EgoPart, Scenario, Where
-from contracts.world import World
-from sim_worker.planners.path import FrenetPath
-from sim_worker.scenarios.casting import Cast, cast
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.placement import passage_on_path, places
-from sim_worker.scenarios.places import Place, Unplaced
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.scenarios.ways import unlike_its_turn
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario, Where
+from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.placement import passage_on_path, places
+from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.ways import unlike_its_turn
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_region
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.places import box
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
 from tests.world_gen.drawn_maps import drawn_map
-from world_gen.build import build_region
-from world_gen.build_graph import build_road_graph
 
 VEHICLE = load_vehicle()
 

@@ -6,10 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from contracts.errors import UserError
-from contracts.scenario import Scenario
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.reading import CATALOGUE, catalogue, find_scenario, numbers, read_scenario
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.scenario import Scenario
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.reading import (
+    CATALOGUE,
+    catalogue,
+    find_scenario,
+    numbers,
+    read_scenario,
+)
 
 IDS = {
     "ccftap", "cccscp", "cpta", "cbta", "scp", "ltap_od", "ltip", "rtip", "roundabout_entry",

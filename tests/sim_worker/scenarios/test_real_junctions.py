@@ -13,19 +13,19 @@ from pathlib import Path
 
 import pytest
 
-from contracts.world import World
-from sim_worker.scenarios.casting import Cast, cast
-from sim_worker.scenarios.drawing import draw_cases
-from sim_worker.scenarios.placement import places
-from sim_worker.scenarios.reading import catalogue
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.vehicle.parameters import load_vehicle
+from foretwin.contracts.world import World
+from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.scenarios.test_casting import check_impact
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
-from world_gen.read_osm import read_map
 
 pytestmark = pytest.mark.real_data
 

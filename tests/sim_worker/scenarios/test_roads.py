@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from contracts.frames import wrap_angle
-from contracts.world import World
-from sim_worker.scenarios.roads import RoadNetwork
-from sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, traffic_turn
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.world import World
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, traffic_turn
 from tests.sim_worker.scenarios.worlds import cross, motorway, ring, tee
 
 

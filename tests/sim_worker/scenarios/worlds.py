@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 import math
 
-from contracts.frames import GeoPoint
-from contracts.world import World
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import build_region
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, roundabout, world_of
-from world_gen.build import build_region
-from world_gen.build_graph import build_road_graph
 
 SIGNALS = {"highway": "traffic_signals"}
 ROAD = {"highway": "secondary", "name": "High Road", "lanes": "2"}

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from contracts.foreign_bus import Arrived
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.mailbox import Mailbox
-from contracts.setup import BusSetup, Ros2Setup, write_setup
-from telemetry.ros_parts import typestore
+from foretwin.contracts.foreign_bus import Arrived
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.mailbox import Mailbox
+from foretwin.contracts.setup import BusSetup, Ros2Setup, write_setup
+from foretwin.telemetry.ros_messages.parts import typestore
 
 ROOT = Path(__file__).resolve().parents[3]
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
@@ -181,7 +181,7 @@ def gateway_process(
         drive_frame=FRAME, towards_vehicle=flag,
     )  # fmt: skip
     write_setup(setup, file)
-    command = [sys.executable, "-m", "telemetry.ros2", "--setup", str(file)]
+    command = [sys.executable, "-m", "foretwin.telemetry.ros2", "--setup", str(file)]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
         try:
             yield process

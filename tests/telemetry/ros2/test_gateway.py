@@ -6,15 +6,15 @@ import math
 
 import pytest
 
-from contracts.bus import Mailbox
-from contracts.drive import GnssFix, RoadUser, RoadUsers, SteeringSample, VehicleState
-from contracts.frames import GeoPoint
-from contracts.simulation import MirrorSample, PlaneState
-from contracts.towards_vehicle import Authority, VehicleCommand
-from telemetry.ros2.gateway import Gateway
-from telemetry.ros2.mapping import parse_mapping
-from telemetry.ros_foreign import FOREIGN
-from telemetry.ros_parts import ODOMETRY, typestore, yaw_of
+from foretwin.contracts.bus import Mailbox
+from foretwin.contracts.drive import GnssFix, RoadUser, RoadUsers, SteeringSample, VehicleState
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
+from foretwin.telemetry.ros2.gateway import Gateway
+from foretwin.telemetry.ros2.mapping import parse_mapping
+from foretwin.telemetry.ros_messages.foreign import FOREIGN
+from foretwin.telemetry.ros_messages.parts import ODOMETRY, typestore, yaw_of
 from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import (
     FIX_KEY,

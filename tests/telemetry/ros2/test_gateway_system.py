@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import pytest
 
-from contracts.bus import Mailbox, ZenohBus, ask
-from contracts.drive import GnssFix, InfoRequest
-from contracts.foreign_bus import Arrived, ZenohForeignBus
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from contracts.simulation import MirrorSample, PlaneState
-from telemetry.ros_parts import CONTROL, ODOMETRY, typestore
+from foretwin.contracts.bus import Mailbox, ZenohBus, ask
+from foretwin.contracts.drive import GnssFix, InfoRequest
+from foretwin.contracts.foreign_bus import Arrived, ZenohForeignBus
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.telemetry.ros_messages.parts import CONTROL, ODOMETRY, typestore
 from tests.contracts.bus_sides import DEADLINE_S, python, take_until
 from tests.starvation import kept_waiting
 from tests.telemetry.ros2.gateway_ground import (
@@ -79,10 +79,10 @@ with zenoh.open(config) as session:
 
 ORCHESTRATOR = """
 import sys, time
-from contracts.bus import ZenohBus
-from contracts.keys import alive_key
-from contracts.setup import BusSetup
-from contracts.towards_vehicle import Authority, VehicleCommand
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
 with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True) as bus:
     bus.declare_alive(alive_key(run="r", process="orchestrator"))
     print("ready", flush=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from telemetry.ros2.mapping import MappingError, parse_mapping, read_mapping
+from foretwin.telemetry.ros2.mapping import MappingError, parse_mapping, read_mapping
 
 GOOD = """dialect = "rmw_zenoh"
 [[in]]

@@ -8,17 +8,22 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.roles import Role
-from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
-from contracts.towards_vehicle import Authority
-from orchestrator.config import DriveConfig, VehicleBeside
-from orchestrator.ros2_mapping import read_ros2
-from sim_worker.vehicle.parameters import load_vehicle
-from telemetry.ros2.gateway import Gateway
-from telemetry.ros2.mapping import MappingError, parse_mapping
-from telemetry.ros_parts import DETECTED_OBJECTS, PREDICTED_OBJECTS, typestore, yaw_of
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.roles import Role
+from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
+from foretwin.contracts.towards_vehicle import Authority
+from foretwin.orchestrator.config import DriveConfig, VehicleBeside
+from foretwin.orchestrator.drive.ros2_mapping import read_ros2
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.ros2.gateway import Gateway
+from foretwin.telemetry.ros2.mapping import MappingError, parse_mapping
+from foretwin.telemetry.ros_messages.parts import (
+    DETECTED_OBJECTS,
+    PREDICTED_OBJECTS,
+    typestore,
+    yaw_of,
+)
 from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import RecordingForeign
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.ros2.attachment import Attachment, pack, unpack
-from telemetry.ros2.names import (
+from foretwin.telemetry.ros2.attachment import Attachment, pack, unpack
+from foretwin.telemetry.ros2.names import (
     Entity,
     QosProfile,
     bridge_key,
@@ -20,7 +20,7 @@ from telemetry.ros2.names import (
     token,
     type_hash,
 )
-from telemetry.ros_definitions import DEFINITIONS
+from foretwin.telemetry.ros_messages.definitions import DEFINITIONS
 
 IMU = "sensor_msgs/msg/Imu"
 IMU_HASH = "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"

@@ -7,12 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from contracts.bus import Mailbox
-from contracts.drive import RouteToGoal
-from contracts.frames import local_from_geo
-from telemetry.ros2.gateway import Gateway
-from telemetry.ros2.mapping import parse_mapping
-from telemetry.ros_parts import LANELET_ROUTE, header_from, point_from, ros_type, turn_from
+from foretwin.contracts.bus import Mailbox
+from foretwin.contracts.drive import RouteToGoal
+from foretwin.contracts.frames import local_from_geo
+from foretwin.telemetry.ros2.gateway import Gateway
+from foretwin.telemetry.ros2.mapping import parse_mapping
+from foretwin.telemetry.ros_messages.parts import (
+    LANELET_ROUTE,
+    header_from,
+    point_from,
+    ros_type,
+    turn_from,
+)
 from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import FRAME, RecordingForeign, cdr
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.towards_vehicle import VehicleCommand
-from telemetry.ros2.safety import DEAD_MAN_NS, Limits, VehicleGate
+from foretwin.contracts.towards_vehicle import VehicleCommand
+from foretwin.telemetry.ros2.safety import DEAD_MAN_NS, Limits, VehicleGate
 
 LIMITS = Limits()
 MS = 1_000_000

@@ -9,10 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.drive import RoadUser, RoadUsers
-from contracts.frames import GeoPoint, local_from_geo
-from telemetry.ros2.mapping import MappingError, parse_mapping
-from telemetry.ros2.virtual_objects import LIVES_NS, PlacedObject, UnfitError, VirtualObjects
+from foretwin.contracts.drive import RoadUser, RoadUsers
+from foretwin.contracts.frames import GeoPoint, local_from_geo
+from foretwin.telemetry.ros2.mapping import MappingError, parse_mapping
+from foretwin.telemetry.ros2.virtual_objects import (
+    LIVES_NS,
+    PlacedObject,
+    UnfitError,
+    VirtualObjects,
+)
 from tests.telemetry.ros2.gateway_ground import FRAME
 
 S = 10**9

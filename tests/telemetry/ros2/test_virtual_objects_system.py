@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import pytest
 
-from contracts.bus import Mailbox, ZenohBus
-from contracts.foreign_bus import Arrived, ZenohForeignBus
-from contracts.ports import free_endpoint
-from contracts.setup import BusSetup
-from telemetry.ros_parts import PREDICTED_OBJECTS, typestore
+from foretwin.contracts.bus import Mailbox, ZenohBus
+from foretwin.contracts.foreign_bus import Arrived, ZenohForeignBus
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.telemetry.ros_messages.parts import PREDICTED_OBJECTS, typestore
 from tests.contracts.bus_sides import DEADLINE_S, python
 from tests.starvation import kept_waiting
 from tests.telemetry.ros2.gateway_ground import ROOT, gateway_process, mapping_text
@@ -37,12 +37,12 @@ vehicles = ["van"]
 
 ORCHESTRATOR = """
 import sys, time
-from contracts.bus import ZenohBus
-from contracts.drive import VehicleState
-from contracts.frames import GeoPoint
-from contracts.keys import alive_key
-from contracts.setup import BusSetup
-from contracts.towards_vehicle import Authority
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.towards_vehicle import Authority
 with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True) as bus:
     bus.declare_alive(alive_key(run="r", process="orchestrator"))
     print("ready", flush=True)
@@ -56,9 +56,9 @@ with ZenohBus(BusSetup(endpoint=sys.argv[1]), router=True) as bus:
 
 MIRROR = """
 import sys, time
-from contracts.bus import ZenohBus
-from contracts.setup import BusSetup
-from contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
+from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
 car, van = PlaneState(0.0, 0.0, 0.0, 7.0), PlaneState(-40.0, 0.0, 0.0, 0.0)
 other = MirroredVehicle(
     vehicle_id="van", role="shadow", real=van, shown=van, length_m=5.0, width_m=2.0, height_m=2.0,

@@ -8,10 +8,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from contracts.arrays import Array
-from contracts.frames import GeoPoint, LocalFrame
-from contracts.provenance import Quantity
-from contracts.world import Connection, IntersectionSummary, Lane, Road, World
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import Connection, IntersectionSummary, Lane, Road, World
 
 NOWHERE = IntersectionSummary(
     id="drawn", kind="crossing", lat=52.0, lon=10.0, arms=4, control="uncontrolled",

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from lxml import etree
 
-from contracts.world import World
-from world_gen.export.lanelet2 import write_lanelet2
+from foretwin.contracts.world import World
+from foretwin.world_gen.export.lanelet2 import write_lanelet2
 
 
 class Read(NamedTuple):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from lxml import etree
 
-from contracts.arrays import Array
+from foretwin.contracts.arrays import Array
 
 
 class Place(NamedTuple):

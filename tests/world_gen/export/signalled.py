@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from contracts.signals import SignalGroup, SignalPhase, SignalPlan
-from contracts.world import Conflict, World, WorldJunction
+from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
+from foretwin.contracts.world import Conflict, World, WorldJunction
 from tests.world_gen.drawn_maps import crossing, world_of
 
 

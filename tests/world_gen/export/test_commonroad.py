@@ -15,14 +15,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from contracts.provenance import Choice, Quantity
-from contracts.signals import SignalGroup, SignalPhase, SignalPlan
-from contracts.world import ATTRIBUTION, Building, Crossing, StopLine, World
+from foretwin.contracts.provenance import Choice, Quantity
+from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
+from foretwin.contracts.world import ATTRIBUTION, Building, Crossing, StopLine, World
+from foretwin.world_gen.export.commonroad import write_commonroad
+from foretwin.world_gen.export.commonroad_lights import cycle
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.drawn_world import road, world
 from tests.world_gen.export.signalled import signalled_crossing
-from world_gen.export.commonroad import write_commonroad
-from world_gen.export.commonroad_lights import cycle
 
 DAY = datetime.date(2025, 6, 1)
 STRAIGHT = [(0.0, 0.0), (50.0, 0.0)]

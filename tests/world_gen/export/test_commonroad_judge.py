@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from contracts.world import World
+from foretwin.contracts.world import World
+from foretwin.world_gen.export.commonroad import write_commonroad
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.judges import ask_judge, judges_python
 from tests.world_gen.export.signalled import signalled_crossing
-from world_gen.export.commonroad import write_commonroad
 
 
 def assert_accepted(paths: list[Path], worlds: list[World]) -> None:

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import shapely
 
-from contracts.frames import GeoPoint, local_from_geo
-from contracts.provenance import Choice, Quantity
-from contracts.signals import Signal
-from contracts.world import ATTRIBUTION, Area, Building, Conflict, Crossing, World
+from foretwin.contracts.frames import GeoPoint, local_from_geo
+from foretwin.contracts.provenance import Choice, Quantity
+from foretwin.contracts.signals import Signal
+from foretwin.contracts.world import ATTRIBUTION, Area, Building, Conflict, Crossing, World
+from foretwin.world_gen.export.geojson import write_geojson
 from tests.world_gen.drawn_maps import crossing, world_of
-from world_gen.export.geojson import write_geojson
 
 FIJI = GeoPoint(-17.0, 179.9999)
 

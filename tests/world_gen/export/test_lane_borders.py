@@ -11,13 +11,13 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contracts.arrays import Array
-from contracts.world import World
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import World
+from foretwin.world_gen.export.lane_borders import Borders, crossing, lane_borders
 from tests.world_gen.drawn_maps import crossing as crossing_map
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.drawn_world import connection, leading_to, road, world
 from tests.world_gen.path_shape import rounded, turn_curve
-from world_gen.export.lane_borders import Borders, crossing, lane_borders
 
 WIDTHS = st.lists(st.floats(2.0, 5.0), min_size=1, max_size=4)
 STRAIGHT = [(0.0, 0.0), (50.0, 0.0)]

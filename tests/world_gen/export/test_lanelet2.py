@@ -11,18 +11,18 @@ import numpy as np
 import pyproj
 import pytest
 
-from contracts.world import (
+from foretwin.contracts.world import (
     ATTRIBUTION,
     Area,
     World,
 )
+from foretwin.world_gen.export.lane_borders import Borders
+from foretwin.world_gen.export.lanelet2 import write_lanelet2
+from foretwin.world_gen.export.lanelet2_orientation import oriented, read_as_drawn
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.drawn_world import road, world
 from tests.world_gen.export.lanelet2_file import assert_closed, read, written
 from tests.world_gen.export.signalled import signalled_crossing
-from world_gen.export.lane_borders import Borders
-from world_gen.export.lanelet2 import write_lanelet2
-from world_gen.export.lanelet2_orientation import oriented, read_as_drawn
 
 
 @pytest.mark.parametrize("drawn", [signalled_crossing(), world_of(roundabout())], ids=["x", "o"])

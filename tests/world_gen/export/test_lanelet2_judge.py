@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from contracts.world import Conflict, Connection, World
+from foretwin.contracts.world import Conflict, Connection, World
+from foretwin.world_gen.export.lane_borders import lane_borders
+from foretwin.world_gen.export.lanelet2 import write_lanelet2
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.judges import ask_judge, judges_python
 from tests.world_gen.export.signalled import signalled_crossing
-from world_gen.export.lane_borders import lane_borders
-from world_gen.export.lanelet2 import write_lanelet2
 
 
 def routes_asked(drawn: World, path: Path) -> dict[str, Any]:

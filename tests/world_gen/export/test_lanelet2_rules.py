@@ -8,9 +8,9 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from contracts.provenance import Choice, Quantity
-from contracts.signals import Signal
-from contracts.world import Crossing, WorldJunction
+from foretwin.contracts.provenance import Choice, Quantity
+from foretwin.contracts.signals import Signal
+from foretwin.contracts.world import Crossing, WorldJunction
 from tests.world_gen.drawn_maps import crossing, world_of
 from tests.world_gen.export.drawn_world import road, world
 from tests.world_gen.export.lanelet2_file import written

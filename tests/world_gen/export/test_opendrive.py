@@ -11,7 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contracts.world import World
+from foretwin.contracts.world import World
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.export.opendrive import write_opendrive
+from foretwin.world_gen.junctions.find_intersections import find_intersections
+from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.osm.read_osm import read_map
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import (
     ENGLAND,
     STREET,
@@ -21,12 +27,6 @@ from tests.world_gen.drawn_maps import (
     world_of,
 )
 from tests.world_gen.export.read_opendrive import OpenDriveFile, bend_rad, gap_m
-from world_gen.build import build_world
-from world_gen.build_graph import build_road_graph
-from world_gen.export.opendrive import write_opendrive
-from world_gen.find_intersections import find_intersections
-from world_gen.map_index import index_map
-from world_gen.read_osm import read_map
 
 PRIMARY = {"highway": "primary", "name": "Avenue", "lanes": "4"}
 

@@ -10,9 +10,10 @@ import numpy as np
 import pyproj
 import pytest
 
-from contracts.frames import geo_from_local
-from contracts.provenance import Quantity
-from contracts.world import ATTRIBUTION, Area, Building
+from foretwin.contracts.frames import geo_from_local
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import ATTRIBUTION, Area, Building
+from foretwin.world_gen.export.opendrive import proj_of, write_opendrive
 from tests.world_gen.drawn_maps import (
     AVENUE,
     CROSS,
@@ -24,7 +25,6 @@ from tests.world_gen.drawn_maps import (
 )
 from tests.world_gen.export import drawn_world
 from tests.world_gen.export.test_opendrive import check_closed, plain, written
-from world_gen.export.opendrive import proj_of, write_opendrive
 
 
 def test_who_waits_is_written_for_every_conflict(tmp_path: Path) -> None:

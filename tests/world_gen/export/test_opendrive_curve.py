@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from world_gen.export.opendrive_curve import fit_curve
+from foretwin.world_gen.export.opendrive_curve import fit_curve
 
 STEPS = st.lists(
     st.tuples(st.floats(0.2, 30.0), st.floats(-25.0, 25.0)), min_size=1, max_size=12

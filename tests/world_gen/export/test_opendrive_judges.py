@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import pytest
 
-from contracts.world import World
+from foretwin.contracts.world import World
+from foretwin.world_gen.export.opendrive import write_opendrive
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.read_opendrive import OpenDriveFile
-from world_gen.export.opendrive import write_opendrive
 
 pytestmark = [pytest.mark.judge, pytest.mark.real_data, pytest.mark.timeout(3600)]
 

@@ -15,15 +15,15 @@ from lxml import etree
 from shapely import union_all
 from shapely.geometry import Point, Polygon
 
-from contracts.provenance import Choice, Quantity
-from contracts.signals import Signal
-from contracts.vehicle import Parameter, VehicleParameters
-from contracts.world import ATTRIBUTION, Building, StopLine, World
+from foretwin.contracts.provenance import Choice, Quantity
+from foretwin.contracts.signals import Signal
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.contracts.world import ATTRIBUTION, Building, StopLine, World
+from foretwin.world_gen.export.choices import VehicleKind
+from foretwin.world_gen.export.sdformat import write_sdf
+from foretwin.world_gen.export.sdformat_shapes import extrusions
+from foretwin.world_gen.export.sdformat_vehicles import SdfVehicle, place_vehicles
 from tests.world_gen.drawn_maps import GERMANY, crossing, roundabout, world_of
-from world_gen.export.choices import VehicleKind
-from world_gen.export.sdformat import write_sdf
-from world_gen.export.sdformat_shapes import extrusions
-from world_gen.export.sdformat_vehicles import SdfVehicle, place_vehicles
 
 _CAR = {
     "mass_kg": 1100.0, "yaw_inertia_kgm2": 1800.0, "wheelbase_m": 2.6,

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from foretwin.world_gen.export.sdformat import write_sdf
+from foretwin.world_gen.export.sdformat_vehicles import WHEEL_RADIUS_M, place_vehicles
 from tests.world_gen.export.test_sdformat import ALL_KINDS, CAR, built
-from world_gen.export.sdformat import write_sdf
-from world_gen.export.sdformat_vehicles import WHEEL_RADIUS_M, place_vehicles
 
 WHEELBASE_M, TRACK_M = 2.6, 1.6
 

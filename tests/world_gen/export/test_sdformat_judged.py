@@ -11,13 +11,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from contracts.provenance import Quantity
-from contracts.world import Building
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import Building
+from foretwin.world_gen.export.sdformat import write_sdf
+from foretwin.world_gen.export.sdformat_vehicles import place_vehicles
 from tests.world_gen.drawn_maps import crossing, world_of
 from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.test_sdformat import ALL_KINDS, CAR, built
-from world_gen.export.sdformat import write_sdf
-from world_gen.export.sdformat_vehicles import place_vehicles
 
 pytestmark = pytest.mark.judge
 

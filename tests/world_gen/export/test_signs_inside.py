@@ -12,17 +12,17 @@ from lxml import etree
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from contracts.world import Connection, StopLine, World
+from foretwin.contracts.world import Connection, StopLine, World
+from foretwin.world_gen.export.commonroad import write_commonroad
+from foretwin.world_gen.export.geojson import write_geojson
+from foretwin.world_gen.export.picture_style import View
+from foretwin.world_gen.export.picture_traffic import draw_traffic
+from foretwin.world_gen.export.sdformat import write_sdf
+from foretwin.world_gen.report.report import report_of
 from tests.world_gen.export.lanelet2_file import written as written_lanelet2
 from tests.world_gen.export.test_opendrive import check_closed
 from tests.world_gen.export.test_opendrive import written as written_opendrive
 from tests.world_gen.slip_roads import lines_inside, slip_world
-from world_gen.export.commonroad import write_commonroad
-from world_gen.export.geojson import write_geojson
-from world_gen.export.picture_style import View
-from world_gen.export.picture_traffic import draw_traffic
-from world_gen.export.sdformat import write_sdf
-from world_gen.report import report_of
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["right-hand", "left-hand"])

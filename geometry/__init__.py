@@ -1,0 +1,1 @@
+"""Plane geometry: polylines, Frenet paths, arcs and turns, rectangles, convex cuts."""

@@ -1,0 +1,251 @@
+"""A path in arc length and lateral offset: vectorised projection and look-up for S vehicles.
+
+The path is resampled at equal spacing and prolonged straight at both ends, so that look-ups are
+index arithmetic and a vehicle never runs out of path.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.geometry import compiled
+
+SPACING_M = 1.0
+"""Between nodes. As it is one metre, an arc length less that of the first node is a place."""
+_AFTER_M = 200.0
+NEAR_M = 12.0
+"""How far on either side of the last known place is searched."""
+_MANY = 32
+"""Points, from which on a tree of the nodes is searched faster than all of them."""
+_SMOOTH_NODES = 2
+"""Curvature is the heading change over this many nodes on either side."""
+
+
+class FrenetPoint(NamedTuple):
+    """Places along a path: arc length (S,) and lateral offset (S,), positive to the left."""
+
+    arc_m: Array
+    offset_m: Array
+
+
+class NodePlace(NamedTuple):
+    """Places between a path's nodes: which is before (…), what share (…) of the way to the next."""
+
+    node: npt.NDArray[np.intp]
+    share: Array
+
+
+class PathPose(NamedTuple):
+    """Points of a path: positions (S, 2) and headings (S,)."""
+
+    xy_m: Array
+    yaw_rad: Array
+
+
+class FrenetPath:
+    """A polyline with arc length 0 at its first given point.
+
+    `xy_m` (N, 2), `speed_limit_mps` (N,) or None; `before_m` of straight are put in front. Raises
+    ValueError for less than two distinct points or numbers that are not finite.
+    """
+
+    def __init__(
+        self, xy_m: Array, speed_limit_mps: Array | None = None, *, before_m: float = 20.0
+    ) -> None:
+        self._given = (xy_m, speed_limit_mps, before_m)
+        points = np.asarray(xy_m, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+            raise ValueError(f"a path needs finite points (N, 2), not shape {points.shape}")
+        steps = np.hypot(*np.diff(points, axis=0).T)
+        keep = np.concatenate([[True], steps > 1e-6])
+        points = points[keep]
+        if len(points) < 2:
+            raise ValueError("a path needs at least two distinct points")
+        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        self.length_m = float(arc[-1])
+
+        before, after = int(before_m / SPACING_M), int((self.length_m + _AFTER_M) / SPACING_M)
+        self.first_arc_m = -before * SPACING_M
+        self.arc_m: Array = np.arange(-before, after + 1, dtype=np.float64) * SPACING_M
+        """(M,) arc length of the nodes."""
+        self._x = _prolonged(self.arc_m, arc, points[:, 0])
+        self._y = _prolonged(self.arc_m, arc, points[:, 1])
+        heading = np.unwrap(np.arctan2(np.gradient(self._y), np.gradient(self._x)))
+        self._heading = heading
+        # Tables have a row for each quantity: a look-up gives columns that lie in order.
+        self._nodes = np.stack([self._x, self._y, -np.sin(heading), np.cos(heading)])
+        """(4, M) x, y and the unit vector to the left."""
+        self._pieces = _with_steps(self._nodes)
+        self._last = len(self.arc_m) - 1
+        step = np.diff(self._nodes[:2])
+        length = np.hypot(*step)
+        cos, sin = step / length
+        self._segments = np.stack(
+            [*self._nodes[:2, :-1], cos / length, -sin, sin / length, cos, self.arc_m[:-1]]
+        )
+        """(7, M - 1) start; what turns a way from it into a share of the length and an offset; arc
+        length."""
+        if speed_limit_mps is None:
+            self.speed_limit_mps = np.full(len(self.arc_m), np.inf)
+        else:
+            limit = np.asarray(speed_limit_mps, dtype=np.float64)[keep]
+            limit = np.where(np.isfinite(limit) & (limit > 0.0), limit, np.inf)
+            nearest = np.clip(np.searchsorted(arc, self.arc_m, side="right") - 1, 0, len(arc) - 1)
+            self.speed_limit_mps = limit[nearest]
+        """(M,) limits at the nodes, infinite where unknown."""
+
+    def __reduce__(self) -> tuple[object, tuple[object, ...]]:
+        """Travel to another process as what the path was made of."""
+        return _path_of, self._given
+
+    @property
+    def node_poses(self) -> Array:
+        """(M, 3) x, y and heading without jumps at the nodes."""
+        return np.column_stack([self._x, self._y, self._heading])
+
+    @functools.cached_property
+    def curvature_pm(self) -> Array:
+        """(M,) curvature at the nodes in 1/m, positive to the left, smoothed over 4 m."""
+        k = _SMOOTH_NODES
+        padded = np.pad(self._heading, k, mode="edge")
+        return np.asarray((padded[2 * k :] - padded[: -2 * k]) / (2 * k * SPACING_M))
+
+    def speed_profile(self, *, lateral_accel_mps2: float, decel_mps2: float) -> Array:
+        """Return (M,) the speed at each node that curves ahead allow.
+
+        √(a_lat / |κ|) at every node, lowered so that a deceleration of `decel_mps2` suffices to
+        reach what lies ahead.
+        """
+        return np.asarray(self.with_curve_speeds(lateral_accel_mps2, decel_mps2)[len(self._nodes)])
+
+    @functools.cached_property
+    def _profiles(self) -> dict[tuple[float, float], Array]:
+        return {}
+
+    def with_curve_speeds(self, lateral_accel_mps2: float, decel_mps2: float) -> Array:
+        """Return (10, M) x, y, the unit vector to the left and the speed that curves allow, at the
+        nodes, then the steps of these to the next node."""
+        key = (lateral_accel_mps2, decel_mps2)
+        if key not in self._profiles:
+            square = lateral_accel_mps2 / np.maximum(np.abs(self.curvature_pm), 1e-6)
+            slope = 2.0 * decel_mps2 * self.arc_m
+            ahead = np.minimum.accumulate((square + slope)[::-1])[::-1]
+            speed = np.sqrt(np.minimum(ahead - slope, square))
+            self._profiles[key] = _with_steps(np.concatenate([self._nodes, speed[None]]))
+        return self._profiles[key]
+
+    def place(self, arc_m: Array) -> NodePlace:
+        """Return where arc lengths of any shape lie among the nodes, clipped to the path."""
+        place = arc_m - self.first_arc_m
+        np.maximum(place, 0.0, out=place)
+        np.minimum(place, self._last - 1e-9, out=place)
+        node = place.astype(np.intp)
+        place -= node
+        return NodePlace(node, place)
+
+    def at_nodes(self, values: Array, arc_m: Array) -> Array:
+        """Interpolate `values` (M,), given at the nodes, at arc lengths of any shape."""
+        node, share = self.place(arc_m)
+        low = values[node]
+        return np.asarray(low + share * (values[node + 1] - low))
+
+    def point_of(self, place: NodePlace, offset_m: Array | float = 0.0) -> Array:
+        """Return positions (2, …), x and y, at places and offsets to the left."""
+        found = _between(self._pieces, place)
+        found[2:] *= offset_m
+        found[:2] += found[2:]
+        return found[:2]
+
+    def point_at(self, arc_m: Array, offset_m: Array | float = 0.0) -> Array:
+        """Return positions (…, 2) at arc lengths (…) and offsets to the left."""
+        found = self.point_of(self.place(np.asarray(arc_m)), offset_m)
+        # What moveaxis would do too, at several times the cost of all before it.
+        return found.transpose(*range(1, found.ndim), 0)
+
+    def pose_at(self, arc_m: Array, offset_m: Array | float = 0.0) -> PathPose:
+        """Return positions and headings at arc lengths (…) and offsets to the left."""
+        return PathPose(self.point_at(arc_m, offset_m), self.at_nodes(self._heading, arc_m))
+
+    def _nearest(self, xy_m: Array, end: int) -> npt.NDArray[np.intp]:
+        """Return which of the nodes before `end` is nearest to each of the points."""
+        if len(xy_m) > _MANY:
+            # Slower to import than all else that the process of a hosted planner needs.
+            from scipy.spatial import cKDTree
+
+            return np.asarray(cKDTree(self._nodes[:2, :end].T).query(xy_m)[1], dtype=np.intp)
+        dx, dy = self._x[:end] - xy_m[:, 0, None], self._y[:end] - xy_m[:, 1, None]
+        dx *= dx
+        dy *= dy
+        dx += dy
+        return np.asarray(dx.argmin(axis=1))
+
+    def locate(
+        self,
+        xy_m: Array,
+        *,
+        near_arc_m: Array | None = None,
+        within_m: float = NEAR_M,
+        upto_arc_m: float = np.inf,
+    ) -> FrenetPoint:
+        """Project positions (S, 2) onto the path, as far as `upto_arc_m`.
+
+        With `near_arc_m` (S,) only its surroundings are searched, `within_m` on either side, so
+        that a path that crosses itself is followed rather than jumped along.
+        """
+        xy = np.asarray(xy_m, dtype=np.float64).T
+        if near_arc_m is None:
+            end = max(2, int(np.searchsorted(self.arc_m, upto_arc_m, side="right")))
+            node = self._nearest(xy_m, end)
+        else:
+            either = min(math.ceil(within_m / SPACING_M), self._last // 2)
+            found = np.empty((2, xy.shape[1]))
+            near = np.asarray(near_arc_m, dtype=np.float64)
+            compiled.locate(xy, near, self._nodes, self._segments, self.first_arc_m, either, found)
+            return FrenetPoint(found[0], found[1])
+        # The node's own tangent decides between the segment before and the one after.
+        nodes = self._nodes.take(node, axis=1)
+        turned = (xy - nodes[:2]) * nodes[:1:-1]
+        node -= turned[0] < turned[1]
+        segments = self._segments.take(node, axis=1, mode="clip")
+        turned = segments[2:6].reshape(2, 2, -1)
+        turned *= (xy - segments[:2])[:, None]
+        share, offset = turned[0, 0], turned[0, 1]
+        turned[0] += turned[1]
+        np.maximum(share, 0.0, out=share)
+        np.minimum(share, 1.0, out=share)
+        share += segments[6]
+        return FrenetPoint(share, offset)
+
+
+def _with_steps(values: Array) -> Array:
+    """Return (2 K, M): values (K, M) at nodes, and their steps to the next."""
+    return np.concatenate([values, np.diff(values, append=values[:, -1:])])
+
+
+def _between(table: Array, place: NodePlace) -> Array:
+    """Return values (K, …) at places, from a table (2 K, M) of them with their steps."""
+    found = table.take(place.node, axis=1, mode="clip")
+    half = len(table) // 2
+    steps = found[half:]
+    steps *= place.share
+    steps += found[:half]
+    return np.asarray(steps)
+
+
+def _path_of(xy_m: Array, speed_limit_mps: Array | None, before_m: float) -> FrenetPath:
+    return FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
+
+
+def _prolonged(at: Array, arc: Array, values: Array) -> Array:
+    """Interpolate `values` over `arc`, going on straight beyond both ends."""
+    inside = np.interp(at, arc, values)
+    first = (values[1] - values[0]) / (arc[1] - arc[0])
+    last = (values[-1] - values[-2]) / (arc[-1] - arc[-2])
+    inside = np.where(at < arc[0], values[0] + (at - arc[0]) * first, inside)
+    return np.asarray(np.where(at > arc[-1], values[-1] + (at - arc[-1]) * last, inside))

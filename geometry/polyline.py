@@ -1,0 +1,112 @@
+"""Polylines as (N, 2) arrays of metres: lengths, places along them, cuts and offsets."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+
+_MITRE_LIMIT = 2.0
+
+
+def arc_lengths(xy_m: Array) -> Array:
+    """Return (N,) metres from the first point along the polyline."""
+    steps = np.hypot(*np.diff(xy_m, axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def length(xy_m: Array) -> float:
+    """Return the length in metres."""
+    return float(arc_lengths(xy_m)[-1])
+
+
+def without_repeats(xy_m: Array, *, tolerance_m: float = 0.01) -> Array:
+    """Return the polyline without points closer than `tolerance_m` to the one before."""
+    if len(xy_m) < 2:
+        return xy_m
+    keep = np.concatenate([[True], np.hypot(*np.diff(xy_m, axis=0).T) > tolerance_m])
+    kept: Array = xy_m[keep]
+    return kept
+
+
+def points_at(xy_m: Array, at_m: Array | float) -> Array:
+    """Return the points (M, 2), or (2,), at arc lengths `at_m` (clamped to the ends)."""
+    s = arc_lengths(xy_m)
+    return np.stack([np.interp(at_m, s, xy_m[:, 0]), np.interp(at_m, s, xy_m[:, 1])], axis=-1)
+
+
+def direction_at(xy_m: Array, at_m: float) -> Array:
+    """Return the unit vector (2,) along the segment that holds arc length `at_m`."""
+    s = arc_lengths(xy_m)
+    i = int(np.clip(np.searchsorted(s, at_m, side="right") - 1, 0, len(xy_m) - 2))
+    return unit(xy_m[i + 1] - xy_m[i])
+
+
+def cut(xy_m: Array, from_m: float, to_m: float) -> Array:
+    """Return the piece between two arc lengths; at least two points."""
+    s = arc_lengths(xy_m)
+    inside = (s > from_m + 1e-6) & (s < to_m - 1e-6)
+    ends = points_at(xy_m, np.array([from_m, to_m]))
+    return np.concatenate([ends[:1], xy_m[inside], ends[1:]])
+
+
+def locate(xy_m: Array, point_m: Array) -> float:
+    """Return the arc length of the polyline's point nearest to `point_m` (2,)."""
+    a, b = xy_m[:-1], xy_m[1:]
+    d = b - a
+    norm2 = np.maximum((d * d).sum(axis=1), 1e-12)
+    t = np.clip(((point_m - a) * d).sum(axis=1) / norm2, 0.0, 1.0)
+    gap = a + t[:, None] * d - point_m
+    i = int(np.argmin((gap * gap).sum(axis=1)))
+    return float(arc_lengths(xy_m)[i] + t[i] * math.sqrt(norm2[i]))
+
+
+def unit(vector: Array) -> Array:
+    """Return the vector (2,) with length 1, or (1, 0) where it has none."""
+    norm = math.hypot(vector[0], vector[1])
+    return vector / norm if norm > 1e-9 else np.array([1.0, 0.0])
+
+
+def left_of(direction: Array) -> Array:
+    """Return the direction (..., 2) turned 90° counter-clockwise."""
+    return np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
+
+
+def offset(
+    xy_m: Array,
+    left_m: float,
+    *,
+    before: Array | None = None,
+    after: Array | None = None,
+) -> Array:
+    """Return the polyline shifted to its left by `left_m` (negative: to its right).
+
+    `before` and `after` are unit directions (2,) of the road that continues beyond the ends, so
+    that shifted pieces of one road meet. Stretches that would run backwards are left out.
+    """
+    if abs(left_m) < 1e-9:
+        return xy_m.copy()
+    d = np.diff(xy_m, axis=0)
+    d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
+    first = d[:1] if before is None else before[None]
+    last = d[-1:] if after is None else after[None]
+    incoming = np.concatenate([first, d])
+    outgoing = np.concatenate([d, last])
+    normal = left_of(incoming) + left_of(outgoing)
+    norm = np.hypot(normal[:, 0], normal[:, 1])
+    normal = np.where(norm[:, None] > 0.2, normal / np.maximum(norm, 0.2)[:, None], left_of(d[[0]]))
+    stretch = 1.0 / np.maximum((normal * left_of(outgoing)).sum(axis=1), 1.0 / _MITRE_LIMIT)
+    shifted = xy_m + normal * (left_m * stretch)[:, None]
+    return _without_backward_runs(shifted, d)
+
+
+def _without_backward_runs(shifted: Array, directions: Array) -> Array:
+    forward = (np.diff(shifted, axis=0) * directions).sum(axis=1) > 0.0
+    if forward.all() or not forward.any():
+        return shifted
+    keep = np.concatenate([forward, [True]]) & np.concatenate([[True], forward])
+    keep[0] = keep[-1] = True
+    kept: Array = shifted[keep]
+    return kept

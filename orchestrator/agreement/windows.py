@@ -1,0 +1,236 @@
+"""The same seconds simulated and driven: collects both during a drive, and judges them at its end.
+
+Nothing is judged while the drive goes on: that would take time from the rounds.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoadUser, RoadUsers, SignalColour, VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.rounds.dispatch import RoundDone
+from foretwin.sim_worker.analysis.agreement.criteria import Court, Heard, Users, Window
+from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.route_rules import RouteRules
+
+MOST_WINDOWS = 120
+"""When there are as many, every second one goes, and they are taken half as often from then on."""
+EVERY_NS = 1_000_000_000
+_HOLE_NS, _SEEN_HOLE_NS = 1_500_000_000, 1_000_000_000
+_SPARE_NS = 3_000_000_000
+
+Stamps = npt.NDArray[np.int64]
+
+
+class _Simulated(NamedTuple):
+    """A nominal future until it has been driven."""
+
+    round_id: int
+    stamp_ns: int
+    junction_id: str
+    world: World
+    time_s: Array
+    states: Array
+    users: Users
+    path: PathAhead
+
+
+class WindowDesk:
+    """Takes states, what is seen and heard, and rounds; gives verdicts at the end."""
+
+    def __init__(self, vehicle: VehicleParameters, *, horizon_s: float) -> None:
+        self._vehicle = vehicle
+        self._keep_ns = round(horizon_s * 1e9) + _SPARE_NS
+        self._states: deque[VehicleState] = deque()
+        self._seen: deque[RoadUsers] = deque()
+        self._heard: dict[str, deque[tuple[int, SignalColour]]] = defaultdict(deque)
+        self._waiting: deque[_Simulated] = deque()
+        self._windows: list[Window] = []
+        self._worlds: dict[str, World] = {}
+        self._every_ns = EVERY_NS
+        self._last_ns: int | None = None
+        self.judged: list[Judged] = []
+
+    def take(self, said: Surroundings, state: VehicleState) -> None:
+        """Take where the car is, and what it newly saw and heard."""
+        if self._states and state.stamp_ns < self._states[-1].stamp_ns - _SPARE_NS:
+            for gone in (self._states, self._seen, self._waiting):
+                gone.clear()
+            self._heard.clear()
+            self._last_ns = None
+        if not state.yaw_valid or (self._states and state.stamp_ns <= self._states[-1].stamp_ns):
+            return
+        self._states.append(state)
+        users = said.road_users
+        if users is not None and (not self._seen or users.stamp_ns > self._seen[-1].stamp_ns):
+            self._seen.append(users)
+        for signal in said.signals:
+            known = self._heard[signal.group_id]
+            if not known or signal.stamp_ns > known[-1][0]:
+                known.append((signal.stamp_ns, signal.colour))
+        while self._waiting and _end_ns(self._waiting[0]) <= state.stamp_ns:
+            self._settle(self._waiting.popleft())
+        self._forget(state.stamp_ns)
+
+    def take_round(self, done: RoundDone, path: PathAhead, world: World) -> None:
+        """Take a round's nominal future, the first of its first job."""
+        result = done.results[0]
+        stamp_ns = result.trajectory.stamp_ns
+        if self._last_ns is not None and stamp_ns - self._last_ns < self._every_ns:
+            return
+        self._last_ns = stamp_ns
+        others = result.road_users
+        self._waiting.append(
+            _Simulated(
+                done.order.round_id, stamp_ns, done.order.junction_id, world,
+                np.asarray(result.trajectory.time_s, dtype=np.float64),
+                np.asarray(result.trajectory.states[0], dtype=np.float64),
+                Users(
+                    np.asarray(others.poses[0], dtype=np.float64),
+                    np.asarray(others.speed_mps[0], dtype=np.float64),
+                    np.asarray(others.size_m[0], dtype=np.float64),
+                ),
+                path,
+            )
+        )  # fmt: skip
+
+    def finish(self) -> list[Judged]:
+        """Judge all windows, World by World."""
+        self._waiting.clear()
+        for world_id, world in self._worlds.items():
+            mine = [window for window in self._windows if window.world_id == world_id]
+            if mine:
+                self.judged += judge_in(world, mine, self._vehicle)
+        self.judged.sort(key=lambda one: one.window.stamp_ns)
+        self._windows = []
+        return self.judged
+
+    def record(self, start_stamp_ns: int) -> dict[str, Any] | None:
+        """Return the `agreement` part of run.json, None where nothing was simulated and driven."""
+        return tally(self.judged, start_stamp_ns=start_stamp_ns) if self.judged else None
+
+    def _settle(self, one: _Simulated) -> None:
+        # Negative where the vehicle's clock has been set back.
+        if self._windows and 0 <= one.stamp_ns - self._windows[-1].stamp_ns < self._every_ns:
+            return
+        window = self._window(one)
+        if window is None:
+            return
+        self._windows.append(window)
+        self._worlds[one.world.id] = one.world
+        if len(self._windows) >= MOST_WINDOWS:
+            self._windows = self._windows[::2]
+            self._every_ns *= 2
+            used = {window.world_id for window in self._windows}
+            self._worlds = {key: world for key, world in self._worlds.items() if key in used}
+
+    def _window(self, one: _Simulated) -> Window | None:
+        stamps = one.stamp_ns + np.round(one.time_s * 1e9).astype(np.int64)
+        known = [s for s in self._states if s.stamp_ns >= stamps[0] - _HOLE_NS]
+        at = np.array([state.stamp_ns for state in known], dtype=np.int64)
+        if len(at) < 2 or at[0] > stamps[0] or (np.diff(at) > _HOLE_NS).any():
+            return None
+        stds = [state.position_std_m for state in known]
+        seen = [s for s in self._seen if stamps[0] - _SEEN_HOLE_NS <= s.stamp_ns]
+        told = np.array([stamps[0], *(s.stamp_ns for s in seen), stamps[-1]], dtype=np.int64)
+        return Window(
+            round_id=one.round_id, stamp_ns=one.stamp_ns, junction_id=one.junction_id,
+            world_id=one.world.id, time_s=one.time_s, simulated=one.states,
+            simulated_users=one.users, driven=_driven(known, at, stamps, one.world.frame),
+            driven_users=_users(seen, stamps, one.world.frame), path_xy_m=one.path.xy_m,
+            heard={
+                group: Heard(
+                    np.array([stamp for stamp, _ in said], dtype=np.int64),
+                    tuple(colour for _, colour in said),
+                )
+                for group, said in self._heard.items()
+                if said and said[-1][0] >= stamps[0]
+            },
+            known_users=bool(seen) and bool((np.diff(np.sort(told)) <= _SEEN_HOLE_NS).all()),
+            position_std_m=max((s for s in stds if s is not None), default=None),
+        )  # fmt: skip
+
+    def _forget(self, now_ns: int) -> None:
+        oldest = now_ns - self._keep_ns
+        while self._states[0].stamp_ns < oldest:
+            self._states.popleft()
+        while self._seen and self._seen[0].stamp_ns < oldest:
+            self._seen.popleft()
+        for said in self._heard.values():
+            while said and said[0][0] < oldest:
+                said.popleft()
+
+
+def judge_in(world: World, windows: list[Window], vehicle: VehicleParameters) -> list[Judged]:
+    """Judge the windows of one World."""
+    ground = DrivableGround(world)
+    found = []
+    for window in windows:
+        rules = RouteRules(world, FrenetPath(window.path_xy_m))
+        found.append(judged(window, Court(window, rules, ground, vehicle)))
+    return found
+
+
+def _end_ns(one: _Simulated) -> int:
+    return one.stamp_ns + round(float(one.time_s[-1]) * 1e9)
+
+
+def _driven(known: list[VehicleState], at: Stamps, stamps: Stamps, frame: LocalFrame) -> Array:
+    """Return states (N, 8) of a drive at stamps, in a World's frame."""
+    lat, lon, yaw, speed, rate, tire, accel = np.array(
+        [
+            (
+                s.position.lat_deg, s.position.lon_deg, s.yaw_rad, s.speed_mps,
+                s.yaw_rate_radps, s.tire_angle_rad or 0.0, s.accel_mps2,
+            )
+            for s in known
+        ]
+    ).T  # fmt: skip
+    xy = np.asarray(local_from_geo(frame, lat, lon))
+    heading = np.unwrap(local_from_geo_yaw(frame, yaw, lat, lon))
+    columns = (xy[:, 0], xy[:, 1], heading, speed, np.zeros(len(at)), rate, tire, accel)
+    since, wanted = at - stamps[0], stamps - stamps[0]
+    return np.column_stack([np.interp(wanted, since, column) for column in columns])
+
+
+def _users(seen: list[RoadUsers], stamps: Stamps, frame: LocalFrame) -> Users:
+    """Return those seen at stamps (N,), between two sightings no more than a second apart."""
+    tracks: dict[str, list[tuple[int, RoadUser]]] = defaultdict(list)
+    for message in seen:
+        for user in message.users:
+            tracks[user.user_id].append((message.stamp_ns, user))
+    count = len(stamps)
+    poses, speeds = np.full((count, len(tracks), 3), np.nan), np.full((count, len(tracks)), np.nan)
+    sizes = np.zeros((len(tracks), 2))
+    for place, track in enumerate(tracks.values()):
+        at = np.array([stamp for stamp, _ in track], dtype=np.int64)
+        lat, lon, yaw, speed, length, width = np.array(
+            [
+                (u.position.lat_deg, u.position.lon_deg, u.yaw_rad, u.speed_mps, u.length_m,
+                 u.width_m)
+                for _, u in track
+            ]
+        ).T  # fmt: skip
+        sizes[place] = np.median(length), np.median(width)
+        xy = np.asarray(local_from_geo(frame, lat, lon))
+        heading = np.unwrap(local_from_geo_yaw(frame, yaw, lat, lon))
+        after = np.searchsorted(at, stamps).clip(0, len(at) - 1)
+        before = (np.searchsorted(at, stamps, side="right") - 1).clip(0)
+        there = (stamps >= at[0]) & (stamps <= at[-1]) & (at[after] - at[before] <= _SEEN_HOLE_NS)
+        columns = (xy[:, 0], xy[:, 1], heading, speed)
+        x, y, turned, fast = (np.interp(stamps - at[0], at - at[0], c) for c in columns)
+        poses[there, place] = np.column_stack([x, y, turned])[there]
+        speeds[there, place] = fast[there]
+    return Users(poses, speeds, sizes)

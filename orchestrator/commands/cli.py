@@ -1,0 +1,284 @@
+"""The command line: what every command takes. The work is in the modules they import when run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judge
+from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption, ServiceRoadsOption
+from foretwin.orchestrator.commands.cli_scenarios import scenarios
+from foretwin.orchestrator.commands.cli_set import set_value
+
+EXIT_INTERNAL, EXIT_USER, EXIT_INTERRUPTED = 1, 2, 130
+PATH_ERRORS = (
+    FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError, PermissionError,
+)  # fmt: skip
+"""What is wrong with a path is the user's to mend."""
+
+app = typer.Typer(
+    name="foretwin",
+    help="A low-fidelity digital twin that drives ahead of a real car.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+maps = typer.Typer(name="map", help="Fetch maps and prepare them.", no_args_is_help=True)
+app.add_typer(maps)
+
+app.add_typer(scenarios)
+
+
+@app.command()
+def drive(
+    config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
+    map_file: Annotated[str | None, typer.Option("--map", help="map of the place")] = None,
+    route: Annotated[
+        str | None, typer.Option(help="GPX or GeoJSON file, from-log, or live; default: predicted")
+    ] = None,
+    log: Annotated[str | None, typer.Option(help="recorded drive to replay")] = None,
+    source: Annotated[
+        str | None, typer.Option(help="log, standin, live (a car on the bus), or auto")
+    ] = None,
+    start: Annotated[float | None, typer.Option(help="seconds into the log")] = None,
+    end: Annotated[float | None, typer.Option(help="seconds into the log")] = None,
+    speed: Annotated[
+        str | None, typer.Option(help="replay speed, or max for lock step [default: 1]")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="worker processes [default: 2]")] = None,
+    futures: Annotated[int | None, typer.Option(help="futures per round [default: 64]")] = None,
+    least_futures: Annotated[
+        int | None,
+        typer.Option(
+            help="futures per round where the machine is too slow for all; "
+            "as many as --futures holds them fixed [default: a quarter]"
+        ),
+    ] = None,
+    rate: Annotated[float | None, typer.Option(help="rounds per wall second [default: 2]")] = None,
+    horizon: Annotated[float | None, typer.Option(help="seconds ahead [default: 8]")] = None,
+    planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of the variants [default: 0]")] = None,
+    vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
+    tuning: Annotated[
+        str | None,
+        typer.Option(
+            help="parameters from the driving: off, report, apply [default: report; off where "
+            "there are fewer processors than workers]"
+        ),
+    ] = None,
+    map_aiding: Annotated[
+        str | None, typer.Option(help="roads help to find the car: auto, off [default: auto]")
+    ] = None,
+    view: Annotated[
+        str | None, typer.Option(help="auto, native, web or none [default: auto]")
+    ] = None,
+    out: Annotated[str | None, typer.Option(help="folder of the runs [default: runs]")] = None,
+    ros2: Annotated[
+        str | None, typer.Option(help="mapping of the live car's ROS 2 topics, TOML, or autoware")
+    ] = None,
+    towards_vehicle: Annotated[
+        bool,
+        typer.Option(
+            "--towards-vehicle", help="second switch for what goes to the car; see docs/ros2.md"
+        ),
+    ] = False,
+) -> None:
+    """Drive ahead of a car: worlds for the coming junctions, futures, live comparison."""
+    from foretwin.orchestrator.config import load_config
+    from foretwin.orchestrator.drive.drive import drive as run_drive
+
+    settings = load_config(
+        config,
+        {
+            "map": map_file, "route": route, "log": log, "source": source, "start_s": start,
+            "end_s": end, "speed": speed, "workers": workers, "futures": futures,
+            "least_futures": least_futures, "rate_hz": rate, "horizon_s": horizon,
+            "planner": planner, "seed": seed, "vehicle": vehicle, "tuning": tuning,
+            "map_aiding": map_aiding, "view": view, "out": out, "ros2": ros2,
+            "towards_vehicle": towards_vehicle or None,
+        },
+    )  # fmt: skip
+    raise typer.Exit(run_drive(settings))
+
+
+@app.command()
+def intersections(
+    map_file: MapArgument,
+    route: Annotated[
+        Path | None, typer.Option(help="only those along this GPX or GeoJSON line")
+    ] = None,
+    service_roads: ServiceRoadsOption = False,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
+) -> None:
+    """List the junctions of a map, each one as a driver sees it."""
+    from foretwin.orchestrator.commands.intersections import list_intersections
+
+    list_intersections(map_file, route=route, as_json=as_json, service_roads=service_roads)
+
+
+@app.command()
+def world(
+    map_file: MapArgument,
+    out: Annotated[
+        Path, typer.Option("--out", help="file to write; a folder with --route and --all")
+    ],
+    at: Annotated[str | None, typer.Option(help="LAT,LON: the junction nearest to it")] = None,
+    junction_id: Annotated[str | None, typer.Option("--id", help="the junction's id")] = None,
+    bbox: Annotated[
+        str | None, typer.Option(help="W,S,E,N in degrees: one World of the whole region")
+    ] = None,
+    route: Annotated[
+        Path | None, typer.Option(help="each junction along this GPX or GeoJSON line")
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="each junction of the map")] = False,
+    service_roads: ServiceRoadsOption = False,
+    file_format: Annotated[
+        str,
+        typer.Option(
+            "--format", help="mjcf, sdf, opendrive, lanelet2, commonroad, geojson, svg or png"
+        ),
+    ] = "mjcf",
+    radius: Annotated[float, typer.Option(help="metres around the junction")] = 150.0,
+    opendrive_version: Annotated[str, typer.Option(help="1.8, or 1.4 for CARLA")] = "1.8",
+    simulator: Annotated[
+        str, typer.Option(help="sdf: classic (Gazebo Classic with ROS 2) or gazebo (gz-sim)")
+    ] = "classic",
+    vehicles: Annotated[
+        str, typer.Option(help="sdf: NAME:KIND,… (twin, shadow, ghost), or none")
+    ] = "twin:twin,shadow:shadow,ghost:ghost",
+    vehicle: Annotated[Path | None, typer.Option(help="sdf: vehicle parameters, TOML")] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="also say what was tagged and what was guessed")
+    ] = False,
+) -> None:
+    """Write Worlds of a map: models, road networks for other simulators, or pictures."""
+    from foretwin.orchestrator.commands.world import WorldRequest, write_worlds
+
+    raise typer.Exit(
+        write_worlds(
+            WorldRequest(
+                map_file=map_file, out=out, at=at, junction_id=junction_id, bbox=bbox,
+                route=route, everything=everything, service_roads=service_roads,
+                file_format=file_format, radius_m=radius,
+                opendrive_version=opendrive_version, simulator=simulator, vehicles=vehicles,
+                vehicle=vehicle, report=report,
+            )
+        )
+    )  # fmt: skip
+
+
+@maps.command("get", context_settings={"ignore_unknown_options": True})
+def get_map(
+    area: Annotated[
+        str,
+        typer.Argument(metavar="BBOX|ROUTE", help="W,S,E,N in degrees, or a GPX or GeoJSON file"),
+    ],
+    out: OutOption,
+    config: Annotated[Path | None, typer.Option(help="TOML file with these settings")] = None,
+) -> None:
+    """Fetch the map of a region, or of a route's surroundings, from an Overpass endpoint."""
+    from foretwin.orchestrator.commands.map_get import get_map as fetch
+
+    fetch(area, out=out, config=config)
+
+
+@maps.command("index")
+def index_map(
+    map_file: MapArgument,
+    folder: Annotated[
+        Path | None, typer.Option(help="folder of indexes [default: the user's cache]")
+    ] = None,
+) -> None:
+    """Read a map of any size into an index on disk, from which places and routes are clipped."""
+    from foretwin.orchestrator.worlds.indexing import index_map_file
+
+    index_map_file(map_file, folder=folder)
+
+
+@app.command()
+def sweep(
+    spec: Annotated[Path, typer.Argument(help="what to sweep over, TOML")],
+    out: Annotated[
+        Path | None, typer.Option(help="folder of the rows [default: sweeps/SPEC]")
+    ] = None,
+    workers: Annotated[int, typer.Option(help="worker processes")] = 2,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="start anew, not where it stopped")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="the summary as JSON")] = False,
+) -> None:
+    """Play scenarios on junctions with planners and parameters, offline, into Parquet."""
+    from foretwin.orchestrator.commands.sweep import SweepRequest
+    from foretwin.orchestrator.commands.sweep import sweep as run_sweep
+
+    raise typer.Exit(run_sweep(SweepRequest(spec, out, workers, fresh, as_json)))
+
+
+for about_logs in (convert, identify, gap, judge):
+    app.command()(about_logs)
+
+app.command("set")(set_value)
+
+
+@app.command()
+def view(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
+) -> None:
+    """Open the recording of a run in the viewer."""
+    from foretwin.orchestrator.commands.recordings import open_view
+
+    raise typer.Exit(open_view(run_folder))
+
+
+@app.command()
+def doctor() -> None:
+    """Say what this machine has and what is missing."""
+    from foretwin.orchestrator.commands.doctor import examine
+
+    raise typer.Exit(examine())
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; returns 0 done, 1 internal error, 2 the user's input, 130 Ctrl-C."""
+    try:
+        result = app(arguments, standalone_mode=False)
+    except (UserError, *PATH_ERRORS) as error:
+        print(f"foretwin: {_one_line(error)}", file=sys.stderr)
+        return EXIT_USER
+    except (KeyboardInterrupt, typer.Abort):
+        print("foretwin: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except Exception as error:
+        return _report(error)
+    return result if isinstance(result, int) else 0
+
+
+def _report(error: Exception) -> int:
+    """Say an unexpected error in one line; the traceback goes to a file."""
+    if hasattr(error, "show") and hasattr(error, "exit_code"):  # the command line's own errors
+        error.show()
+        return int(error.exit_code)
+    import tempfile
+    import traceback
+
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="foretwin-", suffix=".log", delete=False, encoding="utf-8"
+    ) as file:
+        traceback.print_exception(error, file=file)
+    print(
+        f"foretwin: internal error: {type(error).__name__}: {_one_line(error)} "
+        f"(traceback in {file.name})",
+        file=sys.stderr,
+    )
+    return EXIT_INTERNAL
+
+
+def _one_line(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror.lower()}"
+    return " ".join(str(error).split())

@@ -1,0 +1,88 @@
+"""The command line of recorded drives: what each command takes. The work is imported when run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(help="recorded drive")],
+    target: Annotated[
+        Path, typer.Argument(help=".mcap, .bag (ROS 1), .csv, or a folder for a ROS 2 bag")
+    ],
+    to: Annotated[
+        str | None, typer.Option("--to", help="mcap, ros2, ros1, csv; else the name tells")
+    ] = None,
+    declaration: Annotated[
+        Path | None,
+        typer.Option("--declaration", help="TOML that declares SOURCE; else SOURCE.toml"),
+    ] = None,
+) -> None:
+    """Convert a recorded drive to MCAP, a ROS bag, or CSV."""
+    from foretwin.orchestrator.commands.recordings import convert_log
+
+    convert_log(source, target, to=to, declaration=declaration)
+
+
+def identify(
+    log: Annotated[Path, typer.Argument(help="recorded drive")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="parameters in force, TOML [default: the bundled BMW 320i]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON object")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="folder for plots and a vehicle file with what was taken")
+    ] = None,
+) -> None:
+    """Say what a recorded drive tells of its vehicle: steering, delays, gains, resistances."""
+    from foretwin.orchestrator.commands.identify import identify_log
+
+    raise typer.Exit(identify_log(log, vehicle_file=vehicle, as_json=as_json, out=out))
+
+
+def judge(
+    run_folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run")],
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="corrected map [default: the run's own]")
+    ] = None,
+    vehicle: Annotated[
+        str | None, typer.Option(help="corrected vehicle parameters [default: the run's own]")
+    ] = None,
+    worlds: Annotated[
+        Path | None, typer.Option(help="folder of corrected Worlds (.world), not built anew")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="folder for the runs it makes [default: RUN/judged]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="what changes as JSON")] = False,
+) -> None:
+    """Judge a run's recorded drive again with a corrected map, vehicle or Worlds: what changes?"""
+    from foretwin.orchestrator.commands.judge import JudgeRequest
+    from foretwin.orchestrator.commands.judge import judge as judge_run
+
+    request = JudgeRequest(
+        run=run_folder, map_file=map_file, vehicle=vehicle, worlds=worlds, out=out,
+        as_json=as_json,
+    )  # fmt: skip
+    raise typer.Exit(judge_run(request))
+
+
+def gap(
+    recording: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
+    vehicle: Annotated[
+        str | None, typer.Option(help="vehicle parameters, TOML, or a bundled name")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="table and verdicts as JSON")] = False,
+    out: Annotated[Path | None, typer.Option(help="folder for plots")] = None,
+    declaration: Annotated[
+        Path | None,
+        typer.Option("--declaration", help="TOML that declares LOG; else LOG.toml"),
+    ] = None,
+) -> None:
+    """Measure how far the model leaves a recorded drive, and say which of the two is wrong."""
+    from foretwin.orchestrator.commands.gap import report_gap
+
+    report_gap(recording, vehicle=vehicle, as_json=as_json, out=out, declaration=declaration)

@@ -1,0 +1,103 @@
+"""The command line of scenarios: what each command takes. The work is where it is imported from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foretwin.orchestrator.commands.cli_options import MapArgument, ServiceRoadsOption
+
+scenarios = typer.Typer(name="scenarios", help="List, check, place, draw and export scenarios.")
+
+
+@scenarios.callback(invoke_without_command=True)
+def list_scenarios(
+    context: typer.Context,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
+) -> None:
+    """List the scenarios that come with foretwin, or check and place scenarios."""
+    if context.invoked_subcommand is not None:
+        return
+    from foretwin.orchestrator.commands.scenarios import list_scenarios as list_them
+
+    list_them(as_json=as_json)
+
+
+@scenarios.command("check")
+def check_scenario(
+    file: Annotated[Path, typer.Argument(help="scenario, TOML")],
+) -> None:
+    """Say whether a scenario file is sound, and how many cases it has."""
+    from foretwin.orchestrator.commands.scenarios import check_scenario_file
+
+    check_scenario_file(file)
+
+
+@scenarios.command("place")
+def place_scenarios(
+    map_file: MapArgument,
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="id or TOML file; may be repeated [default: all]")
+    ] = None,
+    junction_id: Annotated[str | None, typer.Option("--id", help="only this junction")] = None,
+    at: Annotated[str | None, typer.Option(help="LAT,LON: only the junction nearest to it")] = None,
+    service_roads: ServiceRoadsOption = False,
+    as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
+) -> None:
+    """Say which junctions of a map take which scenarios, and why not elsewhere."""
+    from foretwin.orchestrator.commands.scenarios import PlaceRequest
+    from foretwin.orchestrator.commands.scenarios import place_scenarios as place_them
+
+    request = PlaceRequest(map_file, scenario or (), junction_id, at, service_roads)
+    raise typer.Exit(place_them(request, as_json=as_json))
+
+
+MapOption = Annotated[Path, typer.Option("--map", help="map: .osm, .osm.gz, .osm.bz2 or .osm.pbf")]
+IdOption = Annotated[str | None, typer.Option("--id", help="the junction's id")]
+AtOption = Annotated[str | None, typer.Option("--at", help="LAT,LON: the junction nearest to it")]
+CaseOption = Annotated[int, typer.Option("--case", help="which of its cases, from 1")]
+VehicleOption = Annotated[Path | None, typer.Option("--vehicle", help="vehicle parameters, TOML")]
+ScenarioArgument = Annotated[str, typer.Argument(help="id or TOML file")]
+
+
+@scenarios.command("export")
+def export_scenario(
+    scenario: ScenarioArgument,
+    map_file: MapOption,
+    out: Annotated[Path, typer.Option("--out", help=".xosc file to write; .xodr goes beside it")],
+    junction_id: IdOption = None,
+    at: AtOption = None,
+    case: CaseOption = 1,
+    vehicle: VehicleOption = None,
+    service_roads: ServiceRoadsOption = False,
+) -> None:
+    """Write one case at one junction as OpenSCENARIO 1.2, with its roads as OpenDRIVE."""
+    from foretwin.orchestrator.commands.scenario_export import CaseRequest
+    from foretwin.orchestrator.commands.scenario_export import export_scenario as export
+    from foretwin.orchestrator.commands.scenarios import PlaceRequest
+
+    where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
+    export(CaseRequest(scenario, where, case, vehicle), out)
+
+
+@scenarios.command("draw")
+def draw_scenario(
+    scenario: ScenarioArgument,
+    map_file: MapOption,
+    out: Annotated[Path, typer.Option("--out", help=".png file to write")],
+    junction_id: IdOption = None,
+    at: AtOption = None,
+    case: CaseOption = 1,
+    planner: Annotated[str, typer.Option(help="who drives the ego")] = "pure_pursuit_idm",
+    vehicle: VehicleOption = None,
+    service_roads: ServiceRoadsOption = False,
+) -> None:
+    """Draw one case at one junction from above: as planned, and as a planner drives it."""
+    from foretwin.orchestrator.commands.scenario_export import CaseRequest
+    from foretwin.orchestrator.commands.scenario_export import draw_scenario as draw
+    from foretwin.orchestrator.commands.scenarios import PlaceRequest
+
+    where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
+    draw(CaseRequest(scenario, where, case, vehicle), out, planner=planner)

@@ -1,0 +1,29 @@
+"""The command line of a running drive: what is changed while it goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def set_value(
+    assignment: Annotated[
+        str,
+        typer.Argument(
+            metavar="KEY=VALUE",
+            help="role.ID=all, twin, shadow or ghost; correction=free or follow; "
+            "vehicle.NAME=a number, pin, unpin or rollback",
+        ),
+    ],
+    run: Annotated[
+        Path | None,
+        typer.Option(help="id or folder of the run [default: the newest one running]"),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="folder of the runs")] = Path("runs"),
+) -> None:
+    """Change a running drive: a vehicle's role, the twins' correction, the car's parameters."""
+    from foretwin.orchestrator.commands.set import set_in_drive
+
+    print(set_in_drive(assignment, run=run, out=out))

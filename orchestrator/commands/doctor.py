@@ -1,0 +1,151 @@
+"""The command `doctor`: what this machine has, what is missing, and what that costs."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+Verdict = Literal["ok", "missing", "note"]
+
+_BUS_S = 20.0
+"""How long a busy machine may take for one question over the bus."""
+
+
+class Finding(NamedTuple):
+    """One line of the examination."""
+
+    what: str
+    verdict: Verdict
+    text: str
+
+
+def examine() -> int:
+    """Print every finding; returns 3 where something that a drive needs is missing."""
+    findings = [check() for check in CHECKS]
+    marks = {"ok": "ok     ", "missing": "MISSING", "note": "note   "}
+    for finding in findings:
+        print(f"{marks[finding.verdict]}  {finding.what}: {finding.text}")
+    return 3 if any(f.verdict == "missing" for f in findings) else 0
+
+
+def _python() -> Finding:
+    good = sys.version_info >= (3, 11)
+    return Finding(
+        "Python", "ok" if good else "missing", f"{platform.python_version()}, 3.11 or newer"
+    )
+
+
+def _cores() -> Finding:
+    count = os.cpu_count() or 1
+    text = f"{count} cores; a live drive at 64 futures twice a second was measured on 2"
+    return Finding("processor", "ok" if count >= 2 else "note", text)
+
+
+def _tuning() -> Finding:
+    from foretwin.orchestrator.config import DriveConfig
+
+    choice = DriveConfig().tuning_choice
+    return Finding("tuning", "note" if choice.mode == "off" else "ok", choice.text)
+
+
+def _packages() -> Finding:
+    names = ("mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "shapely", "pyproj", "pyarrow")
+    versions, absent = [], []
+    for name in names:
+        try:
+            versions.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            absent.append(name)
+    if absent:
+        return Finding("packages", "missing", f"not installed: {', '.join(absent)}; run make setup")
+    return Finding("packages", "ok", ", ".join(versions))
+
+
+def _bus() -> Finding:
+    import contextlib
+    import threading
+
+    from foretwin.contracts.bus import Mailbox, Request, ZenohBus, ask
+    from foretwin.contracts.drive import InfoRequest, VehicleInfo
+    from foretwin.contracts.ports import free_endpoint
+    from foretwin.contracts.setup import BusSetup
+
+    setup = BusSetup(endpoint=free_endpoint())
+    with (
+        ZenohBus(setup, router=True) as router,
+        ZenohBus(setup) as client,
+        contextlib.closing(Mailbox(4)) as mailbox,
+    ):
+        client.serve("info", mailbox, vehicle="doctor")
+
+        def answer() -> None:
+            while isinstance(request := mailbox.take(None), Request):
+                request.reply(VehicleInfo(vehicle_id="doctor", time_base="log", start_stamp_ns=0))
+
+        threading.Thread(target=answer, daemon=True).start()
+        deadline = time.monotonic() + _BUS_S
+        while time.monotonic() < deadline:
+            started = time.perf_counter()
+            try:
+                ask(router, "info", InfoRequest(), vehicle="doctor", timeout_s=1.0)
+            except TimeoutError:
+                continue
+            taken_ms = 1e3 * (time.perf_counter() - started)
+            return Finding("Zenoh over loopback", "ok", f"question and answer in {taken_ms:.1f} ms")
+    text = f"no answer in {_BUS_S:.0f} s; is loopback filtered?"
+    return Finding("Zenoh over loopback", "missing", text)
+
+
+def _clock() -> Finding:
+    from foretwin.sim_worker.vehicle.clock import silence_step_clock
+
+    if silence_step_clock():
+        return Finding("MuJoCo's step clock", "ok", "switched off")
+    return Finding("MuJoCo's step clock", "note", "cannot be switched off here; steps are slower")
+
+
+def _vulkan() -> Finding:
+    folders = [Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d")]
+    drivers = sorted(p.stem for f in folders if f.is_dir() for p in f.glob("*.json"))
+    if drivers:
+        return Finding("Vulkan drivers", "ok", ", ".join(drivers))
+    text = "none: no pictures and no native viewer (Debian: mesa-vulkan-drivers)"
+    return Finding("Vulkan drivers", "note", text)
+
+
+def _display() -> Finding:
+    if has_display():
+        return Finding("display", "ok", "--view auto opens the native viewer")
+    return Finding("display", "note", "none: --view auto writes monitor.rrd alone")
+
+
+def _disk() -> Finding:
+    free_gb = shutil.disk_usage(tempfile.gettempdir()).free / 1e9
+    return Finding("disk", "ok" if free_gb > 2 else "note", f"{free_gb:.1f} GB free")
+
+
+def _data() -> Finding:
+    folder = os.environ.get("FORETWIN_DATA")
+    if folder and Path(folder).is_dir():
+        return Finding("FORETWIN_DATA", "ok", "set: real-data tests run")
+    return Finding("FORETWIN_DATA", "note", "not set: real-data tests skip (drives need none)")
+
+
+def has_display() -> bool:
+    """Whether a window can be opened here."""
+    if sys.platform in ("darwin", "win32"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+CHECKS: tuple[Callable[[], Finding], ...] = (
+    _python, _cores, _tuning, _packages, _bus, _clock, _vulkan, _display, _disk, _data,
+)  # fmt: skip

@@ -1,0 +1,167 @@
+"""`foretwin gap`: the reality gap of a recorded drive as a table, plots and a verdict."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from foretwin.contracts.drive import GnssFix, VehicleInfo, VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.commands.gap_text import nobody_accused, table_lines, verdict_lines
+from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.sim_worker.analysis.gap.errors import GapMeter, GapRow, gap_table
+from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
+from foretwin.sim_worker.analysis.gap.limits import GapLimits
+from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
+from foretwin.sim_worker.analysis.gap.verdict import Judge, without_manual_commands
+from foretwin.sim_worker.analysis.motion_record import MotionRecorder
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.logs.log import Log, Sample
+from foretwin.telemetry.logs.opening import open_log
+
+_SECOND_NS = 1_000_000_000
+
+
+class GapReport(NamedTuple):
+    """What a recorded drive says of the gap."""
+
+    info: VehicleInfo
+    samples: list[GapSample]
+    rows: list[GapRow]
+    alarms: list[GapAlarm]
+    verdicts: list[Verdict]
+    refused: dict[str, int]
+    """Samples that the reader refused, by reason."""
+
+
+def gap_of(log: Log, vehicle: VehicleParameters, *, name: str, progress: bool = False) -> GapReport:
+    """Replay a drive through the estimator, the model and the judge.
+
+    `name` is what errors call the drive; with `progress` a bar runs over its seconds. Raises
+    UserError for a drive without a position or without motion.
+    """
+    messages = list(log.samples())
+    first = next((m for _, m in messages if isinstance(m, GnssFix)), None)
+    if first is None:
+        raise UserError(f"{name}: no position in the drive, so there is no motion to compare with")
+    stamps = [message.stamp_ns for _, message in messages]  # type: ignore[attr-defined]
+    seconds = (stamps[-1] - stamps[0]) // _SECOND_NS
+    if not progress:
+        return _measured(log, messages, vehicle, LocalFrame(first.position), name, lambda _: None)
+    with progress_bar(seconds, "seconds") as (advance, _):
+        return _measured(log, messages, vehicle, LocalFrame(first.position), name, advance)
+
+
+def _measured(
+    log: Log,
+    messages: list[Sample],
+    vehicle: VehicleParameters,
+    frame: LocalFrame,
+    name: str,
+    advance: Callable[[str], None],
+) -> GapReport:
+    estimator = StateEstimator(
+        log.info,
+        wheelbase_m=vehicle.wheelbase_m.value,
+        steering_ratio=vehicle.steering_ratio.value,
+        steering_offset_rad=vehicle.steering_offset_rad.value,
+    )
+    judge = Judge(log.info, vehicle, frame=frame)
+    recorder = MotionRecorder(frame=frame, keep_s=1e6, depth=len(messages) + 1)
+    states: list[VehicleState] = []
+    verdicts: list[Verdict] = []
+    next_ns: int | None = None
+    for channel, message in messages:
+        stamp_ns: int = message.stamp_ns  # type: ignore[attr-defined]
+        next_ns = stamp_ns + _SECOND_NS if next_ns is None else next_ns
+        while stamp_ns >= next_ns:
+            next_ns += _SECOND_NS
+            advance(Path(name).name)
+        recorder.handle(channel, message)
+        verdict = judge.handle(channel, message)
+        if verdict is not None:
+            verdicts.append(verdict)
+        state = estimator.handle(channel, message)
+        if state is not None:
+            states.append(state)
+    record = without_manual_commands(recorder.record())
+    motion = motion_on_grid(states, record.stamp_ns, frame=frame)
+    meter = GapMeter(FreeRunner(vehicle), vehicle_id=log.info.vehicle_id)
+    samples = meter.samples(record, motion)
+    if not samples:
+        raise UserError(f"{name}: the heading is never known for a second, so no run can begin")
+    limits = GapLimits()
+    alarms = [alarm for sample in samples for alarm in limits.handle(sample)]
+    refused = {reason: count for reason, count in log.skipped.items() if count}
+    return GapReport(log.info, samples, gap_table(samples), alarms, verdicts, refused)
+
+
+def report_gap(
+    recording: Path,
+    *,
+    vehicle: str | None,
+    as_json: bool,
+    out: Path | None,
+    declaration: Path | None = None,
+) -> None:
+    """Print the gap of a recorded drive; with `out` also write its plots there."""
+    parameters = load_vehicle(vehicle)
+    if out is not None and out.exists() and not out.is_dir():
+        raise UserError(f"{out}: is no folder")
+    log = open_log(recording, declaration=declaration)
+    report = gap_of(log, parameters, name=str(recording), progress=True)
+    plots: list[Path] = []
+    if out is not None:
+        from foretwin.orchestrator.commands.gap_plots import write_plots
+
+        out.mkdir(parents=True, exist_ok=True)
+        plots = write_plots(
+            report.samples, report.verdicts, out, start_ns=report.info.start_stamp_ns
+        )
+    if as_json:
+        print(json.dumps(as_object(report), indent=2))
+        return
+    print("\n".join(_lines(report)))
+    for plot in plots:
+        print(f"wrote {plot}")
+
+
+def as_object(report: GapReport) -> dict[str, Any]:
+    """Return the report as JSON has it: rows, verdicts with evidence, alarms, refused samples.
+
+    `reason` says why nobody is accused, null where somebody is.
+    """
+    return {
+        "vehicle_id": report.info.vehicle_id,
+        "independent": _commanded(report),
+        "rows": [row._asdict() for row in report.rows],
+        "reason": nobody_accused(report.verdicts, commanded=_commanded(report)),
+        "verdicts": [msgspec.to_builtins(verdict) for verdict in report.verdicts],
+        "alarms": [msgspec.to_builtins(alarm) for alarm in report.alarms],
+        "refused": report.refused,
+    }
+
+
+def _commanded(report: GapReport) -> bool:
+    return all(row.independent for row in report.rows)
+
+
+def _lines(report: GapReport) -> list[str]:
+    lines = list(table_lines(report.rows))
+    if report.refused:
+        left = ", ".join(f"{count} {reason}" for reason, count in sorted(report.refused.items()))
+        lines.append(f"refused: {left}")
+    start_ns = report.info.start_stamp_ns
+    return lines + list(
+        verdict_lines(
+            report.verdicts, report.alarms, start_ns=start_ns, commanded=_commanded(report)
+        )
+    )

@@ -1,0 +1,162 @@
+"""`foretwin identify`: what a recorded drive says of its vehicle's parameters."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import textwrap
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.tuning import Identification
+from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_acceptable, vehicle_toml
+from foretwin.sim_worker.analysis.identify.picture import draw_estimates, draw_steering
+from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
+from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.logs import open_log
+
+_FINE_S, _COARSE_S = 0.01, 0.02
+_LONG_S = 600.0
+_MOST_S = 2.0 * 3600.0
+_STANDS_MPS = 0.5
+_WIDTH = 80
+_ROW = "{:<21}{:>9}  {:<20} {:<13}{:>9} {:1}"
+_DEGREES = math.degrees(1.0)
+_SHOWN = {
+    "steering_ratio": ("steering ratio", "", 1.0),
+    "steering_offset_rad": ("steering offset", "° at the tyre", _DEGREES),
+    UNDERSTEER_NAME: ("understeer gradient", "mrad per m/s²", 1e3),
+    "wheelbase_m": ("wheelbase", "m", 1.0),
+    "steering_delay_s": ("steering delay", "ms", 1e3),
+    "steering_lag_s": ("steering lag", "ms", 1e3),
+    "drive_gain": ("drive gain", "", 1.0),
+    "brake_gain": ("brake gain", "", 1.0),
+    "drag_npv2": ("drag", "N/(m/s)²", 1.0),
+    "rolling_resistance_n": ("rolling resistance", "N", 1.0),
+    "accel_delay_s": ("drive, brake delay", "ms", 1e3),
+}
+"""Name, unit and scale by which a parameter is shown."""
+
+
+def identify_log(
+    log_file: Path, *, vehicle_file: str | None, as_json: bool, out: Path | None
+) -> int:
+    """Print what the log says; write plots and a vehicle file with what is taken to `out`.
+
+    Returns the exit code, 0.
+    """
+    vehicle = load_vehicle(vehicle_file)
+    record, vehicle_id = read_record(log_file)
+    told = identify(record, vehicle, vehicle_id=vehicle_id)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        changed, _ = accepted(told, vehicle, source=f"identified from {log_file.name}")
+        (out / "vehicle.toml").write_text(vehicle_toml(changed), encoding="utf-8")
+        body = msgspec.json.encode(told)
+        (out / "identification.json").write_bytes(msgspec.json.format(body, indent=1) + b"\n")
+        draw_estimates(told, out / "estimates.png")
+        # A drive without steering, yaw rate or speed has no such picture, and the table says so.
+        with contextlib.suppress(ValueError):
+            draw_steering(record, vehicle, out / "steering.png")
+    if as_json:
+        body = msgspec.json.encode(as_object(told))
+        print(msgspec.json.format(body, indent=1).decode())
+    else:
+        print("\n".join(as_lines(told)))
+        if out is not None:
+            print(f"{out}: vehicle.toml, identification.json and plots")
+    return 0
+
+
+def read_record(log_file: Path) -> tuple[MotionRecord, str]:
+    """Return a log's signals on a grid and its vehicle's id.
+
+    Raises UserError for a log of less than a second, of a vehicle that stands or without a sample
+    that identification could use, and what `open_log` raises.
+    """
+    log = open_log(log_file)
+    recorder: MotionRecorder | None = None
+    waiting: list[tuple[str, Any]] = []
+    for channel, message in log.samples():
+        if recorder is None:
+            waiting.append((channel, message))
+            if not isinstance(message, GnssFix):
+                continue
+            recorder = _recorder(message.position, waiting)
+        else:
+            recorder.handle(channel, message)
+    if recorder is None:
+        recorder = _recorder(GeoPoint(0.0, 0.0), waiting)
+    if recorder.newest_stamp_ns is None:
+        raise UserError(f"{log_file}: holds no speed, yaw rate, steering or command")
+    record = recorder.record(period_s=_COARSE_S)
+    if len(record.stamp_ns) * _COARSE_S < 1.0:
+        raise UserError(f"{log_file}: less than a second of driving")
+    fastest_mps = np.nanmax(np.abs(record.speed_mps), initial=0.0)
+    if record.has("speed_mps") and fastest_mps < _STANDS_MPS:
+        raise UserError(
+            f"{log_file}: the vehicle never goes faster than {fastest_mps:.1f} m/s: "
+            "identification needs a drive with bends, gas and brakes"
+        )
+    if record.time_s[-1] < _LONG_S:
+        record = recorder.record(period_s=_FINE_S)
+    return record, log.info.vehicle_id
+
+
+def _recorder(place: GeoPoint, waiting: list[tuple[str, Any]]) -> MotionRecorder:
+    recorder = MotionRecorder(frame=LocalFrame(place), keep_s=_MOST_S, depth=2_000_000)
+    for channel, message in waiting:
+        recorder.handle(channel, message)
+    return recorder
+
+
+def as_object(told: Identification) -> dict[str, Any]:
+    """Return `{parameter: {value, low, high, reason}}`; value, low and high may be None."""
+    return {
+        found.name: {
+            "value": found.value, "low": found.low, "high": found.high, "reason": found.reason
+        }
+        for found in told.estimates
+    }  # fmt: skip
+
+
+def as_lines(told: Identification) -> list[str]:
+    """Return the table, at most 80 columns wide: a line a parameter, reasons below them."""
+    duration_s = (told.stamp_ns - told.from_stamp_ns) * 1e-9
+    lines = [f"{duration_s:.0f} s of {told.vehicle_id}", ""]
+    lines.append(_ROW.format("", "value", "95 % interval", "unit", "file", "").rstrip())
+    for found in told.estimates:
+        name, unit, scale = _SHOWN[found.name]
+        interval = "" if found.low is None else _interval(found.low, found.high, scale)
+        taken = "*" if is_acceptable(found) else ""
+        lines.append(
+            _ROW.format(name, _number(found.value, scale), interval, unit,
+                        _number(found.prior, scale), taken).rstrip()
+        )  # fmt: skip
+        if found.reason:
+            lines += textwrap.wrap(
+                found.reason, _WIDTH, initial_indent="    ", subsequent_indent="    "
+            )
+    if told.steering_map:
+        lines += ["", "steering ratio by speed"]
+    for entry in told.steering_map:
+        speeds = f"{entry.from_mps:g} to {entry.to_mps:g} m/s"
+        interval = _interval(entry.low, entry.high, 1.0)
+        lines.append(_ROW.format(speeds, _number(entry.ratio, 1.0), interval, "", "", "").rstrip())
+    return [*lines, "", "* may be taken: nothing speaks against it"]
+
+
+def _number(value: float | None, scale: float) -> str:
+    # What is nothing but rounding error is shown as 0, and 0 without a sign.
+    return "-" if value is None else f"{round(value * scale, 5) + 0.0:.4g}"
+
+
+def _interval(low: float | None, high: float | None, scale: float) -> str:
+    return f"{_number(low, scale)} to {_number(high, scale)}"

@@ -1,0 +1,140 @@
+"""`foretwin judge`: a recorded drive again, with map, vehicle or Worlds corrected: what changes?"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from foretwin.contracts.codec import SchemaMismatch, read_message
+from foretwin.contracts.errors import UserError, one_line
+from foretwin.contracts.world import World
+from foretwin.orchestrator.agreement.difference import difference_lines, difference_of, read_judged
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.drive.drive import carry_out
+from foretwin.orchestrator.drive.plan import make_plan, read_inputs
+from foretwin.orchestrator.embedded import ROUTE_FILE
+from foretwin.orchestrator.record.versions import versions
+from foretwin.orchestrator.worlds.given_worlds import read_given_worlds
+
+RECORD, DRIVE = "run.json", "drive.mcap"
+JUDGED = "judged"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JudgeRequest:
+    """What was asked for on the command line."""
+
+    run: Path
+    map_file: Path | None = None
+    vehicle: str | None = None
+    worlds: Path | None = None
+    out: Path | None = None
+    as_json: bool = False
+
+
+def judge(request: JudgeRequest) -> int:
+    """Drive a run's recorded drive again in lock step and print what changes; returns 0, or the
+    exit code of the drive that did not come to its end.
+
+    What it is compared with is the run itself where that was in lock step and of this version;
+    else the drive is first driven again as it was, so that nothing but the correction differs.
+    """
+    record = _record(request.run)
+    again = _again(request.run, record, out=request.out or request.run / JUDGED)
+    corrected = msgspec.structs.replace(
+        again,
+        map=again.map if request.map_file is None else str(request.map_file),
+        vehicle=request.vehicle or again.vehicle,
+        worlds=again.worlds if request.worlds is None else str(request.worlds),
+    )
+    if request.worlds is not None:
+        _check_on_way(request.worlds, request.run, record)
+    read_inputs(corrected)  # what is wrong with them is told before anything long begins
+    before = request.run
+    if record["config"].get("speed") is not None or record.get("versions") != versions():
+        _say(f"{request.run}: driven again as it was, in lock step, to compare with")
+        code, before = _drive(again)
+        if code:
+            return code
+    _say("driven again with what is corrected")
+    code, after = _drive(corrected)
+    if code:
+        return code
+    found = difference_of(read_judged(before), read_judged(after))
+    if request.as_json:
+        print(json.dumps(found, indent=2, ensure_ascii=False))
+    else:
+        print("\n".join(difference_lines(found)))
+    return 0
+
+
+def _drive(config: DriveConfig) -> tuple[int, Path]:
+    plan = make_plan(read_inputs(config), datetime.datetime.now())
+    return carry_out(plan), plan.folder
+
+
+def _record(run: Path) -> dict[str, Any]:
+    for part in (RECORD, DRIVE):
+        if not (run / part).is_file():
+            raise FileNotFoundError(f"run {run}: no {part} in it")
+    try:
+        record: dict[str, Any] = json.loads((run / RECORD).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise UserError(f"{run / RECORD}: not JSON: {error}") from error
+    if not isinstance(record, dict):
+        raise UserError(f"{run / RECORD}: not the record of a run: must be a JSON object")
+    if "config" not in record:
+        exit_word = record.get("exit", "not told")
+        raise UserError(f"{run / RECORD}: the drive never came to its end (exit: {exit_word})")
+    return record
+
+
+def _again(run: Path, record: dict[str, Any], *, out: Path) -> DriveConfig:
+    """Return the configuration of a run, for its recorded drive in lock step."""
+    try:
+        was = msgspec.convert(record["config"], DriveConfig)
+        map_file = record["map"]["file"]
+    except (msgspec.ValidationError, KeyError, TypeError) as error:
+        raise UserError(
+            f"{run / RECORD}: of another version of foretwin: {one_line(error)}"
+        ) from error
+    route = was.route or (str(ROUTE_FILE) if was.map is None else None)
+    if was.route == "live":
+        _say(f"{run}: what it said of its route is not recorded; the way ahead is predicted")
+        route = None
+    kept = tuple(one for one in was.vehicles if not one.live)
+    if len(kept) < len(was.vehicles):
+        gone = ", ".join(one.id for one in was.vehicles if one.live)
+        _say(f"{run}: without {gone}: what live vehicles beside the car sent is not recorded")
+    return msgspec.structs.replace(
+        was, log=str(run / DRIVE), source="log", map=map_file, route=route,
+        speed=None, view="none", out=str(out), endpoint=None, ros2=None, towards_vehicle=False,
+        vehicles=kept,
+    ).validate()  # fmt: skip
+
+
+def _check_on_way(folder: Path, run: Path, record: dict[str, Any]) -> None:
+    """Raise UserError for a World that the run never asked for: nothing would change by it."""
+    reached = record.get("intersections") or ()
+    asked = {str(one["id"]) for one in reached if isinstance(one, dict) and "id" in one}
+    for file in run.glob("worlds/*.world"):
+        with contextlib.suppress(SchemaMismatch):
+            asked.add(read_message(file, World).intersection.id)
+    for name in read_given_worlds(folder):
+        if name not in asked:
+            known = ", ".join(sorted(asked)) or "none"
+            raise UserError(
+                f"worlds {folder}: that of junction {name} does not belong to the way of {run}: "
+                f"its junctions are {known}"
+            )
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,105 @@
+"""`foretwin scenarios export` and `draw`: one case of a scenario at one junction, as a file."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+from typing import NamedTuple
+
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.world import World
+from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlaceRequest, asked_junctions
+from foretwin.sim_worker.planners.registry import check_planner
+from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.openscenario import write_openscenario
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import find_scenario
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.map_index import index_map
+
+
+class CaseRequest(NamedTuple):
+    """Which case of which scenario, and where; the first case is 1."""
+
+    scenario: str
+    where: PlaceRequest
+    case: int
+    vehicle: Path | None = None
+
+
+class PlacedCase(NamedTuple):
+    """A case as it was cast in a World."""
+
+    scenario: Scenario
+    world: World
+    played: Cast
+
+
+def export_scenario(request: CaseRequest, out: Path) -> None:
+    """Write one case as OpenSCENARIO, and its roads beside it as OpenDRIVE.
+
+    Raises UserError where there is no such case, or no place for it at that junction.
+    """
+    if out.suffix != ".xosc":
+        raise UserError(f"{out}: an OpenSCENARIO file is written as .xosc")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    vehicle = load_vehicle(request.vehicle)
+    found = placed_case(request)
+    roads = write_openscenario(
+        found.played, found.scenario, found.world, out, vehicle=vehicle,
+        written_at=datetime.datetime.now(datetime.UTC),
+    )  # fmt: skip
+    played = found.played
+    print(f"{out}: {found.scenario.id}, case {request.case}, at {played.place.junction_id}")
+    print(f"{roads}: its roads")
+
+
+def draw_scenario(request: CaseRequest, out: Path, *, planner: str) -> None:
+    """Write a picture of one case: as planned, and as a planner drives it.
+
+    Raises UserError where there is no such case, place or planner, or where the planner fails.
+    """
+    from foretwin.sim_worker.futures.case_picture import write_case_picture
+    from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
+
+    if out.suffix != ".png":
+        raise UserError(f"{out}: a picture of a case is written as .png")
+    try:
+        check_planner(planner)
+    except ValueError as error:
+        raise UserError(str(error)) from error
+    vehicle = load_vehicle(request.vehicle)
+    scenario, world, played = placed_case(request)
+    heedless = heedless_run(played, vehicle, horizon_s=scenario.horizon_s)
+    try:
+        planned = planned_run(played, scenario, world, vehicle, planner=planner)
+    except ValueError as error:
+        raise UserError(str(error)) from error
+    write_case_picture(out, played, scenario, world, heedless, planned, planner=planner)
+    print(f"{out}: {scenario.id}, case {request.case}, at {played.place.junction_id}")
+
+
+def placed_case(request: CaseRequest) -> PlacedCase:
+    """Return a case at the first place of a junction where it can be cast."""
+    scenario = find_scenario(request.scenario)
+    cases = draw_cases(scenario)
+    if not 1 <= request.case <= len(cases):
+        raise UserError(f"{scenario.id} has cases 1 to {len(cases)}; there is no {request.case}")
+    if request.where.at is None and request.where.junction_id is None:
+        raise UserError("name the junction by --at LAT,LON or --id ID")
+    vehicle = load_vehicle(request.vehicle)
+    opened, junctions = asked_junctions(request.where)
+    index = index_map(opened.osm, opened.graph, opened.junctions)
+    world = build_world(opened.osm, opened.graph, junctions[0], radius_m=RADIUS_M, index=index)
+    result = places(scenario, world, vehicle=vehicle)
+    reasons = [unplaced.reason for unplaced in result.unplaced]
+    for place in result.places:
+        played = cast(scenario, cases[request.case - 1], place, vehicle=vehicle)
+        if isinstance(played, Cast):
+            return PlacedCase(scenario, world, played)
+        reasons.append(played.reason)
+    where = junctions[0].summary
+    raise UserError(f"{scenario.id} has no place at {where.id} {where.name}: {reasons[0]}")

@@ -1,0 +1,207 @@
+"""The commands on scenarios: list the catalogue, check a file, place scenarios on a map."""
+
+from __future__ import annotations
+
+import collections
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.scenario import Scenario
+from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.worlds.choice import (
+    FARTHEST_M,
+    junction_by_id,
+    nearest_junction,
+    node_of_id,
+    parse_place,
+)
+from foretwin.orchestrator.worlds.opening import Clip, NodeClip, OpenMap, open_map
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_world
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import index_map
+
+RADIUS_M = 150.0
+
+
+class PlacedScenario(msgspec.Struct, kw_only=True):
+    """Where one scenario takes place among the junctions that were looked at.
+
+    `places` names, by junction, the connections of the first place there; `unplaced` tells why
+    junctions that it applies to have none, `does_not_apply` counts the others by reason.
+    """
+
+    id: str
+    title: str
+    source: str
+    looked_at: int = 0
+    applies: int = 0
+    placed: int = 0
+    places: dict[str, str] = {}
+    unplaced: dict[str, str] = {}
+    does_not_apply: dict[str, int] = {}
+
+
+class PlaceRequest(NamedTuple):
+    """What was asked for on the command line, as it was typed."""
+
+    map_file: Path
+    scenarios: Sequence[str] = ()
+    junction_id: str | None = None
+    at: str | None = None
+    service_roads: bool = False
+
+
+def list_scenarios(*, as_json: bool) -> None:
+    """Print the catalogue."""
+    found = catalogue().values()
+    if as_json:
+        _print_json([_described(scenario) for scenario in found])
+        return
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    table = Table(
+        Column("id", no_wrap=True), "title", "cases", "where", "source", title="scenarios"
+    )
+    for scenario in found:
+        table.add_row(
+            scenario.id, scenario.title, str(len(draw_cases(scenario))),
+            _where(scenario), scenario.source,
+        )  # fmt: skip
+    Console().print(table)
+
+
+def check_scenario_file(file: Path) -> None:
+    """Print what a scenario file holds; UserError, in one line, where it holds none."""
+    scenario = read_scenario(file)
+    cases = len(draw_cases(scenario))
+    print(f"{file}: {scenario.id}, {scenario.title}: {cases} cases, {_where(scenario)}")
+
+
+def place_scenarios(request: PlaceRequest, *, as_json: bool) -> int:
+    """Print where scenarios take place on a map's junctions, and why not elsewhere.
+
+    Returns 0, or 3 where a junction that a scenario applies to has no place for it.
+    """
+    chosen = [find_scenario(name) for name in request.scenarios] or list(catalogue().values())
+    opened, junctions = asked_junctions(request)
+    with progress_bar(len(junctions), "junctions") as (advance, _):
+        found = placed_on(opened, junctions, chosen, advance=advance)
+    if as_json:
+        _print_json(found)
+    else:
+        _print_table(request.map_file, found)
+    return 3 if any(scenario.unplaced for scenario in found) else 0
+
+
+def asked_junctions(request: PlaceRequest) -> tuple[OpenMap, tuple[Junction, ...]]:
+    """Open as much of a map as is needed; returns it and the junctions that were asked for."""
+    if request.at is not None and request.junction_id is not None:
+        raise UserError("name the junction by --at LAT,LON or by --id ID, not by both")
+    if request.at is not None:
+        lat, lon = parse_place(request.at)
+        around = Clip(np.array([[lat, lon]]), RADIUS_M + FARTHEST_M)
+        opened = open_map(request.map_file, clip=around, service_roads=request.service_roads)
+        return opened, (nearest_junction(opened, lat, lon),)
+    if request.junction_id is not None:
+        clip = NodeClip(node_of_id(request.junction_id), RADIUS_M)
+        opened = open_map(request.map_file, clip=clip, service_roads=request.service_roads)
+        return opened, (junction_by_id(opened, request.junction_id),)
+    opened = open_map(request.map_file, service_roads=request.service_roads)
+    if not opened.junctions:
+        raise UserError(f"{opened.file}: no intersection in this map")
+    return opened, tuple(sorted(opened.junctions, key=lambda j: j.summary.id))
+
+
+def placed_on(
+    opened: OpenMap,
+    junctions: Sequence[Junction],
+    scenarios: Sequence[Scenario],
+    *,
+    advance: Callable[[str], None] = lambda _: None,
+) -> list[PlacedScenario]:
+    """Return where scenarios take place on junctions of a map: one place for each is enough.
+
+    `advance` is told each junction that has been looked at.
+    """
+    found = [PlacedScenario(id=s.id, title=s.title, source=s.source) for s in scenarios]
+    index = index_map(opened.osm, opened.graph, opened.junctions)
+    vehicle = load_vehicle()
+    for junction in junctions:
+        world = build_world(
+            opened.osm, opened.graph, junction, radius_m=RADIUS_M, index=index, ground=False
+        )
+        network = RoadNetwork(world)
+        for scenario, row in zip(scenarios, found, strict=True):
+            result = places(scenario, world, network=network, vehicle=vehicle, most=1)
+            row.looked_at += 1
+            for place in result.places:
+                row.placed += 1
+                row.places[place.junction_id] = place.name
+            for unplaced in result.unplaced:
+                if unplaced.applies:
+                    row.unplaced[unplaced.junction_id] = unplaced.reason
+                else:
+                    count = row.does_not_apply.get(unplaced.reason, 0)
+                    row.does_not_apply[unplaced.reason] = count + 1
+        advance(junction.summary.id)
+    for row in found:
+        row.applies = row.placed + len(row.unplaced)
+    return found
+
+
+def _print_table(map_file: Path, found: list[PlacedScenario]) -> None:
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    table = Table(
+        Column("id", no_wrap=True), "placed", "applies to", "of", "elsewhere", title=str(map_file)
+    )
+    for row in found:
+        reasons = collections.Counter(row.unplaced.values())
+        lines = [f"{count} unplaced: {reason}" for reason, count in reasons.most_common()]
+        others = sorted(row.does_not_apply.items(), key=lambda item: -item[1])
+        lines += [f"{count}: {reason}" for reason, count in others]
+        table.add_row(
+            row.id, str(row.placed), str(row.applies), str(row.looked_at), "\n".join(lines)
+        )
+    Console().print(table)
+
+
+def _described(scenario: Scenario) -> dict[str, object]:
+    return {
+        "id": scenario.id,
+        "title": scenario.title,
+        "shows": scenario.shows,
+        "source": scenario.source,
+        "setting": scenario.where.setting,
+        "kinds": scenario.where.kinds,
+        "controls": scenario.where.controls,
+        "actors": [
+            {"name": a.name, "kind": a.kind, "relation": a.relation, "conduct": a.conduct}
+            for a in scenario.actors
+        ],
+        "cases": len(draw_cases(scenario)),
+        "horizon_s": scenario.horizon_s,
+    }
+
+
+def _where(scenario: Scenario) -> str:
+    where = scenario.where
+    if where.setting != "junction":
+        return where.setting.replace("_", " ")
+    return ", ".join((*where.kinds, *where.controls)) or "any junction"
+
+
+def _print_json(body: object) -> None:
+    print(msgspec.json.format(msgspec.json.encode(body), indent=1).decode())

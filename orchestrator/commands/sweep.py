@@ -1,0 +1,160 @@
+"""The command `sweep`: places scenarios, plays what is not yet played, and sums up."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.sweep.folder import (
+    FoundPlaces,
+    SweepFolder,
+    built_worlds,
+    fingerprint_of,
+)
+from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
+from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, failed_rows, start_worker
+from foretwin.orchestrator.sweep.pool import Crew, Lost, Task
+from foretwin.orchestrator.sweep.rows import Parts, RowsHash
+from foretwin.orchestrator.sweep.spec import Loaded, load_spec, worlds_folder
+from foretwin.orchestrator.sweep.summary import Summary, print_summary
+from foretwin.orchestrator.sweep.worlds import source_digest, sweep_worlds
+
+SOME_FAILED = 3
+
+
+class SweepRequest(NamedTuple):
+    """What was asked for on the command line."""
+
+    spec: Path
+    out: Path | None = None
+    workers: int = 2
+    fresh: bool = False
+    as_json: bool = False
+
+
+def sweep(request: SweepRequest) -> int:
+    """Run a sweep, or go on with it; returns 0, or 3 where futures failed.
+
+    Raises UserError and FileNotFoundError, in one line, for a request that cannot be met.
+    """
+    if request.workers < 1:
+        raise UserError(f"--workers {request.workers}: at least 1")
+    loaded = load_spec(request.spec)
+    out = request.out or Path("sweeps") / request.spec.stem
+    with crew_for(loaded, out, request.workers) as crew:
+        summary = run_sweep(loaded, out, crew, fresh=request.fresh)
+    if request.as_json:
+        sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
+    else:
+        print_summary(out, summary)
+    return SOME_FAILED if summary["failed"] or summary["failures"] else 0
+
+
+def crew_for(loaded: Loaded, out: Path, workers: int) -> Crew:
+    """Return the processes that play a sweep in the folder `out`."""
+    worlds = worlds_folder(loaded.spec) or built_worlds(out)
+    setup = PlaySetup(loaded=loaded, worlds_dir=str(worlds))
+    return Crew(workers, start_worker, setup, timeout_s=loaded.spec.job_timeout_s)
+
+
+def run_sweep(loaded: Loaded, out: Path, crew: Crew, *, fresh: bool = False) -> dict[str, Any]:
+    """Play what is not yet played of a sweep, and return its summary as `sweep.json` has it."""
+    folder = SweepFolder(out, fingerprint_of(loaded, source_digest(loaded.spec)), fresh=fresh)
+    folder.begin(loaded)
+    places = folder.places() or _find_places(loaded, folder, crew)
+    plan = plan_sweep(loaded, places.worlds)
+    parts = Parts(folder.rows_dir, loaded.spec)
+    there = parts.done(plan.jobs)
+    started_s = time.monotonic()
+    _play([job for job in plan.jobs if job.number not in there], loaded, parts, crew)
+    return folder.summarise(
+        _summary(loaded, plan, places, parts)
+        | {"jobs_played": len(plan.jobs) - len(there),
+           "playing_s": round(time.monotonic() - started_s, 3)}
+    )  # fmt: skip
+
+
+def _find_places(loaded: Loaded, folder: SweepFolder, crew: Crew) -> FoundPlaces:
+    """Build or read the Worlds, and find where the scenarios take place in each."""
+    with _counting("Worlds") as advance:
+        worlds = sweep_worlds(loaded.spec, folder.worlds_dir, advance)
+    found: dict[int, WorldPlaces] = {}
+    failures = dict(worlds.failures)
+    tasks = [Task(i, id_, PlaceQuestion(world_id=id_)) for i, id_ in enumerate(worlds.ids)]
+    with progress_bar(len(tasks), "Worlds placed on") as (advance_one, say):
+
+        def done(task: Task, answer: WorldPlaces | Lost) -> None:
+            if isinstance(answer, Lost):
+                failures[task.place] = answer.reason
+                say(f"failed: world {task.place}: {answer.reason}")
+            else:
+                found[task.number] = answer
+            advance_one(task.place)
+
+        crew.run(tasks, done)
+    return folder.save_places(tuple(found[number] for number in sorted(found)), failures)
+
+
+class _counting:  # noqa: N801
+    """A progress bar whose length is known with the first step."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._bar: Any = None
+        self._advance: Any = None
+
+    def __enter__(self) -> Any:
+        return self._count
+
+    def _count(self, name: str, number: int, total: int) -> None:
+        if self._bar is None:
+            self._bar = progress_bar(total, self._what)
+            self._advance, _ = self._bar.__enter__()
+        self._advance(name)
+
+    def __exit__(self, *what: Any) -> None:
+        if self._bar is not None:
+            self._bar.__exit__(*what)
+
+
+def _play(jobs: Sequence[SweepJob], loaded: Loaded, parts: Parts, crew: Crew) -> None:
+    """Play jobs and write their rows as they come."""
+    with progress_bar(sum(len(job.cells) for job in jobs), "futures") as (advance, say):
+
+        def done(task: Task, answer: list[dict[str, Any]] | Lost) -> None:
+            job: SweepJob = task.question
+            if isinstance(answer, Lost):
+                say(f"failed: job {job.number}: {answer.reason}")
+                answer = failed_rows(job, loaded, answer.reason)
+            parts.write(job.number, answer)
+            for _ in job.cells:
+                advance(f"{job.cells[0].junction_id} {job.planner}")
+
+        crew.run([Task(job.number, job.world_id, job) for job in jobs], done)
+
+
+def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts) -> dict[str, Any]:
+    digest, counted = RowsHash(), Summary(loaded.spec)
+    for row in parts.rows(plan.jobs):
+        digest.add(row)
+        counted.add(row)
+    unplaced = [one for world in places.worlds for one in world.unplaced]
+    return {
+        "complete": True,
+        "spec": loaded.spec,
+        "worlds": len(places.worlds),
+        "jobs": len(plan.jobs),
+        **counted.totals(),
+        "rows_sha256": digest.hexdigest(),
+        "scenarios": counted.table(),
+        "unplaced": [one for one in unplaced if one.applies],
+        "does_not_apply": sum(not one.applies for one in unplaced),
+        "failures": places.failures,
+    }

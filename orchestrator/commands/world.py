@@ -1,0 +1,244 @@
+"""The command `world`: checks what is asked for, builds the Worlds, writes them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import World
+from foretwin.orchestrator.commands.world_files import write_each, write_report
+from foretwin.orchestrator.worlds.choice import (
+    FARTHEST_M,
+    junction_by_id,
+    junctions_along,
+    nearest_junction,
+    node_of_id,
+    parse_bbox,
+    parse_place,
+    read_route,
+)
+from foretwin.orchestrator.worlds.opening import Clip, NodeClip, OpenMap, open_map, region_on_map
+from foretwin.world_gen.build import build_region, build_world
+from foretwin.world_gen.export.choices import (
+    OPENDRIVE_VERSIONS,
+    SIMULATORS,
+    VEHICLE_KINDS,
+    VehicleKind,
+)
+from foretwin.world_gen.export.formats import FORMATS, ExportOptions, Format
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import MapIndex, index_map
+from foretwin.world_gen.osm.osm_map import LatLonBounds
+
+_Word = TypeVar("_Word", bound=str)
+MIN_RADIUS_M, MAX_RADIUS_M = 20.0, 2000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldRequest:
+    """What was asked for on the command line, as it was typed."""
+
+    map_file: Path
+    out: Path
+    at: str | None = None
+    junction_id: str | None = None
+    bbox: str | None = None
+    route: Path | None = None
+    everything: bool = False
+    service_roads: bool = False
+    file_format: str = "mjcf"
+    radius_m: float = 150.0
+    opendrive_version: str = "1.8"
+    simulator: str = "classic"
+    vehicles: str = "twin:twin,shadow:shadow,ghost:ghost"
+    vehicle: Path | None = None
+    report: bool = False
+
+
+def write_worlds(request: WorldRequest) -> int:
+    """Build and write what is asked for; returns 0, or 3 where some of many Worlds failed.
+
+    Raises UserError, in one line, for anything that cannot be meant.
+    """
+    format_ = _format(request)
+    options = _options(request)
+    many = request.everything or request.route is not None
+    _check_out(request.out, format_, many=many)
+    if request.bbox is not None:
+        return _region(request, parse_bbox("--bbox", request.bbox), format_, options)
+    if request.at is not None:
+        lat, lon = parse_place(request.at)
+        opened = _open(request, Clip(np.array([[lat, lon]]), request.radius_m + FARTHEST_M))
+        return _single(opened, nearest_junction(opened, lat, lon), request, format_, options)
+    if request.junction_id is not None:
+        clip = NodeClip(node_of_id(request.junction_id), request.radius_m)
+        opened = _open(request, clip)
+        junction = junction_by_id(opened, request.junction_id)
+        return _single(opened, junction, request, format_, options)
+    if request.route is not None:
+        line_deg = read_route(request.route)
+        opened = _open(request, Clip(line_deg, request.radius_m))
+        opened, along = junctions_along(opened, request.route, line_deg)
+        # A junction that is passed twice is written once.
+        junctions = tuple({junction.summary.id: junction for junction in along}.values())
+    else:
+        opened = _open(request)
+        junctions = tuple(sorted(opened.junctions, key=lambda j: j.summary.id))
+    return _write_many(opened, junctions, request, format_, options)
+
+
+def _open(request: WorldRequest, clip: Clip | NodeClip | LatLonBounds | None = None) -> OpenMap:
+    return open_map(request.map_file, clip=clip, service_roads=request.service_roads)
+
+
+def _region(
+    request: WorldRequest, bounds: LatLonBounds, format_: Format, options: ExportOptions
+) -> int:
+    opened = _open(request, bounds)
+    part = region_on_map(opened.file, opened.osm.bounds, bounds)
+    world = build_region(opened.osm, opened.graph, part, index=_index(opened))
+    return _write_one(world, request, format_, options)
+
+
+def _single(
+    opened: OpenMap,
+    junction: Junction,
+    request: WorldRequest,
+    format_: Format,
+    options: ExportOptions,
+) -> int:
+    world = build_world(
+        opened.osm, opened.graph, junction, radius_m=request.radius_m, index=_index(opened)
+    )
+    return _write_one(world, request, format_, options)
+
+
+def _write_one(world: World, request: WorldRequest, format_: Format, options: ExportOptions) -> int:
+    format_.write(world, request.out, options)
+    s = world.intersection
+    place = s.kind if s.kind == "region" else f"{s.kind} {s.name or s.id} ({s.id})"
+    print(f"{request.out}: {place}, {len(world.lanes)} lanes, {len(world.buildings)} buildings, "
+          f"{len(world.notes)} notes. {world.attribution}")  # fmt: skip
+    if request.report:
+        write_report(world, request.out, show=True)
+    return 0
+
+
+def _write_many(
+    opened: OpenMap,
+    junctions: Sequence[Junction],
+    request: WorldRequest,
+    format_: Format,
+    options: ExportOptions,
+) -> int:
+    if not junctions:
+        where = "in this map" if request.route is None else f"along {request.route}"
+        raise UserError(f"{opened.file}: no intersection {where}")
+    index = _index(opened)
+
+    def built(junction: Junction) -> World:
+        return build_world(
+            opened.osm, opened.graph, junction, radius_m=request.radius_m, index=index
+        )
+
+    return write_each(
+        junctions, built, lambda world, path: format_.write(world, path, options),
+        folder=request.out, suffix=format_.suffix, report=request.report,
+        attribution=opened.osm.attribution,
+    )  # fmt: skip
+
+
+def _index(opened: OpenMap) -> MapIndex:
+    return index_map(opened.osm, opened.graph, opened.junctions)
+
+
+def _format(request: WorldRequest) -> Format:
+    chosen = [
+        name
+        for name, given in (
+            ("--at", request.at is not None), ("--id", request.junction_id is not None),
+            ("--bbox", request.bbox is not None), ("--route", request.route is not None),
+            ("--all", request.everything),
+        )
+        if given
+    ]  # fmt: skip
+    if len(chosen) != 1:
+        raise UserError(
+            "name the place by exactly one of --at LAT,LON, --id ID, --bbox W,S,E,N, "
+            f"--route FILE or --all; got {' and '.join(chosen) or 'none'}"
+        )
+    if request.file_format not in FORMATS:
+        raise UserError(f"--format {request.file_format}: one of {', '.join(FORMATS)}")
+    if not MIN_RADIUS_M <= request.radius_m <= MAX_RADIUS_M:
+        raise UserError(
+            f"--radius {request.radius_m}: {MIN_RADIUS_M:.0f} to {MAX_RADIUS_M:.0f} metres"
+        )
+    return FORMATS[request.file_format]
+
+
+def _options(request: WorldRequest) -> ExportOptions:
+    version = _one_of("--opendrive-version", request.opendrive_version, OPENDRIVE_VERSIONS)
+    simulator = _one_of("--simulator", request.simulator, SIMULATORS)
+    vehicles = _vehicles(request.vehicles)
+    if request.file_format != "sdf" or not vehicles:
+        return ExportOptions(opendrive_version=version, simulator=simulator)
+    from foretwin.sim_worker.vehicle.parameters import load_vehicle
+
+    return ExportOptions(
+        simulator=simulator, vehicles=vehicles, vehicle=load_vehicle(request.vehicle)
+    )
+
+
+def _one_of(option: str, word: str, choices: tuple[_Word, ...]) -> _Word:
+    for choice in choices:
+        if choice == word:
+            return choice
+    raise UserError(f"{option} {word}: one of {', '.join(choices)}")
+
+
+def _vehicles(text: str) -> tuple[tuple[str, VehicleKind], ...]:
+    """Return (name, kind) pairs of NAME:KIND,… or none."""
+    if text == "none":
+        return ()
+    pairs = []
+    for part in text.split(","):
+        name, _, word = part.partition(":")
+        kind = next((kind for kind in VEHICLE_KINDS if kind == word), None)
+        if kind is None or not name.isidentifier():
+            raise UserError(
+                f"--vehicles {text}: none, or NAME:KIND,… with KIND one of "
+                f"{', '.join(VEHICLE_KINDS)}"
+            )
+        pairs.append((name, kind))
+    if len({name for name, _ in pairs}) < len(pairs):
+        raise UserError(f"--vehicles {text}: each vehicle needs a name of its own")
+    return tuple(pairs)
+
+
+def _check_out(out: Path, format_: Format, *, many: bool) -> None:
+    if many:
+        if out.exists() and not out.is_dir():
+            raise UserError(f"--out {out}: is a file; --all and --route write into a folder")
+        _check_writable(out, next(path for path in (out, *out.parents) if path.exists()))
+        return
+    if out.is_dir():
+        raise UserError(f"--out {out}: is a folder; name the file to write")
+    if not out.parent.is_dir():
+        raise UserError(f"--out {out}: folder {out.parent} does not exist")
+    if format_.told_by_suffix and out.suffix.lower() != format_.suffix:
+        raise UserError(f"--out {out}: a file of --format {format_.name} ends in {format_.suffix}")
+    _check_writable(out, out.parent)
+
+
+def _check_writable(out: Path, folder: Path) -> None:
+    """Refuse before the map is read, which may take long; UserError says what stands there."""
+    if not folder.is_dir():
+        raise UserError(f"--out {out}: {folder} is no folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UserError(f"--out {out}: folder {folder} cannot be written to")

@@ -1,0 +1,87 @@
+"""Writes many Worlds into a folder, with a progress bar, and says what became of them."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from foretwin.contracts.world import World
+from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.world_gen.junctions.intersections import Junction
+
+FAILURES_FILE = "failures.txt"
+SOME_FAILED = 3
+_SHOWN_KINDS = 20
+
+
+def write_each(
+    junctions: Sequence[Junction],
+    build: Callable[[Junction], World],
+    write: Callable[[World, Path], None],
+    *,
+    folder: Path,
+    suffix: str,
+    attribution: str,
+    report: bool = False,
+) -> int:
+    """Write one file per junction into a folder, made if need be; returns 0, or 3 if some failed.
+
+    What goes wrong with one junction is said in a line and in the failures file of the folder,
+    and does not stop the others.
+    """
+    from foretwin.world_gen.report.report import note_kind
+
+    folder.mkdir(parents=True, exist_ok=True)
+    kinds: Counter[str] = Counter()
+    failures: list[str] = []
+    with progress_bar(len(junctions), "Worlds") as (advance, say):
+        for junction in junctions:
+            name = junction.summary.id
+            path = folder / f"{_file_name(name)}{suffix}"
+            try:
+                world = build(junction)
+                write(world, path)
+                if report:
+                    write_report(world, path, show=False)
+                kinds.update({note_kind(note) for note in world.notes})
+            except Exception as error:  # one bad junction never stops the rest
+                path.unlink(missing_ok=True)
+                failures.append(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
+                say(f"failed: {failures[-1]}")
+            advance(name)
+    return _summary(len(junctions), failures, kinds, folder, attribution)
+
+
+def write_report(world: World, path: Path, *, show: bool) -> None:
+    """Write what was tagged, inferred and a default beside a World's file; print it if asked to."""
+    from foretwin.world_gen.report.report import report_of
+
+    report = report_of(world)
+    for ending, text in ((".report.md", report.as_markdown()), (".report.json", report.as_json())):
+        path.with_name(path.name + ending).write_text(text, encoding="utf-8")
+    if show:
+        print(report.as_text(), end="")
+
+
+def _summary(
+    count: int, failures: list[str], kinds: Counter[str], folder: Path, attribution: str
+) -> int:
+    listed = folder / FAILURES_FILE
+    listed.unlink(missing_ok=True)
+    print(f"{folder}: {count - len(failures)} of {count} Worlds written. {attribution}")
+    for kind, junctions in kinds.most_common(_SHOWN_KINDS):
+        print(f"  {junctions:6d}  {kind}")
+    if len(kinds) > _SHOWN_KINDS:
+        print(f"  and {len(kinds) - _SHOWN_KINDS} more kinds of notes")
+    if not failures:
+        return 0
+    listed.write_text("\n".join(failures) + "\n", encoding="utf-8")
+    print(f"{len(failures)} failed: {listed}", file=sys.stderr)
+    return SOME_FAILED
+
+
+def _file_name(junction_id: str) -> str:
+    return re.sub(r"[^\w.+-]+", "_", junction_id)

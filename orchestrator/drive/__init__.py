@@ -1,0 +1,1 @@
+"""One drive: mission, processes, supervision, and the loops that carry messages."""

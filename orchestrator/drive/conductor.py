@@ -1,0 +1,298 @@
+"""Carries messages between bus and core: both loops feed it what lies in the mailbox."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+from foretwin.contracts import keys
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.simulation import ActiveWorld
+from foretwin.contracts.world import World
+from foretwin.orchestrator.drive.events import EventDesk
+from foretwin.orchestrator.drive.intake import Intake
+from foretwin.orchestrator.drive.mirror_handler import MirrorDesk
+from foretwin.orchestrator.drive.mission import Mission
+from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR
+from foretwin.orchestrator.drive.questions import Questions
+from foretwin.orchestrator.drive.route_handler import RouteDesk
+from foretwin.orchestrator.drive.side_by_side_handler import HumanDesk
+from foretwin.orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
+from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.rounds.runner import RoundRunner
+from foretwin.orchestrator.runtime_configuration import roles
+from foretwin.orchestrator.runtime_configuration.handler import ChangeDesk
+from foretwin.orchestrator.tuning.by_hand import VehicleHandler
+from foretwin.orchestrator.tuning.link import FINDINGS, TuningLink
+from foretwin.orchestrator.worlds.handler import WorldDesk
+
+log = logging.getLogger(ORCHESTRATOR)
+
+MAILBOX_DEPTH = 16384
+
+
+class Conductor:
+    """The state of one drive between its messages."""
+
+    def __init__(self, plan: DrivePlan, bus: Bus, mission: Mission, tables: ResultTables) -> None:
+        self.plan = plan
+        self.bus = bus
+        self.mission = mission
+        self.tables = tables
+        self.mailbox = Mailbox(
+            MAILBOX_DEPTH, when_full="block" if plan.config.lock_step else "drop_oldest"
+        )
+        self.intake = Intake(plan.vehicle, pace=plan.config.speed)
+        self.events = EventDesk(
+            bus, tables, run_id=plan.run_id, now_stamp_ns=lambda: self.intake.now_stamp_ns
+        )
+        self.tell = self.events.tell
+        self.worlds = WorldDesk(
+            plan, bus, self.mailbox, on_ready=self._world_ready, on_failed=self._world_failed,
+            tell=self.tell,
+        )  # fmt: skip
+        self.rounds = RoundRunner(
+            plan, bus, self.mailbox, tables, world_of=self.worlds.world, tell=self.tell,
+            on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
+        )  # fmt: skip
+        self.human = HumanDesk(plan, bus, tables, self.intake, mission, tell=self.tell)
+        self.alive: set[str] = set()
+        self.missed_rounds = 0
+        self.spared_rounds = 0
+        """Rounds that were not due since the machine is too slow for them."""
+        self.unseeded_rounds = 0
+        """Rounds that no machine could have run: no heading known yet, or no road ahead."""
+        self.questions = Questions(bus, self.mailbox, run_id=plan.run_id, alive=self.alive)
+        self.mirror = MirrorDesk(tables, self.tell)
+        self.roles = roles.RolesInForce(
+            plan.config.roles,
+            plan.config.correction,
+            tell=lambda message: self.questions.ask(MIRROR, "use_roles", message),
+        )
+        self.tuning = TuningLink(
+            plan, bus, self.mailbox, tables, events=self.events, intake=self.intake,
+            rounds=self.rounds, alive=self.alive,
+        )  # fmt: skip
+        self.changes = ChangeDesk({
+            "role": roles.RoleHandler(self.roles),
+            "correction": roles.CorrectionHandler(self.roles),
+            "vehicle": VehicleHandler(self.tuning.parameters),
+        })  # fmt: skip
+        self.beside = VehiclesBeside(plan, bus, self.mailbox, tell=self.tell)
+        self.route = RouteDesk(plan, use=mission.give_route, tell=self.tell)
+        self._active_world: str | None = None
+        self._world_untold = False
+
+    # Joining.
+
+    def join(self) -> None:
+        """Subscribe to everything a drive listens to."""
+        run, vehicle = self.plan.run_id, self.plan.config.vehicle_id
+        live = [one.config.id for one in self.plan.beside if one.config.live]
+        for one in (vehicle, *live):
+            for channel in keys.TELEMETRY_CHANNELS:
+                self.bus.subscribe(channel, self.mailbox, vehicle=one)
+        self.route.join(self.bus, self.mailbox)
+        for channel in ("mirror", "event"):
+            self.bus.subscribe(channel, self.mailbox, run=run)
+        self.tuning.join()
+        self.bus.serve("set", self.mailbox, run=run)
+        self.bus.watch_alive(keys.alive_key(run=run, process="*"), self.mailbox)
+
+    def take_info(self, info: VehicleInfo) -> None:
+        """Begin to estimate: what the vehicle says of itself is known."""
+        self.intake.take_info(info)
+        self.beside.begin(info)
+        self.rounds.start_stamp_ns = info.start_stamp_ns
+        self.mission.start_stamp_ns = info.start_stamp_ns
+        if info.body_from_antenna_m is None:
+            text = (
+                f"the source does not say where on the car its reference point "
+                f"({info.reference_point}) sits; taken as base_link"
+            )
+            self.tell(Tell("warning", text))
+
+    # Messages.
+
+    def handle(self, item: object) -> None:
+        """Take one item of the mailbox."""
+        match item:
+            case Received(channel="mirror"):
+                self.mirror.take(item.message())
+            case Received(channel="event"):
+                self.events.heard(item.message())
+            case Received(channel="route"):
+                self.route.take(item)
+            case Received(channel=channel) if channel in FINDINGS:
+                self.tuning.heard(item)
+            case Received():
+                self.take_telemetry(item)
+            case Reply(channel="job"):
+                self.rounds.reply(item)
+            case Reply(channel="build"):
+                self.worlds.build_reply(
+                    item, workers=self.rounds.desk.workers, builder_up=BUILDER in self.alive
+                )
+            case Reply(channel="prepare"):
+                self.worlds.prepare_reply(item)
+            case Reply(channel="info"):
+                self.beside.take_info(item.tag, item.message)
+            case Reply(channel="use_world" | "use_roles"):
+                self.questions.answered()
+            case Reply(channel="use_vehicle" | "tune"):
+                process_id = self.tuning.reply(item)
+                if process_id in self.alive and process_id not in self.rounds.desk.workers:
+                    self._worker_up(process_id)
+            case Request(channel="set"):
+                self.changes.take(item, stamp_ns=self.intake.now_stamp_ns)
+            case Alive():
+                self._alive(item)
+            case _:
+                pass
+
+    def take_telemetry(self, item: Received) -> None:
+        """Take one sample, and let the mission go on where it gives a new state."""
+        sender = keys.vehicle_of_key(item.key)
+        if sender != self.plan.config.vehicle_id:
+            self.beside.take_sample(sender, item)
+            return
+        try:
+            state = self.intake.take(item)
+        except SchemaMismatch as error:
+            if self.intake.refused == 1:
+                self.tell(Tell("error", str(error)))
+            return
+        self.human.take(state)
+        if state is None:
+            return
+        self.watch_telemetry(item.received_mono_ns)
+        self.beside.keep_up_with(state, self.intake.road_users)
+        self.bus.publish("state", state, vehicle=self.plan.config.vehicle_id)
+        self.route.keep_up_with(state, self.intake.plan)
+        self.rounds.take_state(state)
+        self.rounds.windows.take(self.intake.surroundings, state)
+        self.obey(self.mission.on_state(state, mono_s=item.received_mono_ns / 1e9))
+        if self.mission.road_line is not None and self.plan.config.map_aiding == "auto":
+            self.intake.take_line(self.mission.road_line)
+
+    def watch_telemetry(self, mono_ns: int) -> None:
+        """Tell what newly went wrong with the telemetry; also when none comes any more."""
+        for text in self.intake.warnings(mono_ns):
+            self.tell(Tell("warning", text))
+
+    def start_round(self) -> bool:
+        """Start a round where the mission wants one; returns whether it did."""
+        started_mono_ns = time.monotonic_ns()
+        intent = self.mission.plan_round()
+        latest = self.intake.latest
+        if intent is None or latest is None:
+            return False
+        if isinstance(intent, NotReady):
+            if intent.world_late:
+                self.missed_rounds += 1
+            else:
+                self.unseeded_rounds += 1
+            return False
+        said = self.beside.among(self.intake.surroundings, latest.state, self.roles.roles)
+        self.rounds.start(intent, latest, said, started_mono_ns=started_mono_ns)
+        return True
+
+    def finish(self) -> None:
+        """Compare what can still be compared and settle the counts."""
+        self.rounds.finish()
+        self.human.finish()
+        if self.intake.end is not None:
+            self.intake.counts.settle(self.intake.end.published)
+
+    # Worlds.
+
+    def obey(self, instructions: list[Instruction]) -> None:
+        """Carry out what the mission says."""
+        for instruction in instructions:
+            match instruction:
+                case BuildWorld(junction_id, load):
+                    self.worlds.want(junction_id, load=load, workers=self.rounds.desk.workers)
+                case UseWorld(world_id):
+                    self._active_world = world_id
+                    self._world_untold = True
+                    if not self.plan.config.lock_step:
+                        self.announce_world()
+                case Tell():
+                    self.tell(instruction)
+
+    def announce_world(self) -> None:
+        """Tell those who watch, and the mirror, which World counts from the next state on.
+
+        In lock step only between steps, when no state is on its way that may overtake this.
+        """
+        if not self._world_untold:
+            return
+        self._world_untold = False
+        active = ActiveWorld(stamp_ns=self.intake.now_stamp_ns + 1, world_id=self._active_world)
+        self.bus.publish("active_world", active, run=self.plan.run_id)
+        self.questions.ask(MIRROR, "use_world", active)
+
+    def _world_ready(self, junction_id: str, world: World) -> None:
+        self.obey(self.mission.on_world(junction_id, world, mono_s=time.monotonic()))
+
+    def _world_failed(self, junction_id: str, reason: str) -> None:
+        self.tell(Tell("error", f"no world for {junction_id}: {reason}"))
+        self.mission.on_world_failed(junction_id)
+
+    # Changes.
+
+    def make_changes(self) -> None:
+        """Make what `foretwin set` asked for; between rounds, and from the next state on."""
+        if self.rounds.desk.open_rounds:
+            return
+        stamp_ns, start_ns = self.intake.now_stamp_ns + 1, self.intake.start_stamp_ns
+        for change in self.changes.make(stamp_ns=stamp_ns, start_stamp_ns=start_ns):
+            self.tell(Tell("info", f"set {change.text}"))
+            self.tables.add("changes", [change.row()])
+        self.tuning.hand_over()
+
+    # Processes.
+
+    def _alive(self, item: Alive) -> None:
+        process_id = keys.process_of_alive_key(item.key)
+        if process_id == ORCHESTRATOR:
+            return
+        if item.up:
+            self._process_up(process_id)
+        else:
+            self._process_down(process_id)
+
+    def _process_up(self, process_id: str) -> None:
+        self.alive.add(process_id)
+        if not self.tuning.process_up(process_id):
+            self._worker_up(process_id)
+        if process_id == MIRROR:
+            self._world_untold = True
+            self.announce_world()
+            self.roles.announce(self.intake.now_stamp_ns)
+        elif process_id == BUILDER:
+            self.worlds.builder_up()
+
+    def _worker_up(self, process_id: str) -> None:
+        """Give a worker that has the parameters in force its Worlds, and jobs."""
+        if not process_id.startswith("w"):
+            return
+        self.rounds.desk.worker_up(process_id)
+        for world_id in self.mission.worlds_ahead():
+            self.worlds.prepare(process_id, world_id)
+        self.rounds.give_out()
+
+    def _process_down(self, process_id: str) -> None:
+        if process_id not in self.alive:
+            return
+        self.alive.discard(process_id)
+        self.tuning.process_down(process_id)
+        log.info("lost %s", process_id)
+        if process_id.startswith("w"):
+            self.rounds.desk.worker_down(process_id)
+            self.worlds.worker_down(process_id)
+            self.rounds.give_out()

@@ -1,0 +1,292 @@
+"""One drive from its inputs to its files: starts the processes, runs the loop, ends everything."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import logging
+import signal
+import time
+from types import FrameType
+
+from foretwin.contracts.bus import Mailbox, Reply, ZenohBus
+from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.process import log_to_file
+from foretwin.contracts.setup import ProcessSetup
+from foretwin.contracts.simulation import RunEnd
+from foretwin.orchestrator.config import DriveConfig
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.in_charge import InCharge
+from foretwin.orchestrator.drive.intake import unannounced
+from foretwin.orchestrator.drive.live_loop import LiveLoop
+from foretwin.orchestrator.drive.lock_step import LockStepLoop
+from foretwin.orchestrator.drive.mission import Mission, MissionSettings
+from foretwin.orchestrator.drive.plan import DrivePlan, make_plan, read_inputs
+from foretwin.orchestrator.drive.processes import ORCHESTRATOR, PROCESSES, process_ids, row_of
+from foretwin.orchestrator.drive.progress import ProgressLine
+from foretwin.orchestrator.drive.start_worlds import prepare_start
+from foretwin.orchestrator.drive.supervisor import FreshInterpreter, Supervisor, fold_stderr
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.orchestrator.record.run_record import reserve_record, run_record, write_record
+from foretwin.orchestrator.record.summary import summary_text
+from foretwin.orchestrator.record.versions import versions
+from foretwin.orchestrator.routing.route_ahead import WayAhead
+
+log = logging.getLogger(ORCHESTRATOR)
+
+START_TIMEOUT_S = 120.0
+END_GRACE_S, LOCK_STEP_GRACE_S = 10.0, 120.0
+"""What recorder and viewer get to write at the end of a drive, live and where nothing may miss."""
+LAST_WORDS_S = 0.1
+"""How long nothing may come from processes that have ended before all is taken for heard."""
+INTERRUPT_GRACE_S = 1.2
+HUNG_AFTER_S, GIVES_WAY_HUNG_AFTER_S = 1.0, 30.0
+"""A process whose token is gone for so long while it runs (a stopped one, say) is killed; one that
+gives way may have to wait for a processor that long."""
+
+EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
+
+
+class DriveError(RuntimeError):
+    """A drive that could not go on; the message says why."""
+
+
+class _Interrupt:
+    """Remembers Ctrl-C and SIGTERM; the loops ask, nothing is torn away in the middle."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._remember)
+
+    def _remember(self, _number: int, _frame: FrameType | None) -> None:
+        self.asked = True
+
+
+def drive(config: DriveConfig) -> int:
+    """Run one drive; returns its exit code. Raises UserError before anything is written."""
+    return carry_out(make_plan(read_inputs(config), datetime.datetime.now()))
+
+
+def carry_out(plan: DrivePlan) -> int:
+    """Run a drive whose folder is made; returns its exit code."""
+    log_to_file(
+        ProcessSetup(
+            run_id=plan.run_id,
+            process_id=ORCHESTRATOR,
+            vehicle_id=plan.config.vehicle_id,
+            bus=plan.bus,
+            log_file=str(plan.folder / "log.jsonl"),
+        )
+    )
+    return _Drive(plan).run()
+
+
+class _Drive:
+    """The processes of one drive and the loop over them."""
+
+    def __init__(self, plan: DrivePlan) -> None:
+        self._plan = plan
+        self._interrupt = _Interrupt()
+        self._supervisor = Supervisor(FreshInterpreter(plan.processes_dir))
+        self._vehicle_lost = False
+        self._given_up: set[str] = set()
+        self._seen_alive: set[str] = set()
+        self._silent_since_s: dict[str, float] = {}
+        self._mission = Mission(
+            WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index),
+            MissionSettings(
+                radius_m=plan.config.radius_m,
+                look_ahead_s=plan.config.look_ahead_s,
+                horizon_s=plan.config.horizon_s,
+            ),
+        )
+
+    def run(self) -> int:
+        """Run to the end, whatever ends it; the run's files are complete afterwards."""
+        plan = self._plan
+        started_s = time.monotonic()
+        reserve_record(plan, plan.folder / "run.json")
+        log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
+        with ZenohBus(plan.bus, router=True) as bus:
+            tables = ResultTables(
+                plan.folder / "results",
+                {
+                    "run_id": plan.run_id,
+                    "attribution": plan.osm.attribution,
+                    "map": plan.osm.sha256,
+                },
+                lossless=plan.config.lock_step,
+            )
+            conductor = Conductor(plan, bus, self._mission, tables)
+            exit_word, code = "failed", EXIT_FAILED
+            with ProgressLine(conductor, self._mission) as line:
+                line.say(f"run {plan.folder}")
+                line.say(plan.config.tuning_choice.text)
+                conductor.events.on_event = line.tell
+                try:
+                    exit_word, code = self._go(bus, conductor, line)
+                except Exception:
+                    log.exception("the drive ended by an error")
+                    raise
+                finally:
+                    self._end(bus, conductor, line, exit_word, started_s)
+        return code
+
+    def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
+        conductor.join()
+        self._start_processes()
+        conductor.rounds.draw_cases()  # while they come up
+        if not self._join_processes(bus, conductor):
+            return "interrupted", EXIT_INTERRUPTED
+        prepare_start(self._plan, conductor, look_after=self._look_after, stop=self._stop)
+        bus.declare_alive(alive_key(run=self._plan.run_id, process=ORCHESTRATOR))
+
+        def housekeeping(now_s: float) -> None:
+            self._look_after(conductor, now_s)
+            self._supervisor.let_give_way(conductor.alive, now_s)
+            line.update(now_s)
+
+        loop: LockStepLoop | LiveLoop
+        if self._plan.config.lock_step:
+            loop = LockStepLoop(conductor, housekeeping=housekeeping, stop=self._stop)
+        else:
+            in_charge = InCharge(bus, self._plan).say if self._plan.towards_vehicle else _nothing
+            loop = LiveLoop(
+                conductor, housekeeping=housekeeping, stop=self._stop, each_turn=in_charge
+            )
+        ended = loop.run()
+        if self._vehicle_lost and not self._interrupt.asked:
+            raise DriveError("the vehicle's process died; see log.jsonl")
+        if not ended:
+            return "interrupted", EXIT_INTERRUPTED
+        conductor.finish()
+        return "completed", EXIT_DONE
+
+    def _stop(self) -> bool:
+        return self._interrupt.asked or self._vehicle_lost
+
+    def _start_processes(self) -> None:
+        for row in PROCESSES:
+            if row.runs(self._plan):
+                for process_id in process_ids(row, self._plan):
+                    setup = row.setup(self._plan, process_id)
+                    self._supervisor.start(row_of(row, self._plan), setup)
+
+    def _join_processes(self, bus: ZenohBus, conductor: Conductor) -> bool:
+        """Wait until every process is there and the vehicle has introduced itself."""
+        expected = {
+            process_id
+            for row in PROCESSES
+            if row.runs(self._plan)
+            for process_id in process_ids(row, self._plan)
+        }
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while not expected <= conductor.alive:
+            if self._stop():
+                return False
+            self._look_after(conductor, time.monotonic())
+            missing = ", ".join(sorted(expected - conductor.alive))
+            if self._given_up & expected:
+                dead = ", ".join(sorted(self._given_up & expected))
+                raise DriveError(f"cannot be started: {dead}; see log.jsonl")
+            if time.monotonic() > deadline:
+                raise DriveError(f"not up after {START_TIMEOUT_S:.0f} s: {missing}; see log.jsonl")
+            item = conductor.mailbox.take(0.1)
+            if item is not None:
+                conductor.handle(item)
+        return self._ask_info(bus, conductor, deadline)
+
+    def _ask_info(self, bus: ZenohBus, conductor: Conductor, deadline: float) -> bool:
+        answers = Mailbox(4)
+        while not self._stop():
+            bus.request(
+                "info", InfoRequest(), answers, timeout_s=2.0, vehicle=self._plan.config.vehicle_id
+            )
+            reply = answers.take(3.0)
+            if isinstance(reply, Reply) and reply.message is not None:
+                conductor.take_info(reply.message)
+                return True
+            if self._plan.config.resolved_source == "live":
+                # A live car may start when it likes, and need not know our question.
+                while (item := conductor.mailbox.take()) is not None:
+                    conductor.handle(item)
+                self._look_after(conductor, time.monotonic())
+                first_ns = conductor.intake.first_stamp_ns
+                # A gateway knows our question, and the antenna's place.
+                if first_ns is not None and self._plan.ros2 is None:
+                    conductor.take_info(unannounced(self._plan.config.vehicle_id, first_ns))
+                    return True
+            elif time.monotonic() > deadline:
+                raise DriveError("the vehicle does not say what it is; see log.jsonl")
+        return False
+
+    def _look_after(self, conductor: Conductor, now_s: float) -> None:
+        for death in self._supervisor.poll(now_s):
+            text = f"{death.process_id} ended with code {death.exit_code}"
+            if not death.restarted:
+                self._given_up.add(death.process_id)
+            if death.restarted:
+                conductor.tell(Tell("warning", f"{text}; started again"))
+            elif death.row.when_dead == "end_drive":
+                conductor.tell(Tell("error", text))
+                self._vehicle_lost = True
+            else:
+                conductor.tell(Tell("error", f"{text}; the drive goes on without it"))
+        self._end_the_hung(conductor, now_s)
+
+    def _end_the_hung(self, conductor: Conductor, now_s: float) -> None:
+        """Kill processes that were alive, run still, and have not answered for a while."""
+        for process_id in self._supervisor.running():
+            if process_id in conductor.alive:
+                self._silent_since_s.pop(process_id, None)
+                self._seen_alive.add(process_id)
+            elif process_id in self._seen_alive:
+                since_s = self._silent_since_s.setdefault(process_id, now_s)
+                row = self._supervisor.row(process_id)
+                patience_s = GIVES_WAY_HUNG_AFTER_S if row.nice else HUNG_AFTER_S
+                if row.when_dead == "restart" and now_s - since_s > patience_s:
+                    log.warning("%s hangs: killed", process_id)
+                    self._supervisor.kill(process_id)
+                    self._seen_alive.discard(process_id)
+
+    def _end(
+        self,
+        bus: ZenohBus,
+        conductor: Conductor,
+        line: ProgressLine,
+        exit_word: str,
+        started_s: float,
+    ) -> None:
+        plan = self._plan
+        end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)
+        bus.publish("run_end", end, run=plan.run_id)
+        to_write_s = LOCK_STEP_GRACE_S if plan.config.lock_step else END_GRACE_S
+        quick = exit_word != "completed"
+        killed = self._supervisor.stop(grace_s=INTERRUPT_GRACE_S if quick else to_write_s)
+        if killed:
+            log.warning("had to kill %s", ", ".join(killed))
+        while (item := conductor.mailbox.take_last(LAST_WORDS_S)) is not None:
+            conductor.handle(item)
+        conductor.changes.refuse_all("the drive is over")
+        conductor.beside.close()
+        conductor.route.close()
+        conductor.tables.close()
+        if conductor.tables.failed:
+            line.say(f"error: {conductor.tables.failed}")
+        now_s = time.monotonic()
+        record = run_record(
+            plan, conductor, self._mission, self._supervisor, exit_word=exit_word,
+            wall_s=now_s - started_s, mono_s=now_s,
+        )  # fmt: skip
+        write_record(record, plan.folder / "run.json")
+        logging.shutdown()
+        with contextlib.suppress(OSError):  # a full disk has been told of
+            fold_stderr(plan.processes_dir, plan.folder / "log.jsonl")
+        line.say(summary_text(record))
+
+
+def _nothing() -> None:
+    """Say nothing towards a vehicle."""

@@ -1,0 +1,207 @@
+"""Where telemetry comes in: counts every sample, and turns it into the estimated state."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, NamedTuple
+
+import msgspec
+
+from foretwin.contracts.bus import Received
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import (
+    DriveEnd,
+    PlannedTrajectory,
+    RoadUsers,
+    SignalState,
+    VehicleInfo,
+    VehicleState,
+    VehicleStatus,
+)
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, record
+from foretwin.orchestrator.record.bookkeeping import TelemetryCount
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.map_aid import RoadLine
+
+
+class LatestState(NamedTuple):
+    """The newest state, and when the sample that gave it was received."""
+
+    state: VehicleState
+    receipt_mono_ns: int
+
+
+class Surroundings(NamedTuple):
+    """The newest of what a car says besides its own motion; each with its own stamp."""
+
+    plan: PlannedTrajectory | None
+    road_users: RoadUsers | None
+    signals: tuple[SignalState, ...]
+
+
+class Intake:
+    """Takes samples one by one; the estimator behind it is pure."""
+
+    def __init__(self, vehicle: VehicleParameters, *, pace: float | None = None) -> None:
+        """`pace` is how many seconds of the vehicle pass in one of ours.
+
+        None is lock step: samples are taken in their order and times of receipt mean nothing.
+        """
+        self.counts = TelemetryCount()
+        self.info: VehicleInfo | None = None
+        self.end: DriveEnd | None = None
+        self.latest: LatestState | None = None
+        self.plan: PlannedTrajectory | None = None
+        self.status: VehicleStatus | None = None
+        self.road_users: RoadUsers | None = None
+        self.signals: dict[str, SignalState] = {}
+        """The newest of each signal group."""
+        self.states = 0
+        self.first_stamp_ns: int | None = None
+        self.refused = 0
+        self.watch = TelemetryWatch()
+        self._pace = pace
+        self._vehicle = self._vehicle_at_start = vehicle
+        self._estimator: StateEstimator | None = None
+
+    def take_info(self, info: VehicleInfo) -> None:
+        """Begin to estimate: what the vehicle says of itself is known."""
+        self.info = info
+        self._estimator = StateEstimator(
+            info,
+            wheelbase_m=self._vehicle.wheelbase_m.value,
+            steering_ratio=self._vehicle.steering_ratio.value,
+            steering_offset_rad=self._vehicle.steering_offset_rad.value,
+        )
+
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
+        """Turn steering wheels into tyres with these parameters from now on."""
+        self._vehicle = vehicle
+
+    def take(self, item: Received) -> VehicleState | None:
+        """Take one sample; returns the new state where it gives one.
+
+        Raises SchemaMismatch for a sample of another schema, which is counted as refused.
+        """
+        try:
+            envelope = item.envelope()
+        except SchemaMismatch:
+            self.refused += 1
+            raise
+        message = envelope.message
+        if self.first_stamp_ns is None:
+            self.first_stamp_ns = message.stamp_ns
+        if isinstance(message, DriveEnd):
+            self.end = message
+            return None
+        age_ms = max(0.0, (time.time_ns() - envelope.sent_ns) / 1e6)
+        self.counts.take(key=item.key, channel=item.channel, seq=envelope.seq, age_ms=age_ms)
+        if isinstance(message, PlannedTrajectory):
+            self.plan = message
+        elif isinstance(message, VehicleStatus):
+            self.status = message
+        elif isinstance(message, RoadUsers):
+            self.road_users = message
+        elif isinstance(message, SignalState):
+            self.signals[message.group_id] = message
+        if self._estimator is None:
+            return None
+        received_ns = self._drive_ns(item.received_mono_ns)
+        state = self._estimator.handle(item.channel, message, received_ns=received_ns)
+        if state is not None:
+            state = self._with_tire_angle(state)
+            self.latest = LatestState(state, item.received_mono_ns)
+            self.states += 1
+        return state
+
+    def take_line(self, line: RoadLine) -> None:
+        """Take the line of the map along which the latest state drives."""
+        if self._estimator is not None:
+            self._estimator.take_line(line)
+
+    def _with_tire_angle(self, state: VehicleState) -> VehicleState:
+        """Return the state with the tyre angle that the parameters in force give it.
+
+        The estimator keeps those that it began with: its motion hardly hangs on them.
+        """
+        wheel = state.steering_wheel_rad
+        if self._vehicle is self._vehicle_at_start or wheel is None:
+            return state
+        if state.tire_angle_rad != _tire_angle_rad(wheel, self._vehicle_at_start):
+            return state  # measured, or from the motion
+        return msgspec.structs.replace(state, tire_angle_rad=_tire_angle_rad(wheel, self._vehicle))
+
+    def _drive_ns(self, mono_ns: int) -> int | None:
+        """Return our monotonic clock at the vehicle's pace, None in lock step."""
+        return None if self._pace is None else round(mono_ns * self._pace)
+
+    def warnings(self, mono_ns: int) -> list[str]:
+        """Return what newly went wrong with the telemetry, each thing once.
+
+        Without a clock of ours (lock step) the newest state says what is overdue.
+        """
+        if self._estimator is None or self.end is not None:
+            return []
+        warnings = self.watch.estimator(self._estimator)
+        now_ns = self._drive_ns(mono_ns)
+        if now_ns is not None:
+            warnings += self.watch.overdue(self._estimator.overdue(now_ns), now_ns)
+        elif self.latest is not None:
+            state = self.latest.state
+            warnings += self.watch.overdue(state.stale, state.stamp_ns)
+        return warnings
+
+    def record(self) -> dict[str, Any]:
+        """Return the `telemetry` part of run.json."""
+        receiver_utc_ns = time.time_ns() - time.monotonic_ns()
+        found = record(self._estimator, self.watch, receiver_utc_ns=receiver_utc_ns)
+        state = None if self.latest is None else self.latest.state
+        return {**self.counts.record(self.skipped_invalid), **found, **_position_record(state)}
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What the car last said of its plan, of other road users and of lights."""
+        return Surroundings(self.plan, self.road_users, tuple(self.signals.values()))
+
+    @property
+    def start_stamp_ns(self) -> int:
+        """The stamp of drive time 0."""
+        return self.info.start_stamp_ns if self.info else 0
+
+    @property
+    def now_stamp_ns(self) -> int:
+        """The stamp of the newest state, the drive's start before the first."""
+        return self.latest.state.stamp_ns if self.latest else self.start_stamp_ns
+
+    @property
+    def skipped_invalid(self) -> int:
+        """Samples refused so far: by the source's reader, by the estimator, by the codec."""
+        by_estimator = sum(self._estimator.skipped.values()) if self._estimator else 0
+        return by_estimator + self.refused + (self.end.skipped_invalid if self.end else 0)
+
+
+def _position_record(state: VehicleState | None) -> dict[str, Any]:
+    """Return what gave the position, and how sure of it the newest state is."""
+    if state is None:
+        return {"position_from": [], "position_std_m": None}
+    std_m = state.position_std_m
+    return {
+        "position_from": ["gnss"] if state.map_shift_m is None else ["gnss", "map"],
+        "position_std_m": None if std_m is None else round(std_m, 3),
+    }
+
+
+def _tire_angle_rad(wheel_rad: float, vehicle: VehicleParameters) -> float:
+    return wheel_rad / vehicle.steering_ratio.value + vehicle.steering_offset_rad.value
+
+
+def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:
+    """Return what is taken for granted of a live car that does not say what it is."""
+    return VehicleInfo(
+        vehicle_id=vehicle_id,
+        time_base="utc",
+        start_stamp_ns=first_stamp_ns,
+        source="live telemetry",
+        reference_point="antenna",
+    )

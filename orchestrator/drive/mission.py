@@ -1,0 +1,290 @@
+"""The mission: follows the car on its route, says which Worlds to build and rounds to run.
+
+A state machine without bus and clock: states and worlds in, instructions out. Wall times come in
+as arguments and are only remembered, never decided upon.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.world import World
+from foretwin.orchestrator.drive.visits import VisitBook
+from foretwin.orchestrator.instructions import (
+    BuildWorld,
+    Instruction,
+    NotReady,
+    RoundIntent,
+    Tell,
+    UseWorld,
+)
+from foretwin.orchestrator.routing.junctions_ahead import PassedJunction
+from foretwin.orchestrator.routing.map_matching import OffRoadStretch
+from foretwin.orchestrator.routing.route import Route
+from foretwin.orchestrator.routing.route_ahead import WayAhead
+from foretwin.telemetry.estimator.map_aid import RoadLine
+from foretwin.world_gen.junctions.intersections import Junction
+
+MissionState = Literal["waiting", "following", "off_map"]
+
+MATCH_PERIOD_NS = 100_000_000
+KEEP_PAST_CENTRE_M = 20.0
+"""A junction stays the current one until the car is this far past its centre."""
+
+_WHY_OFF_ROAD = {
+    "no_car_road": "which the map does not give to cars",
+    "against_one_way": "against a one-way street of the map",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionSettings:
+    """What decides when Worlds are built and rounds run."""
+
+    radius_m: float = 150.0
+    look_ahead_s: float = 60.0
+    horizon_s: float = 8.0
+
+
+class Mission:
+    """One drive along one way."""
+
+    def __init__(
+        self, way: WayAhead, settings: MissionSettings, *, start_stamp_ns: int = 0
+    ) -> None:
+        self.state: MissionState = "waiting"
+        self.start_stamp_ns = start_stamp_ns
+        self.road_line: RoadLine | None = None
+        """The line that the latest state drives along; None in doubt, or between two matches."""
+        self._way = way
+        self._settings = settings
+        self._visits = VisitBook()
+        self._current: str | None = None
+        self._passed_s_m: float | None = None
+        self._car: VehicleState | None = None
+        self._last_match_ns: int | None = None
+        self._stretches_told = 0
+        self._off_route_told = False
+        self._map_told = False
+
+    # What comes in.
+
+    def before_start(self, junctions: Iterable[Junction], *, mono_s: float) -> list[Instruction]:
+        """Ask for the Worlds where a given route begins, before the car moves."""
+        return [
+            BuildWorld(junction.summary.id, load=True)
+            for junction in junctions
+            if self._visits.see(junction, load=True, mono_s=mono_s, drive_time_s=0.0)
+        ]
+
+    def give_route(self, route: Route) -> None:
+        """Follow this route from the next state on."""
+        self._way.give(route)
+
+    def on_state(self, state: VehicleState, *, mono_s: float) -> list[Instruction]:
+        """Take where the car is."""
+        self._car = state
+        self._way.take_speed(state)
+        self.road_line = None
+        if not self._time_to_match(state):
+            return []
+        passed = self._way.locate(state)
+        if passed is None:
+            return self._off_map()
+        self.road_line = self._way.road_line(state)
+        told: list[Instruction] = []
+        if self.state != "following":
+            text = "on the map" if self.state == "waiting" else "back on the map"
+            told.append(Tell("info", f"{text}: {self._way.road_text}"))
+            self.state = "following"
+        for junction in passed:
+            told += self._arrive(junction, mono_s)
+        told += self._wanted_worlds(mono_s)
+        told += self._choose_current()
+        told += self._tell_deviations()
+        if state.map_shift_m is not None and not self._map_told:
+            self._map_told = True
+            told.append(Tell("info", "position from GNSS and the map"))
+        return told
+
+    def on_world(self, junction_id: str, world: World, *, mono_s: float) -> list[Instruction]:
+        """A junction's World is built and loaded by the workers."""
+        self._visits.take_world(junction_id, world, mono_s=mono_s, drive_time_s=self.drive_time_s)
+        return self._choose_current()
+
+    def on_world_failed(self, junction_id: str) -> None:
+        """A junction's World cannot be built; the drive goes on without it."""
+        self._visits.latest(junction_id).failed = True
+
+    def on_round(self, junction_id: str, *, futures: int) -> None:
+        """A round for a junction is complete."""
+        visit = self._visits.latest(junction_id)
+        visit.rounds += 1
+        visit.futures += futures
+
+    # What goes out.
+
+    @property
+    def drive_time_s(self) -> float:
+        """Seconds since the drive's start, by the vehicle's clock."""
+        if self._car is None:
+            return 0.0
+        return (self._car.stamp_ns - self.start_stamp_ns) / 1e9
+
+    @property
+    def next_junction(self) -> tuple[str, float] | None:
+        """Name of the junction ahead and seconds until the car is there."""
+        for ahead in self._way.junctions[:1]:
+            return ahead.junction.summary.name or ahead.junction.summary.id, ahead.in_s
+        return None
+
+    @property
+    def junction_id(self) -> str | None:
+        """The junction that the car is at, or has before it."""
+        if self._current is not None:
+            return self._current
+        return next((a.junction.summary.id for a in self._way.junctions), None)
+
+    @property
+    def route_m(self) -> float | None:
+        """How far along its route the car is, None off the map."""
+        return self._way.s_m if self.state == "following" else None
+
+    def worlds_ahead(self) -> list[str]:
+        """Ids of the Worlds that the coming rounds need, the current one first."""
+        ids = [self._current] if self._current else []
+        ids += [ahead.junction.summary.id for ahead in self._way.junctions]
+        visits = [self._visits.get(junction_id) for junction_id in dict.fromkeys(ids)]
+        return [v.world.id for v in visits if v is not None and v.load and v.world is not None]
+
+    def plan_round(self) -> RoundIntent | NotReady | None:
+        """Return the round to run now; None where no junction is within the look-ahead."""
+        car = self._car
+        if self.state != "following" or car is None:
+            return None
+        if self._current is None and not self._within_look_ahead():
+            return None
+        visit = self._visits.latest(self._current) if self._current else None
+        if visit is None or visit.world is None:
+            return NotReady("the world is not ready", world_late=True)
+        if not car.yaw_valid:
+            return NotReady("the heading is not known", world_late=False)
+        path = self._way.path(
+            visit.world.frame, speed_mps=car.speed_mps, horizon_s=self._settings.horizon_s
+        )
+        if path is None:
+            return NotReady("the road ends here", world_late=False)
+        return RoundIntent(
+            junction_id=visit.junction.summary.id,
+            world_id=visit.world.id,
+            path=path,
+            cruise_speed_mps=self._way.cruise_speed_mps,
+        )
+
+    def records(self, *, mono_s: float) -> list[dict[str, Any]]:
+        """Return the `intersections` of run.json: those that the car reached, in order."""
+        return [visit.record(mono_s=mono_s) for visit in self._visits.arrived]
+
+    @property
+    def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:
+        """Stretches driven where the map says that cars may not."""
+        return self._way.off_road_stretches
+
+    # Inside.
+
+    def _time_to_match(self, state: VehicleState) -> bool:
+        last = self._last_match_ns
+        if last is not None and 0 <= state.stamp_ns - last < MATCH_PERIOD_NS:
+            return False
+        self._last_match_ns = state.stamp_ns
+        return True
+
+    def _within_look_ahead(self) -> list[str]:
+        return [
+            ahead.junction.summary.id
+            for ahead in self._way.junctions
+            if ahead.in_s <= self._settings.look_ahead_s
+        ]
+
+    def _off_map(self) -> list[Instruction]:
+        self._passed_s_m = None
+        if self.state in ("off_map", "waiting"):
+            return []
+        self.state = "off_map"
+        told: list[Instruction] = [Tell("warning", "off the map: no rounds until the car is back")]
+        if self._current is not None:
+            self._current = None
+            told.append(UseWorld(None))
+        return told
+
+    def _arrive(self, passed: PassedJunction, mono_s: float) -> list[Instruction]:
+        summary = passed.junction.summary
+        told: list[Instruction] = []
+        at_s = self.drive_time_s
+        if self._visits.see(passed.junction, load=True, mono_s=mono_s, drive_time_s=at_s):
+            told.append(BuildWorld(summary.id, load=True))
+        self._visits.arrive(summary.id, mono_s=mono_s, drive_time_s=at_s)
+        self._passed_s_m = passed.centre_s_m
+        text = f"passed {summary.kind} {summary.name or summary.id} ({summary.control})"
+        return [*told, Tell("info", text)]
+
+    def _wanted_worlds(self, mono_s: float) -> list[Instruction]:
+        soon = set(self._within_look_ahead())
+        wanted = [
+            (ahead.junction, True)
+            for ahead in self._way.junctions
+            if ahead.junction.summary.id in soon
+        ]
+        wanted += [(junction, False) for junction in self._way.other_turns]
+        at_s = self.drive_time_s
+        told: list[Instruction] = [
+            BuildWorld(junction.summary.id, load)
+            for junction, load in wanted
+            if self._visits.see(junction, load=load, mono_s=mono_s, drive_time_s=at_s)
+        ]
+        for ahead in self._way.junctions:
+            if ahead.distance_m <= self._settings.radius_m:
+                self._visits.enter(ahead.junction.summary.id, mono_s=mono_s, drive_time_s=at_s)
+        return told
+
+    def _choose_current(self) -> list[Instruction]:
+        """The junction just passed stays current for a while; then the next one within reach."""
+        if self.state != "following":
+            return []
+        if self._passed_s_m is not None:
+            away_m = self._way.s_m - self._passed_s_m
+            if away_m < KEEP_PAST_CENTRE_M and self._current is not None:
+                return []
+            self._passed_s_m = None
+        chosen = None
+        for junction_id in self._within_look_ahead():
+            visit = self._visits.get(junction_id)
+            if visit is None or visit.failed:
+                continue
+            chosen = junction_id if visit.world is not None else None
+            break
+        if chosen == self._current:
+            return []
+        self._current = chosen
+        world = self._visits.latest(chosen).world if chosen else None
+        return [UseWorld(world.id if world is not None else None)]
+
+    def _tell_deviations(self) -> list[Instruction]:
+        told: list[Instruction] = []
+        if self._way.off_route != self._off_route_told:
+            self._off_route_told = self._way.off_route
+            if self._off_route_told:
+                told.append(Tell("warning", "left the given route; the way ahead is predicted"))
+            else:
+                told.append(Tell("info", "back on the given route"))
+        stretches = self._way.off_road_stretches
+        if len(stretches) > self._stretches_told:
+            self._stretches_told = len(stretches)
+            last = stretches[-1]
+            ways = ", ".join(str(way) for way in last.way_ids)
+            why = _WHY_OFF_ROAD[last.reason]
+            told.append(Tell("warning", f"drives on {last.name or 'a way'} {why} (way {ways})"))
+        return told

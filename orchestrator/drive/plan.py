@@ -1,0 +1,283 @@
+"""Reads and checks everything a drive needs before anything is written."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleInfo
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.orchestrator.commands.doctor import has_display
+from foretwin.orchestrator.config import ConfigError, DriveConfig, VehicleBeside
+from foretwin.orchestrator.drive.ros2_mapping import read_ros2, read_ros2_beside
+from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
+from foretwin.orchestrator.rounds.jobs import scenarios_of
+from foretwin.orchestrator.routing.line_matching import match_line
+from foretwin.orchestrator.routing.road_index import RoadIndex
+from foretwin.orchestrator.routing.route import Route
+from foretwin.orchestrator.routing.standin_path import StandinPath, standin_path
+from foretwin.orchestrator.worlds.given_worlds import check_given_worlds
+from foretwin.orchestrator.worlds.opening import Clip, open_map
+from foretwin.sim_worker.planners.registry import check_planner
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
+from foretwin.telemetry.ros2.mapping import MappingFile
+from foretwin.telemetry.standin.parameters import read_parameters
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.service_roads import open_service_roads
+
+NEAR_ROAD_M = 50.0
+"""A log none of whose positions lies this near to a road was not driven in this map."""
+
+
+CORRIDOR_M = 2000.0
+"""Of a large map, what lies within this distance of a given route or drive is read."""
+
+
+class Beside(NamedTuple):
+    """A vehicle beside the car, its parameters, and whether its commands are recorded."""
+
+    config: VehicleBeside
+    vehicle: VehicleParameters
+    commands_recorded: bool
+    ros2: MappingFile | None = None
+    """How its own ROS 2 topics are read."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveInputs:
+    """Everything read: nothing here has touched the folder of runs yet."""
+
+    config: DriveConfig
+    map_file: Path
+    clip: Clip | None
+    """What of a large map is read: the surroundings of the way known beforehand."""
+    osm: OsmMap
+    graph: RoadGraph
+    index: RoadIndex
+    junctions: tuple[Junction, ...]
+    added_roads: tuple[int, ...]
+    """Indices of service roads that count as car roads in this drive."""
+    routes: tuple[Route, ...]
+    route_source: str
+    drive_frame: LocalFrame
+    vehicle: VehicleParameters
+    beside: tuple[Beside, ...]
+    log_file: Path | None
+    info: VehicleInfo | None
+    standin: StandinPath | None
+    ros2: MappingFile | None = None
+    """How the live car's ROS 2 topics are read, and what goes back."""
+
+    @property
+    def towards_vehicle(self) -> bool:
+        """Whether both switches are on: anything may go out towards the vehicle."""
+        enabled = self.ros2 is not None and self.ros2.mapping.towards_vehicle.enabled
+        return enabled and self.config.towards_vehicle
+
+    @property
+    def commands_recorded(self) -> bool:
+        """Whether the vehicle sends the commands that its automated driving gives."""
+        return self.info is None or "control" in self.info.sends
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrivePlan(DriveInputs):
+    """The inputs with a run's id, its folder and its bus."""
+
+    run_id: str
+    folder: Path
+    bus: BusSetup
+    live_view: str
+
+    @property
+    def worlds_dir(self) -> Path:
+        """Where this run's Worlds lie."""
+        return self.folder / "worlds"
+
+    @property
+    def processes_dir(self) -> Path:
+        """Where the setups of this run's processes lie."""
+        return self.folder / "processes"
+
+    @property
+    def standin_path_file(self) -> Path:
+        """What the stand-in car drives."""
+        return self.processes_dir / "standin_path.json"
+
+    @property
+    def start_stamp_ns(self) -> int:
+        """The stamp of drive time 0."""
+        return 0 if self.info is None else self.info.start_stamp_ns
+
+
+def read_inputs(config: DriveConfig) -> DriveInputs:
+    """Read map, log, route and vehicle; raises UserError or FileNotFoundError, one line each."""
+    try:
+        check_planner(config.planner)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    scenarios_of(config)  # an unknown one is told before anything long begins
+    vehicle = load_vehicle(Path(config.vehicle) if config.vehicle else None)
+    if config.standin_parameters is not None:
+        read_parameters(Path(config.standin_parameters))
+    ros2 = read_ros2(config)
+    map_file = Path(config.map) if config.map else MAP_FILE
+    source = config.resolved_source
+    info, positions, log_file = None, None, None
+    if source == "log":
+        log_file = Path(config.log or "")
+        info, positions = _read_log(config, log_file)
+    given = _given_line(config, positions)
+    near = positions if positions is not None else given
+    clip = None if near is None else Clip(near, CORRIDOR_M)
+    opened = open_map(map_file, clip=clip)
+    osm, graph, junctions = opened.osm, opened.graph, opened.junctions
+    index = RoadIndex(graph)
+    if positions is not None and log_file is not None:
+        _check_in_map(positions, log_file, index, map_file)
+    routes, route_source = _routes(config, graph, index, given)
+    used = (item.edge for route in routes for item in route.edges)
+    added = open_service_roads(graph.edges if config.service_roads else used)
+    if added:
+        # Only now is it known where the route leaves the streets; what it meets there counts.
+        opened = opened.with_roads(added)
+        graph, junctions = opened.graph, opened.junctions
+        index = RoadIndex(graph)
+        routes, route_source = _routes(config, graph, index, given)
+    if config.worlds is not None:
+        check_given_worlds(
+            Path(config.worlds), map_sha256=osm.sha256, junctions=junctions,
+            radius_m=config.radius_m,
+        )  # fmt: skip
+    standin = None
+    if source == "standin":
+        standin = standin_path(osm, graph, routes[0])
+    if positions is not None:
+        origin = positions[0]
+    elif standin is not None:
+        origin = np.array([standin.lat_deg[0], standin.lon_deg[0]])
+    else:
+        origin = np.array([graph.frame.origin.lat_deg, graph.frame.origin.lon_deg])
+    return DriveInputs(
+        config=config,
+        map_file=map_file,
+        clip=clip,
+        osm=osm,
+        graph=graph,
+        index=index,
+        junctions=junctions,
+        added_roads=added,
+        routes=routes,
+        route_source=route_source,
+        drive_frame=LocalFrame(GeoPoint(float(origin[0]), float(origin[1]))),
+        vehicle=vehicle,
+        beside=tuple(_read_beside(one, vehicle) for one in config.vehicles),
+        log_file=log_file,
+        info=info,
+        standin=standin,
+        ros2=ros2,
+    )
+
+
+def _read_log(config: DriveConfig, log_file: Path) -> tuple[VehicleInfo, Array]:
+    """Return what the log says of itself and its positions (N, 2) between start and end."""
+    if not log_file.exists():
+        raise FileNotFoundError(f"recorded drive {log_file}: no such file or folder")
+    log = open_log(log_file)
+    try:
+        line = line_of_log(log, start_s=config.start_s, end_s=config.end_s)
+    except LogError as error:
+        end = "its end" if config.end_s is None else f"--end {config.end_s:g}"
+        raise UserError(f"{log_file} from --start {config.start_s:g} to {end}: {error}") from error
+    return log.info, line.lat_lon_deg
+
+
+def _read_beside(config: VehicleBeside, own: VehicleParameters) -> Beside:
+    vehicle = own if config.vehicle is None else load_vehicle(Path(config.vehicle))
+    if config.log is None:
+        ros2 = read_ros2_beside(config)
+        return Beside(config, vehicle, commands_recorded=config.live, ros2=ros2)
+    file = Path(config.log)
+    if not file.exists():
+        raise FileNotFoundError(f"recorded drive {file} of {config.id}: no such file or folder")
+    return Beside(config, vehicle, commands_recorded="control" in open_log(file).info.sends)
+
+
+def _check_in_map(positions: Array, log_file: Path, index: RoadIndex, map_file: Path) -> None:
+    xy = local_from_geo(index.graph.frame, positions[:, 0], positions[:, 1])
+    every = max(1, len(xy) // 500)
+    if not any(index.near(point, NEAR_ROAD_M) for point in xy[::every]):
+        raise UserError(
+            f"{map_file}: holds no position of the drive {log_file} (which begins at "
+            f"{positions[0, 0]:.5f}, {positions[0, 1]:.5f}); the map covers "
+            f"{_bounds_text(index.graph)}"
+        )
+
+
+def _bounds_text(graph: RoadGraph) -> str:
+    xy = np.array(list(graph.node_xy_m.values()))
+    low, high = geo_from_local(graph.frame, np.stack([xy.min(axis=0), xy.max(axis=0)]))
+    return f"{low[0]:.4f},{low[1]:.4f} to {high[0]:.4f},{high[1]:.4f}"
+
+
+def _given_line(config: DriveConfig, positions: Array | None) -> Array | None:
+    """Return the line (N, 2) of degrees that the route shall follow; None: it is predicted."""
+    if config.route == "live":
+        return None
+    if config.route == "from-log":
+        return positions
+    route_file = config.route
+    if route_file is None and config.map is None:
+        route_file = str(ROUTE_FILE)
+    if route_file is None:
+        return None
+    return read_line(Path(route_file)).lat_lon_deg
+
+
+def _routes(
+    config: DriveConfig, graph: RoadGraph, index: RoadIndex, given: Array | None
+) -> tuple[tuple[Route, ...], str]:
+    """Return the given routes, none where the route is predicted, and where they came from."""
+    if given is None:
+        return (), "live" if config.route == "live" else "predicted"
+    from_log = config.route == "from-log"
+    what = f"from-log of {config.log}" if from_log else config.route or ROUTE_FILE
+    source = "from-log" if from_log else "given"
+    return match_line(graph, given, name=f"--route {what}", index=index).routes, source
+
+
+def make_plan(inputs: DriveInputs, now: datetime.datetime) -> DrivePlan:
+    """Create the run's folder and return the plan of the drive; the first write of all."""
+    config = inputs.config
+    out = Path(config.out)
+    run_id = f"{now:%Y%m%d-%H%M%S}-{secrets.token_hex(2)}"
+    folder = out / run_id
+    for sub in ("worlds", "results", "processes"):
+        (folder / sub).mkdir(parents=True, exist_ok=sub != "worlds")
+    live = config.view
+    if live == "auto":
+        live = "native" if has_display() else "none"
+    plan = DrivePlan(
+        **{name: getattr(inputs, name) for name in DriveInputs.__dataclass_fields__},
+        run_id=run_id,
+        folder=folder.resolve(),
+        bus=BusSetup(endpoint=config.endpoint or free_endpoint(), lossless=config.lock_step),
+        live_view=live,
+    )
+    if plan.standin is not None:
+        plan.standin_path_file.write_text(json.dumps(plan.standin.as_json()), encoding="utf-8")
+    return plan

@@ -1,0 +1,235 @@
+"""The table of processes that a drive consists of, and what each is started with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+from foretwin.contracts.roles import CastVehicle, MirrorCast
+from foretwin.contracts.setup import (
+    BuilderSetup,
+    ProcessSetup,
+    RecorderSetup,
+    ReplaySetup,
+    Ros2Setup,
+    StandinSetup,
+    TuningSetup,
+    ViewerSetup,
+    WorkerSetup,
+)
+from foretwin.orchestrator.drive.plan import Beside, DrivePlan
+from foretwin.orchestrator.rounds.jobs import planners_of
+
+ORCHESTRATOR = "orchestrator"
+BUILDER = "builder"
+MIRROR = "mirror"
+TUNING = "tuning"
+VEHICLE = "vehicle"
+ROS2_BESIDE = "ros2-beside"
+
+WhenDead = Literal["restart", "report", "end_drive"]
+
+
+class ProcessRow(NamedTuple):
+    """One kind of process: its module below `foretwin`, when it runs, how many, what follows from
+    its death."""
+
+    name: str
+    module: str
+    runs: Callable[[DrivePlan], bool]
+    count: Callable[[DrivePlan], int]
+    when_dead: WhenDead
+    setup: Callable[[DrivePlan, str], ProcessSetup]
+    nice: int = 0
+    """Added to the scheduling niceness: who writes for later gives way to who is waited for."""
+    numbered: bool = False
+    """Whether its ids are its name with a number each."""
+
+
+def _one(_: DrivePlan) -> int:
+    return 1
+
+
+def _always(_: DrivePlan) -> bool:
+    return True
+
+
+def _base(plan: DrivePlan, process_id: str) -> dict[str, object]:
+    return {
+        "run_id": plan.run_id,
+        "process_id": process_id,
+        "vehicle_id": plan.config.vehicle_id,
+        "bus": plan.bus,
+        "log_file": str(plan.folder / "log.jsonl"),
+    }
+
+
+def _worker(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return WorkerSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        role="mirror" if process_id == MIRROR else "futures",
+        worlds_dir=str(plan.worlds_dir),
+        vehicle=plan.vehicle,
+        drive_frame=plan.drive_frame,
+        commands_recorded=plan.commands_recorded,
+        mirror_cast=MirrorCast(
+            others=tuple(
+                CastVehicle(
+                    vehicle_id=one.config.id,
+                    vehicle=one.vehicle,
+                    commands_recorded=one.commands_recorded,
+                )
+                for one in plan.beside
+            ),
+            limits=plan.config.follow,
+        ),
+        planners=() if process_id == MIRROR else tuple(planners_of(plan.config.planner)),
+    )
+
+
+def _tuning(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return TuningSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        vehicle=plan.vehicle,
+        drive_frame=plan.drive_frame,
+    )
+
+
+def _tunes(plan: DrivePlan) -> bool:
+    return plan.config.tuning_choice.mode != "off"
+
+
+def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    clip = plan.clip
+    near_deg = () if clip is None else tuple((lat, lon) for lat, lon in clip.line_deg.tolist())
+    return BuilderSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        map=str(plan.map_file),
+        near_deg=near_deg,
+        margin_m=0.0 if clip is None else clip.margin_m,
+        added_roads=plan.added_roads,
+        worlds_dir=str(plan.worlds_dir),
+        cache_dir=str(plan.config.worlds_cache),
+        given_worlds=plan.config.worlds,
+    )
+
+
+def _recorder(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return RecorderSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        file=str(plan.folder / "drive.mcap"),
+    )
+
+
+def _viewer(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return ViewerSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        file=str(plan.folder / "monitor.rrd"),
+        worlds_dir=str(plan.worlds_dir),
+        drive_frame=plan.drive_frame,
+        live=plan.live_view,
+        title=f"foretwin {plan.run_id}",
+        attribution=plan.osm.attribution,
+        start_stamp_ns=plan.start_stamp_ns,
+    )
+
+
+def _replay(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return ReplaySetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        log=str(plan.log_file),
+        start_s=plan.config.start_s,
+        end_s=plan.config.end_s,
+        speed=plan.config.speed,
+    )
+
+
+def _standin(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    return StandinSetup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        path_file=str(plan.standin_path_file),
+        end_s=plan.config.end_s,
+        speed=plan.config.speed,
+        seed=plan.config.seed,
+        plan_shift_m=plan.config.standin_plan_shift_m,
+        parameters_file=plan.config.standin_parameters,
+    )
+
+
+def _ros2(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    assert plan.ros2 is not None
+    return Ros2Setup(
+        **_base(plan, process_id),  # type: ignore[arg-type]
+        mapping=plan.ros2.text,
+        mapping_name=plan.ros2.name,
+        drive_frame=plan.drive_frame,
+        towards_vehicle=plan.config.towards_vehicle,
+        vehicle=plan.vehicle,
+    )
+
+
+def _ros2_of_others(plan: DrivePlan) -> list[Beside]:
+    return [one for one in plan.beside if one.ros2 is not None]
+
+
+def _ros2_beside(plan: DrivePlan, process_id: str) -> ProcessSetup:
+    one = _ros2_of_others(plan)[int(process_id.removeprefix(ROS2_BESIDE))]
+    assert one.ros2 is not None
+    return Ros2Setup(
+        **_base(plan, process_id) | {"vehicle_id": one.config.id},  # type: ignore[arg-type]
+        mapping=one.ros2.text,
+        mapping_name=one.ros2.name,
+        drive_frame=plan.drive_frame,
+        listens_only=True,
+    )
+
+
+def _speaks_ros2(plan: DrivePlan) -> bool:
+    return plan.ros2 is not None
+
+
+def _source_is(source: str) -> Callable[[DrivePlan], bool]:
+    return lambda plan: plan.config.resolved_source == source
+
+
+PROCESSES: tuple[ProcessRow, ...] = (
+    ProcessRow(
+        BUILDER, "orchestrator.worlds.builder_process", _always, _one, "restart", _builder, 10
+    ),
+    ProcessRow(
+        "w", "sim_worker", _always, lambda plan: plan.config.workers, "restart", _worker,
+        numbered=True,
+    ),
+    ProcessRow(MIRROR, "sim_worker", _always, _one, "restart", _worker),
+    ProcessRow(TUNING, "sim_worker.analysis.process", _tunes, _one, "restart", _tuning, 10),
+    ProcessRow("recorder", "telemetry.processes.recorder", _always, _one, "report", _recorder),
+    ProcessRow("viewer", "viewer", _always, _one, "report", _viewer, 10),
+    ProcessRow(
+        VEHICLE, "telemetry.processes.replay", _source_is("log"), _one, "end_drive", _replay
+    ),
+    ProcessRow(VEHICLE, "telemetry.standin", _source_is("standin"), _one, "end_drive", _standin),
+    # Never started again: what has stopped towards a vehicle must not resume by itself.
+    ProcessRow("ros2", "telemetry.ros2", _speaks_ros2, _one, "end_drive", _ros2),
+    ProcessRow(
+        ROS2_BESIDE, "telemetry.ros2", lambda plan: bool(_ros2_of_others(plan)),
+        lambda plan: len(_ros2_of_others(plan)), "restart", _ros2_beside, numbered=True,
+    ),
+)  # fmt: skip
+"""In the order in which they are started; the vehicle waits for the orchestrator's token."""
+
+
+def row_of(row: ProcessRow, plan: DrivePlan) -> ProcessRow:
+    """Return a row as it counts in one drive.
+
+    In lock step nobody may begin in the middle who answers for all samples from the first one on.
+    """
+    if row.name == TUNING and plan.config.lock_step:
+        return row._replace(when_dead="report")
+    return row
+
+
+def process_ids(row: ProcessRow, plan: DrivePlan) -> tuple[str, ...]:
+    """Return the ids of a row's processes."""
+    if row.numbered:
+        return tuple(f"{row.name}{index}" for index in range(row.count(plan)))
+    return (row.name,)

@@ -1,0 +1,123 @@
+"""The progress of a drive: one line on the terminal, and the same on the bus."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Literal
+
+from rich.console import Console
+from rich.status import Status
+
+from foretwin.contracts.simulation import Event, Progress, WorkerStatus
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.drive.mission import Mission
+
+PERIOD_S = 0.25
+PLAIN_PERIOD_S = 10.0
+RATE_WINDOW_S = 5.0
+
+
+class ProgressLine:
+    """Shows where the drive is; on a terminal as a line that renews itself, else now and then."""
+
+    def __init__(self, conductor: Conductor, mission: Mission) -> None:
+        self._conductor = conductor
+        self._mission = mission
+        self._console = Console(stderr=True, highlight=False)
+        self._status: Status | None = None
+        self._last_s = 0.0
+        self._last_plain_s = time.monotonic()
+        self._counts: list[tuple[float, int]] = []
+
+    def __enter__(self) -> ProgressLine:
+        if self._console.is_terminal:
+            self._status = self._console.status("starting", spinner="dots")
+            self._status.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._status is not None:
+            self._status.stop()
+
+    def say(self, text: str) -> None:
+        """Print a line that stays."""
+        self._console.print(text, soft_wrap=True, markup=False)
+
+    def tell(self, event: Event) -> None:
+        """Print what the engineer should know now: warnings and errors."""
+        if event.level != "info":
+            self.say(f"{event.level}: {event.source}: {event.text}")
+
+    def update(self, now_s: float) -> None:
+        """Renew the line and publish it, at most a few times a second."""
+        if now_s - self._last_s < PERIOD_S:
+            return
+        self._last_s = now_s
+        progress = self._progress(now_s)
+        conductor = self._conductor
+        conductor.bus.publish("progress", progress, run=conductor.plan.run_id)
+        for status in self._workers(progress.stamp_ns):
+            conductor.bus.publish("worker_status", status, run=conductor.plan.run_id)
+        text = self._text(progress)
+        if self._status is not None:
+            self._status.update(text)
+        elif now_s - self._last_plain_s >= PLAIN_PERIOD_S:
+            self._last_plain_s = now_s
+            print(text, file=sys.stderr, flush=True)
+
+    def _progress(self, now_s: float) -> Progress:
+        conductor, mission = self._conductor, self._mission
+        self._counts.append((now_s, conductor.rounds.futures.count))
+        self._counts = [c for c in self._counts if now_s - c[0] <= RATE_WINDOW_S]
+        since_s, before = self._counts[0]
+        rate = (
+            (conductor.rounds.futures.count - before) / (now_s - since_s)
+            if now_s > since_s
+            else 0.0
+        )
+        ahead = mission.next_junction
+        return Progress(
+            stamp_ns=conductor.intake.now_stamp_ns,
+            drive_time_s=mission.drive_time_s,
+            mission_state=mission.state,
+            next_intersection=ahead[0] if ahead else None,
+            arrival_in_s=ahead[1] if ahead else None,
+            futures_per_s=rate,
+            dropped=conductor.mailbox.dropped + conductor.tables.dropped,
+            too_slow=conductor.rounds.short_of,
+        )
+
+    def _workers(self, stamp_ns: int) -> list[WorkerStatus]:
+        desk = self._conductor.rounds.desk
+        busy = desk.busy
+        count = self._conductor.plan.config.workers
+        up = set(desk.workers)
+        statuses = []
+        for worker_id in (f"w{index}" for index in range(count)):
+            state: Literal["idle", "busy", "dead"] = "dead"
+            if worker_id in up:
+                state = "busy" if worker_id in busy else "idle"
+            statuses.append(
+                WorkerStatus(
+                    stamp_ns=stamp_ns,
+                    worker_id=worker_id,
+                    state=state,
+                    rtf=self._conductor.rounds.rtf.get(worker_id),
+                )
+            )
+        return statuses
+
+    def _text(self, progress: Progress) -> str:
+        conductor = self._conductor
+        ahead = "no junction ahead"
+        if progress.next_intersection is not None:
+            ahead = f"{progress.next_intersection} in {progress.arrival_in_s:.0f} s"
+        short = f"{progress.too_slow} (machine too slow for all)  " if progress.too_slow else ""
+        return (
+            f"{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}  {short}"
+            f"{progress.futures_per_s:.0f} futures/s  "
+            f"workers {len(conductor.rounds.desk.workers)}/{conductor.plan.config.workers}  "
+            f"missed {conductor.missed_rounds}  "
+            f"dropped {progress.dropped}"
+        )

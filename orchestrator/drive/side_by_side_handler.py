@@ -1,0 +1,133 @@
+"""Human and ADS side by side during a drive: what is said, published and kept of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+from foretwin.contracts.bus import Bus
+from foretwin.contracts.drive import PlannedTrajectory, VehicleState, VehicleStatus
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.side_by_side import Disagreement, DisagreementKind, DrivenSegment
+from foretwin.orchestrator.drive.intake import Intake
+from foretwin.orchestrator.drive.mission import Mission
+from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.record.results import ResultTables
+from foretwin.sim_worker.analysis.side_by_side.segment import Place
+from foretwin.sim_worker.analysis.side_by_side.watch import SideBySide
+
+WORDS: dict[DisagreementKind, str] = {
+    "ads_turns_elsewhere": "the ADS would have turned elsewhere",
+    "ads_in_another_lane": "the ADS would have taken another lane",
+    "ads_beside": "the ADS would have kept beside the driven line",
+    "ads_stops": "the ADS would have stopped, the human went on",
+    "human_stops": "the human stopped, the ADS would have gone on",
+    "ads_faster": "the ADS would have been faster",
+    "ads_slower": "the ADS would have been slower",
+}
+MOST_LISTED = 1000
+"""Disagreements in run.json; all are in the table."""
+
+
+class HumanDesk:
+    """Feeds the comparison with what came in, and hands on what it finds."""
+
+    def __init__(
+        self,
+        plan: DrivePlan,
+        bus: Bus,
+        tables: ResultTables,
+        intake: Intake,
+        mission: Mission,
+        *,
+        tell: Callable[[Tell], None],
+    ) -> None:
+        self._bus, self._tables, self._run_id, self._tell = bus, tables, plan.run_id, tell
+        self._intake, self._mission = intake, mission
+        self._watch = SideBySide(
+            plan.drive_frame, vehicle_id=plan.config.vehicle_id, place=self._place
+        )
+        self._plan: PlannedTrajectory | None = None
+        self._status: VehicleStatus | None = None
+        self._found: list[Disagreement] = []
+
+    def take(self, state: VehicleState | None) -> None:
+        """Take what the intake newly holds, and the state where there is a new one."""
+        status, plan = self._intake.status, self._intake.plan
+        if status is not None and status is not self._status:
+            self._status = status
+            self._watch.take_status(status)
+        if plan is not None and plan is not self._plan:
+            self._plan = plan
+            self._watch.take_plan(plan)
+        if state is not None:
+            self._keep(self._watch.take_state(state))
+
+    def finish(self) -> None:
+        """End what lasts at the drive's end, and write the segments."""
+        self._keep(self._watch.finish())
+        self._tables.add("driven_segments", [msgspec.to_builtins(s) for s in self._segments])
+
+    def record(self) -> dict[str, Any] | None:
+        """Return the `side_by_side` part of run.json, None where the car sent no plans."""
+        segments = self._segments
+        if not any(segment.plans or segment.too_short for segment in segments):
+            return None
+        return {
+            "segments": [msgspec.to_builtins(segment) for segment in segments],
+            "disagreements": [
+                {"drive_time_s": self._drive_s(one.stamp_ns), **disagreement_row(one)}
+                for one in self._found[:MOST_LISTED]
+            ],
+        }
+
+    def _place(self) -> Place:
+        latest = self._intake.latest
+        position = GeoPoint(math.nan, math.nan) if latest is None else latest.state.position
+        return Place(position, self._mission.junction_id, self._mission.route_m)
+
+    @property
+    def _segments(self) -> list[DrivenSegment]:
+        return self._watch.segments
+
+    def _drive_s(self, stamp_ns: int) -> float:
+        return round((stamp_ns - self._intake.start_stamp_ns) / 1e9, 2)
+
+    def _keep(self, found: list[Disagreement]) -> None:
+        for one in found:
+            self._bus.publish("disagreement", one, run=self._run_id)
+            if not one.over:
+                self._tell(Tell("warning", told(one)))
+                continue
+            self._found.append(one)
+            self._tables.add("disagreements", [disagreement_row(one)])
+
+
+def told(one: Disagreement) -> str:
+    """Return a disagreement in one line, with its place."""
+    where = f"{one.position.lat_deg:.6f}, {one.position.lon_deg:.6f}"
+    if one.junction_id is not None:
+        where += f", at or before junction {one.junction_id}"
+    if one.route_m is not None:
+        where += f", {one.route_m:.0f} m along the route"
+    apart = (
+        f"{abs(one.lateral_m):.1f} m to the {'left' if one.lateral_m > 0.0 else 'right'}"
+        if one.aspect == "way"
+        else f"{one.speed_mps:+.1f} m/s, {one.along_m:+.1f} m"
+    )
+    return f"{WORDS[one.kind]} ({apart}) from {where}"
+
+
+def disagreement_row(one: Disagreement) -> dict[str, Any]:
+    """Return a disagreement as its table has it."""
+    row: dict[str, Any] = msgspec.to_builtins(one)
+    position = one.position
+    del row["position"], row["over"]
+    return row | {
+        "lat_deg": position.lat_deg, "lon_deg": position.lon_deg,
+        "duration_s": (one.end_stamp_ns - one.stamp_ns) / 1e9,
+    }  # fmt: skip

@@ -1,0 +1,239 @@
+"""Starts the processes of a drive, notices their deaths, restarts them, and ends them all.
+
+The decisions (who is alive, who is restarted, when to give up) are in `Supervisor`; the
+operating system's processes are behind `Launcher`, so that tests need none.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import defaultdict, deque
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from foretwin.contracts.setup import ProcessSetup, write_setup
+from foretwin.orchestrator.drive.priorities import gives_way
+from foretwin.orchestrator.drive.processes import ProcessRow
+
+log = logging.getLogger("orchestrator")
+
+GIVES_WAY_AFTER_S = 1.0
+"""So long after its death a process may still count as alive."""
+RESTARTS_WITHIN_S = 30.0
+TERM_S = 5.0
+"""What a process that was told to leave has for its last words: on a busy machine one that writes a
+file is slow, not stuck."""
+_REAP_S = 30.0
+MAX_RESTARTS = 5
+"""More deaths than this within RESTARTS_WITHIN_S and a process is given up."""
+
+
+class Child(Protocol):
+    """A started process."""
+
+    pid: int
+
+    def poll(self) -> int | None:
+        """Return the exit code, None while it runs."""
+
+    def send_signal(self, sig: int) -> None:
+        """Send a signal."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for the end."""
+
+
+class Launcher(Protocol):
+    """Starts one process; `module` is below the package `foretwin`."""
+
+    def __call__(self, *, module: str, setup: ProcessSetup) -> Child:
+        """Start a fresh interpreter running `module` with `setup`."""
+
+
+class FreshInterpreter:
+    """Starts each process as a new interpreter in a session of its own.
+
+    Never a fork: a forked child of an open Zenoh session hangs. A session of its own keeps a
+    terminal's Ctrl-C from the children, which the orchestrator ends in order. The interpreter's
+    standard error goes to the run's log, so that a crash leaves its traceback. What lies in the
+    working directory is not imported (`-P`).
+    """
+
+    def __init__(self, folder: Path, *, package: str = "foretwin") -> None:
+        self._folder, self._package = folder, package
+
+    def __call__(self, *, module: str, setup: ProcessSetup) -> Child:
+        """Start a fresh interpreter running `module` with `setup`."""
+        setup_file = self._folder / f"{setup.process_id}.json"
+        write_setup(setup, setup_file)
+        with (self._folder / f"{setup.process_id}.stderr").open("ab") as stderr:
+            return subprocess.Popen(
+                [
+                    sys.executable,
+                    "-P",
+                    "-m",
+                    f"{self._package}.{module}",
+                    "--setup",
+                    str(setup_file),
+                ],
+                stdin=subprocess.DEVNULL,
+                stdout=stderr,
+                stderr=stderr,
+                start_new_session=True,
+                env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Death:
+    """A process that ended although nobody asked it to."""
+
+    process_id: str
+    row: ProcessRow
+    exit_code: int
+    restarted: bool
+
+
+@dataclass(slots=True)
+class _Managed:
+    row: ProcessRow
+    setup: ProcessSetup
+    child: Child
+    gone: bool = False
+
+
+@dataclass(slots=True)
+class Supervisor:
+    """Owns the processes of one drive; call `poll` often (ten times a second or more)."""
+
+    launch: Launcher
+    started: int = 0
+    restarted: int = 0
+    _managed: dict[str, _Managed] = field(default_factory=dict)
+    _deaths: dict[str, deque[float]] = field(default_factory=lambda: defaultdict(deque))
+    _to_give_way: dict[str, float] = field(default_factory=dict)
+
+    def start(self, row: ProcessRow, setup: ProcessSetup) -> None:
+        """Start one process."""
+        child = self.launch(module=row.module, setup=setup)
+        if row.nice:
+            self._to_give_way[setup.process_id] = -math.inf
+        log.info("started %s (%s) as process %d", setup.process_id, row.module, child.pid)
+        self._managed[setup.process_id] = _Managed(row, setup, child)
+        self.started += 1
+
+    def poll(self, now_s: float) -> list[Death]:
+        """Return the processes that died since the last call, restarted where the table says so."""
+        deaths = []
+        for process_id, managed in self._managed.items():
+            if managed.gone:
+                continue
+            exit_code = managed.child.poll()
+            if exit_code is None:
+                continue
+            again = managed.row.when_dead == "restart" and self._may_restart(process_id, now_s)
+            if again:
+                managed.child = self.launch(module=managed.row.module, setup=managed.setup)
+                if managed.row.nice:
+                    self._to_give_way[process_id] = now_s + GIVES_WAY_AFTER_S
+                log.info("started %s again as process %d", process_id, managed.child.pid)
+                self.restarted += 1
+            else:
+                managed.gone = True
+            deaths.append(Death(process_id, managed.row, exit_code, again))
+        return deaths
+
+    def let_give_way(self, alive: Collection[str], now_s: float) -> None:
+        """Let those of the processes `alive` give way that shall; call it as often as `poll`.
+
+        Not before they can take work: at niceness, a start on a busy machine takes minutes.
+        """
+        for process_id, from_s in list(self._to_give_way.items()):
+            managed = self._managed[process_id]
+            if process_id not in alive or now_s < from_s:
+                continue
+            if gives_way(managed.child.pid, managed.row.nice):
+                del self._to_give_way[process_id]
+
+    def _may_restart(self, process_id: str, now_s: float) -> bool:
+        recent = self._deaths[process_id]
+        recent.append(now_s)
+        while recent and now_s - recent[0] > RESTARTS_WITHIN_S:
+            recent.popleft()
+        return len(recent) <= MAX_RESTARTS
+
+    def running(self) -> list[str]:
+        """Return the ids of processes that have not ended."""
+        return [name for name, m in self._managed.items() if not m.gone and m.child.poll() is None]
+
+    def kill(self, process_id: str) -> None:
+        """End a process that hangs; `poll` then sees its death."""
+        managed = self._managed.get(process_id)
+        if managed is not None and not managed.gone:
+            _signal(managed.child, signal.SIGKILL)
+
+    def row(self, process_id: str) -> ProcessRow:
+        """Return the table's row of a process."""
+        return self._managed[process_id].row
+
+    def pid(self, process_id: str) -> int:
+        """Return the operating system's id of a process."""
+        return self._managed[process_id].child.pid
+
+    def stop(self, *, grace_s: float, term_s: float = TERM_S) -> list[str]:
+        """Wait `grace_s` for all to end by themselves, then terminate, then kill.
+
+        Returns the ids that had to be killed. Those who gave way are waited for now.
+        """
+        for managed in self._alive():
+            if managed.row.nice:
+                gives_way(managed.child.pid, 0)
+        self._wait(grace_s)
+        for managed in self._alive():
+            _signal(managed.child, signal.SIGTERM)
+            _signal(managed.child, signal.SIGCONT)
+        self._wait(term_s)
+        killed = self._alive()
+        for managed in killed:
+            _signal(managed.child, signal.SIGKILL)
+        for managed in self._managed.values():
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                managed.child.wait(timeout=_REAP_S)
+            managed.gone = True
+        return [managed.setup.process_id for managed in killed]
+
+    def _alive(self) -> list[_Managed]:
+        return [m for m in self._managed.values() if not m.gone and m.child.poll() is None]
+
+    def _wait(self, seconds: float) -> None:
+        deadline = time.monotonic() + seconds
+        for managed in self._alive():
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                managed.child.wait(timeout=max(0.0, deadline - time.monotonic()))
+
+
+def _signal(child: Child, sig: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        child.send_signal(sig)
+
+
+def fold_stderr(folder: Path, log_file: Path) -> None:
+    """Append what the processes wrote to standard error to the run's log, one JSON line each."""
+    with log_file.open("a", encoding="utf-8") as log:
+        for path in sorted(folder.glob("*.stderr")):
+            for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+                if line.strip():
+                    log.write(
+                        json.dumps({"process": path.stem, "level": "stderr", "text": line}) + "\n"
+                    )
+            path.unlink()

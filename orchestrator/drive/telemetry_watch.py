@@ -1,0 +1,81 @@
+"""What is wrong with the telemetry that comes in: said once, not with every sample."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from foretwin.telemetry.estimator.estimator import ClockReport, StateEstimator
+
+REARM_NS = 5_000_000_000
+"""A channel that was overdue must have come for this long before it is named once more."""
+
+
+class TelemetryWatch:
+    """Turns overdue channels, steps of the clock and samples of a wrong type into warnings.
+
+    Times are of the vehicle's clock, without its steps, or of the receiver's: any one that rises.
+    """
+
+    def __init__(self) -> None:
+        self.stale: Counter[str] = Counter()
+        """How often each channel fell silent."""
+        self._overdue_until_ns: dict[str, int] = {}
+        self._silent: tuple[str, ...] = ()
+        self._steps = 0
+        self._wrong: set[str] = set()
+
+    def overdue(self, channels: tuple[str, ...], now_ns: int) -> list[str]:
+        """Take which channels are overdue now; return a warning of those that are so newly."""
+        newly = []
+        for channel in channels:
+            if channel not in self._silent:
+                self.stale[channel] += 1
+            before_ns = self._overdue_until_ns.get(channel)
+            self._overdue_until_ns[channel] = now_ns
+            if before_ns is None or now_ns - before_ns > REARM_NS:
+                newly.append(channel)
+        self._silent = channels
+        if not newly:
+            return []
+        verb = "is" if len(newly) == 1 else "are"
+        return [f"telemetry: {', '.join(newly)} {verb} overdue; states go on without"]
+
+    def estimator(self, estimator: StateEstimator) -> list[str]:
+        """Return a warning for each new step of the clock and each channel of a wrong type."""
+        steps = estimator.clock.steps if estimator.clock_steps > self._steps else ()
+        warnings = [
+            f"telemetry: the vehicle's clock stepped by {step.step_ns * 1e-9:+.3f} s "
+            f"({step.channel}); its new time counts from here"
+            for step in steps[self._steps :]
+        ]
+        self._steps = estimator.clock_steps
+        for reason in estimator.refused:
+            if reason.endswith("_wrong_type") and reason not in self._wrong:
+                self._wrong.add(reason)
+                channel = reason.removesuffix("_wrong_type")
+                warnings.append(f"telemetry: {channel} carries messages of another type; refused")
+        return warnings
+
+
+def record(
+    estimator: StateEstimator | None, watch: TelemetryWatch, *, receiver_utc_ns: int
+) -> dict[str, Any]:
+    """Return what run.json's `telemetry` says of clock, order and silence.
+
+    `receiver_utc_ns` is the receiver's UTC when its monotonic clock read 0. Of the clock all is
+    None where samples were taken in order, without times of receipt.
+    """
+    clock = ClockReport(None, None, None, ()) if estimator is None else estimator.clock
+    late: Counter[str] = Counter() if estimator is None else estimator.late
+    doubled: Counter[str] = Counter() if estimator is None else estimator.doubled
+    offset_ns = None if clock.offset_ns is None else clock.offset_ns + receiver_utc_ns
+    return {
+        "late": late.total(),
+        "doubled": doubled.total(),
+        "stale": dict(sorted(watch.stale.items())),
+        "clock_offset_ms": None if offset_ns is None else round(offset_ns * 1e-6, 3),
+        "clock_drift_ppm": None if clock.drift_ppm is None else round(clock.drift_ppm, 2),
+        "delay_spread_ms_p95": None if clock.spread_s is None else round(clock.spread_s * 1e3, 3),
+        "clock_steps_s": [round(step.step_ns * 1e-9, 3) for step in clock.steps],
+    }

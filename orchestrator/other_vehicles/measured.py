@@ -1,0 +1,75 @@
+"""Samples of a vehicle beside the car to states of it."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import msgspec
+
+from foretwin.contracts.drive import ControlCommand, VehicleInfo, VehicleState
+from foretwin.contracts.roles import OtherVehicle
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.telemetry.estimator.estimator import StateEstimator
+
+PERIOD_NS = 18_000_000
+"""Between two states of a vehicle that are passed on: 50 Hz at most."""
+FRESH_NS = 500_000_000
+
+
+class Source(Protocol):
+    """Where a vehicle's states come from."""
+
+    def states_until(self, own: VehicleState) -> list[OtherVehicle]:
+        """Return what is new of it as the car comes to its own new state."""
+
+    def close(self) -> None:
+        """Let go of files and threads; idempotent."""
+
+
+def estimator_of(info: VehicleInfo, vehicle: VehicleParameters) -> StateEstimator:
+    """Return the estimator of a vehicle's state."""
+    return StateEstimator(
+        info,
+        wheelbase_m=vehicle.wheelbase_m.value,
+        steering_ratio=vehicle.steering_ratio.value,
+        steering_offset_rad=vehicle.steering_offset_rad.value,
+    )
+
+
+class Measured:
+    """Samples of one vehicle to states, as far apart as is worth passing on."""
+
+    def __init__(self, vehicle_id: str, estimator: StateEstimator) -> None:
+        self._id, self._estimator = vehicle_id, estimator
+        self._commands: list[ControlCommand] = []
+        self._last_ns: int | None = None
+
+    def begin_anew(self, estimator: StateEstimator) -> None:
+        """Forget the motion so far, since more is known of the vehicle now."""
+        self._estimator = estimator
+
+    def take(
+        self,
+        channel: str,
+        message: msgspec.Struct,
+        *,
+        later_ns: int = 0,
+        received_ns: int | None = None,
+    ) -> OtherVehicle | None:
+        """Take one sample; `later_ns` is added to its stamp once the state is estimated.
+
+        `received_ns` is its receipt by the monotonic clock; None where samples are in order.
+        """
+        if isinstance(message, ControlCommand):
+            stamp_ns = message.stamp_ns + later_ns
+            self._commands.append(msgspec.structs.replace(message, stamp_ns=stamp_ns))
+        state = self._estimator.handle(channel, message, received_ns=received_ns)
+        if state is None or not state.yaw_valid:
+            return None
+        stamp_ns = state.stamp_ns + later_ns
+        if self._last_ns is not None and stamp_ns - self._last_ns < PERIOD_NS:
+            return None
+        commands, self._commands = tuple(self._commands), []
+        self._last_ns = stamp_ns
+        moved = msgspec.structs.replace(state, stamp_ns=stamp_ns, vehicle_id=self._id)
+        return OtherVehicle(state=moved, commands=commands)

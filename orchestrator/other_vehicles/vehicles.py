@@ -1,0 +1,146 @@
+"""Vehicles beside the car: from a log, the bus or the car's own detections to states in its time.
+
+Nothing is taken that is later than the car's own newest state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from foretwin.contracts.bus import Bus, Mailbox, Received
+from foretwin.contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleInfo, VehicleState
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.roles import OtherVehicles, Role
+from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
+from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.drive.plan import Beside, DrivePlan
+from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.other_vehicles.detected import DetectedBeside, moved_ahead
+from foretwin.orchestrator.other_vehicles.live import LiveBeside
+from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, Source
+from foretwin.orchestrator.other_vehicles.recorded import LogBeside
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+
+SAME_WITHIN_M = 2.0
+"""A detection whose centre is so near to that of a vehicle with telemetry of its own is it."""
+
+
+def road_user(state: VehicleState, vehicle: VehicleParameters) -> RoadUser:
+    """Return a vehicle as the road user that futures meet."""
+    length_m = vehicle.length_m.value
+    ahead_m = box_centre_from_base_m(vehicle)
+    return RoadUser(
+        user_id=state.vehicle_id,
+        kind=kind_by_length(length_m),
+        position=moved_ahead(state.position, state.yaw_rad, ahead_m),
+        yaw_rad=state.yaw_rad,
+        speed_mps=state.speed_mps,
+        length_m=length_m,
+        width_m=vehicle.width_m.value,
+    )
+
+
+class VehiclesBeside:
+    """All vehicles beside the car: passes their states on, and shows them to futures."""
+
+    def __init__(
+        self,
+        plan: DrivePlan,
+        bus: Bus,
+        mailbox: Mailbox,
+        *,
+        tell: Callable[[Tell], None],
+    ) -> None:
+        """What a vehicle answers that was asked what it is lands in `mailbox`, for `take_info`."""
+        self._bus, self._mailbox, self._run_id = bus, mailbox, plan.run_id
+        self._crew = crew = plan.beside
+        self._sources: dict[str, Source] = {}
+        self._waits = plan.config.lock_step
+        self._tell = tell
+        self._vehicles = {one.config.id: one.vehicle for one in crew}
+        self._seen_as = {one.config.seen_as for one in crew}
+        self._frame = plan.drive_frame
+        self._latest: dict[str, VehicleState] = {}
+        self._detected_ns: int | None = None
+
+    def begin(self, own: VehicleInfo) -> None:
+        """Open what there is, now that the car's clock is known."""
+        self._sources = {one.config.id: self._source(one, own) for one in self._crew}
+
+    def close(self) -> None:
+        """Let go of files and threads; idempotent."""
+        for source in self._sources.values():
+            source.close()
+
+    def _source(self, beside: Beside, own: VehicleInfo) -> Source:
+        config, vehicle = beside.config, beside.vehicle
+        if config.log is not None:
+            return LogBeside(
+                Path(config.log), config.id, vehicle, own=own, offset_s=config.log_offset_s,
+                waits=self._waits, tell=self._tell,
+            )  # fmt: skip
+        if config.seen_as is not None:
+            return DetectedBeside(config.id, config.seen_as, vehicle)
+        return LiveBeside(config.id, vehicle, ask_info=self._ask_info, tell=self._tell)
+
+    def _ask_info(self, vehicle_id: str) -> None:
+        self._bus.request("info", InfoRequest(), self._mailbox, tag=vehicle_id, vehicle=vehicle_id)
+
+    def take_sample(self, vehicle_id: str, item: Received) -> None:
+        """Take a sample of a vehicle on the bus."""
+        source = self._sources.get(vehicle_id)
+        if isinstance(source, LiveBeside):
+            source.take(item)
+
+    def take_info(self, vehicle_id: str, info: VehicleInfo | None) -> None:
+        """Take what a vehicle on the bus says of itself, None where it does not answer."""
+        source = self._sources.get(vehicle_id)
+        if isinstance(source, LiveBeside):
+            source.take_info(info)
+
+    def keep_up_with(self, own: VehicleState, detected: RoadUsers | None) -> None:
+        """Pass on everything up to the car's own new state; `detected` is what it saw last."""
+        if not self._sources:
+            return
+        if detected is not None and detected.stamp_ns != self._detected_ns:
+            self._detected_ns = detected.stamp_ns
+            for source in self._sources.values():
+                if isinstance(source, DetectedBeside):
+                    source.take(detected)
+        heard = [one for s in self._sources.values() for one in s.states_until(own)]
+        heard.sort(key=lambda one: (one.state.stamp_ns, one.state.vehicle_id))
+        self._latest |= {one.state.vehicle_id: one.state for one in heard}
+        message = OtherVehicles(stamp_ns=own.stamp_ns, heard=tuple(heard))
+        self._bus.publish("other_vehicles", message, run=self._run_id)
+
+    def among(
+        self, said: Surroundings, own: VehicleState, roles: Mapping[str, Role]
+    ) -> Surroundings:
+        """Return what surrounds the car with these vehicles in it, ghosts excepted."""
+        if not self._sources:
+            return said
+        mine = [
+            road_user(state, self._vehicles[name])
+            for name, state in self._latest.items()
+            if roles.get(name) in ("twin", "shadow")
+            and abs(own.stamp_ns - state.stamp_ns) <= FRESH_NS
+        ]
+        users = said.road_users
+        fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= FRESH_NS
+        detected = [
+            user
+            for user in (users.users if fresh and users is not None else ())
+            if user.user_id not in self._seen_as and not any(self._same(user, one) for one in mine)
+        ]
+        return said._replace(road_users=RoadUsers(stamp_ns=own.stamp_ns, users=(*detected, *mine)))
+
+    def _same(self, one: RoadUser, other: RoadUser) -> bool:
+        frame = self._frame
+        a, b = (
+            local_from_geo(frame, user.position.lat_deg, user.position.lon_deg)
+            for user in (one, other)
+        )
+        return float(np.hypot(*(a - b))) < SAME_WITHIN_M

@@ -1,0 +1,176 @@
+"""Finds the road a car is on, as it drives and without looking ahead."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.orchestrator.routing.road_hypotheses import (
+    Hypothesis,
+    MatchingWeights,
+    first_hypotheses,
+    next_hypotheses,
+)
+from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex, legality, project
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+
+
+class Match(NamedTuple):
+    """Where on the map the car is; `lateral_m` is positive left of the edge's driving direction.
+
+    `confident` is false where another road is nearly as likely, or the nearest is far away;
+    `direction_known` is false until the car's heading has told which way it drives.
+    """
+
+    directed_edge: DirectedEdge
+    s_on_edge_m: float
+    lateral_m: float
+    distance_m: float
+    confident: bool
+    direction_known: bool = True
+    heading_off_rad: float = 0.0
+    """The car's heading against the road's there, positive to the left; 0 while it is unknown."""
+
+
+class OffRoadStretch(NamedTuple):
+    """A stretch driven where the map says that cars may not: no_car_road or against_one_way."""
+
+    reason: str
+    name: str
+    way_ids: tuple[int, ...]
+    length_m: float
+
+
+class MapMatcher:
+    """Follows one car through the road graph, fix by fix."""
+
+    def __init__(
+        self,
+        graph: RoadGraph,
+        *,
+        index: RoadIndex | None = None,
+        weights: MatchingWeights | None = None,
+        lost_after_m: float = 20.0,
+    ) -> None:
+        self._index = index or RoadIndex(graph)
+        self._weights = weights or MatchingWeights()
+        self._lost_after_m = lost_after_m
+        self._hypotheses: list[Hypothesis] = []
+        self.roads_near: list[NearEdge] = []
+        """Both directions of all roads near the car where it was matched last, nearest first."""
+        self._step_xy: Array | None = None
+        self._road_xy: Array | None = None
+        self._away_m = 0.0
+        self._direction_known = False
+        self._stretches: list[OffRoadStretch] = []
+        self._stretch: OffRoadStretch | None = None
+
+    @property
+    def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:
+        """What has been driven where cars may not drive, the present stretch included."""
+        return (*self._stretches, *((self._stretch,) if self._stretch else ()))
+
+    def update(
+        self, xy_m: Array, yaw_rad: float, yaw_valid: bool, speed_mps: float
+    ) -> Match | None:
+        """Take the car's position (2,) in the graph's frame; return its match, None off the map.
+
+        Off the map means: no road within `begin_radius_m` for `lost_after_m` of driving.
+        Positions that are not finite are ignored; a heading that is not valid does not count.
+        """
+        xy = np.asarray(xy_m, dtype=np.float64)
+        if not np.isfinite(xy).all():
+            return self._match(self._road_xy)
+        yaw = yaw_rad if yaw_valid and math.isfinite(yaw_rad) else None
+        if speed_mps < -0.3 and yaw is not None:
+            yaw += math.pi
+        moved = 0.0 if self._step_xy is None else float(np.hypot(*(xy - self._step_xy)))
+        if not self._hypotheses:
+            self._begin(xy, yaw)
+        elif moved >= self._weights.step_m or (yaw is not None and not self._direction_known):
+            self._step(xy, yaw, moved)
+        if self._away_m == 0.0:
+            self._road_xy = xy
+        # Away from every road the car's place on its last one is where it left it: a wild
+        # position must not carry it to the road's end and past a junction.
+        match = self._match(self._road_xy)
+        if match is None or yaw is None or not self._direction_known:
+            return match
+        road_rad = project(match.directed_edge, xy).heading_rad
+        return match._replace(heading_off_rad=float(wrap_angle(yaw - road_rad)))
+
+    def _begin(self, xy: Array, yaw: float | None) -> None:
+        candidates = self._index.near(xy, self._weights.begin_radius_m)
+        self._step_xy, self.roads_near = xy, candidates
+        if candidates:
+            self._hypotheses = first_hypotheses(candidates, yaw, self._weights)
+            self._direction_known = yaw is not None
+            self._away_m = 0.0
+
+    def _step(self, xy: Array, yaw: float | None, moved_m: float) -> None:
+        candidates = self._index.near(xy, self._weights.search_radius_m)
+        self._step_xy, self.roads_near = xy, candidates
+        if not candidates or candidates[0].distance_m > self._weights.begin_radius_m:
+            # A single wild fix must not end the match: no step counts for more than 5 m.
+            self._away_m += min(moved_m, 5.0)
+            if self._away_m > self._lost_after_m:
+                self._hypotheses = []
+                self._close_stretch()
+            if not candidates or not self._hypotheses:
+                return
+        else:
+            self._away_m = 0.0
+        if yaw is not None and not self._direction_known:
+            # The first heading decides alone: before it both directions were equally likely.
+            self._hypotheses = first_hypotheses(candidates, yaw, self._weights)
+            self._direction_known = True
+        else:
+            self._hypotheses = next_hypotheses(
+                self._index, self._hypotheses, candidates, yaw, moved_m, self._weights
+            )
+        self._note_legality(moved_m)
+
+    def _match(self, xy: Array | None) -> Match | None:
+        if not self._hypotheses or xy is None:
+            return None
+        best = self._hypotheses[0]
+        near = project(best.near.directed_edge, xy)
+        rivals = [
+            other.cost for other in self._hypotheses[1:] if not _adjacent(best.near, other.near)
+        ]
+        confident = (
+            self._direction_known
+            and self._away_m == 0.0
+            and near.distance_m < 15.0
+            and min(rivals, default=math.inf) > 2.0
+        )
+        return Match(
+            near.directed_edge, near.s_m, near.lateral_m, near.distance_m, confident,
+            self._direction_known,
+        )  # fmt: skip
+
+    def _note_legality(self, moved_m: float) -> None:
+        edge = self._hypotheses[0].near.directed_edge
+        reason = legality(edge)
+        if self._stretch is not None and reason != self._stretch.reason:
+            self._close_stretch()
+        if reason == "car":
+            return
+        now = self._stretch or OffRoadStretch(reason, edge.edge.name, (), 0.0)
+        ways = now.way_ids if edge.edge.way_id in now.way_ids else (*now.way_ids, edge.edge.way_id)
+        self._stretch = now._replace(way_ids=ways, length_m=now.length_m + moved_m)
+
+    def _close_stretch(self) -> None:
+        if self._stretch is not None and self._stretch.length_m >= 5.0:
+            self._stretches.append(self._stretch)
+        self._stretch = None
+
+
+def _adjacent(one: NearEdge, other: NearEdge) -> bool:
+    """Whether two candidates follow each other, so that doubt between them means little."""
+    first, second = one.directed_edge, other.directed_edge
+    return first.end_node == second.start_node or second.end_node == first.start_node

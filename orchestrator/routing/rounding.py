@@ -1,0 +1,146 @@
+"""Lines with rounded corners: the geometry under driving paths, with arc lengths carried along."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from scipy.ndimage import gaussian_filter1d
+
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import arc_lengths
+
+FINE_M = 0.5
+"""Spacing of lines while they are worked on."""
+SIMPLIFY_M = 0.5
+ARC_ROOM_M = 15.0
+WIDENING_M = 3.0
+WIDENING_STEPS = 8
+MAX_CURVATURE_PM = 0.18
+"""A turning circle of 11 m, as of an ordinary car."""
+
+
+def clip(line: Array, s: Array, window: tuple[float, float]) -> tuple[Array, Array]:
+    """Cut a polyline to a window of s, with new vertices at the cuts."""
+    low, high = max(window[0], s[0]), min(window[1], s[-1])
+    inside = (s > low) & (s < high)
+    ends = np.array([low, high])
+    end_xy = np.stack([np.interp(ends, s, line[:, 0]), np.interp(ends, s, line[:, 1])], axis=-1)
+    return (
+        np.concatenate([end_xy[:1], line[inside], end_xy[1:]]),
+        np.concatenate([ends[:1], s[inside], ends[1:]]),
+    )
+
+
+def evenly_spaced(line: Array, s: Array) -> tuple[Array, Array]:
+    """Return a polyline and its s resampled at even spacing."""
+    arc = arc_lengths(line)
+    even = np.linspace(0.0, arc[-1], max(3, round(arc[-1] / FINE_M) + 1))
+    points = np.stack([np.interp(even, arc, line[:, k]) for k in (0, 1)], axis=-1)
+    return points, np.interp(even, arc, s)
+
+
+def turns(line: Array) -> Array:
+    """Return the turn in radians at each inner vertex, positive to the left."""
+    legs = np.diff(line, axis=0)
+    turn = np.diff(np.arctan2(legs[:, 1], legs[:, 0]))
+    return np.asarray((turn + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def without_straight(line: Array, s: Array) -> list[int]:
+    """Return the indices without vertices near a corner where the line goes all but straight on.
+
+    A side road that joins there must not shorten the leg that the corner's arc may use.
+    """
+    turn = np.abs(turns(line))
+    corners = s[1:-1][turn > math.radians(35.0)]
+    near = (np.abs(s[1:-1, None] - corners[None, :]) < ARC_ROOM_M).any(axis=1)
+    keep = np.concatenate([[True], ~(near & (turn < math.radians(3.0))), [True]])
+    return [int(index) for index in np.flatnonzero(keep)]
+
+
+def fillet(line: Array, s: Array, radius: Array) -> tuple[Array, Array]:
+    """Replace corners by arcs of `radius` (N - 2,), or less where the legs are too short for it."""
+    legs = np.diff(line, axis=0)
+    length = np.hypot(legs[:, 0], legs[:, 1])
+    heading = np.arctan2(legs[:, 1], legs[:, 0])
+    turn = turns(line)
+    tangent_share = np.tan(np.minimum(np.abs(turn), 3.0) / 2.0)
+    wanted = radius * tangent_share
+    # Two corners share the leg between them in proportion to what they want.
+    total = np.maximum(np.concatenate([[0.0], wanted]) + np.concatenate([wanted, [0.0]]), 1e-9)
+    fits = np.minimum(1.0, 0.98 * length / total)
+    tangent = wanted * np.minimum(fits[:-1], fits[1:])
+    points, places = [line[:1]], [s[:1]]
+    for corner in range(len(turn)):
+        vertex, reach_m = line[corner + 1], tangent[corner]
+        if abs(turn[corner]) < 1e-4 or reach_m < 1e-3:
+            points.append(vertex[None])
+            places.append(s[corner + 1 : corner + 2])
+            continue
+        start = vertex - reach_m * legs[corner] / length[corner]
+        count = max(3, math.ceil(abs(turn[corner]) / 0.08))
+        angles = np.linspace(0.0, turn[corner], count)
+        arc_radius = reach_m / tangent_share[corner]
+        side = math.copysign(1.0, turn[corner])
+        normal = heading[corner] + side * math.pi / 2.0
+        centre = start + arc_radius * np.array([math.cos(normal), math.sin(normal)])
+        spokes = angles + normal + math.pi
+        points.append(centre + arc_radius * np.stack([np.cos(spokes), np.sin(spokes)], axis=-1))
+        places.append(np.linspace(s[corner + 1] - reach_m, s[corner + 1] + reach_m, count))
+    return np.concatenate([*points, line[-1:]]), np.concatenate([*places, s[-1:]])
+
+
+def smoothed(points: Array, deviation_m: float) -> Array:
+    """Smooth evenly spaced points; mirrored through themselves, the ends stay where they are."""
+    pad = min(len(points) - 1, math.ceil(4.0 * deviation_m / FINE_M))
+    before = 2.0 * points[0] - points[pad:0:-1]
+    after = 2.0 * points[-1] - points[-2 : -pad - 2 : -1]
+    padded = np.concatenate([before, points, after])
+    smooth = gaussian_filter1d(padded, deviation_m / FINE_M, axis=0)
+    return np.asarray(smooth[pad : pad + len(points)])
+
+
+def simplified(line: Array) -> list[int]:
+    """Return the indices that Douglas and Peucker (1973) keep within `SIMPLIFY_M`."""
+    numbered = shapely.linestrings(np.column_stack([line, np.arange(len(line))]))
+    kept = shapely.simplify(numbered, SIMPLIFY_M, preserve_topology=False)
+    indices: list[int] = shapely.get_coordinates(kept, include_z=True)[:, 2].astype(int).tolist()
+    return indices
+
+
+def curvature_pm(points: Array) -> Array:
+    """Return the curvature (N,) in 1/m of a path of evenly spaced points, positive to the left."""
+    tangent = np.gradient(points, axis=0)
+    heading = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
+    return np.asarray(np.gradient(heading) / np.maximum(np.hypot(*tangent.T), 1e-3))
+
+
+def normals(points: Array) -> Array:
+    """Return unit normals (N, 2) to the left of a path."""
+    tangent = np.gradient(points, axis=0)
+    tangent /= np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)[:, None]
+    return np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
+
+
+def drivable(points: Array) -> Array:
+    """Widen turns that no car could steer, as far as that helps.
+
+    It does where short edges left no room for an arc; in the hairpin of an island drawn as a V
+    it does not, and the line stays as it was drawn.
+    """
+    best, least = points, float(np.abs(curvature_pm(points)).max())
+    for _ in range(WIDENING_STEPS):
+        tight = np.abs(curvature_pm(points)) > MAX_CURVATURE_PM
+        if not tight.any():
+            break
+        near = gaussian_filter1d(tight.astype(np.float64), 8.0 / FINE_M, mode="nearest")
+        share = np.minimum(1.0, 2.0 * near / float(near.max()))[:, None]
+        # Many small steps rather than one wide one, so that the rest stays where it is.
+        points = points + share * (smoothed(points, WIDENING_M) - points)
+        tightest = float(np.abs(curvature_pm(points)).max())
+        if tightest >= least:
+            break
+        best, least = points, tightest
+    return best

@@ -1,0 +1,164 @@
+"""The route: roads to be driven one after the other, and its most probable continuation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import wrap_angle
+from foretwin.orchestrator.routing.road_index import key_of, legality
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+
+HEADING_OVER_M = 15.0
+"""Headings at a node are measured over this length: nearer, maps draw junctions with kinks."""
+
+_CLASS_RANK = {
+    "motorway": 0, "trunk": 1, "primary": 2, "secondary": 3, "tertiary": 4, "unclassified": 5,
+    "residential": 5, "living_street": 6, "service": 7, "track": 8, "pedestrian": 8,
+}  # fmt: skip
+
+
+class RouteError(UserError):
+    """A route that cannot be driven on this map; the message is one line."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """Directed edges, each beginning where the one before ends.
+
+    `origin_m` is the route's position s at the start of the first edge: it lets a route lose its
+    past or change its future while s keeps counting.
+    """
+
+    edges: tuple[DirectedEdge, ...]
+    origin_m: float = 0.0
+
+    @cached_property
+    def start_m(self) -> Array:
+        """Position s (N + 1,) where each edge starts; the last value is the route's end."""
+        lengths = [directed.edge.length_m for directed in self.edges]
+        return self.origin_m + np.concatenate([[0.0], np.cumsum(lengths)])
+
+    @property
+    def end_m(self) -> float:
+        """Position s of the route's end."""
+        return float(self.start_m[-1])
+
+    def index_at(self, s_m: float) -> int:
+        """Return which edge holds position `s_m`, clamped to the route."""
+        found = int(np.searchsorted(self.start_m, s_m, side="right")) - 1
+        return min(max(found, 0), len(self.edges) - 1)
+
+    def line(self, first: int, last: int) -> Array:
+        """Return the vertices (N, 2) of the edges `first` to `last`, both included."""
+        parts = [self.edges[first].xy_m]
+        parts += [self.edges[index].xy_m[1:] for index in range(first + 1, last + 1)]
+        return np.concatenate(parts)
+
+    def validate(self) -> Route:
+        """Return self, or raise RouteError where it is empty or an edge does not join the next."""
+        if not self.edges:
+            raise RouteError("route without roads")
+        for before, after in zip(self.edges, self.edges[1:], strict=False):
+            if before.end_node != after.start_node:
+                raise RouteError(
+                    f"route jumps from way {before.edge.way_id} (node {before.end_node}) "
+                    f"to way {after.edge.way_id} (node {after.start_node})"
+                )
+        return self
+
+
+def point_along(line_m: Array, s_m: float) -> Array:
+    """Return the point (2,) at `s_m` along a polyline (N, 2), clamped to its ends."""
+    cumulative = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line_m, axis=0).T))])
+    return np.array(
+        [np.interp(s_m, cumulative, line_m[:, 0]), np.interp(s_m, cumulative, line_m[:, 1])]
+    )
+
+
+def leaving_heading(directed: DirectedEdge) -> float:
+    """Return the heading in radians over the first metres of an edge."""
+    line = directed.xy_m
+    delta = point_along(line, HEADING_OVER_M) - line[0]
+    return math.atan2(delta[1], delta[0])
+
+
+def arriving_heading(edges: tuple[DirectedEdge, ...]) -> float:
+    """Return the heading in radians over the last metres of a sequence of edges.
+
+    Reaches back over edges shorter than that, so that a short link inside a junction does not
+    decide what straight on means.
+    """
+    parts: list[Array] = []
+    length_m = 0.0
+    for directed in reversed(edges):
+        parts.append(directed.xy_m[::-1])
+        length_m += directed.edge.length_m
+        if length_m >= HEADING_OVER_M:
+            break
+    backwards = np.concatenate(parts)
+    delta = backwards[0] - point_along(backwards, HEADING_OVER_M)
+    return math.atan2(delta[1], delta[0])
+
+
+def turn_angle(before: tuple[DirectedEdge, ...], after: DirectedEdge) -> float:
+    """Return the turn in radians from the end of `before` into `after`, positive to the left."""
+    return float(wrap_angle(leaving_heading(after) - arriving_heading(before)))
+
+
+def most_probable_next(graph: RoadGraph, before: tuple[DirectedEdge, ...]) -> DirectedEdge | None:
+    """Return the edge a car most probably takes next, None at a dead end; never a U-turn.
+
+    Straightest first; another name, another class and ground where cars may not drive count as
+    further degrees of turn, so that they are taken where nothing better leads on (a recorded
+    drive may be older than the map). One-way streets are not entered the wrong way.
+    """
+    last = before[-1]
+    best: tuple[float, int] | None = None
+    choice: DirectedEdge | None = None
+    for option in graph.at_node(last.end_node):
+        if option.edge.index == last.edge.index or legality(option) == "against_one_way":
+            continue
+        degrees = abs(math.degrees(turn_angle(before, option)))
+        if last.edge.name and option.edge.name != last.edge.name:
+            degrees += 20.0
+        ranks = [_CLASS_RANK.get(e.road_class.removesuffix("_link"), 6) for e in
+                 (last.edge, option.edge)]  # fmt: skip
+        degrees += 8.0 * max(0, ranks[1] - ranks[0])
+        if legality(option) == "no_car_road":
+            degrees += 60.0
+        if degrees > 60.0 + 150.0:
+            continue
+        rank = (degrees, option.edge.index)
+        if best is None or rank < best:
+            best, choice = rank, option
+    return choice
+
+
+def extend_most_probable(graph: RoadGraph, route: Route, *, until_m: float) -> Route:
+    """Return `route` continued by the most probable roads until its end lies at `until_m`.
+
+    It ends earlier at a dead end, at the map's edge, or where it would drive the same road a
+    third time.
+    """
+    edges = list(route.edges)
+    end_m = route.end_m
+    driven: dict[tuple[int, bool], int] = {}
+    while end_m < until_m:
+        following = most_probable_next(graph, tuple(edges[-4:]))
+        if following is None:
+            break
+        key = key_of(following)
+        driven[key] = driven.get(key, 0) + 1
+        if driven[key] > 2:
+            break
+        edges.append(following)
+        end_m += following.edge.length_m
+    if len(edges) == len(route.edges):
+        return route
+    return Route(tuple(edges), route.origin_m)

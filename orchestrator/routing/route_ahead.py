@@ -1,0 +1,161 @@
+"""Where the car is on the map and what lies ahead of it: junctions, arrival times, the path."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import (
+    LocalFrame,
+    local_from_geo,
+    local_from_geo_yaw,
+    target_from_source,
+)
+from foretwin.contracts.futures import PathAhead
+from foretwin.orchestrator.routing.arrival import DrivingPace, predict_arrivals
+from foretwin.orchestrator.routing.cruise import CruiseSpeed
+from foretwin.orchestrator.routing.driving_path import driving_path
+from foretwin.orchestrator.routing.junctions_ahead import PassedJunction, UpcomingJunction
+from foretwin.orchestrator.routing.map_matching import MapMatcher, Match, OffRoadStretch
+from foretwin.orchestrator.routing.road_index import RoadIndex
+from foretwin.orchestrator.routing.road_line import RoadLines
+from foretwin.orchestrator.routing.route import Route
+from foretwin.orchestrator.routing.route_follower import Progress, RouteFollower
+from foretwin.telemetry.estimator.map_aid import RoadLine
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.roads.road_graph import RoadGraph
+
+FAR_AHEAD_M = 3000.0
+ALTERNATIVES_M = 300.0
+"""How far ahead other turns than the predicted ones are looked down."""
+PATH_BEHIND_M = 10.0
+PATH_SPARE_M = 60.0
+MIN_PATH_M = 20.0
+
+
+class JunctionAhead(NamedTuple):
+    """A junction on the way: distance along the route to its centre, and seconds until there."""
+
+    junction: Junction
+    distance_m: float
+    in_s: float
+
+
+class WayAhead:
+    """Follows the car through the road graph; everything it says is for the latest state."""
+
+    def __init__(
+        self,
+        graph: RoadGraph,
+        junctions: tuple[Junction, ...],
+        routes: tuple[Route, ...],
+        *,
+        index: RoadIndex | None = None,
+    ) -> None:
+        index = index or RoadIndex(graph)
+        self._graph = graph
+        self._matcher = MapMatcher(graph, index=index)
+        self._follower = RouteFollower(graph, junctions, routes, index=index)
+        self._lines = RoadLines(graph)
+        self._pace = DrivingPace()
+        self._cruise = CruiseSpeed()
+        self._given = bool(routes)
+        self._match: Match | None = None
+        self._progress: Progress | None = None
+        self.junctions: tuple[JunctionAhead, ...] = ()
+
+    def give(self, route: Route) -> None:
+        """Follow this route from the next state on."""
+        self._given = True
+        self._follower.give((route,))
+
+    def take_speed(self, state: VehicleState) -> None:
+        """Learn from a state how the car is driven."""
+        self._cruise.update(state.stamp_ns, state.speed_mps)
+
+    def locate(self, state: VehicleState) -> tuple[PassedJunction, ...] | None:
+        """Find the car on the map; returns the junctions just passed, None off the map."""
+        lat, lon = state.position.lat_deg, state.position.lon_deg
+        xy = local_from_geo(self._graph.frame, lat, lon)
+        yaw = float(local_from_geo_yaw(self._graph.frame, state.yaw_rad, lat, lon))
+        self._match = self._matcher.update(xy, yaw, state.yaw_valid, state.speed_mps)
+        self._progress = self._follower.update(self._match)
+        if self._progress is None:
+            self.junctions = ()
+            return None
+        self._pace.update(state.stamp_ns, state.speed_mps, self.speed_limit_mps)
+        upcoming: tuple[UpcomingJunction, ...] = self._follower.upcoming(FAR_AHEAD_M)
+        arrivals = predict_arrivals(self._follower.route, self._progress.s_m, upcoming, self._pace)
+        self.junctions = tuple(JunctionAhead(a.junction, a.distance_m, a.in_s) for a in arrivals)
+        return self._progress.passed
+
+    def road_line(self, state: VehicleState) -> RoadLine | None:
+        """Return the line that a state just located drives along, None where it is in doubt."""
+        if self._match is None or self._progress is None or not state.yaw_valid:
+            return None
+        xy = local_from_geo(self._graph.frame, state.position.lat_deg, state.position.lon_deg)
+        return self._lines.near(
+            state, xy, self._match, self._follower.route, self._progress.s_m,
+            roads_near=self._matcher.roads_near,
+        )  # fmt: skip
+
+    @property
+    def s_m(self) -> float:
+        """The car's position along its route."""
+        assert self._progress is not None
+        return self._progress.s_m
+
+    @property
+    def off_route(self) -> bool:
+        """Whether a route is given and the car is not on it."""
+        return self._progress is not None and self._progress.off_route
+
+    @property
+    def other_turns(self) -> tuple[Junction, ...]:
+        """Junctions near ahead that turns lead to which are not expected, where those may come."""
+        if self._progress is None or (self._given and not self._progress.off_route):
+            return ()
+        return tuple(a.junction for a in self._follower.alternatives(ALTERNATIVES_M))
+
+    @property
+    def road_text(self) -> str:
+        """The road that the car is on, for people."""
+        assert self._match is not None
+        edge = self._match.directed_edge.edge
+        return f"{edge.name or edge.road_class} (way {edge.way_id})"
+
+    @property
+    def speed_limit_mps(self) -> float:
+        """The limit of the road that the car is on."""
+        assert self._match is not None
+        return self._match.directed_edge.edge.speed_limit_mps.value
+
+    @property
+    def cruise_speed_mps(self) -> float:
+        """The speed that the nominal future aims at."""
+        return self._cruise.aim_mps(self.speed_limit_mps)
+
+    @property
+    def off_road_stretches(self) -> tuple[OffRoadStretch, ...]:
+        """Stretches driven where the map says that cars may not."""
+        return self._matcher.off_road_stretches
+
+    def path(self, frame: LocalFrame, *, speed_mps: float, horizon_s: float) -> PathAhead | None:
+        """Return the way ahead in a World's frame; None where the road ends within a few metres.
+
+        Long enough for a car that speeds up by 8 m/s over the horizon.
+        """
+        if self._follower.route.end_m - self.s_m < MIN_PATH_M:
+            return None
+        reach_m = horizon_s * max(speed_mps + 8.0, 15.0) + PATH_SPARE_M
+        geometry = driving_path(
+            self._graph,
+            self._follower.route,
+            s_from_m=self.s_m - PATH_BEHIND_M,
+            s_to_m=self.s_m + reach_m,
+        )
+        still = np.zeros(len(geometry.xy_m))
+        moved = target_from_source(frame, self._graph.frame, geometry.xy_m, still)
+        return PathAhead(xy_m=moved.xy_m, speed_limit_mps=geometry.speed_limit_mps)

@@ -1,0 +1,291 @@
+"""Knows where on its route the car is, which junctions come next and which it has passed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from foretwin.orchestrator.routing.given_routes import GivenRoutes
+from foretwin.orchestrator.routing.junctions_ahead import (
+    PassedJunction,
+    UpcomingJunction,
+    encounters,
+)
+from foretwin.orchestrator.routing.map_matching import Match
+from foretwin.orchestrator.routing.other_turns import OtherTurns
+from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
+from foretwin.orchestrator.routing.route import Route, extend_most_probable
+from foretwin.orchestrator.routing.turning import TURNING_RAD, route_with_turn
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+
+BEHIND_M = 150.0
+"""Of the road already driven, what a route keeps."""
+
+SourceOfRoute = Literal["given", "predicted"]
+
+
+class Progress(NamedTuple):
+    """Where the car is on its route.
+
+    `route_version` grows whenever what lies ahead has changed; `off_route` says that a route is
+    given and the car is not on it, so that the way ahead is predicted; `passed` are the junctions
+    passed with this update.
+    """
+
+    s_m: float
+    route_version: int
+    off_route: bool
+    source: SourceOfRoute
+    passed: tuple[PassedJunction, ...]
+
+
+class RouteFollower:
+    """Follows a car along the routes given, or along the most probable path without any."""
+
+    def __init__(
+        self,
+        graph: RoadGraph,
+        junctions: Sequence[Junction],
+        given: Sequence[Route] = (),
+        *,
+        index: RoadIndex | None = None,
+        ahead_m: float = 1200.0,
+        patience_m: float = 6.0,
+    ) -> None:
+        self._graph = graph
+        self._index = index or RoadIndex(graph)
+        self._junction_at = {node: junction for junction in junctions for node in junction.nodes}
+        self._other_turns = OtherTurns(graph, self._junction_at)
+        self._given = GivenRoutes(given)
+        self._ahead_m = ahead_m
+        self._patience_m = patience_m
+        self._route: Route | None = None
+        self._place = 0
+        self._s_m = 0.0
+        self._begun_m = 0.0
+        self._version = 0
+        self._on_given = False
+        self._direction_known = False
+        self._turning = False
+        self._given_from = 0
+        self._doubt: Match | None = None
+        self._encounters: tuple[PassedJunction, ...] = ()
+        self._passed_at: dict[str, float] = {}
+
+    def give(self, routes: Sequence[Route]) -> None:
+        """Follow these from the next match on; what is driven on now is kept until they are met."""
+        self._given, self._given_from, self._on_given = GivenRoutes(routes), 0, False
+
+    @property
+    def route(self) -> Route:
+        """The road from 150 m behind the car to at least `ahead_m` ahead, if roads lead on."""
+        if self._route is None:
+            raise LookupError("no route before the first match")
+        return self._route
+
+    def update(self, match: Match | None) -> Progress | None:
+        """Take the car's match; None (off the map) ends the route until the car is back."""
+        if match is None:
+            self._route = None
+            self._doubt = None
+            return None
+        if self._route is None or self._turned_round(match):
+            self._begin(match)
+        elif (found := self._locate(match)) is not None:
+            self._place, self._s_m = found
+            self._doubt = None
+            if not self._on_given:
+                self._rejoin(match)
+            if not self._on_given:
+                self._turn_with(match)
+        elif self._leaving(match):
+            self._leave(match)
+        self._direction_known = match.direction_known
+        self._extend()
+        return Progress(
+            self._s_m,
+            self._version,
+            bool(self._given) and not self._on_given,
+            "given" if self._on_given else "predicted",
+            self._take_passed(),
+        )
+
+    def upcoming(self, horizon_m: float) -> tuple[UpcomingJunction, ...]:
+        """Return the junctions ahead on the route within `horizon_m`, nearest first."""
+        return tuple(
+            UpcomingJunction(met.junction, met.centre_s_m - self._s_m, met.centre_s_m)
+            for met in self._encounters
+            if self._s_m < met.centre_s_m <= self._s_m + horizon_m and not self._is_passed(met)
+        )
+
+    def alternatives(self, horizon_m: float) -> tuple[UpcomingJunction, ...]:
+        """Return the junctions within `horizon_m` that other legal turns lead to, nearest first.
+
+        Distances run to the junction's first node. Both directions count while the car's own is
+        unknown.
+        """
+        if self._route is None:
+            return ()
+        edge = self._route.edges[self._place]
+        rest_m = float(self._route.start_m[self._place + 1]) - self._s_m
+        starts = [(edge, rest_m)]
+        if not self._direction_known:
+            starts.append((DirectedEdge(edge.edge, not edge.reverse), edge.edge.length_m - rest_m))
+        known = {ahead.junction.summary.id for ahead in self.upcoming(horizon_m)}
+        nearest: dict[str, UpcomingJunction] = {}
+        for met in self._other_turns.junctions(starts, s_m=self._s_m, horizon_m=horizon_m):
+            name = met.junction.summary.id
+            if name in known or self._near_passed(name, self._s_m, met.junction.radius_m):
+                continue
+            if name not in nearest or met.distance_m < nearest[name].distance_m:
+                nearest[name] = met
+        return tuple(sorted(nearest.values(), key=lambda a: (a.distance_m, a.junction.summary.id)))
+
+    # --- where the car is -------------------------------------------------------------------
+
+    def _begin(self, match: Match) -> None:
+        edge = match.directed_edge
+        place = self._given.find(edge, direction_matters=match.direction_known)
+        s_on_edge = match.s_on_edge_m
+        if place is not None:
+            edges = self._given.edges_from(place)
+            if edges[0].reverse != edge.reverse:
+                s_on_edge = edge.edge.length_m - s_on_edge
+            self._given_from = place
+        else:
+            edges = (edge,)
+        self._on_given = place is not None
+        self._place = 0
+        self._begun_m = self._s_m
+        self._set_route(Route(edges, self._s_m - s_on_edge))
+
+    def _turned_round(self, match: Match) -> bool:
+        """Whether the car drives its present road the other way round than thought."""
+        assert self._route is not None
+        edge, new = self._route.edges[self._place], match.directed_edge
+        if edge.edge.index != new.edge.index or edge.reverse == new.reverse:
+            return False
+        return match.direction_known and (match.confident or not self._direction_known)
+
+    def _locate(self, match: Match) -> tuple[int, float] | None:
+        """Return the place in the route and position s of a match, None where it is elsewhere."""
+        assert self._route is not None
+        best: tuple[float, int, float] | None = None
+        for place in range(max(0, self._place - 4), len(self._route.edges)):
+            start_m = float(self._route.start_m[place])
+            if start_m > self._s_m + 300.0:
+                break
+            edge = self._route.edges[place]
+            if edge.edge.index != match.directed_edge.edge.index:
+                continue
+            s_on_edge = match.s_on_edge_m
+            if edge.reverse != match.directed_edge.reverse:
+                if match.direction_known:
+                    continue
+                s_on_edge = edge.edge.length_m - s_on_edge
+            s_m = start_m + s_on_edge
+            found = (abs(s_m - self._s_m), place, s_m)
+            best = found if best is None else min(best, found)
+        return None if best is None else (best[1], best[2])
+
+    def _leaving(self, match: Match) -> bool:
+        """Whether the car has left its route: the match is sure, or stays off for a while."""
+        first = self._doubt
+        if first is None or key_of(first.directed_edge) != key_of(match.directed_edge):
+            self._doubt = first = match
+        return match.confident or abs(match.s_on_edge_m - first.s_on_edge_m) > self._patience_m
+
+    def _leave(self, match: Match) -> None:
+        """Cut the route where the car left it, and predict from its new road."""
+        assert self._route is not None
+        key = key_of(match.directed_edge)
+        best: tuple[float, int, tuple[DirectedEdge, ...]] | None = None
+        for place in range(max(0, self._place - 3), min(self._place + 3, len(self._route.edges))):
+            reached = self._index.reached(self._route.edges[place]).get(key)
+            if reached is None:
+                continue
+            s_m = float(self._route.start_m[place + 1]) + reached.gap_m + match.s_on_edge_m
+            effort = abs(s_m - self._s_m) + (reached.effort_m - reached.gap_m)
+            if best is None or effort < best[0]:
+                best = (effort, place, reached.via)
+        if best is None:
+            self._begun_m = self._s_m
+            new = Route((match.directed_edge,), self._s_m - match.s_on_edge_m)
+            self._place = 0
+        else:
+            _, place, via = best
+            edges = (*self._route.edges[: place + 1], *via, match.directed_edge)
+            new = Route(edges, self._route.origin_m)
+            self._place = len(edges) - 1
+            self._s_m = float(new.start_m[self._place]) + match.s_on_edge_m
+        self._on_given = False
+        self._doubt = None
+        self._set_route(new)
+        self._rejoin(match)
+
+    def _turn_with(self, match: Match) -> None:
+        """Predict the turn that the car's heading shows, and drop it when the heading does."""
+        assert self._route is not None
+        off_rad = match.heading_off_rad
+        turned = route_with_turn(self._graph, self._route, self._place, self._s_m, off_rad)
+        if turned is not None:
+            self._turning = True
+            self._set_route(turned)
+        elif self._turning and abs(off_rad) < TURNING_RAD / 3.0:
+            self._turning = False
+            self._set_route(Route(self._route.edges[: self._place + 1], self._route.origin_m))
+
+    def _rejoin(self, match: Match) -> None:
+        """Take the given route up again where the car is back on it."""
+        place = self._given.find(match.directed_edge, start=self._given_from)
+        if place is None:
+            return
+        assert self._route is not None
+        rest = self._given.edges_from(place)[1:]
+        self._on_given = True
+        self._given_from = place
+        self._set_route(Route((*self._route.edges[: self._place + 1], *rest), self._route.origin_m))
+
+    # --- what lies ahead --------------------------------------------------------------------
+
+    def _set_route(self, route: Route) -> None:
+        self._route = extend_most_probable(
+            self._graph, route, until_m=self._s_m + self._ahead_m + 200.0
+        )
+        self._version += 1
+        self._encounters = tuple(encounters(self._route, self._junction_at))
+
+    def _extend(self) -> None:
+        """Keep enough road ahead and little behind; neither changes what is already foreseen."""
+        assert self._route is not None
+        route = self._route
+        drop = route.index_at(self._s_m - BEHIND_M)
+        drop = min(drop, self._place)
+        grown = route
+        if route.end_m < self._s_m + self._ahead_m:
+            grown = extend_most_probable(
+                self._graph, route, until_m=self._s_m + self._ahead_m + 200.0
+            )
+        if drop:
+            grown = Route(grown.edges[drop:], float(grown.start_m[drop]))
+            self._place -= drop
+        if grown is not route:
+            self._route = grown
+            self._encounters = tuple(encounters(grown, self._junction_at))
+
+    def _near_passed(self, name: str, s_m: float, radius_m: float) -> bool:
+        passed = self._passed_at.get(name)
+        return passed is not None and abs(s_m - passed) < 2.0 * radius_m + 50.0
+
+    def _is_passed(self, met: PassedJunction) -> bool:
+        # A route that changes moves a centre a little; it is still the same passage.
+        return self._near_passed(met.junction.summary.id, met.centre_s_m, met.junction.radius_m)
+
+    def _take_passed(self) -> tuple[PassedJunction, ...]:
+        passed: list[PassedJunction] = []
+        for met in self._encounters:
+            if self._begun_m < met.centre_s_m <= self._s_m and not self._is_passed(met):
+                passed.append(met)
+                self._passed_at[met.junction.summary.id] = met.centre_s_m
+        return tuple(passed)

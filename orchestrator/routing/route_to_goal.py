@@ -1,0 +1,100 @@
+"""A way over the map's roads from a start to a goal that another program gives as two poses."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import RoutePose
+from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, wrap_angle
+from foretwin.orchestrator.routing.line_matching import match_line
+from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex, key_of, legality
+from foretwin.orchestrator.routing.route import Route, RouteError
+from foretwin.orchestrator.routing.shortest_paths import ShortestWays
+from foretwin.world_gen.roads.road_graph import DirectedEdge
+
+NEAR_M = 30.0
+"""A pose farther from every road is on none: yards and car parks are often not in the map."""
+_TURNED_RAD = math.radians(60.0)
+
+
+class FoundWay(NamedTuple):
+    """A route, and how much of it the vehicle's own plan told; the rest is the shortest way."""
+
+    route: Route
+    planned_m: float
+
+
+class WayFinder:
+    """Finds ways on one map; made once, since a large map's network takes a while."""
+
+    def __init__(self, index: RoadIndex) -> None:
+        self._index = index
+        self._ways = ShortestWays(index.graph)
+
+    def find(self, start: RoutePose, goal: RoutePose, *, planned_deg: Array | None) -> FoundWay:
+        """Return the way from start to goal, at first along `planned_deg` (N, 2) where given.
+
+        A plan that follows no road is passed over. Raises RouteError, one line, where a pose is on
+        no road that leads its way, or where none leads from one to the other.
+        """
+        at_goal = self._on_road(goal, "goal")
+        edges = self._along(planned_deg)
+        planned_m = sum(float(one.edge.length_m) for one in edges)
+        if not edges:
+            at_start = self._on_road(start, "start")
+            edges = (at_start.directed_edge,)
+            if key_of(edges[0]) == key_of(at_goal.directed_edge) and at_start.s_m <= at_goal.s_m:
+                return FoundWay(Route(edges), 0.0)
+        else:
+            passed = [key_of(one) for one in edges]
+            if key_of(at_goal.directed_edge) in passed:
+                last = passed.index(key_of(at_goal.directed_edge))
+                return FoundWay(Route(edges[: last + 1]), planned_m)
+        rest = self._ways.between(edges[-1].end_node, at_goal.directed_edge.start_node)
+        if rest is None:
+            raise RouteError(f"no road leads from {_text(start)} to its goal {_text(goal)}")
+        return FoundWay(Route((*edges, *rest, at_goal.directed_edge)).validate(), planned_m)
+
+    def _on_road(self, pose: RoutePose, what: str) -> NearEdge:
+        graph = self._index.graph
+        lat, lon = pose.position.lat_deg, pose.position.lon_deg
+        xy_m = local_from_geo(graph.frame, lat, lon)
+        yaw_rad = float(local_from_geo_yaw(graph.frame, pose.yaw_rad, lat, lon))
+        near = self._index.near(xy_m, NEAR_M)
+        if not near:
+            raise RouteError(f"its {what} {_text(pose)} lies within {NEAR_M:g} m of no road")
+        fit = [
+            one
+            for one in near
+            if abs(float(wrap_angle(one.heading_rad - yaw_rad))) < _TURNED_RAD
+            and legality(one.directed_edge) != "against_one_way"
+        ]
+        if not fit:
+            raise RouteError(f"its {what} {_text(pose)} lies on no road that leads its way")
+        return min(fit, key=lambda one: (legality(one.directed_edge) != "car", one.distance_m))
+
+    def _along(self, planned_deg: Array | None) -> tuple[DirectedEdge, ...]:
+        if planned_deg is None or len(planned_deg) < 2:
+            return ()
+        try:
+            found = match_line(self._index.graph, planned_deg, name="plan", index=self._index)
+        except RouteError:
+            return ()
+        return found.routes[0].edges if len(found.routes) == 1 else ()
+
+
+def away_m(route: Route, xy_m: Array) -> float:
+    """Return how far a point (2,) lies from a route."""
+    line = route.line(0, len(route.edges) - 1)
+    start, leg = line[:-1], np.diff(line, axis=0)
+    along = ((xy_m - start) * leg).sum(axis=1) / np.maximum((leg**2).sum(axis=1), 1e-9)
+    off = xy_m - (start + np.clip(along, 0.0, 1.0)[:, None] * leg)
+    return float(np.hypot(*off.T).min())
+
+
+def _text(pose: RoutePose) -> str:
+    return f"{pose.position.lat_deg:.5f}, {pose.position.lon_deg:.5f}"

@@ -1,0 +1,93 @@
+"""What the stand-in car drives: the route's lane-centre path with a speed profile it can hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import geo_from_local
+from foretwin.orchestrator.routing.driving_path import driving_path
+from foretwin.orchestrator.routing.route import Route
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.roads.road_graph import RoadGraph
+
+LATERAL_MPS2 = 2.0
+ACCEL_MPS2 = 1.3
+BRAKE_MPS2 = 1.8
+LEAD_M = 12.0
+"""Left out at both ends, so that the car neither begins nor ends on a map's last node."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StandinPath:
+    """Positions (N,) in degrees and speeds (N,); speed 0 asks for a stop there."""
+
+    lat_deg: Array
+    lon_deg: Array
+    speed_mps: Array
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the lists that the stand-in's process reads."""
+        return {
+            "lat_deg": [round(float(v), 9) for v in self.lat_deg],
+            "lon_deg": [round(float(v), 9) for v in self.lon_deg],
+            "speed_mps": [round(float(v), 3) for v in self.speed_mps],
+        }
+
+
+def standin_path(osm: OsmMap, graph: RoadGraph, route: Route) -> StandinPath:
+    """Return the path along a route: limits, slow in bends, a halt at the stop signs on its way."""
+    start_m, end_m = float(route.start_m[0]) + LEAD_M, route.end_m - LEAD_M
+    geometry = driving_path(graph, route, s_from_m=start_m, s_to_m=end_m)
+    stops = [int(np.searchsorted(geometry.s_m, s_m)) for s_m in stop_signs(osm, route)]
+    speed = speed_profile(
+        geometry.xy_m,
+        geometry.speed_limit_mps,
+        stop_indices=[index for index in stops if 0 < index < len(geometry.s_m)],
+    )
+    geo = geo_from_local(graph.frame, geometry.xy_m)
+    return StandinPath(lat_deg=geo[:, 0], lon_deg=geo[:, 1], speed_mps=speed)
+
+
+def stop_signs(osm: OsmMap, route: Route) -> list[float]:
+    """Return the positions along a route of the stop signs that face its driver."""
+    found = []
+    for place, directed in enumerate(route.edges):
+        xy = directed.xy_m
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+        nodes = directed.edge.node_ids[::-1] if directed.reverse else directed.edge.node_ids
+        for node, s_m in zip(nodes[1:], along[1:], strict=True):
+            tags = osm.node_tags.get(node, {})
+            facing = "backward" if directed.reverse else "forward"
+            if tags.get("highway") == "stop" and tags.get("direction", facing) in (facing, "both"):
+                found.append(float(route.start_m[place] + s_m))
+    return found
+
+
+def speed_profile(xy_m: Array, limit_mps: Array, *, stop_indices: Sequence[int] = ()) -> Array:
+    """Return speeds (N,) within limits (N,), lateral acceleration, and what drive and brakes give.
+
+    v² ≤ a_lat/|κ|, then v² ≤ v₀² + 2·a·Δs forwards and backwards (the usual two-pass profile).
+    """
+    step = np.hypot(*np.diff(xy_m, axis=0).T)
+    heading = np.unwrap(np.arctan2(*np.diff(xy_m, axis=0).T[::-1]))
+    curvature = np.zeros(len(xy_m))
+    if len(xy_m) > 2:
+        curvature[1:-1] = np.diff(heading) / np.maximum(0.5 * (step[1:] + step[:-1]), 1e-3)
+    smooth = np.convolve(np.pad(np.abs(curvature), 3, mode="edge"), np.ones(7) / 7, mode="valid")
+    speed = np.minimum(limit_mps, np.sqrt(LATERAL_MPS2 / np.maximum(smooth, 1e-4)))
+    speed[-1] = 0.0
+    speed[list(stop_indices)] = 0.0
+    for index in range(1, len(speed)):
+        speed[index] = min(
+            speed[index], np.sqrt(speed[index - 1] ** 2 + 2 * ACCEL_MPS2 * step[index - 1])
+        )
+    for index in range(len(speed) - 2, -1, -1):
+        speed[index] = min(
+            speed[index], np.sqrt(speed[index + 1] ** 2 + 2 * BRAKE_MPS2 * step[index])
+        )
+    return speed

@@ -1,0 +1,122 @@
+"""What a command asks of a map: one junction by id or place, those along a line, or a region."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import local_from_geo
+from foretwin.orchestrator.worlds.opening import OpenMap
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.osm_map import LatLonBounds
+
+_JUNCTION_ID = re.compile(r"n-?\d{1,18}", re.ASCII)
+FARTHEST_M = 200.0
+"""A place farther than this from every junction names none."""
+
+
+def junction_by_id(opened: OpenMap, junction_id: str) -> Junction:
+    """Return the junction of that id; UserError where there is none."""
+    for junction in opened.junctions:
+        if junction.summary.id == junction_id:
+            return junction
+    raise UserError(
+        f"--id {junction_id}: {opened.file} holds no such intersection; "
+        f"`foretwin intersections {opened.file}` lists all"
+    )
+
+
+def node_of_id(junction_id: str) -> int:
+    """Return the node that a junction is named by; UserError where no junction is named so."""
+    if not _JUNCTION_ID.fullmatch(junction_id):
+        raise UserError(
+            f"--id {junction_id}: intersections are named n and a number, as n25; "
+            "`foretwin intersections MAP` lists all"
+        )
+    return int(junction_id[1:])
+
+
+def nearest_junction(opened: OpenMap, lat: float, lon: float) -> Junction:
+    """Return the junction nearest to a place; UserError where there is none near it."""
+    if not opened.junctions:
+        raise UserError(f"{opened.file}: no intersection in this map")
+    here = local_from_geo(opened.osm.frame, lat, lon)
+    away = [float(np.hypot(*(j.centre_xy_m - here))) for j in opened.junctions]
+    best = int(np.argmin(away))
+    if not away[best] <= FARTHEST_M:
+        raise UserError(
+            f"--at {lat},{lon}: the nearest intersection of {opened.file} is "
+            f"{away[best]:.0f} m away, more than {FARTHEST_M:.0f}"
+        )
+    return opened.junctions[best]
+
+
+def parse_place(at: str) -> tuple[float, float]:
+    """Return latitude and longitude of LAT,LON; UserError where they are none."""
+    lat, lon = _degrees("--at", at, "two numbers, LAT,LON", 2)
+    if not -90.0 <= lat <= 90.0 or not -180.0 <= lon <= 180.0:
+        raise UserError(f"--at {at}: latitude -90 to 90, then longitude -180 to 180")
+    return lat, lon
+
+
+def read_route(route: Path) -> Array:
+    """Return a GPX or GeoJSON line as (N, 2) latitudes and longitudes in degrees."""
+    from foretwin.telemetry.logs import read_line
+
+    return read_line(route).lat_lon_deg
+
+
+class AlongRoute(NamedTuple):
+    """The junctions along a route in driving order, once per passage, and the map they are of."""
+
+    opened: OpenMap
+    junctions: tuple[Junction, ...]
+
+
+def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> AlongRoute:
+    """Return the junctions along a route's line; the service roads that it uses count there."""
+    from foretwin.orchestrator.routing.line_matching import match_line
+    from foretwin.world_gen.junctions.route_junctions import junctions_on_route
+    from foretwin.world_gen.roads.service_roads import open_service_roads
+
+    matched = match_line(opened.graph, line_deg, name=f"--route {route}")
+    used = (item.edge for stretch in matched.routes for item in stretch.edges)
+    opened = opened.with_roads(open_service_roads(used))
+    junctions = tuple(
+        passage.junction
+        for stretch in matched.routes
+        for passage in junctions_on_route(opened.junctions, stretch.edges)
+    )
+    return AlongRoute(opened, junctions)
+
+
+def parse_bbox(option: str, bbox: str) -> LatLonBounds:
+    """Return bounds from W,S,E,N in degrees; UserError where they enclose nothing."""
+    west, south, east, north = _degrees(option, bbox, "four numbers, W,S,E,N in degrees", 4)
+    if not (-180.0 <= west <= 180.0 and -180.0 <= east <= 180.0):
+        raise UserError(f"{option} {bbox}: longitudes (first and third) are -180 to 180")
+    if not (-90.0 <= south <= 90.0 and -90.0 <= north <= 90.0):
+        raise UserError(f"{option} {bbox}: latitudes (second and fourth) are -90 to 90")
+    if west >= east:
+        raise UserError(
+            f"{option} {bbox}: west must be less than east (W,S,E,N); a box across the "
+            "antimeridian is to be asked for in two parts"
+        )
+    if south >= north:
+        raise UserError(f"{option} {bbox}: south must be less than north (W,S,E,N)")
+    return LatLonBounds(south=south, west=west, north=north, east=east)
+
+
+def _degrees(option: str, text: str, wanted: str, count: int) -> tuple[float, ...]:
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise UserError(f"{option} {text}: {wanted}") from None
+    if len(values) != count or not np.isfinite(values).all():
+        raise UserError(f"{option} {text}: {wanted}")
+    return values

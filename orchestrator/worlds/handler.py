@@ -1,0 +1,187 @@
+"""The desk where Worlds are asked for, built by the builder, and loaded by every worker."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from foretwin.contracts.bus import Bus, Mailbox, Reply
+from foretwin.contracts.codec import SchemaMismatch, read_message
+from foretwin.contracts.simulation import BuildRequest, PrepareRequest, WorldNotice
+from foretwin.contracts.world import World
+from foretwin.orchestrator.drive.plan import DrivePlan
+from foretwin.orchestrator.drive.processes import BUILDER
+from foretwin.orchestrator.instructions import Tell
+
+log = logging.getLogger("orchestrator")
+
+BUILD_TIMEOUT_S = 60.0
+
+
+@dataclass(slots=True)
+class _Order:
+    """One junction's World: whether workers load it, and those that have not done so yet."""
+
+    load: bool
+    world: World | None = None
+    pending: set[str] | None = None
+    """None until loading begins."""
+    ready: bool = False
+    asked_again: bool = False
+
+
+class WorldDesk:
+    """Asks builder and workers; a World is ready once every worker that is up has loaded it.
+
+    A builder that dies is asked again when it is back; a worker that dies is waited for no more.
+    """
+
+    def __init__(
+        self,
+        plan: DrivePlan,
+        bus: Bus,
+        mailbox: Mailbox,
+        *,
+        on_ready: Callable[[str, World], None],
+        on_failed: Callable[[str, str], None],
+        tell: Callable[[Tell], None],
+    ) -> None:
+        self._plan = plan
+        self._bus = bus
+        self._mailbox = mailbox
+        self._on_ready = on_ready
+        self._on_failed = on_failed
+        self._tell = tell
+        self._orders: dict[str, _Order] = {}
+        self._junction_of: dict[str, str] = {}
+
+    @property
+    def building(self) -> list[str]:
+        """Junctions whose World is not ready yet."""
+        return [junction_id for junction_id, order in self._orders.items() if not order.ready]
+
+    def world(self, world_id: str) -> World:
+        """Return a World that has been built in this run."""
+        world = self._orders[self._junction_of[world_id]].world
+        assert world is not None
+        return world
+
+    def want(self, junction_id: str, *, load: bool, workers: tuple[str, ...]) -> None:
+        """Have a World built, and loaded by `workers` where `load` says so."""
+        order = self._orders.get(junction_id)
+        if order is None:
+            self._orders[junction_id] = _Order(load)
+            self._ask_build(junction_id)
+            return
+        order.load = order.load or load
+        if order.world is not None and load:
+            self._load(order, order.world, workers)
+
+    def _ask_build(self, junction_id: str) -> None:
+        self._bus.request(
+            "build",
+            BuildRequest(intersection_id=junction_id, radius_m=self._plan.config.radius_m),
+            self._mailbox,
+            tag=junction_id,
+            timeout_s=BUILD_TIMEOUT_S,
+            run=self._plan.run_id,
+            process=BUILDER,
+        )
+
+    def builder_up(self) -> None:
+        """The builder is back: ask again for what it owes."""
+        for junction_id, order in self._orders.items():
+            if order.world is None and not order.ready:
+                self._ask_build(junction_id)
+
+    def build_reply(self, reply: Reply, *, workers: tuple[str, ...], builder_up: bool) -> None:
+        """Take the builder's answer and let the workers load the World."""
+        junction_id = reply.tag
+        order = self._orders[junction_id]
+        if reply.message is None:
+            if builder_up:
+                self._build_failed(junction_id, order, reply.error or "no reason given")
+            return
+        if order.world is not None:
+            return
+        answer = reply.message
+        file = self._plan.worlds_dir / f"{answer.world_id}.world"
+        try:
+            world = read_message(file, World)
+        except (OSError, SchemaMismatch) as error:
+            self._build_failed(junction_id, order, str(error))
+            return
+        order.world = world
+        self._junction_of[world.id] = junction_id
+        how = "from the cache" if answer.cached else "built"
+        log.info("world %s of %s %s in %.2f s", world.id, junction_id, how, answer.seconds)
+        if order.load:
+            self._load(order, world, workers)
+        else:
+            self._settle(junction_id, order)
+
+    def _build_failed(self, junction_id: str, order: _Order, reason: str) -> None:
+        """Ask once more where the builder only took too long; else give the World up."""
+        if reason == "no answer" and not order.asked_again:
+            order.asked_again = True
+            self._ask_build(junction_id)
+            return
+        order.ready = True  # nothing more will come of it
+        self._on_failed(junction_id, reason)
+
+    def _load(self, order: _Order, world: World, workers: tuple[str, ...]) -> None:
+        if order.pending is None:
+            notice = WorldNotice(
+                world_id=world.id,
+                intersection_id=self._junction_of[world.id],
+                file=f"{world.id}.world",
+            )
+            self._bus.publish("world", notice, run=self._plan.run_id)
+        order.pending = set(workers)
+        for worker_id in sorted(order.pending):
+            self.prepare(worker_id, world.id)
+        self._settle(self._junction_of[world.id], order)
+
+    def prepare(self, worker_id: str, world_id: str) -> None:
+        """Let one worker load a World."""
+        self._bus.request(
+            "prepare",
+            PrepareRequest(world_id=world_id),
+            self._mailbox,
+            tag=(worker_id, world_id, time.perf_counter()),
+            timeout_s=BUILD_TIMEOUT_S,
+            run=self._plan.run_id,
+            process=worker_id,
+        )
+
+    def prepare_reply(self, reply: Reply) -> None:
+        """Take a worker's answer."""
+        worker_id, world_id, asked_s = reply.tag
+        if reply.error == "no answer":
+            # Just started or just gone; a job loads the World too.
+            log.info("world %s not loaded by %s beforehand", world_id, worker_id)
+        elif reply.message is None:
+            text = f"{worker_id} could not load world {world_id}: {reply.error}"
+            self._tell(Tell("warning", text))
+        else:
+            taken_s = time.perf_counter() - asked_s
+            log.info("world %s loaded by %s in %.2f s", world_id, worker_id, taken_s)
+        self._loaded(self._junction_of[world_id], worker_id)
+
+    def worker_down(self, worker_id: str) -> None:
+        """A worker is gone: nothing waits for it."""
+        for junction_id in list(self._orders):
+            self._loaded(junction_id, worker_id)
+
+    def _loaded(self, junction_id: str, worker_id: str) -> None:
+        order = self._orders[junction_id]
+        if order.pending is not None and worker_id in order.pending:
+            order.pending.discard(worker_id)
+            self._settle(junction_id, order)
+
+    def _settle(self, junction_id: str, order: _Order) -> None:
+        if order.world is not None and not order.pending and not order.ready:
+            order.ready = True
+            self._on_ready(junction_id, order.world)

@@ -1,0 +1,1 @@
+"""What a drive says of model and car: identification, gap, agreement, side by side."""

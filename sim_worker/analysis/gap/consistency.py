@@ -1,0 +1,186 @@
+"""Which signals of a stretch of driving agree with which: gains, offsets, delays, plateaus."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.analysis.gap.fitting import Follower, Line, follower, line_through
+from foretwin.sim_worker.analysis.gap.pairs import Pairs
+from foretwin.sim_worker.analysis.motion_record import PERIOD_S
+
+_MIN_TURN_RAD, _MIN_CURVATURE_PM = 0.012, 0.006
+_HARD_MPS2 = 1.2
+_LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
+_TOGETHER_S = 0.3
+"""Samples nearer to each other than this err alike."""
+_LEAST_STOP_S = 0.3
+_EVERY = 5
+"""Smoothed signals need not be compared at every sample."""
+
+
+class Lag(NamedTuple):
+    """A time and its standard deviation."""
+
+    seconds: float
+    std_s: float
+
+
+class Consistency(NamedTuple):
+    """What a stretch says of each pair; None where it says nothing.
+
+    Steering lines are in tyre angles as the model reads them, turns in curvature: offsets of
+    `motion_by_measured` are 1/m.
+    """
+
+    gyro_by_course: Line | None
+    speed_by_gnss: Line | None
+    measured_by_command: Follower | None
+    model_by_command: Follower | None
+    model_stops_at_rad: float
+    """The tyre angle that the model holds while commands and car go beyond, NaN where none."""
+    motion_by_measured: Line | None
+    motion_by_measured_hard: Line | None
+    """The same where the lateral acceleration is high."""
+    missing_mps2: float
+    """Lateral acceleration (RMS) by which the model at the measured steering misses the car's."""
+    motion_lag: Lag | None
+    """By how much the model's turning lags behind the car's."""
+    motion_by_command: Line | None
+    motion_by_angle: Line | None
+    """Kinematic tyre angle of the motion over the measured one: free of the model's limits."""
+    excited_s: float
+    moved_s: float
+
+
+def consistency_of(pairs: Pairs) -> Consistency:
+    """Compare the signals of one stretch (some seconds) pair by pair."""
+    measured = model = angle = None
+    if _varies(pairs.asked_rad) or _varies(pairs.done_rad):
+        measured = follower(pairs.asked_rad, pairs.done_rad)
+    if _varies(pairs.commanded_rad):
+        model = follower(pairs.commanded_rad, pairs.model_tire_rad)
+    if _varies(pairs.done_rad):
+        angle = _line(pairs.done_rad, pairs.arc_rad)
+    real, by_measured = pairs.curvature_pm, pairs.by_measured_pm
+    hard = np.abs(real * pairs.speed_mps**2) > _HARD_MPS2
+    motion = _turning(by_measured, real)
+    return Consistency(
+        gyro_by_course=_turn_rates(pairs),
+        speed_by_gnss=_mean_ratio(pairs.ground_mps[::_EVERY], pairs.wheel_mps[::_EVERY],
+                                  period_s=_EVERY * PERIOD_S, together_s=0.4, least_s=1.5),
+        measured_by_command=measured,
+        model_by_command=model,
+        model_stops_at_rad=_stop(pairs.commanded_rad, pairs.done_rad, pairs.model_tire_rad),
+        motion_by_measured=motion,
+        motion_by_measured_hard=None if motion is None else _mean_ratio(
+            np.where(hard, by_measured, np.nan), real,
+            period_s=PERIOD_S, together_s=0.4, least_s=0.6),
+        missing_mps2=_missing(pairs),
+        motion_lag=_lag(by_measured, real),
+        motion_by_command=_turning(pairs.by_command_pm, real),
+        motion_by_angle=angle,
+        excited_s=float(pairs.excited.sum()) * PERIOD_S,
+        moved_s=float(pairs.moves.sum()) * PERIOD_S,
+    )  # fmt: skip
+
+
+def _varies(angle: Array) -> bool:
+    known = angle[np.isfinite(angle)]
+    return len(known) > 50 and bool(np.ptp(known) > _MIN_TURN_RAD)
+
+
+def _stop(asked: Array, done: Array, model: Array) -> float:
+    """Return where the tyres of the model, which has no noise, stop."""
+    known = np.isfinite(asked) & np.isfinite(done) & np.isfinite(model)
+    asked, done, model = np.abs(asked[known]), np.abs(done[known]), np.abs(model[known])
+    top = float(np.max(model, initial=0.0))
+    held = (model > 0.995 * top) & (np.minimum(asked, done) > 1.1 * top)
+    return top if held.sum() * PERIOD_S >= _LEAST_STOP_S else float("nan")
+
+
+def _line(x: Array, y: Array, *, together_s: float = _TOGETHER_S) -> Line | None:
+    known = np.isfinite(x) & np.isfinite(y)
+    return line_through(x[known], y[known], independent=known.sum() * PERIOD_S / together_s)
+
+
+def _turning(model: Array, real: Array) -> Line | None:
+    """Fit the car's curvature over the model's, None where neither varies."""
+    known = np.isfinite(model) & np.isfinite(real)
+    if not known.any():
+        return None
+    widest = max(float(np.ptp(model[known])), float(np.ptp(real[known])))
+    return _line(model, real) if widest > _MIN_CURVATURE_PM else None
+
+
+def _turn_rates(pairs: Pairs) -> Line | None:
+    """Fit how the gyro goes with the course's rate; without a bend its bias alone."""
+    course, gyro = pairs.course_radps[::_EVERY], pairs.gyro_radps[::_EVERY]
+    known = np.isfinite(course) & np.isfinite(gyro)
+    course, gyro = course[known], gyro[known]
+    seconds = len(course) * _EVERY * PERIOD_S
+    if seconds < 1.2:
+        return None
+    independent = max(seconds / 0.4, 2.0)
+    # The course is by far the noisier: over it the gyro's gain would come out too small.
+    line = line_through(gyro, course, independent=independent)
+    if line is not None and line.gain > 5.0 * line.gain_std:
+        gain = 1.0 / line.gain
+        gain_std, offset_std = line.gain_std * gain**2, line.offset_std * gain
+        offset = -line.offset * gain
+        return line._replace(gain=gain, gain_std=gain_std, offset=offset, offset_std=offset_std)
+    # The slower the car, the less its positions say of its course.
+    weight = pairs.ground_mps[::_EVERY][known] ** 2
+    weight /= np.sum(weight)
+    apart = gyro - course
+    offset = float(np.sum(weight * apart))
+    std = float(np.sqrt(np.sum(weight * (apart - offset) ** 2)))
+    heard = independent / (len(weight) * float(np.sum(weight**2)))
+    return Line(1.0, np.inf, offset, std / np.sqrt(heard), std, 0.0)
+
+
+def _missing(pairs: Pairs) -> float:
+    """Return the RMS of the lateral acceleration between model and car in bends, NaN in none."""
+    apart = (pairs.curvature_pm - pairs.by_measured_pm) * pairs.speed_mps**2
+    apart = apart[pairs.excited & np.isfinite(apart)]
+    if len(apart) * PERIOD_S < 0.6:
+        return float("nan")
+    return float(np.sqrt(np.mean(apart * apart)))
+
+
+def _mean_ratio(
+    x: Array, y: Array, *, period_s: float, together_s: float, least_s: float
+) -> Line | None:
+    """Fit y = gain x: some signals vary too little in seconds to part an offset from a gain."""
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known], y[known]
+    if len(x) * period_s <= least_s:
+        return None
+    gain = float(np.sum(x * y) / np.sum(x * x))
+    left = y - gain * x
+    independent = max(len(x) * period_s / together_s, 2.0)
+    residual = float(np.sqrt(np.sum(left * left) / (len(x) - 1)))
+    std = residual / float(np.sqrt(np.mean(x * x) * independent))
+    return Line(gain, std, 0.0, 0.0, residual, 1.0)
+
+
+def _lag(model: Array, real: Array) -> Lag | None:
+    """Return how much the model's turning lags behind the car's, None where unknown.
+
+    An offset is fitted too: on the way into a bend it looks like a lag.
+    """
+    known = np.isfinite(model) & np.isfinite(real)
+    if known.sum() < 10 or float(np.ptp(model[known])) < _LEAST_SWING_PM:
+        return None
+    pair = follower(real, model, longest_s=_LONGEST_LAG_S)
+    at_once = _line(real, model)
+    changes = _line(real, np.gradient(real) / PERIOD_S)
+    if pair is None or at_once is None or changes is None:
+        return None
+    # What a lag changes beyond what gain and offset could.
+    tells = abs(pair.line.gain) * changes.residual * np.sqrt(known.sum() * PERIOD_S / _TOGETHER_S)
+    std_s = pair.line.residual / max(float(tells), 1e-9)
+    helps = pair.line.residual**2 < 0.5 * at_once.residual**2
+    return Lag(pair.delay_s if helps else 0.0, std_s)

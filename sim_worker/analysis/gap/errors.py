@@ -1,0 +1,171 @@
+"""How far the free model leaves reality, by horizon and by manoeuvre."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.gap import GapSample, Manoeuvre
+from foretwin.sim_worker.analysis.gap.free_run import (
+    FreeRunner,
+    accel_commands_from_motion,
+    start_states,
+    steering_signals,
+)
+from foretwin.sim_worker.analysis.gap.manoeuvres import MANOEUVRES, manoeuvre_of
+from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
+from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
+from foretwin.sim_worker.vehicle.lag import without_lags
+
+HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
+QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")
+"""Of a sample; a row has `position_m` too, how far apart both are."""
+
+
+class GapRow(NamedTuple):
+    """RMS and 95th percentile of |model - reality| by quantity, for one horizon and manoeuvre."""
+
+    horizon_s: float
+    manoeuvre: Manoeuvre
+    runs: int
+    independent: bool
+    rms: dict[str, float]
+    p95: dict[str, float]
+
+
+class GapMeter:
+    """Lets the model run freely from measured states and measures how far it gets from reality."""
+
+    def __init__(self, runner: FreeRunner, *, vehicle_id: str) -> None:
+        self._runner = runner
+        self._vehicle_id = vehicle_id
+        self._immediate: FreeRunner | None = None
+
+    def samples(
+        self,
+        record: MotionRecord,
+        motion: MeasuredMotion,
+        *,
+        every_s: float = 1.0,
+        horizons_s: Sequence[float] = HORIZONS_S,
+        from_index: int = 0,
+    ) -> list[GapSample]:
+        """Return the gap at each horizon after each start, `every_s` apart, in time order.
+
+        Where no commands were recorded, they are estimated from the motion and the samples are
+        not independent. Runs that meet a gap in the measured motion are left out.
+        """
+        stride = max(1, round(every_s / PERIOD_S))
+        known = motion.known
+        shortest = round(min(horizons_s) / PERIOD_S)
+        starts = np.arange(from_index, len(known) - shortest, stride)
+        starts = starts[known[starts]] if len(starts) else starts
+        wanted = [(row, horizon) for row in range(len(starts)) for horizon in horizons_s]
+        return self._measure(record, motion, starts, wanted)
+
+    def latest(
+        self, record: MotionRecord, motion: MeasuredMotion, *, horizons_s: Sequence[float]
+    ) -> list[GapSample]:
+        """Return the gap at the record's last instant after each horizon, all in one batch."""
+        last = len(motion.known) - 1
+        fitting = [h for h in horizons_s if round(h / PERIOD_S) <= last]
+        starts = np.array([last - round(horizon / PERIOD_S) for horizon in fitting], dtype=np.intp)
+        if not motion.known[starts].all():
+            fitting = [h for h, start in zip(fitting, starts, strict=True) if motion.known[start]]
+            starts = starts[motion.known[starts]]
+        return self._measure(record, motion, starts, list(enumerate(fitting)))
+
+    def _measure(
+        self,
+        record: MotionRecord,
+        motion: MeasuredMotion,
+        starts: np.ndarray[Any, np.dtype[np.intp]],
+        wanted: Sequence[tuple[int, float]],
+    ) -> list[GapSample]:
+        """Run from each of `starts`; return the gap of each (row, horizon) wanted."""
+        if not len(starts):
+            return []
+        known = motion.known
+        found: list[GapSample] = []
+        vehicle, runner = self._runner.vehicle, self._runner
+        signals = steering_signals(record, vehicle)
+        recorded = np.isfinite(signals.commanded_rad) & np.isfinite(record.command_accel_mps2)
+        independent = bool(recorded[starts].mean() > 0.9)
+        tire = signals.measured_rad
+        if independent:
+            accel, steer = record.command_accel_mps2, signals.commanded_rad
+        else:
+            if self._immediate is None:
+                self._immediate = FreeRunner(without_lags(vehicle))
+            runner = self._immediate
+            accel = accel_commands_from_motion(
+                vehicle, speed_mps=motion.speed_mps, accel_mps2=motion.accel_mps2
+            )
+            begin = start_states(vehicle, **motion._asdict(), tire_rad=tire)
+            steer = np.where(known, begin[:, 6], np.nan)
+        chosen = {name: values[starts] for name, values in motion._asdict().items()}
+        begin = start_states(vehicle, **chosen, tire_rad=tire[starts])
+        begin[:, :2] -= begin[:, :2]  # near the origin, where numbers are exact
+        steps = round(max(horizon for _, horizon in wanted) / PERIOD_S)
+        runs = runner.run(
+            states=begin, starts=starts, steps=steps, accel_mps2=accel, tire_rad=steer,
+            delayed=independent,
+        )  # fmt: skip
+        for row, horizon in wanted:
+            start, count = int(starts[row]), round(horizon / PERIOD_S)
+            end = start + count
+            if end >= len(known) or not known[start : end + 1].all():
+                continue
+            real = MeasuredMotion(*(column[end] for column in motion))
+            model = runs[row, count]
+            dx = model[0] + motion.x_m[start] - real.x_m
+            dy = model[1] + motion.y_m[start] - real.y_m
+            cos, sin = np.cos(real.yaw_rad), np.sin(real.yaw_rad)
+            stretch = slice(start, end + 1)
+            found.append(
+                GapSample(
+                    vehicle_id=self._vehicle_id,
+                    stamp_ns=int(record.stamp_ns[end]),
+                    horizon_s=horizon,
+                    manoeuvre=manoeuvre_of(
+                        speed_mps=motion.speed_mps[stretch],
+                        yaw_rate_radps=motion.yaw_rate_radps[stretch],
+                        accel_mps2=motion.accel_mps2[stretch],
+                    ),
+                    along_m=float(cos * dx + sin * dy),
+                    across_m=float(cos * dy - sin * dx),
+                    yaw_rad=float(wrap_angle(model[2] - real.yaw_rad)),
+                    yaw_rate_radps=float(model[5] - real.yaw_rate_radps),
+                    speed_mps=float(model[3] - real.speed_mps),
+                    accel_mps2=float(model[7] - real.accel_mps2),
+                    independent=independent,
+                )
+            )
+        return sorted(found, key=lambda sample: sample.stamp_ns)
+
+
+def gap_table(samples: Sequence[GapSample]) -> list[GapRow]:
+    """Return one row for each horizon and manoeuvre that occurred, shortest horizon first."""
+    groups: dict[tuple[float, Manoeuvre], list[GapSample]] = defaultdict(list)
+    for sample in samples:
+        groups[sample.horizon_s, sample.manoeuvre].append(sample)
+    rows = []
+    for horizon, manoeuvre in sorted(groups, key=lambda key: (key[0], MANOEUVRES.index(key[1]))):
+        group = groups[horizon, manoeuvre]
+        values = {name: np.array([getattr(one, name) for one in group]) for name in QUANTITIES}
+        values["position_m"] = np.hypot(values["along_m"], values["across_m"])
+        rows.append(
+            GapRow(
+                horizon_s=horizon,
+                manoeuvre=manoeuvre,
+                runs=len(group),
+                independent=all(one.independent for one in group),
+                rms={name: float(np.sqrt(np.mean(v * v))) for name, v in values.items()},
+                p95={name: float(np.percentile(np.abs(v), 95)) for name, v in values.items()},
+            )
+        )
+    return rows

@@ -1,0 +1,142 @@
+"""The planar model left to itself from measured states: many windows in one MuJoCo Batch."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
+from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
+from foretwin.sim_worker.vehicle.resistance import resistance_mps2
+from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_velocity
+
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+_TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1
+_SPEED_GAIN_PS = 4.0
+
+
+class SteeringSignals(NamedTuple):
+    """Tyre angles (N,) as the model reads them: commanded and measured; NaN where unknown."""
+
+    commanded_rad: Array
+    measured_rad: Array
+
+
+def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> SteeringSignals:
+    """Return the tyre angles that the record's steering means to the model."""
+    ratio, offset = vehicle.steering_ratio.value, vehicle.steering_offset_rad.value
+
+    def read(tire: Array, wheel: Array) -> Array:
+        return np.where(np.isfinite(tire), tire, wheel / ratio + offset)
+
+    commanded = np.where(
+        np.isfinite(record.command_tire_rad),
+        record.command_tire_rad + offset,
+        record.command_wheel_rad / ratio + offset,
+    )
+    return SteeringSignals(commanded, read(record.tire_rad, record.wheel_rad))
+
+
+class FreeRunner:
+    """Runs the model of one vehicle from measured states; keeps its compiled stage.
+
+    Belongs to one thread. The grid is that of a MotionRecord (20 ms).
+    """
+
+    def __init__(self, vehicle: VehicleParameters, *, batch: int = 32) -> None:
+        self.vehicle = vehicle
+        self._stage = Stage(None, vehicle, nsim=batch, control_hz=1.0 / PERIOD_S)
+
+    def run(
+        self,
+        *,
+        states: Array,
+        starts: np.ndarray[Any, np.dtype[np.intp]],
+        steps: int,
+        accel_mps2: Array,
+        tire_rad: Array,
+        hold_speed_mps: Array | None = None,
+        delayed: bool | Flags = True,
+    ) -> Array:
+        """Return (K, steps + 1, 8) states, K runs from `states` (K, 8) at grid indices `starts`.
+
+        `accel_mps2` and `tire_rad` (N,) are commands on the grid. Where `hold_speed_mps` (N,) is
+        known the model follows that speed instead of accelerations; where `delayed`, for all or
+        for each run (K,), is false the tyres follow at once, as measured angles must. Gaps in
+        commands hold what was before.
+        """
+        accel, tire = _filled(accel_mps2), _filled(tire_rad)
+        last = len(tire) - 1
+        late = np.broadcast_to(np.asarray(delayed), len(starts))
+        parts = []
+        for first in range(0, len(starts), self._stage.nsim):
+            chunk = slice(first, first + self._stage.nsim)
+            at, begin = starts[chunk], states[chunk]
+            back = np.arange(-2 * _TICKS_BACK + 1, 1) // 2
+            history = tire[np.clip(at[:, None] - 1 + back, 0, last)]
+            waits = late[chunk]
+            self._stage.seed(
+                begin,
+                steering_delay_s=np.where(waits, self.vehicle.steering_delay_s.value, 0.0),
+                friction_factor=np.ones(len(at)),
+                steering_history_rad=np.where(waits[:, None], history, begin[:, 6:7]),
+            )
+            seen = [self._stage.states.copy()]
+            for step in range(steps):
+                now = np.minimum(at + step, last)
+                pushed = accel[now]
+                if hold_speed_mps is not None:
+                    later = np.minimum(now + 1, last)
+                    behind = hold_speed_mps[now] - self._stage.states[:, 3]
+                    follows = (hold_speed_mps[later] - hold_speed_mps[now]) / PERIOD_S
+                    follows += _SPEED_GAIN_PS * behind
+                    pushed = np.where(np.isfinite(follows), follows, pushed)
+                self._stage.step(Controls(pushed, tire[now]))
+                seen.append(self._stage.states.copy())
+            parts.append(np.stack(seen, axis=1))
+        return np.concatenate(parts) if parts else np.zeros((0, steps + 1, 8))
+
+
+def start_states(
+    vehicle: VehicleParameters,
+    *,
+    x_m: Array,
+    y_m: Array,
+    yaw_rad: Array,
+    speed_mps: Array,
+    yaw_rate_radps: Array,
+    accel_mps2: Array,
+    tire_rad: Array,
+) -> Array:
+    """Return (K, 8) states to start from; a tyre angle that is NaN is that of steady cornering."""
+    rows = np.zeros((len(x_m), 8))
+    for index in range(len(x_m)):
+        speed, rate = float(speed_mps[index]), float(yaw_rate_radps[index])
+        tire = float(tire_rad[index])
+        rows[index] = (
+            x_m[index], y_m[index], yaw_rad[index], speed, rear_slip_velocity(vehicle, speed, rate),
+            rate, tire if np.isfinite(tire) else kinematic_tire_angle(vehicle, speed, rate),
+            accel_mps2[index],
+        )  # fmt: skip
+    return rows
+
+
+def accel_commands_from_motion(
+    vehicle: VehicleParameters, *, speed_mps: Array, accel_mps2: Array
+) -> Array:
+    """Return the accelerations (N,) to command so that the model moves as measured, no lags."""
+    force = accel_mps2 * vehicle.wheel_inertia_mass_factor.value
+    force = force + resistance_mps2(vehicle, np.nan_to_num(speed_mps))
+    gain = np.where(force > 0.0, vehicle.drive_gain.value, vehicle.brake_gain.value)
+    return np.asarray(force / gain)
+
+
+def _filled(values: Array) -> Array:
+    """Hold the last known value through gaps; 0 before the first."""
+    known = np.isfinite(values)
+    index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return np.where(index >= 0, values[np.maximum(index, 0)], 0.0)

@@ -1,0 +1,65 @@
+"""The vehicle's estimated states on the grid of its record: what a free run is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.sim_worker.analysis.motion_record import between_samples
+
+_LONGEST_GAP_S = 0.5
+
+
+class MeasuredMotion(NamedTuple):
+    """Base_link at N instants in a local frame; NaN where no state is near."""
+
+    x_m: Array
+    y_m: Array
+    yaw_rad: Array
+    speed_mps: Array
+    yaw_rate_radps: Array
+    accel_mps2: Array
+
+    @property
+    def known(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Where the motion is known, shape (N,)."""
+        return np.isfinite(self.x_m)
+
+
+def motion_on_grid(
+    states: Sequence[VehicleState],
+    stamp_ns: np.ndarray[Any, np.dtype[np.int64]],
+    *,
+    frame: LocalFrame,
+) -> MeasuredMotion:
+    """Interpolate states with a known heading to `stamp_ns` (N,), which ascend.
+
+    Positions are without what a map has moved them by: that is no motion of the car. States out of
+    time order or with numbers that are not finite are passed over.
+    """
+    rows: list[tuple[float, ...]] = []
+    base_ns = int(stamp_ns[0])
+    for state in states:
+        place = state.position
+        values = (
+            place.lat_deg, place.lon_deg, state.yaw_rad, state.speed_mps, state.yaw_rate_radps,
+            state.accel_mps2, *(state.map_shift_m or (0.0, 0.0)),
+        )  # fmt: skip
+        time_s = (state.stamp_ns - base_ns) * 1e-9
+        if state.yaw_valid and np.isfinite(values).all() and (not rows or time_s > rows[-1][0]):
+            rows.append((time_s, *values))
+    at = np.asarray((stamp_ns - base_ns) * 1e-9, dtype=np.float64)
+    if len(rows) < 2:
+        return MeasuredMotion(*(np.full(len(at), np.nan) for _ in MeasuredMotion._fields))
+    table = np.array(rows)
+    xy = local_from_geo(frame, table[:, 1], table[:, 2]) - table[:, 7:9]
+    yaw = np.unwrap(local_from_geo_yaw(frame, table[:, 3], table[:, 1], table[:, 2]))
+    columns = (xy[:, 0], xy[:, 1], yaw, table[:, 4], table[:, 5], table[:, 6])
+    return MeasuredMotion(
+        *(between_samples(table[:, 0], column, at, gap_s=_LONGEST_GAP_S) for column in columns)
+    )

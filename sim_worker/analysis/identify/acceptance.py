@@ -1,0 +1,135 @@
+"""Which estimates are taken into a vehicle's parameters, and the file that holds them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Collection
+
+import msgspec
+
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.tuning import (
+    UNDERSTEER_GRADIENT,
+    Identification,
+    ParameterChange,
+    ParameterEstimate,
+)
+from foretwin.contracts.vehicle import Parameter, VehicleParameters
+from foretwin.sim_worker.vehicle.parameters import check_vehicle, understeer_gradient
+from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
+
+HALF_OF_95 = 1.96
+_STIFFNESS = "front_cornering_stiffness_npr"
+
+
+def is_acceptable(estimate: ParameterEstimate) -> bool:
+    """Return whether an estimate has a value and nothing speaks against it."""
+    return estimate.value is not None and not estimate.reason
+
+
+def front_stiffness(vehicle: VehicleParameters, gradient_rad_per_mps2: float) -> float:
+    """Return the front axle's cornering stiffness that gives an understeer gradient.
+
+    The rear's stays: yaw rate tells their difference alone. Raises ValueError for a car that
+    oversteers more than any front tyre could account for.
+    """
+    base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
+    mass = vehicle.mass_kg.value
+    soft = mass * (base - rear) / (base * vehicle.rear_cornering_stiffness_npr.value)
+    soft += gradient_rad_per_mps2
+    if not soft > 0.0:
+        raise ValueError(f"no front stiffness gives {gradient_rad_per_mps2:g} rad per m/s²")
+    return mass * rear / (base * soft)
+
+
+def accepted(
+    told: Identification,
+    vehicle: VehicleParameters,
+    *,
+    pinned: Collection[str] = (),
+    source: str = "identified",
+) -> tuple[VehicleParameters, tuple[ParameterChange, ...]]:
+    """Return `vehicle` with what may be taken of `told`, and each change.
+
+    An understeer gradient becomes the front axle's cornering stiffness, `pinned` under either
+    name. What would make no vehicle (a negative drag), or an implausible one, is passed over.
+    """
+    changes: list[ParameterChange] = []
+    for estimate in told.estimates:
+        if not is_acceptable(estimate) or estimate.name in pinned:
+            continue
+        assert estimate.value is not None
+        assert estimate.low is not None
+        assert estimate.high is not None
+        std = (estimate.high - estimate.low) / (2.0 * HALF_OF_95)
+        name, value = estimate.name, estimate.value
+        if name == UNDERSTEER_GRADIENT:
+            if _STIFFNESS in pinned:
+                continue
+            try:
+                stiffness = front_stiffness(vehicle, value)
+                softer = front_stiffness(vehicle, value + std)
+            except ValueError:
+                continue
+            name, value, std = _STIFFNESS, stiffness, abs(stiffness - softer)
+        before = getattr(vehicle, name).value
+        low, high = PLAUSIBLE[name]
+        if not low <= value <= high:
+            continue
+        changed = msgspec.structs.replace(
+            vehicle, **{name: Parameter(value, std, f"{source}, {told.excited_s:.0f} s")}
+        )
+        try:
+            vehicle = check_vehicle(changed)
+        except ValueError:
+            continue
+        changes.append(
+            ParameterChange(
+                vehicle_id=told.vehicle_id, stamp_ns=told.stamp_ns, name=name, before=before,
+                value=value, std=std, origin="identified",
+            )
+        )  # fmt: skip
+    return vehicle, tuple(changes)
+
+
+def vehicle_toml(vehicle: VehicleParameters) -> str:
+    """Return the text of a parameter file that `load_vehicle` reads as `vehicle`."""
+    lines = [f"name = {json.dumps(vehicle.name)}"]
+    for field in msgspec.structs.fields(vehicle):
+        parameter = getattr(vehicle, field.name)
+        if not isinstance(parameter, Parameter):
+            continue
+        lines += ["", f"[{field.name}]", f"value = {float(parameter.value)!r}"]
+        if parameter.std is not None:
+            lines.append(f"std = {float(parameter.std)!r}")
+        lines.append(f"source = {json.dumps(parameter.source, ensure_ascii=False)}")
+    return "\n".join(lines) + "\n"
+
+
+def in_force(vehicle: VehicleParameters, name: str) -> float:
+    """Return the value of a parameter, derived ones included; UserError for another name."""
+    if name == UNDERSTEER_GRADIENT:
+        return understeer_gradient(vehicle)
+    parameter = getattr(vehicle, name, None)
+    if not isinstance(parameter, Parameter):
+        raise UserError(f"{name} is no parameter of a vehicle")
+    return float(parameter.value)
+
+
+def is_left_open(vehicle: VehicleParameters, name: str, value: float) -> bool:
+    """Return whether a value lies within two standard deviations of what a vehicle file says."""
+    if name == UNDERSTEER_GRADIENT:
+        usual = understeer_gradient(vehicle)
+        parts = ("front_cornering_stiffness_npr", "rear_cornering_stiffness_npr")
+        softer = (understeer_gradient(_softer(vehicle, part)) for part in parts)
+        std = math.hypot(*(one - usual for one in softer))
+    else:
+        usual, std = in_force(vehicle, name), getattr(vehicle, name).std or 0.0
+    return abs(value - usual) <= 2.0 * std
+
+
+def _softer(vehicle: VehicleParameters, name: str) -> VehicleParameters:
+    given: Parameter = getattr(vehicle, name)
+    softer = Parameter(given.value - (given.std or 0.0), given.std, given.source)
+    return msgspec.structs.replace(vehicle, **{name: softer})

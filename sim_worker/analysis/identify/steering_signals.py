@@ -1,0 +1,148 @@
+"""The signals that steering is identified from, and what given parameters leave unexplained.
+
+A single-track car turns with r = v/L (tan(δ - β) + β), where β is its rear tyres' slip and
+
+    δ = (w - τ dw/dt)/i + δ0 + p⁺ a⁺ + p⁻ a⁻ - K a_y - T dr/dt
+
+with steering wheel w, ratio i, offset δ0 at the tyre, understeer gradient K (Gillespie 1992, eq.
+6-15), T = I_z/L (1/C_f + 1/C_r) for what the tyres need to turn the body, τ by which the tyres (or
+the gyro's samples) come after the steering wheel, and p± by which the car pulls to a side when it
+is driven or braked.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.analysis.identify.single_track import SLOWEST_MPS, sideways
+from foretwin.sim_worker.analysis.identify.smoothing import smoothed
+from foretwin.sim_worker.analysis.motion_record import MotionRecord
+
+Indices = np.ndarray[Any, np.dtype[np.int64]]
+WIDTH_S = 0.1
+ALIKE_S = 2.0 * math.sqrt(math.pi) * WIDTH_S
+"""For so long, smoothed white noise says one thing only."""
+_LEAST_STOOD = 4.0
+_MAX_LATERAL_MPS2 = 4.0
+"""Beyond it, tyres are no longer linear."""
+_LEAST_FEED = 0.2
+"""Of 1 + K v²/L, which is zero at the speed where an oversteering car loses its stability."""
+INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING, GYRO_BIAS, LAG, PULL_DRIVEN, PULL_BRAKED = range(8)
+"""The parameters θ: 1/i, δ0, K, T, the gyro's bias, τ/i, p⁺, p⁻."""
+
+
+class Unexplained(NamedTuple):
+    """Yaw rate (M,) that parameters leave unexplained, and its slopes (8, M) by each of them."""
+
+    yaw_rate_radps: Array
+    slopes: Array
+
+
+class SteeringSignals(NamedTuple):
+    """Smoothed signals at N instants, of which those `used` (M) count, while driving."""
+
+    time_s: Array
+    used: Indices
+    speed_mps: Array
+    yaw_rate_radps: Array
+    wheel_rad: Array
+    wheel_radps: Array
+    rear_slip_rad: Array
+    lateral_mps2: Array
+    given: Array
+    """What each parameter is multiplied by at the tyre (8, N)."""
+    per_m: Array
+    """Speed over wheelbase (M,)."""
+    wheelbase_m: float
+    gyro_bias_radps: float
+    gyro_bias_std_radps: float
+    """What the gyro told while the car stood, and how surely; 0 and inf where it did not."""
+
+    def unexplained(self, values: Array) -> Unexplained:
+        """Return what parameters (8,) leave unexplained of the yaw rate."""
+        used, per_m = self.used, self.per_m
+        asked, slip, speed = self.given[:, used], self.rear_slip_rad[used], self.speed_mps[used]
+        front = np.clip(values @ asked - slip, -1.2, 1.2)
+        slope = per_m * (1.0 + np.square(np.tan(front)))
+        # Measured yaw rate stands on both sides: solved for, its noise no longer weighs K.
+        feeds = np.maximum(1.0 + slope * values[UNDERSTEER] * speed, _LEAST_FEED)
+        apart = self.yaw_rate_radps[used] - per_m * (np.tan(front) + slip) - values[GYRO_BIAS]
+        apart /= feeds
+        slopes = asked * slope
+        slopes[UNDERSTEER] += slope * speed * apart
+        slopes[GYRO_BIAS] = 1.0
+        return Unexplained(apart, slopes / feeds)
+
+    def steered_rad(self, values: Array) -> Array:
+        """Return the tyre angle (N,) that the motion asks the steering wheel for."""
+        turned = self.wheelbase_m * (self.yaw_rate_radps - values[GYRO_BIAS])
+        turned /= np.maximum(self.speed_mps, SLOWEST_MPS)
+        tyre = np.arctan(turned - self.rear_slip_rad) + self.rear_slip_rad
+        by_wheel = values[INVERSE_RATIO] * self.wheel_rad - values[LAG] * self.wheel_radps
+        return np.asarray(tyre - (values @ self.given - by_wheel))
+
+    def late_wheel_rad(self, values: Array) -> Array:
+        """Return the steering wheel (N,) as the tyres follow it, τ before."""
+        return np.asarray(self.wheel_rad - values[LAG] / values[INVERSE_RATIO] * self.wheel_radps)
+
+
+def _mean(values: Array, *, alike: float) -> tuple[float, float]:
+    """Return mean and its std, as wide as Student's of so few that are not `alike`."""
+    count = len(values) / alike
+    if count < _LEAST_STOOD:
+        return 0.0, math.inf
+    return float(np.mean(values)), float(np.std(values) / math.sqrt(count - 3.0))
+
+
+def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> SteeringSignals:
+    """Return the signals of a record at even instants; ValueError saying what it lacks."""
+    for name, told in (
+        ("wheel_rad", "steering-wheel angle"),
+        ("speed_mps", "speed"),
+        ("yaw_rate_radps", "yaw rate"),
+    ):
+        if not record.has(name):
+            raise ValueError(f"no {told} was measured for half of the time")
+    period_s = float(record.time_s[1])
+
+    def smooth(values: Array, *, derivative: bool = False) -> Array:
+        return smoothed(values, period_s=period_s, width_s=WIDTH_S, derivative=derivative)
+
+    speed, rate, wheel = map(smooth, (record.speed_mps, record.yaw_rate_radps, record.wheel_rad))
+    gaining, turning, steering = (
+        smooth(values, derivative=True)
+        for values in (record.speed_mps, record.yaw_rate_radps, record.wheel_rad)
+    )
+    side = sideways(vehicle, speed_mps=speed, yaw_rate_radps=rate, yaw_accel_radps2=turning,
+                    period_s=period_s)  # fmt: skip
+    known = np.isfinite(wheel) & np.isfinite(side.accel_mps2)
+    moving = known & (speed > SLOWEST_MPS) & (np.abs(side.accel_mps2) < _MAX_LATERAL_MPS2)
+    if not moving.any():
+        raise ValueError("the car did not drive")
+    used = np.flatnonzero(moving)
+    base = vehicle.wheelbase_m.value
+    standing = np.isfinite(rate) & (np.abs(speed) < 1e-3)
+    bias, bias_std = _mean(rate[standing], alike=ALIKE_S / period_s)
+    return SteeringSignals(
+        time_s=record.time_s,
+        used=used,
+        speed_mps=speed,
+        yaw_rate_radps=rate,
+        wheel_rad=wheel,
+        wheel_radps=steering,
+        rear_slip_rad=side.rear_slip_rad,
+        lateral_mps2=side.accel_mps2,
+        given=np.stack(
+            [wheel, np.ones_like(wheel), -side.accel_mps2, -turning, np.zeros_like(wheel),
+             -steering, np.maximum(gaining, 0.0), np.minimum(gaining, 0.0)]
+        ),
+        per_m=speed[used] / base,
+        wheelbase_m=base,
+        gyro_bias_radps=bias,
+        gyro_bias_std_radps=bias_std,
+    )  # fmt: skip

@@ -1,0 +1,130 @@
+"""One plan against what was then driven: how far apart in way and pace, and what that means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.side_by_side import DisagreementKind
+from foretwin.geometry.frenet_path import FrenetPath
+
+_LEAST_WAY_M = 3.0
+"""Ways are compared as far as both went, and not at all where that is less."""
+_MOVED_M = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """From where on a plan and a drive disagree; a disagreement ends below `release` of that.
+
+    Beside and faster or slower are set wide of what two careful drivers differ by: half the room
+    that a car has in its lane, and what 4 s at 0.6 m/s² make.
+    """
+
+    beside_m: float = 1.0
+    lane_m: float = 2.0
+    turn_rad: float = radians(25.0)
+    along_m: float = 5.0
+    speed_mps: float = 2.5
+    stands_mps: float = 0.5
+    goes_mps: float = 2.0
+    release: float = 0.6
+
+    def lowered(self) -> Limits:
+        """Return the limits below which a disagreement is over."""
+        return Limits(
+            beside_m=self.release * self.beside_m, lane_m=self.lane_m,
+            turn_rad=self.turn_rad, along_m=self.release * self.along_m,
+            speed_mps=self.release * self.speed_mps, stands_mps=self.stands_mps,
+            goes_mps=self.release * self.goes_mps, release=self.release,
+        )  # fmt: skip
+
+
+class Departure(NamedTuple):
+    """A plan seen from what was driven, each where it is greatest in size, signed.
+
+    `lateral_m` and `turned_rad` between the two ways wherever both led; `along_m` along the driven
+    heading and `speed_mps` at the same instants; speeds at the end of both.
+    """
+
+    lateral_m: float
+    turned_rad: float
+    along_m: float
+    speed_mps: float
+    planned_end_mps: float
+    driven_end_mps: float
+
+
+def departure(planned: Array, driven: Array) -> Departure:
+    """Compare x, y, yaw, speed (N, 4) of a plan and of the drive at the same N instants."""
+    difference = planned - driven
+    cos, sin = np.cos(driven[:, 2]), np.sin(driven[:, 2])
+    lateral, turned = _between_ways(planned, driven)
+    return Departure(
+        lateral_m=lateral,
+        turned_rad=turned,
+        along_m=_greatest(cos * difference[:, 0] + sin * difference[:, 1]),
+        speed_mps=_greatest(difference[:, 3]),
+        planned_end_mps=float(planned[-1, 3]),
+        driven_end_mps=float(driven[-1, 3]),
+    )
+
+
+def way_kind(found: Departure, limits: Limits) -> DisagreementKind | None:
+    """Say what a departure means for the way, None where it is within the limits."""
+    aside_m = abs(found.lateral_m)
+    if aside_m <= limits.beside_m:
+        return None
+    if abs(found.turned_rad) > limits.turn_rad:
+        return "ads_turns_elsewhere"
+    return "ads_in_another_lane" if aside_m > limits.lane_m else "ads_beside"
+
+
+def pace_kind(found: Departure, limits: Limits) -> DisagreementKind | None:
+    """Say what a departure means for the pace, None where it is within the limits."""
+    planned, driven = found.planned_end_mps, found.driven_end_mps
+    if planned < limits.stands_mps and driven > limits.goes_mps:
+        return "ads_stops"
+    if driven < limits.stands_mps and planned > limits.goes_mps:
+        return "human_stops"
+    if abs(found.speed_mps) > limits.speed_mps:
+        return "ads_faster" if found.speed_mps > 0.0 else "ads_slower"
+    if abs(found.along_m) > limits.along_m:
+        return "ads_faster" if found.along_m > 0.0 else "ads_slower"
+    return None
+
+
+def _between_ways(planned: Array, driven: Array) -> tuple[float, float]:
+    """Return the greatest offset and angle of the planned way from the driven, as far as both go.
+
+    Ways, not instants: who stops on a lane's middle departs in pace, not in way.
+    """
+    moved = _moved(driven)
+    if len(moved) < 2 or len(_moved(planned)) < 2:
+        return 0.0, 0.0
+    way = FrenetPath(moved[:, :2], before_m=0.0)
+    place = way.locate(planned[:, :2])
+    gone_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(planned[:, :2], axis=0).T))])
+    common = (place.arc_m < way.length_m) & (gone_m <= way.length_m)
+    if not common.any() or min(way.length_m, float(gone_m[-1])) < _LEAST_WAY_M:
+        return 0.0, 0.0
+    turned = wrap_angle(planned[common, 2] - way.pose_at(place.arc_m[common]).yaw_rad)
+    return _greatest(place.offset_m[common]), _greatest(np.asarray(turned))
+
+
+def _moved(track: Array) -> Array:
+    """Return the rows of a track (N, 4) that lie apart from those before."""
+    kept = [0]
+    for row in range(1, len(track)):
+        if np.hypot(*(track[row, :2] - track[kept[-1], :2])) >= _MOVED_M:
+            kept.append(row)
+    return track[kept]
+
+
+def _greatest(values: Array) -> float:
+    return float(values[np.abs(values).argmax()])

@@ -1,0 +1,219 @@
+"""Human and ADS side by side while a drive goes on: plans wait until they have been driven.
+
+A state machine without clock: statuses, plans and states in, disagreements out.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleState, VehicleStatus
+from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
+from foretwin.sim_worker.analysis.side_by_side.departure import (
+    Limits,
+    departure,
+    pace_kind,
+    way_kind,
+)
+from foretwin.sim_worker.analysis.side_by_side.segment import Course, Place, Segment, Waiting
+
+HORIZON_S = 4.0
+"""How much of a plan is compared: beyond, both have seen what nobody knew."""
+_STEP_S = 0.1
+_EVERY_NS = 200_000_000
+"""Plans come ten times a second and hardly differ: every second one tells all."""
+_LEAST_S = 1.0
+_KEEP_NS = round((HORIZON_S + 3.0) * 1e9)
+_LONGEST_HOLE_NS = 1_500_000_000
+
+
+class SideBySide:
+    """Compares each plan with what was driven from its stamp on, up to the next takeover.
+
+    A segment lasts as long as the control mode stays what it is; a status that does not say who
+    drives changes nothing. Figures are kept of every segment, disagreements of those in which a
+    human drives. `place` says where the car is as a plan comes in.
+    """
+
+    def __init__(
+        self,
+        frame: LocalFrame,
+        *,
+        vehicle_id: str,
+        place: Callable[[], Place],
+        limits: Limits | None = None,
+    ) -> None:
+        self._frame = frame
+        self._vehicle_id = vehicle_id
+        self._place = place
+        self._limits = limits or Limits()
+        self._lowered = self._limits.lowered()
+        self._driven: deque[tuple[int, Array]] = deque()
+        self._last_plan_ns: int | None = None
+        self._open: deque[Segment] = deque()
+        self._done: list[Segment] = []
+
+    @property
+    def segments(self) -> list[DrivenSegment]:
+        """All segments in which a plan came in or the control mode was told."""
+        return [segment.record() for segment in (*self._done, *self._open)]
+
+    def take_status(self, status: VehicleStatus) -> None:
+        """Take who drives; another than before is a takeover."""
+        mode = status.control_mode
+        if mode == "unknown" or (self._open and self._open[-1].mode == mode):
+            return
+        if self._open:
+            before = self._open[-1]
+            if before.mode == "unknown" and status.stamp_ns - before.from_ns < _LEAST_S * 1e9:
+                before.mode = mode  # told a moment after the first plan, not taken over
+                return
+            if status.stamp_ns <= before.from_ns:
+                return
+            before.until_ns = status.stamp_ns
+        self._begin(mode, status.stamp_ns)
+
+    def take_plan(self, plan: PlannedTrajectory) -> None:
+        """Take what the ADS plans now."""
+        if not self._open:
+            self._begin("unknown", plan.stamp_ns)
+        last, segment = self._last_plan_ns, self._open[-1]
+        if plan.stamp_ns < segment.from_ns or len(plan.time_from_stamp_s) < 2:
+            return
+        if last is not None and 0 <= plan.stamp_ns - last < _EVERY_NS:
+            return
+        self._last_plan_ns = plan.stamp_ns
+        begin_s, end_s = float(plan.time_from_stamp_s[0]), float(plan.time_from_stamp_s[-1])
+        first = max(0, int(np.ceil(begin_s / _STEP_S - 1e-6)))
+        last_step = int(np.floor(min(end_s, HORIZON_S) / _STEP_S + 1e-6))
+        time_s: Array = _STEP_S * np.arange(first, last_step + 1, dtype=np.float64)
+        if len(time_s) < 2:
+            return
+        lat, lon = plan.lat_deg, plan.lon_deg
+        yaw = np.unwrap(local_from_geo_yaw(self._frame, plan.yaw_rad, lat, lon))
+        rows = np.column_stack([local_from_geo(self._frame, lat, lon), yaw, plan.speed_mps])
+        segment.waiting.append(
+            Waiting(
+                stamp_ns=plan.stamp_ns,
+                stamps_ns=plan.stamp_ns + np.round(time_s * 1e9),
+                planned=_at(time_s, plan.time_from_stamp_s, rows),
+                place=self._place(),
+            )
+        )
+
+    def take_state(self, state: VehicleState) -> list[Disagreement]:
+        """Take where the car is; return disagreements that begin to be told of, or end."""
+        if not state.yaw_valid or self._last_plan_ns is None:
+            return []  # what was driven before the first plan is compared with nothing
+        if self._driven and state.stamp_ns <= self._driven[-1][0]:
+            if state.stamp_ns < self._driven[-1][0] - 1_000_000_000:
+                return self._clock_stepped_back()
+            return []
+        lat, lon = state.position.lat_deg, state.position.lon_deg
+        xy = local_from_geo(self._frame, lat, lon)
+        yaw = float(local_from_geo_yaw(self._frame, state.yaw_rad, lat, lon))
+        self._driven.append((state.stamp_ns, np.array([*xy, yaw, state.speed_mps])))
+        while self._driven[0][0] < state.stamp_ns - _KEEP_NS:
+            self._driven.popleft()
+        if self._open:
+            self._open[-1].last_ns = max(self._open[-1].last_ns, state.stamp_ns)
+        return self._settle(state.stamp_ns)
+
+    def finish(self) -> list[Disagreement]:
+        """Compare what can still be compared at the drive's end, and end what lasts."""
+        found = []
+        if self._open and self._driven:
+            last = self._open[-1]
+            last.until_ns = self._driven[-1][0]
+            found = self._settle(self._driven[-1][0])
+        return found + self._close_all()
+
+    def _begin(self, mode: ControlMode, stamp_ns: int) -> None:
+        number = len(self._done) + len(self._open)
+        way = Course(self._vehicle_id, number, "way")
+        pace = Course(self._vehicle_id, number, "pace")
+        self._open.append(Segment(number, mode, stamp_ns, (way, pace), last_ns=stamp_ns))
+
+    def _settle(self, now_ns: int) -> list[Disagreement]:
+        """Compare the plans that have been driven, and end the segments that are over."""
+        found: list[Disagreement] = []
+        while self._open:
+            segment = self._open[0]
+            until_ns = segment.until_ns
+            while segment.waiting:
+                end_ns = segment.waiting[0].stamps_ns[-1]
+                if now_ns < (end_ns if until_ns is None else min(end_ns, until_ns)):
+                    break
+                found += self._compare(segment, segment.waiting.popleft())
+            if until_ns is None or now_ns < until_ns or segment.waiting:
+                break
+            if len(self._open) == 1:
+                break  # the drive's end, not a takeover
+            found += _ended(segment)
+            self._done.append(self._open.popleft())
+        return found
+
+    def _compare(self, segment: Segment, plan: Waiting) -> list[Disagreement]:
+        upto = np.inf if segment.until_ns is None else segment.until_ns
+        chosen = plan.stamps_ns <= upto
+        segment.cut += not chosen.all()
+        stamps = plan.stamps_ns[chosen]
+        driven = self._driven_at(stamps) if len(stamps) > 1 else None
+        if driven is None or stamps[-1] - plan.stamp_ns < _LEAST_S * 1e9:
+            segment.too_short += 1
+            return []
+        found = departure(plan.planned[chosen], driven)
+        segment.count(found)
+        if segment.mode != "manual":
+            return []
+        told: list[Disagreement] = []
+        for course, kind_of in zip(segment.courses, (way_kind, pace_kind), strict=True):
+            kind = kind_of(found, self._limits)
+            within = kind_of(found, self._lowered) is None
+            told += course.take(plan.stamp_ns, kind, within, found, plan.place)
+        segment.disagreements += sum(one.over for one in told)
+        return told
+
+    def _driven_at(self, stamps_ns: Array) -> Array | None:
+        known = np.array([stamp for stamp, _ in self._driven], dtype=np.float64)
+        rows = np.array([row for _, row in self._driven])
+        if len(known) < 2 or known[0] > stamps_ns[0] or known[-1] < stamps_ns[-1]:
+            return None
+        first = int(np.searchsorted(known, stamps_ns[0], side="right")) - 1
+        last = int(np.searchsorted(known, stamps_ns[-1]))
+        if (np.diff(known[first : last + 1]) > _LONGEST_HOLE_NS).any():
+            return None
+        rows[:, 2] = np.unwrap(rows[:, 2])
+        return _at(stamps_ns, known, rows)
+
+    def _clock_stepped_back(self) -> list[Disagreement]:
+        """Nothing of before can be compared any more: a new segment by the new clock."""
+        told = self._close_all()
+        self._driven.clear()
+        self._last_plan_ns = None
+        return told
+
+    def _close_all(self) -> list[Disagreement]:
+        found = []
+        while self._open:
+            segment = self._open.popleft()
+            segment.too_short += len(segment.waiting)
+            segment.waiting.clear()
+            found += _ended(segment)
+            self._done.append(segment)
+        return found
+
+
+def _ended(segment: Segment) -> list[Disagreement]:
+    found = [one for course in segment.courses for one in course.finish()]
+    segment.disagreements += len(found)
+    return found
+
+
+def _at(at: Array, known: Array, rows: Array) -> Array:
+    return np.column_stack([np.interp(at, known, column) for column in rows.T])

@@ -1,0 +1,1 @@
+"""Many cars stepped together: the batch simulation, collisions, accidents."""

@@ -1,0 +1,222 @@
+"""A case of a scenario seen from above: who starts where, and what becomes of it.
+
+The ego is blue where it keeps its speed, green where a planner drives it; others are red, those
+that stand brown. Starts are hollow, the moment of the impact, or the closest one, is full.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.world import World
+from foretwin.geometry.polyline import offset
+from foretwin.geometry.rectangles import Rectangles, corners
+from foretwin.sim_worker.futures.case_picture_runs import Run
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.world_gen.export.picture_ground import draw_ground
+from foretwin.world_gen.export.picture_marks import scale_bar
+from foretwin.world_gen.export.picture_style import LANE_EDGE, LINE_COLOUR, View, view_around
+
+EGO, PLANNED, OTHERS, STANDING, IMPACT = "#1f5fd0", "#0b8a4b", "#d62728", "#7a4b22", "#ffd400"
+_LEAST_HALF_M, _MOST_HALF_M, _MARGIN_M = 20.0, 75.0, 8.0
+_GHOST_EVERY_S = 1.0
+
+
+def draw_case(
+    axes: Axes,
+    played: Cast,
+    world: World,
+    heedless: Run,
+    planned: Run | None,
+    *,
+    aspect: float,
+    view: View | None = None,
+) -> None:
+    """Draw one case in its World; `aspect` is the width of the axes over their height.
+
+    Without a `view`, it holds what happens, but for who comes from afar.
+    """
+    view = view or _view(heedless, planned, aspect)
+    draw_ground(axes, world, view)
+    _draw_lanes(axes, world, view)
+    _draw_paths(axes, played, heedless)
+    runs = ((heedless, EGO), *(((planned, PLANNED),) if planned is not None else ()))
+    for run, colour in runs:
+        axes.plot(*run.ego.centre_m.T, color=colour, linewidth=1.6, zorder=12.0)
+        _box(axes, run.ego_at(0), facecolor="none", edgecolor=colour, linewidth=1.1, zorder=12.1)
+        _box(axes, run.ego_at(run.moment), facecolor=colour, edgecolor="black", linewidth=0.7,
+             alpha=0.85, zorder=13.0 if run is heedless else 12.8)  # fmt: skip
+    for instant in _ghosts(heedless):
+        _box(axes, heedless.ego_at(instant), facecolor="none", edgecolor=EGO, linewidth=0.5,
+             alpha=0.55, zorder=12.0)  # fmt: skip
+    for number, actor in enumerate(played.actors):
+        colour = OTHERS if actor.speed_mps > 0.0 else STANDING
+        box = heedless.others[number]
+        if actor.speed_mps > 0.0:
+            axes.plot(*box.centre_m.T, color=colour, linewidth=1.3, zorder=12.0)
+            start = heedless.others_at(0)[number]
+            _box(axes, start, facecolor="none", edgecolor=colour, linewidth=1.1, zorder=12.2)
+            for instant in _ghosts(heedless):
+                _box(axes, heedless.others_at(instant)[number], facecolor="none",
+                     edgecolor=colour, linewidth=0.5, alpha=0.55, zorder=12.0)  # fmt: skip
+        at = heedless.others_at(heedless.moment)[number]
+        _box(axes, at, facecolor=colour, edgecolor="black", linewidth=0.7, alpha=0.85,
+             zorder=12.9)  # fmt: skip
+        if planned is not None and actor.speed_mps > 0.0:
+            at = planned.others_at(planned.moment)[number]
+            _box(axes, at, facecolor="none", edgecolor=PLANNED, linewidth=1.4, zorder=13.1)
+    if played.impact_with:
+        axes.plot(
+            *played.impact_point_m, marker="*", markersize=11.0, color=IMPACT,
+            markeredgecolor="black", markeredgewidth=0.7, zorder=14.0,
+        )  # fmt: skip
+    scale_bar(axes, view)
+
+
+def told(played: Cast, heedless: Run, planned: Run | None, planner: str) -> str:
+    """Say in one line each who is how fast, what is planned, and what the planner makes of it."""
+    moving = [f"ego {3.6 * played.ego_speed_mps:.0f} km/h{' backwards' if played.reverse else ''}"]
+    moving += [
+        f"{_words(a.name)} {3.6 * a.speed_mps:.0f} km/h" for a in played.actors if a.speed_mps > 0.0
+    ]
+    lines = [", ".join(moving) + _faults(played)]
+    if played.impact_with:
+        lines.append(f"keeping its speed: hits {_words(played.impact_with)} after "
+                     f"{played.impact_time_s:.1f} s")  # fmt: skip
+    elif played.actors:
+        lines.append(f"keeping its speed: {heedless.clearance_m:.1f} m to the nearest")
+    else:
+        lines.append("keeping its speed: alone")
+    if planned is not None:
+        end = f"hits {planned.collision_with} after {planned.collision_s:.1f} s"
+        if not planned.collision_with:
+            end = "no collision"
+            if np.isfinite(planned.clearance_m):
+                end += f", {planned.clearance_m:.1f} m to the nearest"
+        lines.append(f"{planner}: {end}")
+    return "\n".join(lines)
+
+
+def write_case_picture(
+    path: Path,
+    played: Cast,
+    scenario: Scenario,
+    world: World,
+    heedless: Run,
+    planned: Run | None,
+    *,
+    planner: str,
+) -> None:
+    """Write one case as PNG, with its legend and the map's attribution."""
+    figure = Figure(figsize=(9.0, 10.0), dpi=110, facecolor="white")
+    axes = figure.add_axes((0.02, 0.1, 0.96, 0.77))
+    draw_case(axes, played, world, heedless, planned, aspect=0.96 * 9.0 / 7.7)
+    where = world.intersection.name or played.place.junction_id
+    figure.text(0.02, 0.965, f"{scenario.title}: {where}", fontsize=13, weight="bold")
+    figure.text(
+        0.02, 0.88, f"{scenario.shows}\n{told(played, heedless, planned, planner)}", fontsize=9.5
+    )
+    draw_case_legend(figure, planner if planned is not None else "", ncols=3)
+    figure.text(0.98, 0.012, world.attribution, fontsize=9, ha="right", weight="bold")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    metadata = {"Copyright": world.attribution, "Software": "foretwin"}
+    FigureCanvasAgg(figure).print_figure(str(path), format="png", metadata=metadata)
+
+
+def draw_case_legend(figure: Figure, planner: str, *, ncols: int = 4) -> None:
+    """Explain the colours at the figure's lower edge."""
+    handles: list[Any] = [
+        Patch(facecolor=EGO, edgecolor="black", label="ego, keeping its speed"),
+        Patch(facecolor=OTHERS, edgecolor="black", label="others at the impact, or when nearest"),
+        Patch(facecolor=STANDING, edgecolor="black", label="standing"),
+        Patch(facecolor="none", edgecolor=EGO, label="start (hollow), each second (faint)"),
+        Line2D([], [], marker="*", linestyle="", markersize=10, color=IMPACT,
+               markeredgecolor="black", label="planned impact"),
+    ]  # fmt: skip
+    if planner:
+        handles[1:1] = [
+            Patch(facecolor=PLANNED, edgecolor="black", label=f"ego by {planner}, when nearest"),
+            Patch(facecolor="none", edgecolor=PLANNED, label="others at that moment"),
+        ]
+    figure.legend(
+        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=ncols, fontsize=8.5,
+        frameon=False, columnspacing=1.2, handlelength=1.6,
+    )  # fmt: skip
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _faults(played: Cast) -> str:
+    """Name the faults of the case that are not none."""
+    none = {"friction_factor": 1.0, "steering_gain": 1.0, "brake_gain": 1.0}
+    said = [
+        f"{_words(field)} {value:.2g}"
+        for name, value in played.values.items()
+        if name.startswith("faults.")
+        and value != none.get(field := name.removeprefix("faults."), 0.0)
+    ]
+    return f"; {', '.join(said)}" if said else ""
+
+
+def _view(heedless: Run, planned: Run | None, aspect: float) -> View:
+    """Return a view that holds what happens; who comes from afar comes in from beyond its edge."""
+    points = [heedless.ego.centre_m[[0, heedless.moment]]]
+    points += [box.centre_m[[0, heedless.moment]] for box in heedless.others]
+    if planned is not None:
+        points.append(planned.ego.centre_m[planned.moment][None])
+    middle = heedless.ego.centre_m[heedless.moment]
+    spread = np.clip(
+        np.concatenate(points), middle - 1.6 * _MOST_HALF_M, middle + 1.6 * _MOST_HALF_M
+    )
+    low, high = spread.min(axis=0) - _MARGIN_M, spread.max(axis=0) + _MARGIN_M
+    half = max((high - low)[1] / 2.0, (high - low)[0] / 2.0 / aspect)
+    half = min(max(half, _LEAST_HALF_M), _MOST_HALF_M)
+    centre = (low + high) / 2.0
+    reach = 0.75 * half * np.array([aspect, 1.0])
+    return view_around(np.clip(centre, middle - reach, middle + reach), half, aspect, close=False)
+
+
+def _ghosts(run: Run) -> list[int]:
+    """Return the instants of whole seconds between the start and the moment."""
+    every = max(1, round(_GHOST_EVERY_S / float(run.time_s[1] - run.time_s[0])))
+    return list(range(every, run.moment, every))
+
+
+def _draw_lanes(axes: Axes, world: World, view: View) -> None:
+    lines = [
+        offset(lane.centerline, side * lane.width_m.value / 2.0)
+        for lane in world.lanes
+        if view.meets(lane.centerline)
+        for side in (1.0, -1.0)
+    ]
+    axes.add_collection(LineCollection(lines, colors=LANE_EDGE, linewidths=0.7, zorder=4.5))
+    for stop in world.stop_lines:
+        if view.holds(stop.ends):
+            colour = LINE_COLOUR.get(stop.control.value, LINE_COLOUR["none"])
+            axes.plot(*stop.ends.T, color=colour, linewidth=1.8, solid_capstyle="butt", zorder=6.0)
+
+
+def _draw_paths(axes: Axes, played: Cast, heedless: Run) -> None:
+    ways = [(played.ego_xy_m, EGO)]
+    ways += [(a.xy_m, OTHERS) for a in played.actors if a.speed_mps > 0.0]
+    for xy, colour in ways:
+        axes.plot(*xy.T, color=colour, linewidth=0.8, linestyle=(0, (4, 3)), alpha=0.7,
+                  zorder=11.0)  # fmt: skip
+
+
+def _box(axes: Axes, box: Rectangles, **style: Any) -> None:
+    outline: Array = corners(box)
+    axes.add_collection(PolyCollection(list(outline), **style))

@@ -1,0 +1,183 @@
+"""Drives the cars of a scene: planners look, decide, and the stage moves everybody on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.play import Play
+from foretwin.sim_worker.futures.scene import Scene
+from foretwin.sim_worker.planner_interface import (
+    Planner,
+    PlannerOutput,
+    PlannerView,
+    RemembersWithinJob,
+    rows_of,
+)
+from foretwin.sim_worker.planners.registry import load_planner
+
+Flags = npt.NDArray[np.bool_]
+Rows = npt.NDArray[np.intp]
+
+
+class DriveRecord(NamedTuple):
+    """What was recorded at T control ticks.
+
+    States (S, T, 8), static contacts and validity (S, T), progress (S,) along the path; of road
+    users poses (S, T, R, 3) and speeds (S, T, R). `failures` (S,) says why a planner failed,
+    `remarks` (S,) what one that did not has to say.
+    """
+
+    states: Array
+    static_contact: Flags
+    valid: Flags
+    progress_m: Array
+    users: Array
+    user_speed_mps: Array
+    failures: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+
+def drive(scene: Scene, stage: Stage, *, ticks: int) -> DriveRecord:
+    """Seed the stage with the scene's starts and drive for a number of control ticks."""
+    loop = _Loop(scene, stage, ticks)
+    for tick in range(ticks):
+        loop.advance(tick)
+    return loop.record()
+
+
+class _Loop:
+    def __init__(self, scene: Scene, stage: Stage, ticks: int) -> None:
+        self._play = Play(scene, stage)
+        self._scene, self._stage = scene, stage
+        count = len(scene.starts)
+        self._planners = _Planners(scene.planners)
+        self._states = np.empty((count, ticks + 1, 8))
+        self._states[:, 0] = stage.states
+        self._contact = np.zeros((count, ticks + 1), dtype=bool)
+        self._valid = np.ones((count, ticks + 1), dtype=bool)
+        self._sound = True
+        traffic = scene.traffic
+        most = 0 if traffic is None else traffic.arc_m.shape[1]
+        self._users = np.empty((count, ticks + 1, most, 3))
+        self._user_speed = np.empty((count, ticks + 1, most))
+        self._note_users(0)
+
+    def advance(self, tick: int) -> None:
+        scene, stage = self._scene, self._stage
+        now = stage.states
+        if self._sound:
+            view = self._play.look(tick, now, stage.heading)
+        else:
+            # What has failed is not shown to planners: one bad future must not spoil the job.
+            now = np.where(self._valid[:, tick, None], now, scene.starts)
+            view = self._play.look(tick, now)
+        answer = self._planners.plan(view)
+        self._play.act(tick * stage.control_dt_s, answer)
+        self._keep(tick + 1)
+
+    def _keep(self, tick: int) -> None:
+        stage = self._stage
+        self._states[:, tick] = stage.states
+        if stage.looked:
+            self._contact[:, tick] = stage.static_contact
+        self._note_users(tick)
+        if not self._sound or self._planners.any_failed or stage.any_diverged():
+            well = ~stage.diverged() & ~self._planners.failed
+            self._valid[:, tick] = self._valid[:, tick - 1] & well
+            self._sound = bool(self._valid[:, tick].all())
+
+    def _note_users(self, tick: int) -> None:
+        traffic = self._scene.traffic
+        if traffic is not None:
+            self._users[:, tick] = traffic.poses
+            self._user_speed[:, tick] = traffic.speed_mps
+
+    def record(self) -> DriveRecord:
+        scene = self._scene
+        ends = np.where(self._valid[:, -1:], self._states[:, -1, :2], scene.starts[:, :2])
+        end = scene.path.locate(ends, near_arc_m=self._play.arc_m).arc_m
+        return DriveRecord(
+            self._states,
+            self._contact,
+            self._valid,
+            end - scene.start_arc_m,
+            self._users,
+            self._user_speed,
+            tuple(
+                self._planners.reasons[row] or ("" if self._valid[row, -1] else "diverged")
+                for row in range(len(scene.starts))
+            ),
+            tuple(self._planners.remarks()),
+        )
+
+
+class _Planners:
+    """All planners of a job, each with its rows; one that fails takes only its own rows along."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.failed: Flags = np.zeros(len(names), dtype=bool)
+        self.any_failed = False
+        self.reasons = [""] * len(names)
+        self._groups: list[tuple[str, Planner, Rows]] = []
+        for kind in sorted(set(names)):
+            rows = np.flatnonzero([name == kind for name in names])
+            planner = load_planner(kind)
+            if isinstance(planner, RemembersWithinJob):
+                planner = planner.begin(len(rows))
+            self._groups.append((kind, planner, rows))
+
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        if len(self._groups) == 1:
+            name, planner, rows = self._groups[0]
+            return self._ask(name, planner, rows, view)
+        accel, angle = np.zeros(len(view.arc_m)), np.zeros(len(view.arc_m))
+        alone = view._replace(users=None)
+        for name, planner, rows in self._groups:
+            shown = view if getattr(planner, "looks_at_users", True) else alone
+            accel[rows], angle[rows] = self._ask(name, planner, rows, rows_of(shown, rows))
+        return PlannerOutput(accel, angle)
+
+    def _ask(self, name: str, planner: Planner, rows: Rows, view: PlannerView) -> PlannerOutput:
+        if self.any_failed and self.failed[rows].all():
+            return PlannerOutput(np.zeros(len(rows)), np.zeros(len(rows)))
+        try:
+            accel, angle = planner.plan(view)
+            if np.shape(accel) != (len(rows),) or np.shape(angle) != (len(rows),):
+                raise ValueError(
+                    f"answers of shapes {np.shape(accel)} and {np.shape(angle)}, not {(len(rows),)}"
+                )
+        except Exception as error:
+            # The others go on without it, whatever it was.
+            self._fail(name, rows, f"{type(error).__name__}: {error}", view.time_s)
+            return PlannerOutput(np.zeros(len(rows)), np.zeros(len(rows)))
+        # Of what is no number, the sum of all products is none either.
+        if not math.isfinite(np.dot(accel, angle)):
+            fine = np.isfinite(accel + angle)
+            said = getattr(planner, "remarks", {})
+            for place in np.flatnonzero(~fine):
+                reason = said.get(int(place), "answers what is no number")
+                self._fail(name, rows[place : place + 1], reason, view.time_s)
+            accel, angle = np.where(fine, accel, 0.0), np.where(fine, angle, 0.0)
+        return PlannerOutput(accel, angle)
+
+    def remarks(self) -> list[str]:
+        """Return what planners have to say of the cars that they did drive, empty for most."""
+        found = [""] * len(self.reasons)
+        for _, planner, rows in self._groups:
+            for place, said in getattr(planner, "remarks", {}).items():
+                if not self.failed[rows[place]]:
+                    found[rows[place]] = said
+        return found
+
+    def _fail(self, name: str, rows: Rows, reason: str, time_s: float) -> None:
+        for row in rows[~self.failed[rows]]:
+            self.reasons[row] = f"planner {name!r} at {time_s:g} s: {' '.join(reason.split())}"
+        self.failed[rows] = True
+        self.any_failed = True

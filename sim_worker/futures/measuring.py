@@ -1,0 +1,84 @@
+"""Metrics of a job's futures: from what was recorded to numbers by name."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.futures import FuturesJob
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.futures.closed_loop import DriveRecord
+from foretwin.sim_worker.futures.scene import Scene, SceneMaker
+from foretwin.sim_worker.metrics.rollout import Rollout
+from foretwin.sim_worker.metrics.route_rules import RouteRules
+from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.table import METRICS, evaluate
+from foretwin.sim_worker.road_users.cast import KIND_NAMES
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
+
+CLEARANCE = "min_clearance"
+
+
+class Measured(NamedTuple):
+    """Metrics that the job names, each (S,), and the least clearance (S,), infinite for nobody."""
+
+    values: dict[str, Array]
+    clearance_m: Array
+
+
+def measure(
+    job: FuturesJob,
+    scene: Scene,
+    record: DriveRecord,
+    user_size_m: Array,
+    *,
+    vehicle: VehicleParameters,
+    every: int,
+    scenes: SceneMaker,
+) -> Measured:
+    """Measure what the job names, and the clearance, at the instants of the result.
+
+    `scenes` are those of the job's World.
+
+    Raises ValueError for a metric that is unknown, or that a job cannot give what it needs.
+    """
+    count = len(scene.starts)
+    clearance = np.full(count, np.inf)
+    names = list(job.metrics)
+    if scene.traffic is not None:
+        names = list(dict.fromkeys([CLEARANCE, *names]))
+    if not names:
+        return Measured({}, clearance)
+    instants = record.states[:, ::every]
+    rollout = Rollout(
+        time_s=np.arange(instants.shape[1], dtype=np.float64) * job.step_s,
+        states=instants,
+        users=record.users[:, ::every],
+        user_speed_mps=record.user_speed_mps[:, ::every],
+        user_size_m=user_size_m,
+        valid=np.asarray(record.valid.all(axis=1)),
+        vehicle=vehicle,
+    )
+    needs = {need for name in names if name in METRICS for need in METRICS[name].needs}
+    context = Context(
+        path=scene.path,
+        ground=scenes.drivable if "ground" in needs else None,
+        rules=RouteRules(scene.lights.world, scene.path) if "rules" in needs else None,
+        user_mass_kg=_masses(scene) if "user_mass_kg" in needs else None,
+        start_s=job.drive_time_s,
+        live=scene.lights.live,
+    )
+    found = evaluate(rollout, names, context=context)
+    if CLEARANCE in found:
+        clearance = found[CLEARANCE].values
+    return Measured({name: found[name].values for name in job.metrics}, clearance)
+
+
+def _masses(scene: Scene) -> Array:
+    """Return (S, R) masses of road users by their kinds."""
+    if scene.casts is None:
+        return np.zeros((len(scene.starts), 0))
+    masses = np.array([KINDS[kind].mass_kg for kind in KIND_NAMES])
+    return masses[scene.casts.kinds]

@@ -1,0 +1,300 @@
+"""From a job to the scene it plays in: who drives where, aims at what, and suffers from what."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import SignalColour
+from foretwin.contracts.futures import Faults, FuturesJob, Variant
+from foretwin.contracts.scenario import FAULTS, Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.futures.faults import FaultArrays, fault_arrays
+from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
+from foretwin.sim_worker.planners.registry import drives_backwards
+from foretwin.sim_worker.road_users.cast import Casting, Player, casting
+from foretwin.sim_worker.road_users.path_table import PathTable
+from foretwin.sim_worker.road_users.perception import Sight
+from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
+from foretwin.sim_worker.road_users.traffic import Traffic
+from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.places import Unplaced
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.seen import SeenActors
+from foretwin.sim_worker.scenarios.staged import StagedScenarios, staged_players, staged_start
+from foretwin.sim_worker.vehicle.seeding import local_state
+from foretwin.world_gen.rules.signal_state import LiveColour, world_colours_at
+
+_MAX_OFFSET_M = 8.0
+_CAR_WITHIN_M = 60.0
+"""The car is looked for on this much of the path's beginning."""
+
+
+class Aims(NamedTuple):
+    """What each of S futures aims at; all (S,)."""
+
+    target_speed_mps: Array
+    speed_factor: Array
+    offset_m: Array
+
+
+class Scene(NamedTuple):
+    """All that S futures of a job begin with; `casts` is None where nobody else is on the road.
+
+    `limit_share` (M,) at the path's nodes is how far limits lie below that at the start.
+    """
+
+    path: FrenetPath
+    starts: Array
+    start_arc_m: Array
+    aims: Aims
+    planners: tuple[str, ...]
+    faults: FaultArrays
+    limit_share: Array | None
+    casts: Casting | None
+    traffic: Traffic | None
+    sight: Sight | None
+    rules: PathRules
+    ground: SharedGround | None
+    car_plan: KnownPlan | None
+    lights: Lights
+    left_out: tuple[str, ...]
+    """(S,) why a future's scenario does not happen in it, in words; empty where it does."""
+
+    @property
+    def backwards(self) -> npt.NDArray[np.bool_]:
+        """(S,) whose planner drives in reverse."""
+        return np.array([drives_backwards(name) for name in self.planners])
+
+    def red_arcs_m(self, time_s: float) -> Array:
+        """Return (P, K) the stop lines of all paths that show no green at a time of the job."""
+        if not self.rules.groups:
+            return self.rules.stop_arcs_m
+        return self.rules.red(self.lights.at(time_s))
+
+
+class Lights(NamedTuple):
+    """The colours of a World's lights during a job."""
+
+    world: World
+    start_s: float
+    live: Mapping[str, LiveColour]
+    by_plan: bool
+
+    def at(self, time_s: float) -> dict[str, SignalColour]:
+        """Return colours by group: those heard, kept, and by option those of the World's plans.
+
+        A plan that no map tells is a guess: cars that follow a real one do not stop for it.
+        """
+        drive_s = self.start_s + time_s
+        found = world_colours_at(self.world, drive_s) if self.by_plan else {}
+        return {**found, **{group: heard.colour for group, heard in self.live.items()}}
+
+
+class SceneMaker:
+    """Makes the scenes of one World; keeps what they have in common."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._rules = JunctionRules(world)
+        self._network = RoadNetwork(world)
+        self._seen = SeenActors(self._network)
+        self._live = LiveScenarios(self._network)
+        self.staged = StagedScenarios(self._network)
+        """The scenarios of this World at named places, away from any drive."""
+        self.rehearsed: dict[tuple[object, ...], Any] = {}
+        """Drives of egos alone that cases were cast on."""
+
+    @functools.cached_property
+    def drivable(self) -> DrivableGround:
+        """Where this World may be driven on; what one job looked up, the next ones know."""
+        return DrivableGround(self.world)
+
+    def scene(
+        self,
+        job: FuturesJob,
+        vehicle: VehicleParameters,
+        *,
+        tick_s: float,
+        staged: Mapping[int, Cast | Unplaced] | None = None,
+        start_arc_m: Array | None = None,
+    ) -> Scene:
+        """Return the scene of a job on this World.
+
+        `staged` are the cases of the rows that name their place, if they are known already;
+        `start_arc_m` (S,) is about where the cars are, if that is known.
+
+        Raises ValueError for a scenario that the job does not define, or a state that is not
+        finite.
+        """
+        count = len(job.variants)
+        path = FrenetPath(job.path.xy_m, job.path.speed_limit_mps)
+        scenarios = {scenario.id: scenario for scenario in job.scenarios}
+        scenario_of = [_scenario_of(variant, scenarios) for variant in job.variants]
+        if staged is None:
+            staged = self.staged_cases(job, vehicle)
+        if job.starts is None:
+            starts = np.repeat(local_state(job.state, self.world.frame, vehicle)[None], count, 0)
+            for row, played in staged.items():
+                if isinstance(played, Cast):
+                    starts[row] = staged_start(played, vehicle)
+        else:
+            starts = np.array(job.starts, dtype=np.float64)
+        place = path.locate(starts[:, :2], upto_arc_m=_CAR_WITHIN_M)
+        if staged and start_arc_m is None:
+            start_arc_m = place.arc_m
+            for row, played in staged.items():
+                if isinstance(played, Cast):
+                    start_arc_m[row] = played.ego_arc_m
+        if start_arc_m is not None:
+            # Ways may be long, and cross themselves.
+            place = path.locate(starts[:, :2], near_arc_m=start_arc_m)
+        aims = _aims(job, place.offset_m)
+        live = any(v.scenario_id and not v.place for v in job.variants)
+        on_path = self._live.on(path, float(place.arc_m[0]), vehicle) if live else None
+        seen = self._seen.actors(job.road_users)
+        casts: list[tuple[Player, ...]] = []
+        faults = []
+        left_out = [""] * count
+        for row, (variant, scenario) in enumerate(zip(job.variants, scenario_of, strict=True)):
+            faults.append(_faults(variant, scenario))
+            cast = seen
+            players: tuple[Player, ...] | Unplaced = ()
+            if row in staged:
+                played = staged[row]
+                players = played if isinstance(played, Unplaced) else staged_players(played, path)
+            elif scenario is not None and on_path is not None:
+                players = on_path.players(
+                    scenario,
+                    variant.values,
+                    place_rank=variant.place_rank,
+                    ego_arc_m=float(place.arc_m[row]),
+                    ego_speed_mps=float(starts[row, 3]),
+                )
+            if isinstance(players, Unplaced):
+                left_out[row] = players.reason
+            else:
+                cast = (*seen, *players)
+            casts.append(cast)
+        fault_columns = fault_arrays(faults)
+        crowd = casting(casts, ego_path=path, replayed=job.replayed)
+        # Where recorded road users go, no rule binds.
+        taken = [self._rules.taken(one) for one in crowd.paths] + [()] * len(job.replayed)
+        rules = self._rules.between(taken)
+        traffic = sight = None
+        if crowd.crowd.present.any():
+            tracks = () if crowd.replay is None else crowd.replay.tracks
+            table = PathTable(crowd.paths, tracks)
+            traffic = Traffic(crowd.crowd, table, rules, crowd.replay)
+            sight = Sight(
+                traffic,
+                table.along(path),
+                vehicle,
+                fault_columns.perception,
+                hidden_by=crowd.hidden_by,
+                walks=crowd.walks,
+                tick_s=tick_s,
+            )
+        heard = {state.group_id: LiveColour(0.0, state.colour) for state in job.signals}
+        return Scene(
+            path=path,
+            starts=starts,
+            start_arc_m=place.arc_m,
+            aims=aims,
+            planners=tuple(variant.planner for variant in job.variants),
+            faults=fault_columns,
+            # Staged, a case says how fast the ego drives.
+            limit_share=None if staged else _limit_share(path, float(place.arc_m[0])),
+            casts=crowd if traffic is not None else None,
+            traffic=traffic,
+            sight=sight,
+            rules=rules,
+            ground=self._rules.ground(taken[0], path),
+            car_plan=_known_plan(job),
+            lights=Lights(self.world, job.drive_time_s, heard, job.lights_by_plan),
+            left_out=tuple(left_out),
+        )
+
+    def staged_cases(
+        self, job: FuturesJob, vehicle: VehicleParameters
+    ) -> dict[int, Cast | Unplaced]:
+        """Return the cases of the rows that name their place, on its path as it is."""
+        known = {scenario.id: scenario for scenario in job.scenarios}
+        rows: dict[tuple[str, str], list[int]] = {}
+        for row, variant in enumerate(job.variants):
+            if variant.place and variant.scenario_id:
+                rows.setdefault((variant.scenario_id, variant.place), []).append(row)
+        found: dict[int, Cast | Unplaced] = {}
+        for (_, place), mine in rows.items():
+            scenario = _scenario_of(job.variants[mine[0]], known)
+            assert scenario is not None
+            cases = [job.variants[row].values for row in mine]
+            found.update(zip(mine, self.staged.cast(scenario, cases, place, vehicle), strict=True))
+        return found
+
+
+def _scenario_of(variant: Variant, known: Mapping[str, Scenario]) -> Scenario | None:
+    if not variant.scenario_id:
+        return None
+    if variant.scenario_id not in known:
+        raise ValueError(
+            f"future {variant.name!r} names scenario {variant.scenario_id!r}; the job defines "
+            f"{', '.join(known) or 'none'}"
+        )
+    return known[variant.scenario_id]
+
+
+def _faults(variant: Variant, scenario: Scenario | None) -> Faults:
+    """Return a variant's faults; those that its scenario draws count instead."""
+    if scenario is None:
+        return variant.faults
+    drawn = {
+        name.removeprefix(f"{FAULTS}."): value
+        for name, value in variant.values.items()
+        if name.startswith(f"{FAULTS}.")
+    }
+    return msgspec.structs.replace(variant.faults, **drawn)
+
+
+def _known_plan(job: FuturesJob) -> KnownPlan | None:
+    plan = job.car_plan
+    return None if plan is None else KnownPlan(plan.time_s, plan.xy_m, plan.yaw_rad, plan.speed_mps)
+
+
+def _aims(job: FuturesJob, present_offset_m: Array) -> Aims:
+    variants = job.variants
+    cruise = np.array([v.values.get("ego.speed_mps", np.nan) for v in variants])
+    if job.starts is None:
+        cruise[[not v.place for v in variants]] = np.nan
+    cruise = np.where(np.isfinite(cruise), cruise, job.cruise_speed_mps)
+    target = cruise * np.array([v.target_speed_factor for v in variants])
+    target += np.array([v.target_speed_offset_mps for v in variants])
+    factor = np.array([v.target_speed_factor for v in variants])
+    factor = np.where(cruise > 1.0, target / np.maximum(cruise, 1.0), factor)
+    # The future keeps the car's present offset, or one would measure the map's error.
+    present = np.minimum(np.maximum(present_offset_m, -_MAX_OFFSET_M), _MAX_OFFSET_M)
+    offset = present + np.array([v.lateral_shift_m for v in variants])
+    return Aims(np.maximum(target, 0.0), factor, offset)
+
+
+def _limit_share(path: FrenetPath, start_arc_m: float) -> Array | None:
+    """Return (M,) how far the limits lie below the one where the car is, at most 1; None for 1.
+
+    A driver's speed relates to the limit, which the map may have guessed: only its drops count.
+    """
+    limits = path.speed_limit_mps
+    here = limits[int(np.clip(np.searchsorted(path.arc_m, start_arc_m), 0, len(limits) - 1))]
+    if not np.isfinite(here):
+        return None
+    share = np.minimum(np.where(np.isfinite(limits), limits, here) / here, 1.0)
+    return np.asarray(share) if share.min() < 1.0 else None

@@ -1,0 +1,269 @@
+"""The mirror of the real car: shadow and ghost at its pose, the twin under its commands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.frames import LocalFrame, wrap_angle
+from foretwin.contracts.roles import MirrorCast, OtherVehicle, UseRoles
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.mirror.casting import Casting, FreeTwin
+from foretwin.sim_worker.mirror.member import CastMember
+from foretwin.sim_worker.mirror.mirror_world import GHOST, SHADOW, MirrorWorld
+from foretwin.sim_worker.mirror.samples import plane_state
+from foretwin.sim_worker.vehicle.commands import (
+    STEP_BACK_NS,
+    CommandMemory,
+    TwinCommand,
+    estimated_command,
+)
+from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
+from foretwin.sim_worker.vehicle.seeding import local_state
+
+_STEP_NS = round(TIMESTEP_S * 1e9)
+_ALONE = MirrorCast()
+_GRID_TOLERANCE = 0.05
+"""Of a sample period: how early a state may be and still count for its instant."""
+
+
+class Mirror:
+    """Steps the twin along with the measured states of one car; no clock, no bus.
+
+    The free twin starts from the measured state, runs on commands alone, and starts anew after each
+    `window_s`, in each new World and where its physics diverged; it never teleports otherwise. All
+    gaps are its own. Roles, corrections and other vehicles need a `Cast` beside it, which is there
+    only as long as something asks for it. States must come in time order; a command counts from its
+    stamp on and should come before the first state after it.
+    """
+
+    def __init__(
+        self,
+        vehicle: VehicleParameters,
+        *,
+        drive_frame: LocalFrame,
+        window_s: float = 8.0,
+        rate_hz: float = 10.0,
+        commands_recorded: bool = False,
+        vehicle_id: str = "ego",
+        cast: MirrorCast = _ALONE,
+    ) -> None:
+        self._vehicle = vehicle
+        self._drive_frame = drive_frame
+        self._window_ns = round(window_s * 1e9)
+        self._period_ns = 1e9 / rate_hz
+        self._recorded = commands_recorded
+        self._commands = CommandMemory(vehicle, keep_s=MAX_STEERING_DELAY_S + 1.0)
+        self._pending: list[tuple[int, World | None]] = []
+        self._pending_vehicles: list[tuple[int, VehicleParameters]] = []
+        self._world_id: str | None = None
+        self._frame = drive_frame
+        self._scene = self._build(None)
+        self._casting = Casting(
+            CastMember(vehicle_id, vehicle, commands_recorded),
+            cast,
+            drive_frame=drive_frame,
+            commands=self._commands,
+        )
+        self._measured: Array | None = None
+        self._measured_stamp_ns = 0
+        self._map_shift_m = self._seed_map_shift_m = np.zeros(2)
+        self._seed_stamp_ns = 0
+        self._steps = 0
+        self._independent = False
+        self._first_stamp_ns: int | None = None
+        self._last_index = -1
+
+    def _build(self, world: World | None) -> MirrorWorld:
+        return MirrorWorld(
+            world,
+            self._vehicle,
+            steering_delay_s=None if self._recorded else 0.0,
+        )
+
+    def set_world(self, world: World | None, *, from_stamp_ns: int = 0) -> None:
+        """Use `world`, or open ground, from the first state at or after `from_stamp_ns` on."""
+        self._pending.append((from_stamp_ns, world))
+
+    def use_vehicle(self, vehicle: VehicleParameters, *, from_stamp_ns: int = 0) -> None:
+        """Give the twin these parameters from the first state at or after `from_stamp_ns` on."""
+        self._pending_vehicles.append((from_stamp_ns, vehicle))
+
+    def handle_command(self, command: ControlCommand) -> None:
+        """Take a command of the car; ignored where none are expected."""
+        if self._recorded:
+            self._commands.add(command)
+
+    def set_roles(self, use: UseRoles) -> None:
+        """Let roles and correction count from the first state at or after their stamp on."""
+        self._casting.set_roles(use)
+
+    def handle_other(self, other: OtherVehicle) -> None:
+        """Take where another vehicle was measured, and what it was told."""
+        self._casting.take_other(other)
+
+    def handle_state(self, state: VehicleState) -> MirrorSample | None:
+        """Step the twin up to the state; returns a sample where one is due.
+
+        States without a known heading and out of time order are passed over; after a step of the
+        car's clock back by a second or more everything begins anew. Raises ValueError for a state
+        that is not finite.
+        """
+        if not state.yaw_valid:
+            return None
+        if self._measured is not None and (state.stamp_ns < self._measured_stamp_ns - STEP_BACK_NS):
+            # Worlds that were to come by the old clock are due: their time has passed.
+            self._pending = [(state.stamp_ns, world) for _, world in self._pending]
+            self._measured, self._first_stamp_ns, self._last_index = None, None, -1
+        if self._measured is not None and state.stamp_ns <= self._measured_stamp_ns:
+            return None
+        self._change_vehicle(state.stamp_ns)
+        self._change_world(state.stamp_ns)
+        measured = local_state(state, self._frame, self._vehicle)
+        self._map_shift_m = np.array(state.map_shift_m or (0.0, 0.0))
+        gap_ns = state.stamp_ns - self._measured_stamp_ns
+        self._casting.before(state, self._free_twin)
+        if self._measured is None or gap_ns > self._window_ns:
+            self._seed(measured, state.stamp_ns)
+        else:
+            self._advance(measured, state.stamp_ns)
+        self._measured, self._measured_stamp_ns = measured, state.stamp_ns
+        self._scene.place(SHADOW, measured[:3])
+        self._scene.place(GHOST, measured[:3])
+        if not self._sound():
+            self._seed(measured, state.stamp_ns)
+        self._casting.advance(state.stamp_ns)
+        sample = self._sample(state, measured) if self._due(state.stamp_ns) else None
+        if state.stamp_ns - self._seed_stamp_ns >= self._window_ns:
+            self._seed(measured, state.stamp_ns)
+        return sample
+
+    def _change_vehicle(self, stamp_ns: int) -> None:
+        due = [vehicle for stamp, vehicle in self._pending_vehicles if stamp <= stamp_ns]
+        if not due:
+            return
+        self._pending_vehicles = [one for one in self._pending_vehicles if one[0] > stamp_ns]
+        self._vehicle = due[-1]
+        self._commands.use_vehicle(self._vehicle)
+        self._scene.use_vehicle(self._vehicle)
+        self._casting.use_vehicle(self._vehicle)
+
+    def _change_world(self, stamp_ns: int) -> None:
+        due = [world for stamp, world in self._pending if stamp <= stamp_ns]
+        if not due:
+            return
+        self._pending = [entry for entry in self._pending if entry[0] > stamp_ns]
+        world = due[-1]
+        world_id = None if world is None else world.id
+        if world_id == self._world_id:
+            return
+        self._world_id = world_id
+        self._frame = self._drive_frame if world is None else world.frame
+        self._scene = self._build(world)
+        self._casting.change_world(world, self._frame)
+        self._measured = None
+
+    def _seed(self, measured: Array, stamp_ns: int) -> None:
+        scene = self._scene
+        history = self._commands.angles_before(
+            stamp_ns, count=scene.history_samples, step_ns=_STEP_NS
+        )
+        scene.place(SHADOW, measured[:3])
+        scene.place(GHOST, measured[:3])
+        scene.seed_twin(measured, steering_history_rad=history)
+        self._seed_stamp_ns, self._steps = stamp_ns, 0
+        self._seed_map_shift_m = self._map_shift_m
+        self._casting.start_anew(stamp_ns)
+        self._independent = self._recorded and history is not None and not self._commands.estimated
+
+    def _advance(self, measured: Array, stamp_ns: int) -> None:
+        """Step in whole physics steps, moving the shadow evenly towards its measured pose."""
+        before = self._measured
+        assert before is not None
+        start_ns = self._measured_stamp_ns
+        guess = estimated_command(
+            self._vehicle,
+            before,
+            measured,
+            stamp_ns=start_ns,
+            duration_s=(stamp_ns - start_ns) / 1e9,
+        )
+        turn = float(wrap_angle(measured[2] - before[2]))
+        moved = np.array([measured[0] - before[0], measured[1] - before[1], turn])
+        total = (stamp_ns - self._seed_stamp_ns) // _STEP_NS
+        while self._steps < total:
+            now_ns = self._seed_stamp_ns + self._steps * _STEP_NS
+            command = self._command(now_ns, guess)
+            share = (now_ns + _STEP_NS - start_ns) / (stamp_ns - start_ns)
+            pose = before[:3] + min(max(share, 0.0), 1.0) * moved
+            self._scene.place(SHADOW, pose)
+            self._scene.place(GHOST, pose)
+            self._scene.step(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
+            self._steps += 1
+        self._commands.forget_before(stamp_ns)
+
+    def _command(self, stamp_ns: int, guess: TwinCommand) -> TwinCommand:
+        command = self._commands.at(stamp_ns) if self._recorded else None
+        if command is None:
+            self._independent = False
+            return guess
+        return command
+
+    def _free_twin(self) -> FreeTwin | None:
+        if self._measured is None:
+            return None
+        stamp_ns = self._seed_stamp_ns + self._steps * _STEP_NS
+        return FreeTwin(self._scene.twin_state, stamp_ns)
+
+    def _sound(self) -> bool:
+        return bool(np.isfinite(self._scene.twin_state).all())
+
+    def _due(self, stamp_ns: int) -> bool:
+        if self._first_stamp_ns is None:
+            self._first_stamp_ns = stamp_ns
+        index = int((stamp_ns - self._first_stamp_ns) / self._period_ns + _GRID_TOLERANCE)
+        due = index > self._last_index
+        self._last_index = max(index, self._last_index)
+        return due
+
+    def _sample(self, state: VehicleState, measured: Array) -> MirrorSample:
+        twin = self._twin_at(state.stamp_ns)
+        shadow = self._scene.measured_pose(SHADOW)
+        ghost = self._scene.measured_pose(GHOST)
+        # What a map has moved the position by since is no motion that the twin lacks.
+        shift = self._map_shift_m - self._seed_map_shift_m
+        dx, dy = twin[:2] - measured[:2] + shift
+        cos, sin = np.cos(measured[2]), np.sin(measured[2])
+        sample = MirrorSample(
+            stamp_ns=state.stamp_ns,
+            world_id=self._world_id,
+            real=self._in_drive_frame(measured[:3], measured[3]),
+            twin=self._in_drive_frame(twin[:3], twin[3]),
+            shadow=self._in_drive_frame(shadow, measured[3]),
+            ghost=self._in_drive_frame(ghost, measured[3]),
+            gap_m=float(np.hypot(dx, dy)),
+            gap_along_m=float(cos * dx + sin * dy),
+            gap_across_m=float(cos * dy - sin * dx),
+            gap_yaw_rad=float(wrap_angle(twin[2] - measured[2])),
+            gap_speed_mps=float(twin[3] - measured[3]),
+            since_reset_s=(state.stamp_ns - self._seed_stamp_ns) / 1e9,
+            independent=self._independent,
+            twin_yaw_rate_radps=float(twin[5]),
+        )
+        return self._casting.told(sample)
+
+    def _twin_at(self, stamp_ns: int) -> Array:
+        """Return the twin's state (8,), carried on by the part of a step that is left."""
+        twin = self._scene.twin_state
+        left_s = (stamp_ns - self._seed_stamp_ns) / 1e9 - self._steps * TIMESTEP_S
+        cos, sin = np.cos(twin[2]), np.sin(twin[2])
+        twin[0] += left_s * (cos * twin[3] - sin * twin[4])
+        twin[1] += left_s * (sin * twin[3] + cos * twin[4])
+        twin[2] += left_s * twin[5]
+        return twin
+
+    def _in_drive_frame(self, pose: Array, speed_mps: float) -> PlaneState:
+        return plane_state(pose, speed_mps, drive_frame=self._drive_frame, world_frame=self._frame)

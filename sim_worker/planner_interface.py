@@ -1,0 +1,142 @@
+"""What a planner under test sees and answers, vectorised over S simulations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPath
+
+
+class SeenUsers(NamedTuple):
+    """Other road users as perceived: up to R for each of S cars, NaN where there is none.
+
+    `poses` (S, R, 3) x, y, yaw of box centres in the World's frame, `speed_mps` (S, R) along their
+    yaw, `size_m` (S, R, 2) length and width, `arc_m` and `offset_m` (S, R) of box centres on the
+    ego's path, `walks` (S, R) true for those who keep to no lane, `turned_rad` (S, R) their yaw
+    against the path's heading there. Who drives a future with faults perceives late, displaced,
+    or nothing.
+    """
+
+    poses: Array
+    speed_mps: Array
+    size_m: Array
+    arc_m: Array
+    offset_m: Array
+    walks: npt.NDArray[np.bool_]
+    turned_rad: Array
+
+
+class SharedGround(NamedTuple):
+    """Ground on the ego's path that other movements of the junction cross or join; C pieces.
+
+    Between `enter_arc_m` and `leave_arc_m` (C,) the ego is on it; `point_m` (C, 2) is its middle;
+    `waits` (C,) where the ego has to give way there, wherever no light says otherwise;
+    `their_yaw_rad` (C,) which way the others cross it, where that is known.
+    """
+
+    enter_arc_m: Array
+    leave_arc_m: Array
+    point_m: Array
+    waits: npt.NDArray[np.bool_]
+    their_yaw_rad: Array | None = None
+
+
+class KnownPlan(NamedTuple):
+    """The real car's own plan: `time_s` (K,) from the start, `xy_m` (K, 2), `yaw_rad`, `speed_mps`
+    (K,) of base_link in the World's frame."""
+
+    time_s: Array
+    xy_m: Array
+    yaw_rad: Array
+    speed_mps: Array
+
+
+class PlannerView(NamedTuple):
+    """Everything a planner may know at one control tick; arrays have S rows.
+
+    `states` (S, 8) as `foretwin.contracts.futures.STATE_COLUMNS`; `arc_m` and `offset_m` (S,) place
+    base_link on `path`; `desired_offset_m` (S,) is the lateral offset to keep; `speed_factor` (S,)
+    is how much faster than the nominal future this one likes everything, curves included;
+    `lead_gap_m` (S,) from bumper to bumper, infinite without a lead, and `lead_speed_mps` (S,);
+    `stop_arc_m` (S,) where the front has to stand for a light, infinite without one; `users` and
+    `ground` are None where there are none; `car_plan` where none was received; `heading` (2, S) is
+    the cosine and sine of the states' yaw, where these are known already.
+    """
+
+    time_s: float
+    states: Array
+    path: FrenetPath
+    arc_m: Array
+    offset_m: Array
+    desired_offset_m: Array
+    target_speed_mps: Array
+    speed_factor: Array
+    lead_gap_m: Array
+    lead_speed_mps: Array
+    vehicle: VehicleParameters
+    stop_arc_m: Array | None = None
+    users: SeenUsers | None = None
+    ground: SharedGround | None = None
+    car_plan: KnownPlan | None = None
+    heading: Array | None = None
+
+
+class PlannerOutput(NamedTuple):
+    """Commands of one control tick: acceleration (S,) in the direction of travel, angle at the
+    tyres (S,), positive left."""
+
+    accel_mps2: Array
+    tire_angle_rad: Array
+
+
+class Planner(Protocol):
+    """A planner holds no state between ticks: its answer is a function of the view alone.
+
+    One whose class says `drives_backwards = True` has its cars driven in reverse; one that says
+    `looks_at_users = False` is shown no `users`, whose rows would be cut out in vain.
+    """
+
+    def plan(self, view: PlannerView) -> PlannerOutput:
+        """Answer one control tick."""
+
+
+class JobDriver(Planner, Protocol):
+    """Drives one job's cars from its first tick to its last, and may remember in between."""
+
+    @property
+    def remarks(self) -> Mapping[int, str]:
+        """What there is to say of rows: why one's answers are NaN, or what else happened to it."""
+
+
+@runtime_checkable
+class RemembersWithinJob(Protocol):
+    """A planner that remembers from tick to tick: `begin` is called as each job begins."""
+
+    def begin(self, count: int) -> JobDriver:
+        """Return what drives the `count` cars of one job."""
+
+
+def rows_of(view: PlannerView, rows: npt.NDArray[np.intp]) -> PlannerView:
+    """Return what a planner sees that drives only some of the cars."""
+    users = view.users
+    if users is not None:
+        users = SeenUsers._make(field[rows] for field in users)
+    return view._replace(
+        states=view.states[rows],
+        arc_m=view.arc_m[rows],
+        offset_m=view.offset_m[rows],
+        desired_offset_m=view.desired_offset_m[rows],
+        target_speed_mps=view.target_speed_mps[rows],
+        speed_factor=view.speed_factor[rows],
+        lead_gap_m=view.lead_gap_m[rows],
+        lead_speed_mps=view.lead_speed_mps[rows],
+        stop_arc_m=None if view.stop_arc_m is None else view.stop_arc_m[rows],
+        users=users,
+        heading=None if view.heading is None else view.heading[:, rows],
+    )

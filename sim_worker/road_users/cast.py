@@ -1,0 +1,171 @@
+"""Who is on the road in each future of a job, as arrays for `Traffic`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.futures import RecordedRoadUser
+from foretwin.contracts.scenario import Conduct
+from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.road_users.crowd import Crowd
+from foretwin.sim_worker.road_users.path_table import Indices
+from foretwin.sim_worker.road_users.replay import Replay
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
+
+KIND_NAMES: tuple[RoadUserKind, ...] = tuple(KINDS)
+
+
+class Player(NamedTuple):
+    """One road user of one future; arc lengths are those of its box centre on its own path.
+
+    `size_m` is length and width where measured, else that of its kind. Who stops does so
+    `acts_after_s` after the start; `hidden_by` names another actor of the future.
+    """
+
+    name: str
+    kind: RoadUserKind
+    path: FrenetPath
+    start_arc_m: float
+    speed_mps: float
+    conduct: Conduct = "heedless"
+    desired_mps: float | None = None
+    lateral_m: float = 0.0
+    acts_after_s: float = np.inf
+    decel_mps2: float = 4.0
+    hidden_by: str = ""
+    size_m: tuple[float, float] | None = None
+
+
+class Casting(NamedTuple):
+    """The crowd of a job, and what else is known of it: (S, R) where nothing else is said.
+
+    `paths` are all that anybody drives on, the ego's first; `replay` has where those are who come
+    first in every future, if they were recorded.
+    """
+
+    crowd: Crowd
+    paths: tuple[FrenetPath, ...]
+    kinds: Indices
+    hidden_by: Indices
+    walks: npt.NDArray[np.bool_]
+    replay: Replay | None = None
+
+
+def casting(
+    casts: Sequence[Sequence[Player]],
+    *,
+    ego_path: FrenetPath,
+    replayed: Sequence[RecordedRoadUser] = (),
+) -> Casting:
+    """Lay the road users of S futures out as arrays; places without one are not present.
+
+    Those `replayed` come first in each; their `path_of` counts on after the paths.
+    """
+    first = len(replayed)
+    shape = (len(casts), first + max(map(len, casts), default=0))
+    # Futures have many road users in common: each is looked at once.
+    known: dict[int, int] = {}
+    players: list[Player] = []
+    which, hidden = np.zeros(shape, np.intp), np.full(shape, -1, np.intp)
+    for s, cast in enumerate(casts):
+        for player in cast:
+            if id(player) not in known:
+                players.append(player)
+                known[id(player)] = len(players)
+        which[s, first : first + len(cast)] = [known[id(player)] for player in cast]
+        for r, player in enumerate(cast, start=first):
+            if player.hidden_by:
+                hidden[s, r] = first + [other.name for other in cast].index(player.hidden_by)
+    paths = {id(ego_path): ego_path}
+    for player in players:
+        paths.setdefault(id(player.path), player.path)
+    places = {path: place for place, path in enumerate(paths)}
+    rows = [_NOBODY, *(_row(player, places) for player in players)]
+    which[:, :first] = len(rows) + np.arange(first)
+    rows += [_recorded_row(user, len(paths) + place) for place, user in enumerate(replayed)]
+    present, lawful, walks, path_of, kinds, columns = (
+        np.array(column)[which] for column in zip(*rows, strict=True)
+    )
+    length, width, lateral, arc, speed, desired, accel, decel, brakes_at, brakes_by = np.moveaxis(
+        columns, -1, 0
+    ).copy()
+    crowd = Crowd(
+        present=present,
+        lawful=lawful,
+        length_m=length,
+        width_m=width,
+        path_of=path_of,
+        lateral_m=lateral,
+        start_arc_m=arc,
+        start_speed_mps=speed,
+        desired_mps=desired,
+        accel_mps2=accel,
+        decel_mps2=decel,
+        brakes_at_s=brakes_at,
+        brakes_by_mps2=brakes_by,
+    )
+    replay = Replay(replayed) if replayed else None
+    return Casting(crowd, tuple(paths.values()), kinds, hidden, walks, replay)
+
+
+class _Row(NamedTuple):
+    """What arrays hold of one player; `numbers` are the columns of `Crowd` from its length on."""
+
+    present: bool
+    lawful: bool
+    walks: bool
+    path: int
+    kind: int
+    numbers: tuple[float, ...]
+
+
+_NOBODY = _Row(
+    False, False, False, 0, 0, (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
+)  # fmt: skip
+
+
+def _recorded_row(user: RecordedRoadUser, path: int) -> _Row:
+    traits = KINDS[user.kind]
+    length, width = user.size_m or (traits.length_m, traits.width_m)
+    return _NOBODY._replace(
+        present=True,
+        walks=not traits.keeps_lane,
+        path=path,
+        kind=KIND_NAMES.index(user.kind),
+        numbers=(length, width, *_NOBODY.numbers[2:]),
+    )
+
+
+def _row(player: Player, places: Mapping[int, int]) -> _Row:
+    return _Row(
+        present=True,
+        lawful=player.conduct == "law_abiding",
+        walks=not KINDS[player.kind].keeps_lane,
+        path=places[id(player.path)],
+        kind=KIND_NAMES.index(player.kind),
+        numbers=_numbers(player),
+    )
+
+
+def _numbers(player: Player) -> tuple[float, ...]:
+    """Return a player's columns in the order of `Crowd`, from its length on."""
+    traits = KINDS[player.kind]
+    length, width = player.size_m or (traits.length_m, traits.width_m)
+    desired = player.speed_mps if player.desired_mps is None else player.desired_mps
+    return (
+        length,
+        width,
+        player.lateral_m,
+        player.start_arc_m,
+        0.0 if player.conduct == "parked" else player.speed_mps,
+        desired,
+        traits.accel_mps2,
+        traits.decel_mps2,
+        player.acts_after_s if player.conduct == "stops" else np.inf,
+        player.decel_mps2,
+    )

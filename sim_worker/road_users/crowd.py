@@ -1,0 +1,50 @@
+"""Who is on the road, as arrays: up to R road users in each of S futures, and the ego."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.road_users.path_table import Indices
+
+Flags = npt.NDArray[np.bool_]
+
+
+class Crowd(NamedTuple):
+    """Who is on the road besides the ego; every field (S, R).
+
+    `path_of` is a place in the `PathTable`; `lateral_m` lies to its left. `desired_mps` is the
+    speed on a free road. From `brakes_at_s` on, infinite for most, it brakes by `brakes_by_mps2`.
+    `lawful` ones react to others, the rest keep their speed.
+    """
+
+    present: Flags
+    lawful: Flags
+    length_m: Array
+    width_m: Array
+    path_of: Indices
+    lateral_m: Array
+    start_arc_m: Array
+    start_speed_mps: Array
+    desired_mps: Array
+    accel_mps2: Array
+    decel_mps2: Array
+    brakes_at_s: Array
+    brakes_by_mps2: Array
+
+
+class EgoBoxes(NamedTuple):
+    """The ego as others see it: box centres (S, 3) x, y, yaw, speeds (S,), places on its path (S,).
+
+    `path_of` is the ego path's place in the table; `arc_m` that of the box centre.
+    """
+
+    poses: Array
+    speed_mps: Array
+    path_of: int
+    arc_m: Array
+    length_m: float
+    width_m: float

@@ -1,0 +1,204 @@
+"""What the law-abiding make of those around them: follow, stop at red, leave ground to others.
+
+Free road and following: intelligent driver model (Treiber, Hennecke, Helbing 2000, eq. 2 and 3),
+the nearest of a leader, a red light and ground to be left to others counting as what is ahead.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
+from foretwin.sim_worker.road_users.path_table import Indices, PathTable
+from foretwin.sim_worker.road_users.right_of_way import PathRules
+
+TIME_GAP_S, STANDSTILL_GAP_M = 1.2, 2.0
+_SIGHT_M = 60.0
+_BESIDE_M = 0.3
+_CURVE_AHEAD_M = 15.0
+_LATERAL_ACCEL_MPS2 = 2.5
+_LINE_GAP_M = 1.0
+_LAG_S, _LEAD_S = 1.0, 0.5
+"""Nobody enters ground that somebody else leaves less than `_LEAD_S` before, or reaches less than
+`_LAG_S` after."""
+_STANDING_MPS = 0.5
+_ROWS_AT_ONCE = 512
+"""Whose surroundings are looked at together: they stay in the cache."""
+
+
+class Now(NamedTuple):
+    """Road users now: `poses` (S, R, 3), NaN where absent, `speed_mps` and `arc_m` (S, R)."""
+
+    poses: Array
+    speed_mps: Array
+    arc_m: Array
+
+
+class _Pairs(NamedTuple):
+    """Who may have to wait for whom, (N,) each: places among the law-abiding, futures, columns of
+    the others, the ego first; and the ground they share as in `PathRules.meetings` (N, 4)."""
+
+    who: Indices
+    future: Indices
+    other: Indices
+    ground: Array
+
+
+class LawAbiding:
+    """The K law-abiding ones of a crowd, in the order of `rows` (K,) and `columns` (K,)."""
+
+    def __init__(self, crowd: Crowd, table: PathTable, rules: PathRules) -> None:
+        self.rows, self.columns = s, r = np.nonzero(crowd.lawful & crowd.present)
+        self._crowd, self._table, self._rules = crowd, table, rules
+        self._path = crowd.path_of[s, r]
+        self._on = table.on(self._path)
+        self._half = 0.5 * crowd.length_m[s, r]
+        self._width = crowd.width_m[s, r]
+        self._decel, self._most = crowd.decel_mps2[s, r], crowd.accel_mps2[s, r]
+        self._desired = crowd.desired_mps[s, r]
+        self._parts = [
+            slice(first, first + _ROWS_AT_ONCE) for first in range(0, len(s), _ROWS_AT_ONCE)
+        ]
+        self._pairs: tuple[int, _Pairs] | None = None
+
+    def accelerations(self, now: Now, ego: EgoBoxes, red_arcs_m: Array) -> Array:
+        """Return (K,) what they choose; `red_arcs_m` (P, K) of paths, or (S, P, K)."""
+        s, r, decel, most = self.rows, self.columns, self._decel, self._most
+        arc, speed = now.arc_m[s, r], now.speed_mps[s, r]
+        bend = self._bend(arc)
+        gap, lead_speed = self._leader(now, ego, bend)
+        red = red_arcs_m[self._path] if red_arcs_m.ndim == 2 else red_arcs_m[s, self._path]
+        still = np.minimum(self._before(red, arc, speed), self._wait(now, ego, arc, speed))
+        nearer = still < gap
+        gap, lead_speed = np.where(nearer, still, gap), np.where(nearer, 0.0, lead_speed)
+        wanted = STANDSTILL_GAP_M * (~nearer) + np.maximum(
+            speed * TIME_GAP_S + speed * (speed - lead_speed) / (2.0 * np.sqrt(most * decel)), 0.0
+        )
+        curve = np.sqrt(_LATERAL_ACCEL_MPS2 / np.maximum(np.abs(bend), 1e-6))
+        allowed = np.minimum(self._desired, curve)
+        free = 1.0 - (speed / np.maximum(allowed, 0.1)) ** 4
+        accel = most * (free - np.square(wanted / np.maximum(gap, 0.1)))
+        return np.clip(accel, -2.0 * decel, most)
+
+    def _bend(self, arc: Array) -> Array:
+        """Return (K,) the mean curvature of the own path over the next metres."""
+        here = self._table.headings(self._table.place(self._on, arc))
+        there = self._table.headings(self._table.place(self._on, arc + _CURVE_AHEAD_M))
+        return np.asarray((there - here) / _CURVE_AHEAD_M)
+
+    def _leader(self, now: Now, ego: EgoBoxes, bend: Array) -> tuple[Array, Array]:
+        """Return the gap to whoever is ahead in the own lane, infinite for nobody, and its speed.
+
+        Others are looked for beside the parabola that the own path bends along.
+        """
+        s, crowd = self.rows, self._crowd
+        x, y, yaw = now.poses[s, self.columns].T
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        xs, ys, yaws = (_with_ego(ego.poses[:, i], now.poses[..., i]) for i in range(3))
+        length = _with_ego(ego.length_m, crowd.length_m)
+        width = _with_ego(ego.width_m, crowd.width_m)
+        half_bend = 0.5 * bend
+        widest = 0.5 * (self._width + np.max(length + width)) + _BESIDE_M
+        found = [
+            _in_front(xs.T, ys.T, s[part], x[part], y[part], cos[part], sin[part],
+                      half_bend[part], widest[part], part.start)
+            for part in self._parts
+        ]  # fmt: skip
+        k, o = np.concatenate(found, axis=1)
+        at = s[k] * length.shape[1] + o
+        dx, dy = xs.take(at) - x[k], ys.take(at) - y[k]
+        ahead = cos[k] * dx + sin[k] * dy
+        left = cos[k] * dy - sin[k] * dx - half_bend[k] * np.square(ahead)
+        turned = yaws.take(at) - yaw[k]
+        along, across = np.abs(np.cos(turned)), np.abs(np.sin(turned))
+        long, wide = length.take(at), width.take(at)
+        gap = ahead - self._half[k] - 0.5 * (long * along + wide * across)
+        beside = 0.5 * (self._width[k] + long * across + wide * along) + _BESIDE_M
+        in_way = (np.abs(left) < beside) & (np.square(dx) + np.square(dy) < _SIGHT_M**2)
+        nearest = np.full(len(s), np.inf)
+        np.minimum.at(nearest, k[in_way], gap[in_way])
+        chosen = in_way & (gap == nearest[k])
+        speeds = _with_ego(ego.speed_mps, now.speed_mps)
+        speed = np.zeros(len(s))
+        speed[k[chosen]] = speeds.take(at[chosen]) * np.cos(turned[chosen])
+        return nearest, np.maximum(speed, 0.0)
+
+    def _wait(self, now: Now, ego: EgoBoxes, arc: Array, speed: Array) -> Array:
+        """Return how far ground lies ahead that must be left to somebody else, else infinite."""
+        k, row, o, ground = self._pairs_with(ego.path_of)
+        ahead = ground[:, 0] - arc[k] - self._half[k]
+        # Whoever has entered, or can no more stop before, goes on.
+        reach = np.square(speed[k]) / (2.0 * self._decel[k])
+        meets = np.flatnonzero((ahead > reach - _LINE_GAP_M) & (ahead < reach + _SIGHT_M))
+        k, row, o, ground, ahead = k[meets], row[meets], o[meets], ground[meets], ahead[meets]
+        arcs = _with_ego(ego.arc_m, now.arc_m)[row, o]
+        speeds = _with_ego(ego.speed_mps, now.speed_mps)[row, o]
+        halves = 0.5 * _with_ego(ego.length_m, self._crowd.length_m)[row, o]
+        _, leave, their_in, their_out = ground.T
+        moving = np.maximum(speeds, _STANDING_MPS)
+        reach_s = (their_in - arcs - halves) / moving
+        reach_s = np.where((speeds < _STANDING_MPS) & (reach_s > 0.0), np.inf, reach_s)
+        gone_s = (their_out - arcs + halves) / moving
+        pace = np.maximum(speed[k], 4.0)
+        enter_s = np.maximum(ahead, 0.0) / pace
+        clear_s = (leave - arc[k] + self._half[k]) / pace
+        taken = (gone_s > 0.0) & (reach_s < clear_s + _LAG_S) & (gone_s > enter_s - _LEAD_S)
+        gap = np.full(len(self.rows), np.inf)
+        np.minimum.at(gap, k[taken], ahead[taken] - _LINE_GAP_M)
+        return gap
+
+    def _pairs_with(self, ego_path: int) -> _Pairs:
+        """Return who may have to wait for whom, found once: nobody changes paths."""
+        if self._pairs is None or self._pairs[0] != ego_path:
+            meetings, crowd = self._rules.meetings, self._crowd
+            # One more row and column than paths: who is not there takes the last, and meets nobody.
+            waits = np.pad(np.isfinite(meetings[..., 0]), (0, 1))
+            there = _with_ego(ego_path, np.where(crowd.present, crowd.path_of, len(meetings)))
+            k, o = np.nonzero(waits[self._path[:, None], there[self.rows]])
+            others = o != self.columns[k] + 1
+            k, o = k[others], o[others]
+            row = self.rows[k]
+            pairs = _Pairs(k, row, o, meetings[self._path[k], there[row, o]])
+            self._pairs = (ego_path, pairs)
+        return self._pairs[1]
+
+    def _before(self, lines_m: Array, arc: Array, speed: Array) -> Array:
+        """Return how far ahead the next of the lines (K, L) is that can still be stopped at."""
+        ahead = lines_m - (arc + self._half)[:, None]
+        reach = np.square(speed) / (4.0 * self._decel)
+        ahead = np.where(ahead > reach[:, None] - _LINE_GAP_M, ahead, np.inf)
+        return np.asarray(ahead.min(axis=1, initial=np.inf)) - _LINE_GAP_M
+
+
+def _in_front(
+    xs: Array, ys: Array, future: Indices, x: Array, y: Array, cos: Array, sin: Array,
+    half_bend: Array, within_m: Array, first: int,
+) -> Indices:  # fmt: skip
+    """Return (2, N) who of (K,) road users has whom of (R + 1, S) ahead, near its own parabola.
+
+    Everybody's x and y come with one row for each of the others: so the inner loops are long.
+    """
+    dx, dy = xs.take(future, axis=1) - x, ys.take(future, axis=1) - y
+    ahead = cos * dx
+    ahead += sin * dy
+    dy *= cos
+    dx *= sin
+    dy -= dx
+    bent = np.square(ahead, out=dx)
+    bent *= half_bend
+    dy -= bent
+    near = np.abs(dy, out=dy) < within_m
+    near &= ahead > 0.0
+    near &= ahead < _SIGHT_M
+    other, who = np.divmod(np.flatnonzero(near), len(x))
+    return np.stack([who + first, other])
+
+
+def _with_ego(ego: Array | float, others: Array) -> Array:
+    """Return (S, 1 + R) the ego's values (S,), or the one of all, before those of others (S, R)."""
+    found = np.empty((others.shape[0], others.shape[1] + 1), dtype=others.dtype)
+    found[:, 0], found[:, 1:] = ego, others
+    return found

@@ -1,0 +1,108 @@
+"""Many paths at once: poses of any number of road users, each at its place on a path of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
+
+Indices = npt.NDArray[np.intp]
+
+
+class OnPaths(NamedTuple):
+    """Paths of any number of places (…): their first nodes in the table, where these are, and the
+    last place short of the end."""
+
+    begin: Indices
+    first_arc_m: Array
+    last: Array
+
+
+class Place(NamedTuple):
+    """Places (…) in a table: the node before, and the share of the way to the next."""
+
+    node: Indices
+    share: Array
+
+
+class PathTable:
+    """The nodes of P paths in one array, so that look-ups for all road users are one call.
+
+    Beyond a path's ends, places stay at the end. After the paths come `tracks` of poses (N, 3)
+    without jumps of yaw, whose nodes are those of a clock instead of an arc length: who knows the
+    time says where on them somebody is.
+    """
+
+    def __init__(self, paths: Sequence[FrenetPath], tracks: Sequence[Array] = ()) -> None:
+        if not paths:
+            raise ValueError("a table needs at least one path")
+        self.paths = tuple(paths)
+        nodes = [*(path.node_poses for path in paths), *tracks]
+        counts = np.array([len(poses) for poses in nodes])
+        self._begin: Indices = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
+        self._first_arc = np.array([path.arc_m[0] for path in paths] + [0.0] * len(tracks))
+        self._last = counts - 1.0
+        self._poses: Array = np.concatenate(nodes)
+        """(M, 3) x, y and heading without jumps, of all nodes."""
+        self._steps = np.diff(self._poses, axis=0, append=self._poses[-1:])
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def on(self, path_of: Indices) -> OnPaths:
+        """Return what places on these paths (…) have in common, to be looked up once."""
+        last = self._last[path_of] - 1e-9
+        return OnPaths(self._begin[path_of], self._first_arc[path_of], last)
+
+    def place(self, on: OnPaths, arc_m: Array) -> Place:
+        """Return where arc lengths (…) are on their paths."""
+        place = (arc_m - on.first_arc_m) / SPACING_M
+        place = np.minimum(np.maximum(place, 0.0), on.last)
+        index = place.astype(np.intp)
+        return Place(on.begin + index, place - index)
+
+    def poses(self, place: Place, lateral_m: Array | None = None) -> Array:
+        """Return x, y, yaw (…, 3) at places on the paths, `lateral_m` (…) to the left of them."""
+        found = self._steps.take(place.node, axis=0)
+        found *= place.share[..., None]
+        found += self._poses.take(place.node, axis=0)
+        if lateral_m is not None:
+            found[..., 0] -= np.sin(found[..., 2]) * lateral_m
+            found[..., 1] += np.cos(found[..., 2]) * lateral_m
+        return np.asarray(found)
+
+    def headings(self, place: Place) -> Array:
+        """Return the paths' headings (…), without jumps, at places."""
+        return np.asarray(
+            self._steps[:, 2].take(place.node) * place.share + self._poses[:, 2].take(place.node)
+        )
+
+    def along(self, path: FrenetPath) -> PathProjection:
+        """Project every node on another path, so that road users can be found on it at once."""
+        place = path.locate(self._poses[:, :2])
+        heading = path.pose_at(place.arc_m).yaw_rad
+        columns = [place.arc_m, place.offset_m, self._poses[:, 2] - heading]
+        return PathProjection(np.column_stack(columns))
+
+
+class PathProjection:
+    """Where all places of a table lie on one other path, looked up instead of searched for."""
+
+    def __init__(self, columns: Array) -> None:
+        """`columns` (M, 3) are arc length, offset to the left and relative heading of all nodes."""
+        # One array each: what is looked up then lies together.
+        self._columns = [np.ascontiguousarray(column) for column in columns.T]
+        self._steps = [np.diff(column, append=column[-1:]) for column in self._columns]
+
+    def at(self, place: Place) -> tuple[Array, Array, Array]:
+        """Return arc length, offset to the left and relative heading (…) on the other path."""
+        arc, offset, turned = (
+            steps.take(place.node) * place.share + column.take(place.node)
+            for steps, column in zip(self._steps, self._columns, strict=True)
+        )
+        return arc, offset, turned

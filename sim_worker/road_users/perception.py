@@ -1,0 +1,185 @@
+"""Other road users as a driver perceives them: places on the ego's path, late or lost by faults."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.frenet_path import FrenetPoint
+from foretwin.sim_worker.planner_interface import SeenUsers
+from foretwin.sim_worker.road_users.path_table import PathProjection, Place
+from foretwin.sim_worker.road_users.traffic import Traffic
+from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+
+Flags = npt.NDArray[np.bool_]
+
+_MARGIN_M = 0.3
+"""What passes the car's side by less than this is in its way."""
+_ROUNDING_M = 1e-6
+
+
+class PerceptionFaults(NamedTuple):
+    """Each (S,): how late everybody else is seen, and from when for how long nobody is."""
+
+    delay_s: Array
+    lost_from_s: Array
+    lost_for_s: Array
+
+
+class Lead(NamedTuple):
+    """What is ahead of S cars: bumper to bumper, infinite without a lead, and its speed; (S,)."""
+
+    gap_m: Array
+    speed_mps: Array
+
+
+class Sight:
+    """What S cars see of the traffic around them, tick by tick."""
+
+    def __init__(
+        self,
+        traffic: Traffic,
+        along: PathProjection,
+        vehicle: VehicleParameters,
+        faults: PerceptionFaults,
+        *,
+        hidden_by: npt.NDArray[np.intp],
+        walks: Flags,
+        tick_s: float,
+        kept: int | None = None,
+    ) -> None:
+        """`along` projects the traffic's paths on the ego's; `hidden_by` (S, R) columns or -1.
+
+        What was seen is remembered for as long as anybody sees late, or for `kept` ticks.
+        """
+        crowd = traffic.crowd
+        self._crowd, self._along, self._walks = crowd, along, walks
+        self._vehicle, self._hidden_by = vehicle, hidden_by
+        self._length_m, self._width_m = vehicle.length_m.value, vehicle.width_m.value
+        self._front_m = box_centre_from_base_m(vehicle) + self._length_m / 2.0
+        self._size = np.stack([crowd.length_m, crowd.width_m], axis=-1)
+        self._late = np.round(faults.delay_s / tick_s).astype(np.intp)
+        self._faults, self._tick_s = faults, tick_s
+        self._hidden = np.nonzero((hidden_by >= 0) & crowd.present)
+        self._hides = hidden_by[self._hidden]
+        self.anybody_hidden = len(self._hides) > 0
+        """Whether it matters where the cars' eyes are."""
+        kept = kept or int(self._late.max(initial=0)) + 1
+        self._past: list[tuple[npt.NDArray[Any], ...]] = [_now(traffic)] * kept
+        self._anybody_late = bool(self._late.any())
+        self._ever_lost = bool((faults.lost_for_s > 0.0).any())
+        self._all_there = traffic.replay is None and bool(crowd.present.all())
+        self._beside_m = crowd.lateral_m if crowd.lateral_m.any() else None
+        self._sizes = np.stack([crowd.length_m.ravel(), crowd.width_m.ravel()])
+        half_diagonal = 0.5 * np.hypot(crowd.length_m, crowd.width_m)
+        self._at_most_aside_m = half_diagonal + (0.5 * self._width_m + _MARGIN_M + _ROUNDING_M)
+        """However it is turned, who is farther aside than this is not in the way."""
+
+    def begun(self, futures: npt.NDArray[np.intp], traffic: Traffic) -> Sight:
+        """Return the sight of (K,) cars that see `traffic`, begun as that of these futures did."""
+        return Sight(
+            traffic,
+            self._along,
+            self._vehicle,
+            PerceptionFaults._make(column[futures] for column in self._faults),
+            hidden_by=self._hidden_by[futures],
+            walks=self._walks[futures],
+            tick_s=self._tick_s,
+            kept=len(self._past) + 1,
+        )
+
+    def carry_on(self, before: Sight, futures: Flags, *, looked: bool) -> None:
+        """Let the `futures` (S,) remember what they saw before, both sights being `begun`.
+
+        Who has `looked` at this instant already looks again.
+        """
+        past = [*before._past[1:], before._past[-1]] if looked else before._past
+        row = futures[:, None]
+        kept = row, row, row, row[..., None]
+        self._past = [
+            tuple(np.where(k, *pair) for k, *pair in zip(kept, theirs, mine, strict=True))
+            for mine, theirs in zip(self._past, past, strict=True)
+        ]
+
+    def look(
+        self, tick: int | npt.NDArray[np.intp], traffic: Traffic, eyes_xy_m: Array
+    ) -> SeenUsers:
+        """Return what is seen at a tick, or ticks (S,), from where the cars' fronts are (S, 2)."""
+        self._past = [_now(traffic), *self._past[:-1]]
+        node, share, speed, poses = self._past[0]
+        if self._anybody_late:
+            rows = np.arange(len(node))
+            node, share, speed, poses = (
+                np.stack([past[k] for past in self._past])[self._late, rows] for k in range(4)
+            )
+        on_arc, offset, turned = self._along.at(Place(node, share))
+        if self._beside_m is not None:
+            offset = offset + self._beside_m * np.cos(turned)
+        unseen = self._unseen(tick, poses, eyes_xy_m)
+        if unseen is not None:
+            on_arc = np.where(unseen, np.nan, on_arc)
+            poses = np.where(unseen[..., None], np.nan, poses)
+        return SeenUsers(poses, speed, self._size, on_arc, offset, self._walks, turned)
+
+    def _unseen(
+        self, tick: int | npt.NDArray[np.intp], poses: Array, eyes_xy_m: Array
+    ) -> Flags | None:
+        """(S, R) bool: who is away, lost or hidden; None where everybody is seen."""
+        if self._all_there and not self._ever_lost and not self.anybody_hidden:
+            return None
+        unseen = np.isnan(poses[..., 0])
+        if self._ever_lost:
+            unseen |= self._lost(np.asarray(tick) * self._tick_s)[:, None]
+        if self.anybody_hidden:
+            unseen[self._hidden] |= self._behind(poses, eyes_xy_m)
+        return unseen
+
+    def _lost(self, time_s: float | Array) -> Flags:
+        since = time_s - self._faults.lost_from_s
+        return np.asarray((since >= 0.0) & (since < self._faults.lost_for_s))
+
+    def _behind(self, poses: Array, eyes_xy_m: Array) -> Flags:
+        """(H,) bool: whether the line from the eyes to a hidden one meets what hides it."""
+        s, r = self._hidden
+        hider = poses[s, self._hides]
+        cos, sin = np.cos(hider[:, 2]), np.sin(hider[:, 2])
+        half = 0.5 * self._size[s, self._hides]
+
+        def from_hider(xy: Array) -> Array:
+            dx, dy = xy[:, 0] - hider[:, 0], xy[:, 1] - hider[:, 1]
+            return np.column_stack([cos * dx + sin * dy, cos * dy - sin * dx])
+
+        start = from_hider(eyes_xy_m[s])
+        way = from_hider(poses[s, r, :2]) - start
+        with np.errstate(divide="ignore", invalid="ignore"):
+            near, far = (-half - start) / way, (half - start) / way
+        low, high = np.fmin(near, far).max(axis=1), np.fmax(near, far).min(axis=1)
+        return np.asarray((low <= high) & (high >= 0.0) & (low <= 1.0))
+
+    def lead(self, seen: SeenUsers, place: FrenetPoint) -> Lead:
+        """Return who is in the way of base_link at `place` (S,) on the ego's path."""
+        aside = np.abs(seen.offset_m - place.offset_m[:, None])
+        few = np.flatnonzero(aside < self._at_most_aside_m)
+        row = few // aside.shape[1]
+        turned, length, width = seen.turned_rad.take(few), *self._sizes.take(few, axis=1)
+        cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
+        gap = seen.arc_m.take(few) - place.arc_m[row] - self._front_m
+        gap -= 0.5 * (length * cos + width * sin)
+        beside = 0.5 * (length * sin + width * cos + self._width_m) + _MARGIN_M
+        in_way = (aside.take(few) < beside) & (gap > -self._length_m)
+        gaps = np.full(aside.shape, np.inf)
+        gaps.put(few[in_way], gap[in_way])
+        rows, nearest = np.arange(len(gaps)), gaps.argmin(axis=1)
+        gap = gaps[rows, nearest]
+        speed = seen.speed_mps[rows, nearest] * np.cos(seen.turned_rad[rows, nearest])
+        return Lead(gap, np.where(np.isfinite(gap), speed, 0.0))
+
+
+def _now(traffic: Traffic) -> tuple[npt.NDArray[Any], ...]:
+    """Return what is remembered of an instant: places, speeds and poses."""
+    node, share = traffic.place
+    return node, share, traffic.speed_mps.copy(), traffic.poses

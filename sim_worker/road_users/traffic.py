@@ -1,0 +1,100 @@
+"""Other road users of S futures, up to R in each, moved together along paths of their own.
+
+Their motion along a path is all there is to it: arc length and speed. Law-abiding ones decide a few
+times a second, as people do, and keep the acceleration in between. Recorded ones are where they
+were at the time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes, Flags
+from foretwin.sim_worker.road_users.law_abiding import LawAbiding, Now
+from foretwin.sim_worker.road_users.path_table import Indices, PathTable
+from foretwin.sim_worker.road_users.replay import Replay
+from foretwin.sim_worker.road_users.right_of_way import PathRules
+
+
+class Traffic:
+    """The road users of one job; `arc_m`, `speed_mps` (S, R) and `poses` (S, R, 3) are now.
+
+    The first of each future are those of `replay`; while one is away, its speed is NaN too.
+    """
+
+    def __init__(
+        self, crowd: Crowd, table: PathTable, rules: PathRules, replay: Replay | None = None
+    ) -> None:
+        self.crowd, self.table, self.replay, self._rules = crowd, table, replay, rules
+        self._on = table.on(crowd.path_of)
+        self._now_s: float | Array = 0.0
+        self._absent = None if crowd.present.all() else ~crowd.present
+        self.arc_m = crowd.start_arc_m.copy()
+        self.speed_mps = np.where(crowd.present, crowd.start_speed_mps, 0.0)
+        self._put()
+        self._accel = np.zeros_like(self.arc_m)
+        self._brakes = bool(np.isfinite(crowd.brakes_at_s[crowd.present]).any())
+        self._lawful = LawAbiding(crowd, table, rules)
+        self.reacts = len(self._lawful.rows) > 0
+        """Whether anybody does anything but keep a speed."""
+
+    def _put(self) -> None:
+        self.place = self.table.place(self._on, self.arc_m)
+        gone = None if self.replay is None else self._play_back(self.replay)
+        self.poses = self.table.poses(self.place, self.crowd.lateral_m)
+        if gone is not None:
+            np.copyto(self.poses[:, : gone.shape[1]], np.nan, where=gone[..., None])
+        if self._absent is not None:
+            self.poses[self._absent] = np.nan
+
+    def _play_back(self, replay: Replay) -> Flags:
+        """Put recorded road users where they are now; returns (1 or S, T) who of them is away."""
+        now, count = replay.at(self._now_s), len(replay)
+        mine = (slice(None), slice(count))
+        self.place.node[mine] = self._on.begin[mine] + now.node
+        self.place.share[mine] = now.share
+        self.speed_mps[mine] = now.speed_mps
+        return now.gone
+
+    def begun(self, futures: Indices) -> Traffic:
+        """Return traffic (K, R) that begins as that of these futures did."""
+        crowd = Crowd._make(f[futures] for f in self.crowd)
+        return Traffic(crowd, self.table, self._rules, self.replay)
+
+    def carry_on(self, before: Traffic, futures: Flags) -> None:
+        """Let the `futures` (S,) go on from where traffic of the same paths has them."""
+        for mine, theirs in (
+            (self.arc_m, before.arc_m),
+            (self.speed_mps, before.speed_mps),
+            (self._accel, before._accel),
+        ):
+            mine[futures] = theirs[futures]
+        if self.replay is not None:
+            self._now_s = np.where(futures[:, None], before._now_s, self._now_s)
+        self._put()
+
+    def step(self, *, time_s: float | Array, dt_s: float) -> None:
+        """Advance by `dt_s` from `time_s`, one or (S, 1), with what was decided last."""
+        crowd = self.crowd
+        self._now_s = time_s + dt_s
+        if self.reacts or self._brakes:
+            accel = self._accel
+            if self._brakes:
+                accel = np.where(time_s >= crowd.brakes_at_s - 1e-9, -crowd.brakes_by_mps2, accel)
+            after = np.maximum(self.speed_mps + accel * dt_s, 0.0)
+            self.arc_m += 0.5 * (self.speed_mps + after) * dt_s
+            self.speed_mps = after
+        else:
+            self.arc_m += self.speed_mps * dt_s
+        if self.replay is not None:
+            self.arc_m[:, : len(self.replay)] = 0.0
+        self._put()
+
+    def decide(self, ego: EgoBoxes, red_arcs_m: Array) -> None:
+        """Let law-abiding road users choose their accelerations; `red_arcs_m` (P, K) of paths, or
+        (S, P, K)."""
+        if self.reacts:
+            now = Now(self.poses, self.speed_mps, self.arc_m)
+            chosen = self._lawful.accelerations(now, ego, red_arcs_m)
+            self._accel[self._lawful.rows, self._lawful.columns] = chosen

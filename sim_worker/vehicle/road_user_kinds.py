@@ -1,0 +1,65 @@
+"""Sizes, masses and limits of the kinds of road users."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from foretwin.contracts.drive import RoadUserKind
+
+_SUMO = "Eclipse SUMO 1.28, defaults of vClass"
+_TARGETS = "Euro NCAP articulated target"
+
+
+class KindTraits(NamedTuple):
+    """What is typical of a kind of road user, with whoever rides it.
+
+    `length_m`, `width_m` and `height_m` of its box; `accel_mps2` and `decel_mps2` are those of
+    ordinary driving, `hard_decel_mps2` of an emergency; `speed_mps` is what it does not exceed.
+    `keeps_lane` is false for those who walk.
+    """
+
+    length_m: float
+    width_m: float
+    height_m: float
+    mass_kg: float
+    accel_mps2: float
+    decel_mps2: float
+    hard_decel_mps2: float
+    speed_mps: float
+    source: str
+    keeps_lane: bool = True
+
+
+KINDS: dict[RoadUserKind, KindTraits] = {
+    "car": KindTraits(
+        4.5, 1.8, 1.5, 1500.0, 2.6, 4.5, 9.0, 55.6,
+        f"{_SUMO} passenger; 4.5 m long, as compact cars are",
+    ),
+    "van": KindTraits(
+        6.0, 2.04, 2.6, 2800.0, 2.6, 4.5, 9.0, 44.4,
+        "Volkswagen Crafter, medium wheelbase, rounded and half laden; "
+        f"limits of {_SUMO} delivery",
+    ),
+    "lorry": KindTraits(
+        7.1, 2.4, 2.8, 9000.0, 1.3, 4.0, 7.0, 36.1,
+        f"{_SUMO} truck, laden with as much again",
+    ),
+    "bus": KindTraits(12.0, 2.5, 3.4, 12000.0, 1.2, 4.0, 7.0, 27.8, f"{_SUMO} bus"),
+    "tram": KindTraits(22.0, 2.4, 3.2, 37900.0, 1.0, 3.0, 7.0, 22.2, f"{_SUMO} tram"),
+    "motorcycle": KindTraits(
+        2.2, 0.9, 1.5, 280.0, 6.0, 4.5, 9.0, 55.6,
+        f"{_SUMO} motorcycle with a rider of 80 kg, who brakes as car drivers do",
+    ),
+    "bicycle": KindTraits(
+        1.89, 0.5, 1.87, 95.0, 1.2, 3.0, 7.0, 8.3,
+        f"{_TARGETS}, bicyclist (rounded); {_SUMO} bicycle with 80 kg of rider and 15 of bicycle",
+    ),
+    "pedestrian": KindTraits(
+        0.5, 0.5, 1.8, 75.0, 1.5, 2.0, 5.0, 3.0,
+        f"{_TARGETS}, adult (rounded, with its stride); {_SUMO} pedestrian; running at 3 m/s",
+        keeps_lane=False,
+    ),
+    "unknown": KindTraits(
+        4.5, 1.8, 1.5, 1500.0, 2.6, 4.5, 9.0, 55.6, "taken for a car: the most frequent",
+    ),
+}  # fmt: skip

@@ -1,0 +1,1 @@
+"""The vehicle's state from what it sends: pure and causal."""

@@ -1,0 +1,296 @@
+"""An extended Kalman filter of a car's planar motion in a local frame: arithmetic, no messages.
+
+State: x, y, yaw, speed, acceleration, curvature, and what the sensors have of their own: the
+gyro's and the accelerometer's bias, a satellite receiver's wandering error (x, y), the speed
+sensor's scale, and the slip of the rear axle; where a map helps, also how far the car drives from
+the line that it draws. Turning is a curvature times a speed, so that a car that stands cannot turn,
+whatever its positions jitter; and the gyro's bias is learnt for free while it stands.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.telemetry.estimator import motion_noise
+
+X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
+GNSS_X, GNSS_Y, SPEED_SCALE, SLIP = range(8, 12)
+SIZE = 12
+ROAD_OFFSET = SIZE
+"""Metres to the left of the map's line; only in a filter that has been told of one."""
+_IDENTITY = np.eye(SIZE + 1)
+
+MAX_CURVATURE_PM = 0.25
+"""A turning circle of 8 m across: tighter than any passenger car's."""
+_MAX_STEP_S = 0.05
+_DRIFT_M = 0.03
+_STANDING_CURVATURE_PM = 0.1
+_LEAST_TURN_RAD = 0.002
+_KNOWN_YAW_VAR = 0.15**2
+
+
+class KinematicFilter:
+    """Predicts with constant acceleration and curvature, and is corrected by each measurement.
+
+    `mean` (12,) and `covariance` (12, 12) are in SI units, in the order of the module's indices;
+    (13,) and (13, 13) once a map helps.
+    The point is base_link. Speed stays at or above zero unless `may_reverse`. What no sensor has
+    spoken of yet (receiver's error, scale, slip) has no variance and so no effect.
+    """
+
+    def __init__(
+        self, *, xy_m: Array, yaw_rad: float, speed_mps: float, yaw_std_rad: float
+    ) -> None:
+        self.mean: Array = np.zeros(SIZE)
+        self.mean[: CURVATURE + 1] = xy_m[0], xy_m[1], yaw_rad, speed_mps, 0.0, 0.0
+        spread = np.zeros(SIZE)
+        spread[: ACCEL_BIAS + 1] = (
+            0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05, motion_noise.GYRO_BIAS_STD_RADPS, 0.1,
+        )  # fmt: skip
+        self.covariance: Array = np.diag(spread * spread)
+        self.may_reverse = speed_mps < 0.0
+        self._gnss_std_m = 0.0
+        self._slip_density = motion_noise.SLIP_DENSITY
+
+    def copy(self) -> KinematicFilter:
+        """Return another filter that goes on from the same state."""
+        other = object.__new__(KinematicFilter)
+        other.__dict__.update(self.__dict__)
+        other.mean, other.covariance = self.mean.copy(), self.covariance.copy()
+        return other
+
+    @property
+    def yaw_rate_radps(self) -> float:
+        """Speed times curvature."""
+        return float(self.mean[SPEED] * self.mean[CURVATURE])
+
+    def predict(self, duration_s: float) -> None:
+        """Move the state on by `duration_s`, in steps short enough for the linearisation."""
+        steps = max(1, math.ceil(duration_s / _MAX_STEP_S - 1e-9))
+        for _ in range(steps):
+            self._step(duration_s / steps)
+
+    def _step(self, dt: float) -> None:
+        x, y, yaw, speed, accel, curvature, *_ = self.mean.tolist()
+        slip = float(self.mean[SLIP])
+        size = len(self.mean)
+        if not self.may_reverse and speed + accel * dt < 0.0:
+            accel = min(0.0, -speed / dt)  # it stops within the step
+        distance = (speed + 0.5 * accel * dt) * dt
+        # The rear axle moves outwards of where the body points, the more the harder it turns.
+        heading = yaw + 0.5 * curvature * distance - slip * speed * speed * curvature
+        cos, sin = math.cos(heading), math.sin(heading)
+        half = 0.5 * dt * dt
+        side = distance * (0.5 * curvature * dt - 2.0 * slip * speed * curvature)
+        by_accel = 0.5 * distance * curvature * half
+        by_curvature = distance * (0.5 * distance - slip * speed * speed)
+        by_slip = -distance * speed * speed * curvature
+        jacobian = _IDENTITY[:size, :size].copy()
+        jacobian[X, YAW : CURVATURE + 1] = (
+            -distance * sin, dt * cos - side * sin, half * cos - by_accel * sin,
+            -by_curvature * sin,
+        )  # fmt: skip
+        jacobian[Y, YAW : CURVATURE + 1] = (
+            distance * cos, dt * sin + side * cos, half * sin + by_accel * cos,
+            by_curvature * cos,
+        )  # fmt: skip
+        jacobian[X, SLIP], jacobian[Y, SLIP] = -by_slip * sin, by_slip * cos
+        jacobian[YAW, SPEED : CURVATURE + 1] = curvature * dt, curvature * half, distance
+        jacobian[SPEED, ACCEL] = dt
+        fading = math.exp(-dt / motion_noise.GNSS_CORRELATION_S)
+        jacobian[GNSS_X, GNSS_X] = jacobian[GNSS_Y, GNSS_Y] = fading
+        mean = self.mean.copy()
+        mean[:5] = (
+            x + distance * cos, y + distance * sin, yaw + curvature * distance,
+            speed + accel * dt, accel,
+        )  # fmt: skip
+        mean[GNSS_X : GNSS_Y + 1] *= fading
+        self.mean = mean
+        covariance = jacobian @ self.covariance @ jacobian.T
+        noise = covariance.reshape(-1)[:: size + 1]  # a view of the diagonal
+        wandering = motion_noise.densities(speed, slip=self._slip_density)
+        noise[YAW : ACCEL_BIAS + 1] += dt * np.array(wandering)
+        if self._gnss_std_m:
+            noise[GNSS_X : GNSS_Y + 1] += self._gnss_std_m**2 * (1.0 - fading * fading)
+        self.covariance = covariance
+
+    def correct(self, row: Array, residual: float, std: float) -> None:
+        """Apply one scalar measurement: `row` is its derivative by the state."""
+        cross = self.covariance @ row
+        variance = float(row @ cross) + std * std
+        self.mean += cross * (residual / variance)
+        self.covariance -= cross[:, None] * (cross / variance)
+        self._limit()
+
+    def _limit(self) -> None:
+        mean = self.mean
+        if not self.may_reverse and mean[SPEED] < 0.0:
+            mean[SPEED] = 0.0
+        if abs(mean[CURVATURE]) > MAX_CURVATURE_PM:
+            mean[CURVATURE] = math.copysign(MAX_CURVATURE_PM, mean[CURVATURE])
+
+    def sensor_xy(self, lever_m: tuple[float, float]) -> Array:
+        """Return where a sensor at `lever_m` (forward, left) of base_link is, shape (2,)."""
+        cos, sin = math.cos(self.mean[YAW]), math.sin(self.mean[YAW])
+        forward, left = lever_m
+        offset: Array = np.array([cos * forward - sin * left, sin * forward + cos * left])
+        return self.mean[:2] + offset
+
+    def know_gyro_bias(self, bias_radps: float, std_radps: float) -> None:
+        """Begin with a gyro's bias that was learnt while the car stood."""
+        self.mean[GYRO_BIAS] = bias_radps
+        self.covariance[GYRO_BIAS, GYRO_BIAS] = std_radps * std_radps
+
+    def know_road(self) -> None:
+        """Begin to tell how far beside a map's line the car drives."""
+        if len(self.mean) == SIZE:
+            self.mean = np.append(self.mean, 0.0)
+            self.covariance = np.pad(self.covariance, (0, 1))
+
+    def doubt_position(self, std_m: float) -> None:
+        """Make the place unknown within `std_m` and tell it apart from what else is known."""
+        self.covariance[:2, :] = 0.0
+        self.covariance[:, :2] = 0.0
+        self.covariance[X, X] = self.covariance[Y, Y] = std_m * std_m
+
+    def expect_wander(self, std_m: float) -> None:
+        """Let positions have an error of `std_m` that stays alike for half a minute."""
+        missing = std_m * std_m - self._gnss_std_m**2
+        if missing > 0.0:
+            self.covariance[GNSS_X, GNSS_X] += missing
+            self.covariance[GNSS_Y, GNSS_Y] += missing
+        self._gnss_std_m = std_m
+
+    def forget_wander(self) -> None:
+        """Begin the receiver's error anew: it has jumped."""
+        for index in (GNSS_X, GNSS_Y):
+            self.mean[index] = 0.0
+            self.covariance[index, :] = 0.0
+            self.covariance[:, index] = 0.0
+            self.covariance[index, index] = self._gnss_std_m**2
+
+    def _position_rows(self, lever_m: tuple[float, float], *, wander: bool) -> tuple[Array, Array]:
+        """Return where a receiver should say it is (2,), and that by the state."""
+        expected = self.sensor_xy(lever_m)
+        rows = np.zeros((2, len(self.mean)))
+        rows[0, X] = rows[1, Y] = 1.0
+        rows[0, YAW], rows[1, YAW] = self.mean[Y] - expected[1], expected[0] - self.mean[X]
+        if wander:
+            rows[0, GNSS_X] = rows[1, GNSS_Y] = 1.0
+            expected = expected + self.mean[GNSS_X : GNSS_Y + 1]
+        return expected, rows
+
+    def position_surprise(
+        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool
+    ) -> tuple[float, float]:
+        """Return how far a position (2,) lies off the expected one, and that one's spread."""
+        expected, rows = self._position_rows(lever_m, wander=wander)
+        spread = float(np.trace(rows @ self.covariance @ rows.T)) + 2.0 * std_m * std_m
+        return float(np.hypot(*(xy_m - expected))), math.sqrt(spread)
+
+    def correct_position(
+        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool = False,
+        hold_yaw: bool = False,
+    ) -> None:  # fmt: skip
+        """Apply a position (2,) of a sensor at `lever_m` with white noise of `std_m`.
+
+        `wander` says that the receiver's own slow error lies on top, as `expect_wander` has it.
+        With `hold_yaw` the yaw stays as it is, and so does what is known of it.
+        """
+        expected, rows = self._position_rows(lever_m, wander=wander)
+        cross = self.covariance @ rows.T
+        (a, b), (_, d) = (rows @ cross).tolist()
+        a, d = a + std_m * std_m, d + std_m * std_m
+        inverse = np.array([[d, -b], [-b, a]]) / (a * d - b * b)
+        gain = cross @ inverse
+        covariance = self.covariance - gain @ cross.T
+        if hold_yaw:
+            # Any gain but the best one costs (K - K_best) S (K - K_best)': here in the yaw alone.
+            kept = gain[YAW].copy()
+            covariance[YAW, YAW] += kept @ cross[YAW]
+            gain[YAW] = 0.0
+        self.mean = self.mean + gain @ (xy_m - expected)
+        self.covariance = 0.5 * (covariance + covariance.T)
+        self._limit()
+
+    def move_position(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
+        """Put the sensor at `xy_m` and leave yaw and motion as they are: the source jumped."""
+        self.mean[:2] += xy_m - self.sensor_xy(lever_m)
+        self.doubt_position(std_m)
+
+    def drift_sideways(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
+        """Take a step across the car as the receiver's own: a car that creeps cannot go there."""
+        cos, sin = math.cos(self.mean[YAW]), math.sin(self.mean[YAW])
+        step = xy_m - self.sensor_xy(lever_m)
+        along, across = cos * step[0] + sin * step[1], -sin * step[0] + cos * step[1]
+        if abs(across) > max(abs(along), _DRIFT_M) and self.covariance[YAW, YAW] < _KNOWN_YAW_VAR:
+            sideways: Array = across * np.array([-sin, cos])
+            self.move_position(self.sensor_xy(lever_m) + sideways, std_m, lever_m)
+
+    def limit_turn(self, yaw_before_rad: float, *, moved_m: float) -> None:
+        """Undo what a correction turned beyond the tightest bend over `moved_m`.
+
+        Positions that shift under a car that hardly moves must not turn it round.
+        """
+        if self.covariance[YAW, YAW] > _KNOWN_YAW_VAR:
+            return
+        reach = MAX_CURVATURE_PM * moved_m + _LEAST_TURN_RAD
+        change = math.remainder(self.mean[YAW] - yaw_before_rad, math.tau)
+        self.mean[YAW] = yaw_before_rad + min(max(change, -reach), reach)
+
+    def correct_speed(self, speed_mps: float, std_mps: float) -> None:
+        """Apply a measured speed, whose scale is estimated."""
+        if self.covariance[SPEED_SCALE, SPEED_SCALE] == 0.0:
+            self.covariance[SPEED_SCALE, SPEED_SCALE] = motion_noise.SPEED_SCALE_STD**2
+        row = np.zeros(len(self.mean))
+        row[SPEED], row[SPEED_SCALE] = 1.0 + self.mean[SPEED_SCALE], self.mean[SPEED]
+        self.correct(row, speed_mps - self.mean[SPEED] * row[SPEED], std_mps)
+
+    def correct_yaw(self, yaw_rad: float, std_rad: float) -> None:
+        """Apply a measured yaw in the local frame."""
+        row = np.zeros(len(self.mean))
+        row[YAW] = 1.0
+        self.correct(row, math.remainder(yaw_rad - self.mean[YAW], math.tau), std_rad)
+
+    def correct_yaw_rate(self, rate_radps: float, std_radps: float, *, biased: bool) -> None:
+        """Apply a measured yaw rate; `biased` for a gyro, whose bias is estimated."""
+        row = np.zeros(len(self.mean))
+        row[SPEED], row[CURVATURE] = self.mean[CURVATURE], self.mean[SPEED]
+        expected = self.yaw_rate_radps
+        if biased:
+            self._know_slip()
+            row[GYRO_BIAS] = 1.0
+            expected += self.mean[GYRO_BIAS]
+        self.correct(row, rate_radps - expected, std_radps)
+
+    def _know_slip(self) -> None:
+        """Tell the body's heading from the path's: a gyro shows how they part."""
+        self._slip_density = motion_noise.GYRO_SLIP_DENSITY
+        if self.covariance[SLIP, SLIP] == 0.0:
+            self.mean[SLIP], std = motion_noise.SLIP_RADPMPS2
+            self.covariance[SLIP, SLIP] = std * std
+
+    def correct_accel(self, accel_mps2: float, std_mps2: float) -> None:
+        """Apply a forward specific force: acceleration plus a slow bias, such as the grade's."""
+        row = np.zeros(len(self.mean))
+        row[ACCEL] = row[ACCEL_BIAS] = 1.0
+        self.correct(row, accel_mps2 - self.mean[ACCEL] - self.mean[ACCEL_BIAS], std_mps2)
+
+    def correct_curvature(self, curvature_pm: float, std_pm: float) -> None:
+        """Apply the curvature that the measured steering implies."""
+        row = np.zeros(len(self.mean))
+        row[CURVATURE] = 1.0
+        self.correct(row, curvature_pm - self.mean[CURVATURE], std_pm)
+
+    def stand(self) -> None:
+        """Apply that the car stands: no speed and no acceleration; yaw stays as it is."""
+        row = np.zeros(len(self.mean))
+        row[SPEED] = 1.0
+        self.correct(row, -self.mean[SPEED], 0.01)
+        row[SPEED], row[ACCEL] = 0.0, 1.0
+        self.correct(row, -self.mean[ACCEL], 0.05)
+        # What positions said of the curvature in the last moments before a stop is mostly noise.
+        self.correct_curvature(0.0, _STANDING_CURVATURE_PM)

@@ -1,0 +1,158 @@
+"""What a vehicle has measured lately: the latest samples, their age, and which were refused."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any
+
+from foretwin.contracts.drive import SpeedSample, SteeringSample
+
+FRESH_NS = 1_000_000_000
+"""A quantity counts as measured while its last sample is younger than this."""
+CLOCK_LEAP_NS = 10_000_000_000
+"""One stamp that is this far ahead must not make all later ones look late."""
+MOTION_FIELDS = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
+"""Fields of VehicleState that are either measured or estimated."""
+_CHANNEL_FIELDS = {
+    "imu": ("yaw_rate_radps", "accel_mps2"),
+    "speed": ("speed_mps",),
+    "heading": ("yaw_rad",),
+    "steering": ("tire_angle_rad",),
+}
+_LIMITS = {
+    "speed_mps": 100.0,
+    "accel_mps2": 100.0,
+    "rate_radps": 20.0,
+    "yaw_rad": 100.0,
+    "yaw_rate_radps": 20.0,
+    "tire_angle_rad": 1.5,
+    "steering_wheel_rad": 50.0,
+}
+"""Beyond these a number is no motion of a road vehicle."""
+
+
+class Measured:
+    """Remembers samples beside positions; `skipped` counts what it refused, by reason."""
+
+    def __init__(
+        self, *, steering_ratio: float, steering_offset_rad: float, skipped: Counter[str]
+    ) -> None:
+        self._steering_ratio = steering_ratio
+        self._steering_offset_rad = steering_offset_rad
+        self._skipped = skipped
+        self._sample_ns: dict[str, int] = {}
+        self._field_ns: dict[str, int] = {}
+        self._leap_ns: dict[str, int] = {}
+        self._steering: SteeringSample | None = None
+        self.speed_mps = 0.0
+        """The last measured speed; 0 before there is one."""
+
+    def copy(self, *, skipped: Counter[str]) -> Measured:
+        """Return another memory of the same samples that counts into `skipped`."""
+        other = object.__new__(Measured)
+        other.__dict__.update(self.__dict__)
+        other._skipped = skipped
+        other._sample_ns, other._field_ns = self._sample_ns.copy(), self._field_ns.copy()
+        return other
+
+    def take(self, channel: str, message: Any) -> bool:
+        """Remember a sample; return False for one that is refused or says nothing of the motion."""
+        fields = _CHANNEL_FIELDS.get(channel)
+        if fields is None:
+            return False
+        stamp_ns = message.stamp_ns
+        if stamp_ns < self._sample_ns.get(channel, stamp_ns):
+            self._skipped[f"{channel}_time_backwards"] += 1
+            return False
+        if self._leaps(channel, stamp_ns):
+            self._skipped[f"{channel}_time_leap"] += 1
+            return False
+        fault = _fault(message)
+        if fault is not None:
+            self._skipped[f"{channel}_{fault}"] += 1
+            return False
+        self._sample_ns[channel] = stamp_ns
+        for name in fields:
+            self._field_ns[name] = stamp_ns
+        if getattr(message, "yaw_rate_radps", None) is not None:
+            self._field_ns["yaw_rate_radps"] = stamp_ns
+        if isinstance(message, SpeedSample):
+            self.speed_mps = message.speed_mps
+        elif isinstance(message, SteeringSample):
+            self._steering = message
+        return True
+
+    def _leaps(self, channel: str, stamp_ns: int) -> bool:
+        """Return whether the stamp is far ahead without a second one to bear witness."""
+        if stamp_ns - self._sample_ns.get(channel, stamp_ns) <= CLOCK_LEAP_NS:
+            return False
+        before_ns = self._leap_ns.get(channel)
+        self._leap_ns = {**self._leap_ns, channel: stamp_ns}
+        return before_ns is None or not 0 <= stamp_ns - before_ns <= CLOCK_LEAP_NS
+
+    @property
+    def anything(self) -> bool:
+        """Whether any sample beside positions has come."""
+        return bool(self._sample_ns)
+
+    def fresh(self, name: str, stamp_ns: int) -> bool:
+        """Return whether field `name` was measured within a second before `stamp_ns`."""
+        measured_ns = self._field_ns.get(name)
+        return measured_ns is not None and stamp_ns - measured_ns <= FRESH_NS
+
+    def estimated(self, stamp_ns: int) -> tuple[str, ...]:
+        """Return the names of the motion fields that are not fresh."""
+        return tuple(name for name in MOTION_FIELDS if not self.fresh(name, stamp_ns))
+
+    @property
+    def steering_wheel_rad(self) -> float | None:
+        """The last measured angle at the steering wheel."""
+        return None if self._steering is None else self._steering.steering_wheel_rad
+
+    @property
+    def tire_angle_rad(self) -> float | None:
+        """The last measured angle at the tyres, or what the steering wheel's implies."""
+        if self._steering is None:
+            return None
+        if self._steering.tire_angle_rad is not None:
+            return self._steering.tire_angle_rad
+        wheel = self._steering.steering_wheel_rad
+        return None if wheel is None else wheel / self._steering_ratio + self._steering_offset_rad
+
+
+class Doubt:
+    """The standard deviation to give a sensor that states none: its recent surprises, at least.
+
+    Speeds and courses of a satellite receiver lag behind its positions by up to a second; taken at
+    their word they would lead the track away.
+    """
+
+    def __init__(self, least: float) -> None:
+        self._least = least
+        self._mean_square = 0.0
+
+    def copy(self) -> Doubt:
+        """Return another one that goes on from here by itself."""
+        other = Doubt(self._least)
+        other._mean_square = self._mean_square
+        return other
+
+    def std(self, surprise: float) -> float:
+        """Take the latest surprise and return the standard deviation to use for it."""
+        self._mean_square += 0.02 * (surprise * surprise - self._mean_square)
+        return max(self._least, 2.0 * math.sqrt(self._mean_square))
+
+
+def _fault(message: Any) -> str | None:
+    """Return why a sample cannot be a road vehicle's, or None."""
+    for name in message.__struct_fields__:
+        value = getattr(message, name)
+        for number in value if type(value) is tuple else (value,):
+            if type(number) is not float:
+                continue
+            if not math.isfinite(number):
+                return "not_finite"
+            if abs(number) > _LIMITS.get(name, math.inf):
+                return "implausible"
+    return None

@@ -1,0 +1,300 @@
+"""A car's motion from samples in the order of their stamps: pure and causal."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix, HeadingSample, SpeedSample, VehicleInfo, VehicleState
+from foretwin.contracts.frames import GeoPoint, base_from_sensor
+from foretwin.telemetry.estimator.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
+from foretwin.telemetry.estimator.local_place import LocalPlace
+from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
+from foretwin.telemetry.estimator.measured import Measured
+from foretwin.telemetry.estimator.motion_corrections import STANDING_MPS, MotionCorrections
+from foretwin.telemetry.estimator.position_gate import PositionGate
+from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
+
+_WANDER_M = 0.5
+_WHITE_SHARE = 0.1
+"""Of the stated error of a receiver that wanders: what changes from fix to fix."""
+_UNKNOWN_PLACE_M = 1000.0
+_CREEPING_MPS = 1.0
+
+
+class MotionTrack:
+    """Takes samples one by one and says where base_link is, and how it moves.
+
+    Positions whose source states no standard deviation, or only positions of at most 5 cm, are
+    passed through unchanged at their own stamp; rougher ones, and those with other sensors beside
+    them, are fused. `skipped` counts refused input by reason.
+    """
+
+    def __init__(
+        self,
+        info: VehicleInfo,
+        *,
+        wheelbase_m: float = 2.7,
+        steering_ratio: float = 15.0,
+        steering_offset_rad: float = 0.0,
+    ) -> None:
+        """`steering_ratio` is steering wheel over tyre; the offset is added at the tyre."""
+        self._info = info
+        self._wheelbase_m = wheelbase_m
+        self._lever = info.body_from_antenna_m or (0.0, 0.0, 0.0)
+        self._gate = PositionGate()
+        self._measured = Measured(
+            steering_ratio=steering_ratio, steering_offset_rad=steering_offset_rad,
+            skipped=self._gate.skipped,
+        )  # fmt: skip
+        self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
+        self._aid = MapAid()
+        self._place: LocalPlace | None = None
+        self._start_ns = 0
+        self._filter: KinematicFilter | None = None
+        self._filter_stamp_ns = 0
+        self._fix: GnssFix | None = None
+        self._shifts = 0
+        self._standing = False
+
+    @property
+    def skipped(self) -> Counter[str]:
+        """How many samples were refused, by reason."""
+        return self._gate.skipped
+
+    def copy(self) -> MotionTrack:
+        """Return another track that goes on from here by itself."""
+        other = object.__new__(MotionTrack)
+        other.__dict__.update(self.__dict__)
+        other._gate = self._gate.copy()
+        other._measured = self._measured.copy(skipped=other._gate.skipped)
+        other._corrections = self._corrections.copy(other._measured)
+        other._aid = self._aid.copy()
+        if self._filter is not None:
+            other._filter = self._filter.copy()
+        return other
+
+    def take(self, channel: str, message: Any) -> bool:
+        """Take a sample; returns whether it was believed. Channels without motion are ignored."""
+        if channel == "gnss":
+            return self._position(message)
+        if channel == "map":
+            return self._road(message)
+        if not self._measured.take(channel, message):
+            return False
+        self._motion(message)
+        return True
+
+    @property
+    def fix(self) -> GnssFix | None:
+        """The last position that was believed."""
+        return self._fix
+
+    @property
+    def started(self) -> bool:
+        """Whether there is a state to speak of between positions: a place and a heading."""
+        return self._filter is not None
+
+    # Samples beside positions.
+
+    def _motion(self, message: Any) -> None:
+        filter_ = self._advance(message.stamp_ns)
+        if isinstance(message, SpeedSample):
+            self._standing = abs(message.speed_mps) < STANDING_MPS
+        self._corrections.watch(message, standing=self._standing)
+        if filter_ is not None:
+            self._corrections.correct(filter_, message, convergence_rad=self._convergence_rad)
+        elif isinstance(message, HeadingSample):
+            local_yaw = message.yaw_rad + self._convergence_rad
+            self._start(message.stamp_ns, local_yaw, yaw_std_rad=0.02)
+
+    def _road(self, line: RoadLine) -> bool:
+        """Take a map's line where positions say of themselves how far they can be off."""
+        filter_, fix, place = self._filter, self._fix, self._place
+        if filter_ is None or fix is None or place is None or fix.std_m is None:
+            return False
+        std = fix.std_m if self._wanders else 0.0
+        return self._aid.take(filter_, place, line, receiver_std_m=std)
+
+    # Positions.
+
+    def _position(self, fix: GnssFix) -> bool:
+        if not self._gate.plausible(fix):
+            return False
+        if self._place is None:
+            self._place = LocalPlace.around(fix.position)
+            self._start_ns = fix.stamp_ns
+        xy = self._place.xy_m(fix.position)
+        time_s = (fix.stamp_ns - self._start_ns) * 1e-9
+        recent = self._gate.recent
+        held = bool(recent) and bool(np.array_equal(recent[-1].xy_m, xy))
+        if (
+            held
+            and self._measured.fresh("speed_mps", fix.stamp_ns)
+            and abs(self._measured.speed_mps) > 0.5
+        ):
+            self.skipped["gnss_repeated"] += 1  # a slow receiver's last answer, sent once more
+            return False
+        lever = self._lever[:2]
+        filter_ = self._advance(fix.stamp_ns)
+        expected = recent[-1].xy_m if recent else None
+        if filter_ is not None:
+            expected = filter_.sensor_xy(lever)
+            late_s = max(0.0, (self._filter_stamp_ns - fix.stamp_ns) * 1e-9)
+            course = filter_.mean[YAW]
+            xy = xy + filter_.mean[SPEED] * late_s * np.array([math.cos(course), math.sin(course)])
+        verdict = self._gate.judge(time_s, xy, expected)
+        if verdict == "skip":
+            return False
+        if verdict == "relocate" and not self._place.reaches(xy):
+            # What went before was wrong, or another place: begin anew, with a frame of this one.
+            self._place = LocalPlace.around(fix.position)
+            self._gate.restart(time_s, np.zeros(2))
+            filter_ = self._filter = None
+        self._fix = fix
+        self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
+        std = self._gate.std_m(fix)
+        if filter_ is None:
+            self._start_from_course(fix.stamp_ns, std)
+        else:
+            self._correct(filter_, xy, std, relocate=verdict == "relocate")
+        return True
+
+    def _correct(self, filter_: KinematicFilter, xy: Array, std: float, *, relocate: bool) -> None:
+        lever = self._lever[:2]
+        wander, white = self._wanders, std
+        if wander:
+            filter_.expect_wander(std)
+            white = _WHITE_SHARE * std
+        if relocate:
+            self._move(filter_, xy, std)
+            return
+        away_m, spread_m = filter_.position_surprise(xy, white, lever, wander=wander)
+        if away_m > max(1.0, 8.0 * spread_m):
+            self._shifts += 1
+            if wander and self._shifts < 3:
+                self.skipped["gnss_outlier"] += 1
+                return
+            self._move(filter_, xy, std)
+            if self._shifts >= 3:
+                self._turn_to_course(filter_)
+            return
+        self._shifts, yaw_before = 0, filter_.mean[YAW]
+        wheels = self._measured.fresh("speed_mps", self._filter_stamp_ns)
+        if abs(filter_.mean[SPEED]) < _CREEPING_MPS and not wander:
+            filter_.drift_sideways(xy, std, lever)
+        hold = wheels and self._standing
+        filter_.correct_position(xy, white, lever, wander=wander, hold_yaw=hold)
+        filter_.limit_turn(yaw_before, moved_m=self._gate.last_step_m)
+        if wander:
+            self._aid.watch(filter_, receiver_std_m=std)
+        if not wheels:
+            self._standing = filter_.mean[SPEED] < 0.5 and self._gate.standing(std)
+            if self._standing:
+                filter_.stand()
+        if self._standing:
+            filter_.mean[YAW] = yaw_before
+        elif not filter_.may_reverse and not self._measured.fresh("yaw_rad", self._filter_stamp_ns):
+            course = self._gate.course(1.0 + 5.0 * std, within_s=3.0)
+            if course is not None and abs(math.remainder(course - yaw_before, math.tau)) > 1.75:
+                self._turn_to_course(filter_)
+
+    def _move(self, filter_: KinematicFilter, xy: Array, std: float) -> None:
+        filter_.move_position(xy, std, self._lever[:2])
+        if self._wanders:
+            filter_.forget_wander()
+
+    @property
+    def _wanders(self) -> bool:
+        """Whether the receiver itself says that it is rough: then its error wanders slowly."""
+        return self._fix is not None and (self._fix.std_m or 0.0) >= _WANDER_M
+
+    def _turn_to_course(self, filter_: KinematicFilter) -> None:
+        course = self._gate.course(1.0, within_s=3.0)
+        if course is not None:
+            self._start(self._filter_stamp_ns, course, yaw_std_rad=0.3)
+        self._shifts = 0
+
+    def _start_from_course(self, stamp_ns: int, std: float) -> None:
+        course = self._gate.course(max(1.0, 5.0 * std))
+        if course is None or (
+            self._measured.fresh("speed_mps", stamp_ns) and abs(self._measured.speed_mps) < 0.3
+        ):
+            return
+        if self._measured.fresh("speed_mps", stamp_ns) and self._measured.speed_mps < -0.1:
+            course += math.pi
+        self._start(stamp_ns, course, yaw_std_rad=0.15)
+
+    def _start(self, stamp_ns: int, yaw_rad: float, *, yaw_std_rad: float) -> None:
+        if not self._gate.recent:
+            return
+        measured, at = self._measured.fresh("speed_mps", stamp_ns), self._gate.recent[-1].xy_m
+        xy = base_from_sensor(at, yaw_rad, self._lever)
+        self._filter = KinematicFilter(
+            xy_m=xy, yaw_rad=yaw_rad, yaw_std_rad=yaw_std_rad,
+            speed_mps=self._measured.speed_mps if measured else self._gate.speed_mps(),
+        )  # fmt: skip
+        self._corrections.begin(self._filter)
+        self._filter_stamp_ns = stamp_ns
+        if self._wanders:
+            assert self._fix is not None
+            std = self._gate.std_m(self._fix)
+            self._filter.doubt_position(_UNKNOWN_PLACE_M)
+            self._filter.expect_wander(std)
+            self._filter.correct_position(at, _WHITE_SHARE * std, self._lever[:2], wander=True)
+
+    def _advance(self, stamp_ns: int) -> KinematicFilter | None:
+        if self._filter is not None and stamp_ns > self._filter_stamp_ns:
+            # After a long silence the motion is unknown: two seconds of it are enough.
+            self._filter.predict(min((stamp_ns - self._filter_stamp_ns) * 1e-9, 2.0))
+            self._filter_stamp_ns = stamp_ns
+        return self._filter
+
+    @property
+    def _convergence_rad(self) -> float:
+        return 0.0 if self._place is None else self._place.convergence_rad
+
+    # What comes out.
+
+    def _position_out(self, fix: GnssFix | None) -> GeoPoint:
+        assert self._place is not None
+        if self._filter is None:
+            assert self._fix is not None
+            return self._fix.position
+        if fix is not None and self._gate.at_its_word(fix, alone=not self._measured.anything):
+            if not any(self._lever):
+                return fix.position
+            xy = base_from_sensor(self._gate.recent[-1].xy_m, self._filter.mean[YAW], self._lever)
+        else:
+            xy = self._filter.mean[:2]
+        return self._place.position(xy)
+
+    def state(self, stamp_ns: int, *, fix: GnssFix | None = None) -> VehicleState:
+        """Return the state at `stamp_ns`, at or after all samples taken.
+
+        `fix` is the believed position of this very stamp, None between positions. Raises
+        ValueError before there is any position.
+        """
+        if self._fix is None:
+            raise ValueError("no position has come yet: there is no state")
+        self._advance(stamp_ns)
+        position = self._position_out(fix)
+        if self._filter is None:
+            return unmoved_state(
+                self._measured, vehicle_id=self._info.vehicle_id, stamp_ns=stamp_ns,
+                position=position, position_std_m=self._fix.std_m,
+            )  # fmt: skip
+        return moving_state(
+            self._filter, self._measured, vehicle_id=self._info.vehicle_id, stamp_ns=stamp_ns,
+            position=position, convergence_rad=self._convergence_rad,
+            wheelbase_m=self._wheelbase_m, standing=self._standing, map_shift_m=self._aid.shift_m,
+        )  # fmt: skip
+
+    @property
+    def gyro_bias_radps(self) -> float:
+        """The gyro's bias as learnt so far; 0 before the heading is known."""
+        return 0.0 if self._filter is None else float(self._filter.mean[GYRO_BIAS])

@@ -1,0 +1,192 @@
+"""Which positions may be believed: one decision per fix, from what came before it alone."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import GnssFix
+
+MAX_SPEED_MPS = 70.0
+"""A position that asks for more than this is no motion of a road vehicle."""
+_UNKNOWN_STD_M = 0.01
+"""Of positions that state none, until they turn out worse."""
+_ROUGH_M = 0.3
+_JUMP_CONFIRM_S = 1.0
+_CLOCK_LEAP_S = 10.0
+_HISTORY_S = 6.0
+_STANDING_FIXES = 4
+_MOST_ACCEL_MPS2 = 4.0
+_STANDING_MPS = 0.06
+
+Verdict = Literal["use", "relocate", "skip"]
+
+
+class Placed(NamedTuple):
+    """A believed fix: seconds since the first one and metres (2,) in the local frame."""
+
+    time_s: float
+    xy_m: Array
+
+
+class PositionGate:
+    """Sorts fixes into those to use, those that move the whole track, and those to skip.
+
+    `skipped` counts what was refused by reason. `recent` holds the believed fixes of some seconds.
+    """
+
+    def __init__(self) -> None:
+        self.skipped: Counter[str] = Counter()
+        self.recent: deque[Placed] = deque()
+        self._last_stamp_ns: int | None = None
+        self._leap_stamp_ns: int | None = None
+        self._elsewhere: list[Placed] = []
+        self.roughness_m = 0.0
+        """How far fixes lie, on average, off any motion with up to 4 m/s² through the last two."""
+
+    def copy(self) -> PositionGate:
+        """Return another gate that goes on from here by itself."""
+        other = object.__new__(PositionGate)
+        other.__dict__.update(self.__dict__)
+        other.skipped, other.recent = self.skipped.copy(), self.recent.copy()
+        other._elsewhere = self._elsewhere.copy()
+        return other
+
+    def plausible(self, fix: GnssFix) -> bool:
+        """Return whether the fix is a position on Earth with a stamp after the last one's."""
+        lat, lon = fix.position.lat_deg, fix.position.lon_deg
+        if not (math.isfinite(lat) and math.isfinite(lon)):
+            return self._refuse("gnss_not_finite")
+        if lat == 0.0 and lon == 0.0:
+            return self._refuse("gnss_zero")
+        if abs(lat) > 90.0 or abs(lon) > 180.0:
+            return self._refuse("gnss_off_earth")
+        if self._last_stamp_ns is not None:
+            if fix.stamp_ns <= self._last_stamp_ns:
+                return self._refuse("gnss_time_backwards")
+            if fix.stamp_ns - self._last_stamp_ns > _CLOCK_LEAP_S * 1e9:
+                # One wild stamp must not make all later ones look late: wait for a second.
+                leap, self._leap_stamp_ns = self._leap_stamp_ns, fix.stamp_ns
+                if leap is None or not 0 < fix.stamp_ns - leap <= _CLOCK_LEAP_S * 1e9:
+                    return self._refuse("gnss_time_leap")
+        self._last_stamp_ns = fix.stamp_ns
+        self._leap_stamp_ns = None
+        return True
+
+    def _refuse(self, reason: str) -> bool:
+        self.skipped[reason] += 1
+        return False
+
+    def judge(self, time_s: float, xy_m: Array, expected_xy_m: Array | None) -> Verdict:
+        """Decide on a plausible fix at `xy_m` (2,), where the filter expected `expected_xy_m`.
+
+        A jump is skipped until fixes have agreed with one another for a second; then the track
+        is relocated there.
+        """
+        if expected_xy_m is not None and self.recent:
+            last = self.recent[-1]
+            elapsed = max(time_s - last.time_s, 0.02)
+            # Where the filter is astray, a fix that follows from the last one is still no jump.
+            away = min(_distance(xy_m, expected_xy_m), _distance(xy_m, last.xy_m))
+            if away > MAX_SPEED_MPS * elapsed:
+                return self._judge_jump(Placed(time_s, xy_m))
+        self._elsewhere.clear()
+        self._remember(Placed(time_s, xy_m))
+        return "use"
+
+    def _judge_jump(self, fix: Placed) -> Verdict:
+        if self._elsewhere:
+            last = self._elsewhere[-1]
+            elapsed = max(fix.time_s - last.time_s, 0.02)
+            if _distance(fix.xy_m, last.xy_m) > MAX_SPEED_MPS * elapsed:
+                self._elsewhere.clear()
+        self._elsewhere.append(fix)
+        if fix.time_s - self._elsewhere[0].time_s < _JUMP_CONFIRM_S - 1e-6:
+            self.skipped["gnss_jump"] += 1
+            return "skip"
+        self.recent.clear()
+        for earlier in self._elsewhere:
+            self._remember(earlier)
+        self._elsewhere.clear()
+        return "relocate"
+
+    def restart(self, time_s: float, xy_m: Array) -> None:
+        """Forget all fixes but this one: the local frame is another."""
+        self.recent.clear()
+        self._elsewhere.clear()
+        self._remember(Placed(time_s, xy_m))
+
+    def _remember(self, fix: Placed) -> None:
+        if len(self.recent) >= 2:
+            last, before = self.recent[-1], self.recent[-2]
+            step_s, step_before_s = fix.time_s - last.time_s, last.time_s - before.time_s
+            if step_before_s > 0.0:
+                straight = last.xy_m + (last.xy_m - before.xy_m) * (step_s / step_before_s)
+                allowed = 0.5 * _MOST_ACCEL_MPS2 * step_s * (step_s + step_before_s)
+                excess = min(max(0.0, _distance(fix.xy_m, straight) - allowed), 20.0)
+                self.roughness_m += 0.05 * (excess - self.roughness_m)
+        self.recent.append(fix)
+        while fix.time_s - self.recent[0].time_s > _HISTORY_S:
+            self.recent.popleft()
+
+    @property
+    def rough(self) -> bool:
+        """Whether fixes have turned out too rough to be taken at their word."""
+        return self.roughness_m > _ROUGH_M
+
+    def std_m(self, fix: GnssFix) -> float:
+        """Return the standard deviation that a fix states, or what its like turned out to have."""
+        if fix.std_m is not None and math.isfinite(fix.std_m):
+            return min(max(fix.std_m, 1e-3), 1e4)
+        return self.roughness_m if self.rough else _UNKNOWN_STD_M
+
+    def at_its_word(self, fix: GnssFix, *, alone: bool) -> bool:
+        """Whether a fix is passed on unchanged; `alone` where nothing else tells of the motion."""
+        if fix.std_m is None:
+            return not self.rough
+        return fix.std_m <= 0.05 and alone
+
+    def standing(self, std_m: float) -> bool:
+        """Return whether the last fixes show nothing but jitter of `std_m` about one point."""
+        if len(self.recent) < _STANDING_FIXES:
+            return False
+        last = [self.recent[-k] for k in range(1, _STANDING_FIXES + 1)]
+        span_s = last[0].time_s - last[-1].time_s
+        points = np.array([fix.xy_m for fix in last])
+        spread = np.hypot(*(points - points.mean(axis=0)).T).max()
+        return bool(spread < _STANDING_MPS * span_s + 1.5 * std_m)
+
+    def course(self, min_distance_m: float, *, within_s: float = _HISTORY_S) -> float | None:
+        """Return the direction of the latest stretch of `min_distance_m`, None if too short."""
+        if not self.recent:
+            return None
+        now = self.recent[-1]
+        for fix in reversed(self.recent):
+            if now.time_s - fix.time_s > within_s:
+                return None
+            if _distance(now.xy_m, fix.xy_m) >= min_distance_m:
+                dx, dy = now.xy_m - fix.xy_m
+                return math.atan2(dy, dx)
+        return None
+
+    @property
+    def last_step_m(self) -> float:
+        """How far the last two believed fixes lie apart."""
+        if len(self.recent) < 2:
+            return 0.0
+        return _distance(self.recent[-1].xy_m, self.recent[-2].xy_m)
+
+    def speed_mps(self) -> float:
+        """Return the speed between the last two believed fixes, 0 before there are two."""
+        if len(self.recent) < 2:
+            return 0.0
+        last, before = self.recent[-1], self.recent[-2]
+        return _distance(last.xy_m, before.xy_m) / max(last.time_s - before.time_s, 0.02)
+
+
+def _distance(a: Array, b: Array) -> float:
+    return math.hypot(a[0] - b[0], a[1] - b[1])

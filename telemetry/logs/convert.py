@@ -1,0 +1,148 @@
+"""Turning a recorded drive of any kind into an MCAP file, a bag, or a CSV with its declaration."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Literal, get_args
+
+import msgspec
+
+from foretwin.telemetry.logs import Log, LogError, open_log
+
+Target = Literal["mcap", "ros2", "ros1", "csv"]
+TARGETS: tuple[Target, ...] = get_args(Target)
+_BY_SUFFIX: dict[str, Target] = {".mcap": "mcap", ".bag": "ros1", ".csv": "csv", "": "ros2"}
+
+
+class ConvertReport(msgspec.Struct, frozen=True, kw_only=True):
+    """What was written: samples by channel; and what was refused or left out, by reason."""
+
+    counts: dict[str, int]
+    skipped: dict[str, int]
+
+
+def target_of(path: Path) -> Target:
+    """Return the kind of file that a name asks for; raises LogError for an unknown suffix."""
+    kind = _BY_SUFFIX.get(path.suffix.lower())
+    if kind is None:
+        raise LogError(
+            f"{path}: unknown suffix {path.suffix!r}; .mcap, .bag (ROS 1), .csv, or none for the"
+            f" folder of a ROS 2 bag"
+        )
+    return kind
+
+
+def convert(
+    source: Path,
+    target: Path,
+    *,
+    declaration: Path | None = None,
+    to: Target | None = None,
+) -> ConvertReport:
+    """Write the log at `source` to `target`, complete or not at all.
+
+    `to` is the kind of target, else its suffix tells; `declaration` is that of a CSV at `source`.
+    The declaration of a CSV written is `TARGET.toml`. Raises what `telemetry.logs.open_log` raises,
+    LogError where no sample is valid or the target is the source or an existing folder, and OSError
+    where `target` cannot be written.
+    """
+    source, target = Path(source), Path(target)
+    kind = target_of(target) if to is None else to
+    log = open_log(source, declaration=declaration)
+    if target.exists() and target.samefile(source):
+        raise LogError(f"{target}: is the log itself; name another target")
+    if kind == "ros2" and target.exists():
+        raise LogError(f"{target}: exists; name a folder that does not")
+    counts, left_out = _WRITERS[kind](source, log, target)
+    return ConvertReport(counts=dict(counts), skipped=dict(left_out + log.skipped))
+
+
+def _check(source: Path, log: Log, counts: Counter[str]) -> None:
+    if not counts:
+        told = ", ".join(f"{count} x {reason}" for reason, count in log.skipped.items())
+        raise LogError(f"{source}: holds no valid sample ({told or 'it is empty'})")
+
+
+@contextlib.contextmanager
+def _partial(target: Path) -> Iterator[Path]:
+    """Give the path to write to, which takes the target's place unless something is raised."""
+    partial = target.with_name(target.name + ".partial")
+    try:
+        yield partial
+        partial.replace(target)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+
+
+def _to_mcap(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
+    from foretwin.telemetry.logs.write_mcap import create
+
+    with _partial(target) as partial:
+        with create(partial, info=log.info) as writer:
+            for channel, message in log.samples():
+                writer.add(channel, message)
+        if writer.error is not None:
+            raise writer.error
+        _check(source, log, writer.counts)
+    return writer.counts, Counter()
+
+
+def _to_ros1(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
+    with _partial(target) as partial:
+        partial.unlink(missing_ok=True)
+        counts = _to_bag(source, log, partial, ros1=True)
+    return counts, Counter()
+
+
+def _to_ros2(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
+    # The folder's name is in the names of its files: it must be right from the beginning.
+    around = target.with_name(target.name + ".partial")
+    shutil.rmtree(around, ignore_errors=True)
+    try:
+        around.mkdir()
+        counts = _to_bag(source, log, around / target.name, ros1=False)
+        (around / target.name).replace(target)
+    finally:
+        shutil.rmtree(around, ignore_errors=True)
+    return counts, Counter()
+
+
+def _to_bag(source: Path, log: Log, path: Path, *, ros1: bool) -> Counter[str]:
+    from foretwin.telemetry.logs.write_bag import BagWriter
+
+    writer = BagWriter(path, ros1=ros1, info=log.info)
+    try:
+        for channel, message in log.samples():
+            writer.add(channel, message)
+        _check(source, log, writer.counts)
+    except BaseException:
+        writer.abort()
+        raise
+    writer.close()
+    return writer.counts
+
+
+def _to_csv(source: Path, log: Log, target: Path) -> tuple[Counter[str], Counter[str]]:
+    from foretwin.telemetry.logs.write_csv import write_csv
+
+    toml = target.with_name(target.name + ".toml")
+    with _partial(toml) as declaration, _partial(target) as table:
+        try:
+            counts, left_out = write_csv(log.samples, log.info, table, declaration)
+        except LogError:
+            _check(source, log, Counter(channel for channel, _ in log.samples()))
+            raise
+    return counts, left_out
+
+
+_WRITERS: dict[Target, Callable[[Path, Log, Path], tuple[Counter[str], Counter[str]]]] = {
+    "mcap": _to_mcap,
+    "ros1": _to_ros1,
+    "ros2": _to_ros2,
+    "csv": _to_csv,
+}

@@ -1,0 +1,220 @@
+"""Writing a drive to one MCAP file: profile ros2, CDR, `ros2msg` schemas, CRCs in every chunk.
+
+Log time and publish time are both the message's own stamp. Metadata `foretwin.vehicle_info` holds
+VehicleInfo, `foretwin.frame` the origin of the local frame named "map", as JSON.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+import msgspec
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.ros_messages.parts import schema_text
+from foretwin.telemetry.ros_messages.table import messages_from
+
+FORMAT_METADATA = "foretwin.format"
+INFO_METADATA = "foretwin.vehicle_info"
+FRAME_METADATA = "foretwin.frame"
+LIBRARY = "foretwin"
+CHUNK_BYTES = 256 * 1024
+"""Small, so that a killed recorder loses little."""
+
+
+class RawFile(Protocol):
+    """What is needed of an unbuffered file, such as io.FileIO."""
+
+    def write(self, data: bytes | memoryview, /) -> int | None:
+        """Write some of the bytes and return how many."""
+
+    def tell(self) -> int:
+        """Return the position."""
+
+    def seek(self, offset: int, /) -> int:
+        """Go to a position."""
+
+    def truncate(self, size: int, /) -> int:
+        """Cut the file."""
+
+    def close(self) -> None:
+        """Close the file."""
+
+
+class _Whole:
+    """Writes everything or raises; no buffer, so that an error belongs to the call that made it.
+
+    No io.RawIOBase, since the mcap writer would put a buffer around one.
+    """
+
+    def __init__(self, raw: RawFile) -> None:
+        self._raw = raw
+
+    def write(self, data: bytes) -> int:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._raw.write(rest) or 0 :]
+        return len(data)
+
+    def tell(self) -> int:
+        return self._raw.tell()
+
+    def flush(self) -> None:
+        """Nothing waits here."""
+
+
+class DriveWriter:
+    """Writes messages of a drive; a context manager that finishes the file.
+
+    After an OSError (such as a full disk) the file is cut back to its last complete chunk and ended
+    there, without the index, which readers rebuild; later messages are refused with the same error.
+    """
+
+    def __init__(self, raw: RawFile, *, info: drive.VehicleInfo | None = None) -> None:
+        self.counts: Counter[str] = Counter()
+        """Messages accepted, by channel."""
+        self.error: OSError | None = None
+        self._raw = raw
+        self._stream = _Whole(raw)
+        self._frame: LocalFrame | None = None
+        self._ids: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._whole_bytes = 0
+        self._finished = False
+        self._writer = Writer(
+            self._stream,  # type: ignore[arg-type]
+            chunk_size=CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            enable_crcs=True,
+        )
+        with self._guarded():
+            self._writer.start(profile="ros2", library=LIBRARY)
+            self._writer.add_metadata(FORMAT_METADATA, {"version": "1"})
+        if info is not None:
+            self.set_info(info)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.finish()
+
+    def set_info(self, info: drive.VehicleInfo) -> None:
+        """Write what is known of the vehicle; a later call counts."""
+        with self._guarded():
+            self._writer.add_metadata(INFO_METADATA, {"json": msgspec.json.encode(info).decode()})
+
+    def add(self, channel: str, message: msgspec.Struct) -> None:
+        """Write one message.
+
+        Raises OSError where the file cannot grow, and ValueError for what
+        `foretwin.telemetry.ros_messages.table.messages_from` refuses.
+        """
+        parts = messages_from(channel, message, self._frame_for(message))
+        stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
+        with self._guarded():
+            for topic, kind, data in parts:
+                self._writer.add_message(
+                    channel_id=self._channel_id(topic, kind),
+                    log_time=stamp_ns,
+                    publish_time=stamp_ns,
+                    data=data,
+                    sequence=self.counts[channel] & 0xFFFFFFFF,
+                )
+        self.counts[channel] += 1
+
+    def flush(self) -> None:
+        """End the chunk in progress, so that what was added so far survives a kill."""
+        with self._guarded():
+            self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def finish(self) -> None:
+        """End the file and close it; never raises: what went wrong stands in `error`."""
+        if self._finished:
+            return
+        if self.error is None:
+            with contextlib.suppress(OSError), self._guarded():
+                self._writer.finish()  # type: ignore[no-untyped-call]
+        self._finished = True
+        with contextlib.suppress(OSError):
+            self._raw.close()
+
+    @contextlib.contextmanager
+    def _guarded(self) -> Iterator[None]:
+        if self.error is not None:
+            raise self.error
+        if self._finished:
+            raise ValueError("the file is finished")
+        try:
+            yield
+            self._whole_bytes = self._raw.tell()
+        except OSError as error:
+            self.error = error
+            self._end_after_last_chunk()
+            raise
+
+    def _end_after_last_chunk(self) -> None:
+        """Cut off the broken record and end the file, so that it can still be read."""
+        empty_crc, no_summary = bytes(4), bytes(20)
+        end = bytes([Opcode.DATA_END]) + (4).to_bytes(8, "little") + empty_crc
+        footer = bytes([Opcode.FOOTER]) + (20).to_bytes(8, "little") + no_summary
+        with contextlib.suppress(OSError):
+            self._raw.truncate(self._whole_bytes)
+            self._raw.seek(self._whole_bytes)
+            self._stream.write(end + footer + MCAP0_MAGIC)
+
+    def _frame_for(self, message: msgspec.Struct) -> LocalFrame | None:
+        """Return the local frame, whose origin is the first position that comes along."""
+        if self._frame is None and (origin := position_of(message)) is not None:
+            self._frame = LocalFrame(origin)
+            with self._guarded():
+                self._writer.add_metadata(
+                    FRAME_METADATA, {"id": "map", "json": msgspec.json.encode(self._frame).decode()}
+                )
+        return self._frame
+
+    def _channel_id(self, topic: str, kind: str) -> int:
+        if topic not in self._ids:
+            if kind not in self._schemas:
+                self._schemas[kind] = self._writer.register_schema(
+                    name=kind, encoding="ros2msg", data=schema_text(kind).encode()
+                )
+            self._ids[topic] = self._writer.register_channel(
+                topic=topic, message_encoding="cdr", schema_id=self._schemas[kind]
+            )
+        return self._ids[topic]
+
+
+def position_of(message: msgspec.Struct) -> GeoPoint | None:
+    """Return the first position in a message that lies on Earth, None where there is none."""
+    if isinstance(message, drive.PlannedTrajectory) and len(message.lat_deg):
+        candidate = GeoPoint(float(message.lat_deg[0]), float(message.lon_deg[0]))
+    elif isinstance(message, drive.GnssFix | drive.VehicleState):
+        candidate = message.position
+    else:
+        return None
+    try:
+        return candidate.validate()
+    except ValueError:
+        return None
+
+
+def create(path: Path, *, info: drive.VehicleInfo | None = None) -> DriveWriter:
+    """Create a file to write to; raises OSError where that is impossible."""
+    raw = io.FileIO(os.fspath(path), "w")
+    return DriveWriter(raw, info=info)

@@ -1,0 +1,1 @@
+"""The vehicle's processes: replay of a drive, and the recorder."""

@@ -1,0 +1,245 @@
+"""The recorder process: what the vehicle sends, and the state estimated from it, to one MCAP file.
+
+`python -m foretwin.telemetry.processes.recorder --setup FILE` (`RecorderSetup`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, ZenohBus
+from foretwin.contracts.codec import SchemaMismatch
+from foretwin.contracts.drive import InfoRequest
+from foretwin.contracts.keys import TELEMETRY_CHANNELS, alive_key
+from foretwin.contracts.setup import RecorderSetup
+from foretwin.contracts.simulation import Event
+from foretwin.telemetry.logs.write_mcap import create
+from foretwin.telemetry.processes.recording import SOURCE, Recording
+from foretwin.telemetry.processes.vehicle_process import ORCHESTRATOR
+from foretwin.telemetry.processes.vehicle_process import main as process_main
+from foretwin.telemetry.ros_messages.parts import typestore
+
+DEPTH = 20_000
+"""Messages that may wait: more than a minute of a car at 300 messages a second."""
+_WAIT_S = 0.1
+_GATHER_S = 0.05
+"""Messages are taken in portions: waking up for each of them costs more than writing it."""
+_NICENESS = 10
+_AT_ONCE = 500
+_FLUSH_EVERY_S = 1.0
+_ASK_EVERY_S = 1.0
+_GRACE_S = 1.0
+"""How long the orchestrator may be out of sight before it counts as gone."""
+_LAST_WORDS_S = 0.5
+"""How long messages are still taken after the end of the run; in lock step as long as some come."""
+
+log = logging.getLogger("foretwin.telemetry.processes.recorder")
+
+
+class RecorderProcess:
+    """Carries messages from the bus to a Recording; `step` works a moment, `run` until the end."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        bus: Bus,
+        run_id: str,
+        process_id: str,
+        vehicle_id: str,
+        lossless: bool,
+        mono_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._recording = recording
+        self._bus = bus
+        self._run_id = run_id
+        self._vehicle_id = vehicle_id
+        self._mono_s = mono_s
+        self._lossless = lossless
+        self._messages = Mailbox(DEPTH, when_full="block" if lossless else "drop_oldest")
+        # Apart, so that a flood of samples never drops the end of the run.
+        self._control = Mailbox(64)
+        self._stop = False
+        self._lost_s: float | None = None
+        self._told_lost = 0
+        self._unreadable = 0
+        self._lost = 0
+        self._next_seq: dict[str, int] = {}
+        self._asked_s: float | None = None
+        self._informed = False
+        self._flushed_s = mono_s()
+        self._stamp_ns = 0
+        for channel in (*TELEMETRY_CHANNELS, "state"):
+            bus.subscribe(channel, self._messages, vehicle=vehicle_id)
+        bus.subscribe("run_end", self._control, run=run_id)
+        bus.watch_alive(alive_key(run=run_id, process=ORCHESTRATOR), self._control)
+        self._publish(recording.started())
+        bus.declare_alive(alive_key(run=run_id, process=process_id))
+
+    def stop(self) -> None:
+        """Let `run` finish the file and return; safe in a signal handler."""
+        self._stop = True
+
+    def run(self) -> None:
+        """Record until the run ends, the orchestrator is gone, or `stop` was called."""
+        parent = os.getppid()
+        while self.step() and os.getppid() == parent:
+            if not self._lossless:
+                time.sleep(_GATHER_S)
+        self.finish()
+
+    def step(self) -> bool:
+        """Take what waits, or wait a moment; return False when it is time to finish."""
+        self._take_messages(self._messages.take(_WAIT_S))
+        while (item := self._control.take()) is not None:
+            self._take_control(item)
+        now_s = self._mono_s()
+        self._ask_for_info(now_s)
+        if now_s - self._flushed_s >= _FLUSH_EVERY_S:
+            self._flushed_s = now_s
+            self._publish(self._recording.flush())
+            self._tell_of_losses()
+        gone = self._lost_s is not None and now_s - self._lost_s > _GRACE_S
+        if gone:
+            log.warning("the orchestrator is gone")
+        return not (self._stop or gone)
+
+    def finish(self) -> None:
+        """Write what still waits or is on its way, and end the file.
+
+        Live for half a second at most; in lock step nothing may be missing.
+        """
+        until_s = self._mono_s() + _LAST_WORDS_S
+        while self._lossless or self._mono_s() < until_s:
+            item = self._messages.take_last(_WAIT_S)
+            if item is None:
+                break
+            self._take_messages(item)
+        left = len(self._messages)
+        self._messages.close()
+        self._tell_of_losses(at_the_end=True)
+        self._publish(self._recording.finish())
+        log.info(
+            "recorded %s; unwritten %d, refused %s, missing %d, dropped %d, unreadable %d, left %d",
+            dict(self._recording.counts),
+            self._recording.unwritten,
+            dict(self._recording.refused),
+            self._lost,
+            self._messages.dropped,
+            self._unreadable,
+            left,
+        )
+
+    def _take_messages(self, item: Any | None) -> None:
+        """Write `item` and what waits behind it, a portion at most."""
+        for _ in range(_AT_ONCE):
+            if item is None:
+                return
+            self._write(item)
+            item = self._messages.take()
+        if item is not None:
+            self._write(item)
+
+    def _write(self, item: Received) -> None:
+        try:
+            seq, _, message = item.envelope()
+        except SchemaMismatch as problem:
+            self._unreadable += 1
+            log.warning("%s", problem)
+            return
+        self._lost += max(0, seq - self._next_seq.get(item.key, seq))
+        self._next_seq[item.key] = seq + 1
+        self._stamp_ns = message.stamp_ns
+        self._publish(self._recording.add(item.channel, message))
+
+    def _take_control(self, item: Any) -> None:
+        match item:
+            case Received(channel="run_end"):
+                log.info("the run is over")
+                self._stop = True
+            case Alive(up=True):
+                self._lost_s = None
+            case Alive():
+                self._lost_s = self._mono_s()
+            case Reply(channel="info", message=info) if info is not None:
+                self._informed = True
+                self._publish(self._recording.set_info(info))
+
+    def _ask_for_info(self, now_s: float) -> None:
+        """Ask until the vehicle answers; the recording goes on without."""
+        if self._informed or (self._asked_s is not None and now_s - self._asked_s < _ASK_EVERY_S):
+            return
+        self._asked_s = now_s
+        self._bus.request(
+            "info", InfoRequest(), self._control, timeout_s=_ASK_EVERY_S, vehicle=self._vehicle_id
+        )
+
+    def _tell_of_losses(self, *, at_the_end: bool = False) -> None:
+        # Gaps in the sequence count what the mailbox dropped, and what the bus lost before it.
+        # On a busy machine more are lost every second: told when there are twice as many.
+        enough = self._told_lost if at_the_end else 2 * self._told_lost
+        if self._lost > enough:
+            self._told_lost = self._lost
+            text = (
+                f"{self._lost} messages are missing in the recording so far"
+                f" ({self._messages.dropped} dropped since the disk is slow, the rest by the bus)"
+            )
+            log.warning(text)
+            event = Event(stamp_ns=self._stamp_ns, level="warning", source=SOURCE, text=text)
+            self._publish([event])
+
+    def _publish(self, events: list[Event]) -> None:
+        for event in events:
+            self._bus.publish("event", event, run=self._run_id)
+
+
+def record(setup: RecorderSetup) -> None:
+    """Record until the run ends; blocks, and owns SIGTERM.
+
+    Raises foretwin.contracts.bus.BusUnreachable where no router answers at the start.
+    """
+    typestore()  # Costs a third of a second: before the first message, not at it.
+    with ZenohBus(setup.bus) as bus:
+        path = Path(setup.file)
+        process = RecorderProcess(
+            Recording(lambda: create(path), name=path.name),
+            bus=bus,
+            run_id=setup.run_id,
+            process_id=setup.process_id,
+            vehicle_id=setup.vehicle_id,
+            lossless=setup.bus.lossless,
+        )
+
+        def leave(_signal: int, _frame: FrameType | None) -> None:
+            process.stop()
+
+        signal.signal(signal.SIGTERM, leave)
+        _give_way()
+        process.run()
+
+
+def _give_way() -> None:
+    """Let this thread, which writes for later, give way to who is waited for.
+
+    Not the bus's threads: a message that they do not fetch in time is lost.
+    """
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+
+
+if __name__ == "__main__":
+    sys.exit(
+        process_main(
+            sys.argv[1:], RecorderSetup, record, program="foretwin.telemetry.processes.recorder"
+        )
+    )

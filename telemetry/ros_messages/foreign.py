@@ -1,0 +1,207 @@
+"""What messages of other programs' types mean: the channel each feeds, and how it is read.
+
+Units and axes are as ROS says (REP-103, REP-105, REP-145): degrees on WGS84 of the antenna, m/s,
+rad, body axes forward, left, up. Orientations are not read, since their zero is not certain, but
+for poses in `map` where its place on Earth is known; without that, nothing in `map` is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import msgspec
+
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.ros_messages.commands import (
+    command_from_ackermann,
+    command_from_control,
+    state_from_odometry,
+)
+from foretwin.telemetry.ros_messages.motion import plan_from_trajectory
+from foretwin.telemetry.ros_messages.objects import users_from_detected, users_from_predicted
+from foretwin.telemetry.ros_messages.parts import stamp_ns_of
+from foretwin.telemetry.ros_messages.status import (
+    gear_from_ros,
+    indicator_from_ros,
+    mode_from_ros,
+    signals_from_ros,
+)
+
+NO_FIX = "receiver without fix"
+
+Messages = tuple[msgspec.Struct, ...]
+
+
+class UnusableError(ValueError):
+    """A message that is in order but says nothing of use; the text is why, for counting."""
+
+
+class Foreign(NamedTuple):
+    """How messages of one type are read.
+
+    Of the types and topics of one `stream` one is taken; a status has three streams, which
+    `status.StatusJoiner` joins. `read` takes the message, its stamp and the frame of
+    `map`, None where unknown, returns samples of `channels` and raises UnusableError.
+    """
+
+    stream: str
+    channels: tuple[str, ...]
+    read: Callable[[Any, int, LocalFrame | None], Messages]
+
+
+def stamp_of(ros: Any) -> int:
+    """Return the stamp that a message carries, 0 where it carries none."""
+    if hasattr(ros, "header"):
+        return stamp_ns_of(ros.header.stamp)
+    return stamp_ns_of(ros.stamp) if hasattr(ros, "stamp") else 0
+
+
+def _fix(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+    if ros.status.status < 0:
+        raise UnusableError(NO_FIX)
+    known = ros.position_covariance_type != 0
+    variance = max(float(ros.position_covariance[0] + ros.position_covariance[4]) / 2.0, 0.0)
+    # NavSatFix: "NaN if no altitude is available".
+    alt_m = ros.altitude if ros.altitude == ros.altitude else 0.0
+    return (
+        drive.GnssFix(
+            stamp_ns=stamp_ns,
+            position=GeoPoint(ros.latitude, ros.longitude, alt_m),
+            std_m=variance**0.5 if known else None,
+        ),
+    )
+
+
+def _imu(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+    if ros.angular_velocity_covariance[0] == -1 or ros.linear_acceleration_covariance[0] == -1:
+        raise UnusableError("imu without values")
+    accel, rate = ros.linear_acceleration, ros.angular_velocity
+    return (
+        drive.ImuSample(
+            stamp_ns=stamp_ns,
+            accel_mps2=(accel.x, accel.y, accel.z),
+            rate_radps=(rate.x, rate.y, rate.z),
+        ),
+    )
+
+
+def _pose(ros: Any, stamp_ns: int, frame: LocalFrame | None) -> Messages:
+    try:
+        state = state_from_odometry(
+            ros, _placed("odometry", frame), vehicle_id="", stamp_ns=stamp_ns
+        )
+    except UnusableError:
+        raise
+    except ValueError:
+        raise UnusableError("odometry in another frame than map") from None
+    return (
+        drive.GnssFix(stamp_ns=stamp_ns, position=state.position, std_m=state.position_std_m),
+        drive.HeadingSample(
+            stamp_ns=stamp_ns, yaw_rad=state.yaw_rad, yaw_rate_radps=state.yaw_rate_radps
+        ),
+    )
+
+
+def _speed_by(forward_mps: Callable[[Any], float]) -> Foreign:
+    def read(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+        return (drive.SpeedSample(stamp_ns=stamp_ns, speed_mps=float(forward_mps(ros))),)
+
+    return Foreign("speed", ("speed",), read)
+
+
+def _steering(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+    angle = float(ros.steering_tire_angle)
+    return (drive.SteeringSample(stamp_ns=stamp_ns, tire_angle_rad=angle),)
+
+
+def _control(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+    return (command_from_control(ros, stamp_ns=stamp_ns),)
+
+
+def _ackermann(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+    return (command_from_ackermann(ros, stamp_ns=stamp_ns),)
+
+
+def _plan(ros: Any, _stamp_ns: int, frame: LocalFrame | None) -> Messages:
+    return (plan_from_trajectory(ros, _placed("plan", frame)),)
+
+
+def _placed(what: str, frame: LocalFrame | None) -> LocalFrame:
+    if frame is None:
+        raise UnusableError(f"{what} in a frame whose origin is not known")
+    return frame
+
+
+def _users_by(convert: Callable[..., drive.RoadUsers]) -> Foreign:
+    def read(ros: Any, stamp_ns: int, frame: LocalFrame | None) -> Messages:
+        placed = _placed("objects", frame)
+        try:
+            return (convert(ros, placed, stamp_ns=stamp_ns),)
+        except ValueError:
+            raise UnusableError("objects in the car's own frame") from None
+
+    return Foreign("objects", ("objects",), read)
+
+
+def _status(name: str, convert: Callable[..., drive.VehicleStatus]) -> Foreign:
+    return Foreign(
+        f"status/{name}",
+        ("status",),
+        lambda ros, stamp_ns, _: (convert(ros, stamp_ns=stamp_ns),),
+    )
+
+
+_VELOCITY = _speed_by(lambda ros: ros.longitudinal_velocity)
+_STEERING = Foreign("steering", ("steering",), _steering)
+_CONTROL = Foreign("control", ("control",), _control)
+_PLAN = Foreign("plan", ("plan",), _plan)
+
+FOREIGN: dict[str, Foreign] = {
+    "sensor_msgs/msg/NavSatFix": Foreign("gnss", ("gnss",), _fix),
+    "sensor_msgs/msg/Imu": Foreign("imu", ("imu",), _imu),
+    "autoware_vehicle_msgs/msg/VelocityReport": _VELOCITY,
+    "autoware_auto_vehicle_msgs/msg/VelocityReport": _VELOCITY,
+    "geometry_msgs/msg/TwistStamped": _speed_by(lambda ros: ros.twist.linear.x),
+    "geometry_msgs/msg/TwistWithCovarianceStamped": _speed_by(lambda ros: ros.twist.twist.linear.x),
+    "nav_msgs/msg/Odometry": _speed_by(lambda ros: ros.twist.twist.linear.x),
+    "autoware_vehicle_msgs/msg/SteeringReport": _STEERING,
+    "autoware_auto_vehicle_msgs/msg/SteeringReport": _STEERING,
+    "autoware_control_msgs/msg/Control": _CONTROL,
+    "autoware_auto_control_msgs/msg/AckermannControlCommand": _CONTROL,
+    "ackermann_msgs/msg/AckermannDriveStamped": Foreign("control", ("control",), _ackermann),
+    "autoware_planning_msgs/msg/Trajectory": _PLAN,
+    "autoware_auto_planning_msgs/msg/Trajectory": _PLAN,
+    "autoware_vehicle_msgs/msg/ControlModeReport": _status("mode", mode_from_ros),
+    "autoware_vehicle_msgs/msg/GearReport": _status("gear", gear_from_ros),
+    "autoware_vehicle_msgs/msg/TurnIndicatorsReport": _status("indicator", indicator_from_ros),
+    # Predicted before detected: they have identities, and lie in `map`.
+    "autoware_perception_msgs/msg/PredictedObjects": _users_by(users_from_predicted),
+    "autoware_perception_msgs/msg/DetectedObjects": _users_by(users_from_detected),
+    "autoware_perception_msgs/msg/TrafficLightGroupArray": Foreign(
+        "signals", ("signals",), lambda ros, stamp_ns, _: signals_from_ros(ros, stamp_ns=stamp_ns)
+    ),
+}
+"""Types that are read, by full name; earlier ones win within a stream."""
+
+POSE = Foreign("gnss", ("gnss", "heading"), _pose)
+"""How an Odometry of base_link in `map` stands in for a receiver, where that frame is placed."""
+
+_CHANNELS: dict[type[msgspec.Struct], str] = {
+    drive.GnssFix: "gnss",
+    drive.ImuSample: "imu",
+    drive.SpeedSample: "speed",
+    drive.HeadingSample: "heading",
+    drive.SteeringSample: "steering",
+    drive.ControlCommand: "control",
+    drive.PlannedTrajectory: "plan",
+    drive.VehicleStatus: "status",
+    drive.RoadUsers: "objects",
+    drive.SignalState: "signals",
+}
+
+
+def channel_of(message: msgspec.Struct) -> str:
+    """Return the channel of what a `Foreign` has read."""
+    return _CHANNELS[type(message)]

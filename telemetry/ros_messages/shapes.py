@@ -1,0 +1,85 @@
+"""Kind, size and identity of road users as Autoware's classification, shape and UUID."""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any
+
+import numpy as np
+
+from foretwin.contracts import drive
+from foretwin.telemetry.ros_messages.parts import ros_type, vector_from, within_float32
+
+_KIND_BY_LABEL: dict[int, drive.RoadUserKind] = {
+    1: "car", 2: "lorry", 3: "bus", 4: "lorry", 5: "motorcycle", 6: "bicycle", 7: "pedestrian",
+}  # fmt: skip
+"""ObjectClassification.label; the rest is unknown."""
+_PASSABLE = (10, 11)
+"""OVER_DRIVABLE, UNDER_DRIVABLE."""
+_LABEL_BY_KIND = {
+    # Autoware knows no vans and no trams: what plans around a tram must leave a bus's room.
+    "car": 1, "van": 1, "lorry": 2, "bus": 3, "tram": 3, "motorcycle": 5, "bicycle": 6,
+    "pedestrian": 7, "unknown": 0,
+}  # fmt: skip
+_HEIGHT_M = {"van": 2.5, "lorry": 3.5, "bus": 3.2, "tram": 3.6, "pedestrian": 1.8, "bicycle": 1.8}
+_OTHER_HEIGHT_M = 1.6
+_BOX, _CYLINDER, _POLYGON = 0, 1, 2
+_IDS = uuid.UUID("6f2d1c1e-2f0a-5c39-9d5b-1f5f0c7a3b11")
+"""Namespace of the UUIDs of ids that are none."""
+
+
+def is_passable(classes: Any) -> bool:
+    """Tell whether one may drive over or under what is classified so."""
+    return _label(classes) in _PASSABLE
+
+
+def kind_of(classes: Any) -> drive.RoadUserKind:
+    """Return the kind of an array of ObjectClassification."""
+    return _KIND_BY_LABEL.get(_label(classes), "unknown")
+
+
+def _label(classes: Any) -> int:
+    return int(max(classes, key=lambda one: one.probability).label) if len(classes) else 0
+
+
+def size_m(shape: Any) -> tuple[float, float]:
+    """Return length and width of a Shape in metres."""
+    if shape.type == _POLYGON and len(shape.footprint.points):
+        corners = np.array([(p.x, p.y) for p in shape.footprint.points], dtype=np.float64)
+        extent = np.ptp(corners, axis=0)
+        return float(extent[0]), float(extent[1])
+    width = shape.dimensions.x if shape.type == _CYLINDER else shape.dimensions.y
+    return float(shape.dimensions.x), float(width)
+
+
+def height_m(user: drive.RoadUser) -> float:
+    """Return the height that is usual for a road user's kind."""
+    return _HEIGHT_M.get(user.kind, _OTHER_HEIGHT_M)
+
+
+def classes_from(user: drive.RoadUser) -> list[Any]:
+    """Return the ObjectClassification array of a road user."""
+    classified = ros_type("autoware_perception_msgs/msg/ObjectClassification")
+    return [classified(label=_LABEL_BY_KIND[user.kind], probability=1.0)]
+
+
+def shape_from(user: drive.RoadUser) -> Any:
+    """Return the Shape of a road user: a box."""
+    return ros_type("autoware_perception_msgs/msg/Shape")(
+        type=_BOX,
+        footprint=ros_type("geometry_msgs/msg/Polygon")(points=[]),
+        dimensions=vector_from(
+            within_float32(user.length_m), within_float32(user.width_m), height_m(user)
+        ),
+    )
+
+
+def uuid_from(user_id: str) -> Any:
+    """Return the UUID that `user_id` spells in 32 hexadecimal digits, else one derived from it."""
+    try:
+        found = uuid.UUID(hex=user_id)
+    except ValueError:
+        found = uuid.uuid5(_IDS, user_id)
+    return ros_type("unique_identifier_msgs/msg/UUID")(
+        uuid=np.frombuffer(found.bytes, dtype=np.uint8).copy()
+    )

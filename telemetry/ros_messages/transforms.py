@@ -1,0 +1,59 @@
+"""Transforms between the frames of a car (TFMessage)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import Vector3
+
+
+class TransformTree:
+    """The frames of TFMessages: the last transform of each child to its parent counts."""
+
+    def __init__(self) -> None:
+        self._parents: dict[str, tuple[str, Array]] = {}
+
+    def add(self, ros: Any) -> None:
+        """Take in one TFMessage."""
+        for one in ros.transforms:
+            parent, child = one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")
+            self._parents[child] = (parent, _parent_from_child(one.transform))
+
+    def place_of(self, child: str, *, within: str) -> Vector3 | None:
+        """Return the origin of `child` in the axes of `within`, metres; None where unconnected."""
+        child, within = child.lstrip("/"), within.lstrip("/")
+        to_child, to_within = self._to_root(child), self._to_root(within)
+        if child == within:
+            return (0.0, 0.0, 0.0)
+        shared = next((name for name in to_child if name in to_within), None)
+        if shared is None:
+            return None
+        place = np.linalg.solve(to_within[shared], to_child[shared])[:3, 3]
+        return (float(place[0]), float(place[1]), float(place[2]))
+
+    def _to_root(self, name: str) -> dict[str, Array]:
+        """Return the transforms into each ancestor of a frame, nearest first."""
+        found = {name: np.eye(4)}
+        while name in self._parents:
+            parent, step = self._parents[name]
+            if parent in found:  # a circle: what lies within it has no root
+                break
+            found[parent] = step @ found[name]
+            name = parent
+        return found
+
+
+def _parent_from_child(transform: Any) -> Array:
+    q, at = transform.rotation, transform.translation
+    x, y, z, w = np.array([q.x, q.y, q.z, q.w]) / (np.linalg.norm([q.x, q.y, q.z, q.w]) or 1.0)
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, 3] = (at.x, at.y, at.z)
+    return matrix

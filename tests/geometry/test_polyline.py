@@ -1,0 +1,49 @@
+"""Polylines: offsets keep their distance, cuts keep their length."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foretwin.geometry.polyline import (
+    cut,
+    length,
+    locate,
+    offset,
+    points_at,
+)
+
+
+@given(left=st.floats(-6.0, 6.0), bend=st.floats(-1.0, 1.0))
+def test_an_offset_keeps_its_distance(left, bend):
+    line = np.array([[0.0, 0.0], [30.0, 0.0], [30 + 30 * math.cos(bend), 30 * math.sin(bend)]])
+    shifted = offset(line, left)
+    for at in (1.0, length(shifted) - 1.0):
+        point = points_at(shifted, at)
+        gap = np.hypot(*(point - points_at(line, locate(line, point))))
+        assert gap == pytest.approx(abs(left), abs=1e-6)
+
+
+def test_shifted_pieces_of_one_road_meet_where_directions_beyond_are_given():
+    a, b = np.array([[0.0, 0.0], [20.0, 0.0]]), np.array([[20.0, 0.0], [35.0, 10.0]])
+    along = (b[1] - b[0]) / np.hypot(*(b[1] - b[0]))
+    end = offset(a, 3.0, after=along)[-1]
+    begin = offset(b, 3.0, before=np.array([1.0, 0.0]))[0]
+    np.testing.assert_allclose(end, begin, atol=1e-9)
+
+
+def test_an_offset_to_the_inside_of_a_tight_bend_never_runs_backwards():
+    hook = np.array([[0.0, 0.0], [10.0, 0.0], [10.5, 0.5], [10.0, 1.0], [0.0, 1.0]])
+    shifted = offset(hook, 2.0)
+    assert np.isfinite(shifted).all()
+    assert length(shifted) < length(hook)
+
+
+@given(begin=st.floats(0.0, 40.0), span=st.floats(0.1, 30.0))
+def test_a_cut_has_the_length_asked_for(begin, span):
+    line = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 30.0], [50.0, 30.0]])
+    assert length(cut(line, begin, begin + span)) == pytest.approx(span, abs=1e-6)

@@ -1,0 +1,111 @@
+"""Nominal futures against what was then driven: what a desk collects, and its verdicts."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import RoadUser, RoadUsers, SignalState
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.futures import PathAhead
+from foretwin.orchestrator.agreement.verdict_rows import agreement_lines, judged_row
+from foretwin.orchestrator.agreement.windows import WindowDesk, judge_in
+from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.sim_worker.analysis.agreement.tally import Judged
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.orchestrator.futures_rounds import round_done, straight
+from tests.orchestrator.trip import START_NS, states_along, town_world
+
+VEHICLE = load_vehicle()
+WORLD = town_world("n4")
+FROM_X, Y = -60.0, -1.6
+"""Eastwards on Lime Street West, in the right-hand lane."""
+
+
+def driven(
+    *, others: bool = False, until_s: float = 22.0, std_m: float | None = 0.05
+) -> WindowDesk:
+    """Drive at 5 m/s for 22 s, each second with a round whose nominal future is right."""
+    desk = WindowDesk(VEHICLE, horizon_s=8.0)
+    line = np.array([[FROM_X, Y], [FROM_X + 5.0 * until_s, Y]])
+    path = PathAhead(xy_m=line, speed_limit_mps=np.full(2, 14.0))
+    for number, plain in enumerate(states_along(WORLD.frame, line, speed_mps=5.0)):
+        state = msgspec.structs.replace(plain, position_std_m=std_m)
+        lorry = RoadUser(
+            user_id="lorry", kind="lorry", yaw_rad=0.0, speed_mps=0.0, length_m=10.0, width_m=2.5,
+            position=GeoPoint(state.position.lat_deg + 5e-5, state.position.lon_deg),
+        )  # fmt: skip
+        seen = RoadUsers(stamp_ns=state.stamp_ns, users=(lorry,)) if others else None
+        light = SignalState(stamp_ns=state.stamp_ns, group_id="g", colour="green")
+        desk.take(Surroundings(None, seen, (light,)), state)
+        if number % 10 == 0:
+            ahead = straight((FROM_X + 0.5 * number, Y), speed_mps=5.0)
+            done = round_done(ahead, round_id=number, stamp_ns=state.stamp_ns)
+            desk.take_round(done, path, WORLD)
+    desk.finish()
+    return desk
+
+
+def outcomes(judged: list[Judged]) -> set[str]:
+    return {one.outcome for one in judged}
+
+
+def test_every_second_is_judged_and_recorded() -> None:
+    desk = driven()
+    record = desk.record(START_NS)
+    assert record is not None
+    assert record["windows"] == 14  # of 22 s, those that still have 8 s before them
+    assert sum(record["overall"].values()) == 14
+    rows = [judged_row(one, start_stamp_ns=START_NS) for one in desk.judged]
+    assert [row["drive_time_s"] for row in rows] == pytest.approx(np.arange(14.0))
+    assert {row["intersection_id"] for row in rows} == {"n4"}
+    assert all(row["gap_across_m"] < 0.05 and row["gap_along_m"] < 0.05 for row in rows)
+    assert "clearance" not in rows[0]["observable"]  # nobody told of road users
+    (line, *_) = agreement_lines(record)
+    assert "in 14 windows" in line
+    assert agreement_lines(None) == []
+
+
+def test_who_was_seen_and_what_was_heard_counts_for_reality() -> None:
+    for one in driven(others=True).judged:
+        window = one.window
+        assert one.verdicts.observable[0]
+        assert window.driven_users.poses.shape == (81, 1, 3)
+        assert window.driven_users.size_m.tolist() == [[10.0, 2.5]]
+        # 5e-5 degrees to the north, always beside the car.
+        aside = window.driven_users.poses[:, 0, 1] - window.driven[:, 1]
+        assert aside == pytest.approx(5e-5 * 111_200.0, abs=0.05)
+        assert set(window.heard["g"].colours) == {"green"}
+
+
+def test_positions_too_rough_do_not_say_whether_a_car_left_the_road() -> None:
+    for std_m in (None, 3.0):
+        assert not any(one.verdicts.observable[1] for one in driven(std_m=std_m).judged)
+
+
+def test_a_corrected_world_changes_the_verdict_of_a_recorded_drive() -> None:
+    """The map had a street where, by the corrected one, there is none."""
+    judged = [one for one in driven().judged if one.outcome == "agree_pass"]
+    assert len(judged) >= 5
+    corrected = msgspec.structs.replace(
+        WORLD,
+        road_surface=(),
+        junctions=tuple(msgspec.structs.replace(j, area=None) for j in WORLD.junctions),
+    )
+    again = judge_in(corrected, [one.window for one in judged], VEHICLE)
+    assert outcomes(again) == {"agree_fail"}
+    assert all(one.verdicts.driven[1] for one in again)
+
+
+def test_a_long_drive_keeps_no_more_windows_than_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("foretwin.orchestrator.agreement.windows.MOST_WINDOWS", 8)
+    stamps = [one.window.stamp_ns for one in driven().judged]
+    assert 4 <= len(stamps) < 8
+    assert set(np.diff(stamps)) == {2_000_000_000}
+
+
+def test_a_desk_that_saw_nothing_says_nothing() -> None:
+    desk = WindowDesk(VEHICLE, horizon_s=8.0)
+    assert desk.finish() == []
+    assert desk.record(0) is None

@@ -1,0 +1,84 @@
+"""The doctor: one line per finding, and code 3 where a drive could not run."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+from pathlib import Path
+
+import pytest
+
+from foretwin.orchestrator.commands import doctor
+from foretwin.orchestrator.commands.doctor import Finding, examine
+
+
+def findings() -> dict[str, Finding]:
+    return {finding.what: finding for finding in (check() for check in doctor.CHECKS)}
+
+
+def test_a_machine_that_runs_the_tests_can_drive(capsys: pytest.CaptureFixture[str]) -> None:
+    assert examine() == 0
+    lines = capsys.readouterr().out.splitlines()
+
+    assert len(lines) == len(doctor.CHECKS)
+    assert any(line.startswith("ok") and "Zenoh over loopback" in line for line in lines)
+    assert not any(line.startswith("MISSING") for line in lines)
+
+
+def test_a_missing_library_is_named_with_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = importlib.metadata.version
+
+    def version(name: str) -> str:
+        if name == "osmium":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return known(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", version)
+    monkeypatch.setattr(doctor, "CHECKS", (doctor._packages, doctor._python))
+
+    assert examine() == 3
+    out = capsys.readouterr().out
+    assert out.splitlines()[0] == "MISSING  packages: not installed: osmium; run make setup"
+    assert out.splitlines()[1].startswith("ok")
+
+
+@pytest.mark.parametrize(("cores", "verdict"), [(1, "note"), (2, "ok"), (None, "note")])
+def test_one_core_is_few_but_no_reason_to_stay(
+    cores: int | None, verdict: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+
+    assert doctor._cores().verdict == verdict
+
+
+@pytest.mark.parametrize("folder", [None, "missing", "there"])
+def test_real_data_is_welcome_and_not_needed(
+    folder: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "there").mkdir()
+    monkeypatch.delenv("FORETWIN_DATA", raising=False)
+    if folder:
+        monkeypatch.setenv("FORETWIN_DATA", str(tmp_path / folder))
+
+    assert doctor._data().verdict == ("ok" if folder == "there" else "note")
+
+
+@pytest.mark.parametrize("variable", ["DISPLAY", "WAYLAND_DISPLAY"])
+def test_a_display_is_what_the_environment_says(
+    variable: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert not doctor.has_display()
+    monkeypatch.setenv(variable, ":0")
+    assert doctor.has_display()
+
+
+def test_it_says_whether_a_drive_watches_its_vehicle_here_and_why() -> None:
+    found = findings()["tuning"]
+    assert found.verdict == ("ok" if "report" in found.text.split(":")[0] else "note")
+    assert "processor" in found.text
+    assert "2 workers" in found.text

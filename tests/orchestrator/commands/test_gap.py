@@ -1,0 +1,143 @@
+"""`foretwin gap`: a table, plots, a verdict; and one line for what is no drive."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from foretwin.contracts.drive import GnssFix, SpeedSample, VehicleInfo
+from foretwin.contracts.frames import GeoPoint
+from foretwin.orchestrator.commands.cli import run
+from foretwin.telemetry.logs.write_mcap import create
+from foretwin.telemetry.ros_messages.table import messages_from
+from tests.sim_worker.analysis.gap.test_verdict import END_S, SEED
+from tests.sim_worker.faulty_standin import drive_of
+from tests.telemetry.standin_drive import FRAME
+
+WIDTH = 80
+
+
+def written(file: Path, info: VehicleInfo, samples: Iterable[tuple[str, Any]]) -> Path:
+    with create(file, info=info) as writer:
+        for channel, message in samples:
+            writer.add(channel, message)
+    return file
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drive whose steering sensor sends degrees."""
+    drive = drive_of(SEED, "steering_read_in_degrees", end_s=END_S)
+    return written(tmp_path_factory.mktemp("gap") / "drive.mcap", drive.info, drive.samples)
+
+
+def test_the_verdict_names_degrees_in_json(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["gap", str(recording), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["independent"] is True
+    assert {row["horizon_s"] for row in said["rows"]} == {1.0, 2.0, 4.0, 8.0}
+    assert {row["manoeuvre"] for row in said["rows"]} >= {"straight", "curve", "accelerating"}
+    for row in said["rows"]:
+        assert set(row["rms"]) == set(row["p95"]) == {
+            "position_m", "along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps",
+            "accel_mps2",
+        }  # fmt: skip
+        assert row["rms"]["position_m"] >= row["rms"]["along_m"] >= 0.0
+    first = said["verdicts"][0]
+    assert (first["culprit"], first["cause"]) == ("vehicle", "steering_in_degrees")
+    assert first["evidence"][0]["expected"] == 1.0
+    assert first["since_stamp_ns"] < first["stamp_ns"]
+    assert said["reason"] is None
+
+
+def test_the_table_is_80_columns_wide_and_plots_are_written(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["gap", str(recording), "--vehicle", "bmw_320i", "--out", str(tmp_path / "p")]) == 0
+    said = capsys.readouterr().out
+    assert "real vehicle, steering_in_degrees" in said
+    table = [line for line in said.splitlines() if not line.startswith("wrote ")]
+    assert max(map(len, table)) <= WIDTH
+    assert sum(" s curve" in line for line in table) >= 2
+    for name in ("gap_over_time.png", "gap_by_horizon.png"):
+        assert (tmp_path / "p" / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_commands_it_says_that_nobody_can_be_accused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = drive_of(SEED, end_s=END_S)
+    quiet = (sample for sample in drive.samples if sample[0] != "control")
+    file = written(tmp_path / "quiet.mcap", drive.info, quiet)
+    assert run(["gap", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "commands were not recorded" in said
+    assert "verdict" not in said
+    assert run(["gap", str(file), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["reason"].startswith("commands were not recorded")
+    assert told["rows"]
+    assert told["verdicts"] == []
+
+
+def test_dirt_is_counted_said_and_survived(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """NaN, jumps of 500 m, time that runs back, and a topic that becomes one of another type."""
+    drive = drive_of(SEED, end_s=END_S)
+    north = GeoPoint(FRAME.origin.lat_deg + 0.0045, FRAME.origin.lon_deg)
+    file = tmp_path / "dirty.mcap"
+    with create(file, info=drive.info) as writer:
+        for index, (channel, message) in enumerate(drive.samples):
+            writer.add(channel, message)
+            stamp_ns = message.stamp_ns
+            if index % 500 == 7:
+                writer.add("speed", SpeedSample(stamp_ns=stamp_ns + 1, speed_mps=float("nan")))
+            if index % 900 == 99:
+                writer.add("gnss", GnssFix(stamp_ns=stamp_ns + 3, position=north, std_m=0.02))
+        ((topic, _, data),) = messages_from("speed", SpeedSample(stamp_ns=1, speed_mps=1.0), None)
+        del writer._ids[topic]
+        writer._writer.add_message(
+            channel_id=writer._channel_id(topic, "sensor_msgs/msg/Imu"),
+            log_time=stamp_ns, publish_time=stamp_ns, data=data,
+        )  # fmt: skip
+        early = SpeedSample(stamp_ns=drive.info.start_stamp_ns, speed_mps=3.0)
+        del writer._ids[topic]
+        writer.add("speed", early)
+    assert run(["gap", str(file), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["verdicts"] == []
+    assert said["reason"] == "nothing shows that the car or the model departs"
+    assert said["refused"]["value not finite"] >= 5
+    assert said["refused"]["topic changed its type"] == 1
+    assert sum(count for reason, count in said["refused"].items() if "time" in reason) == 1
+
+
+def test_what_is_no_drive_is_said_in_one_line(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "empty.mcap").touch()
+    (tmp_path / "table.csv").write_text("t,lat,lon\n0,52.5,13.4\n", encoding="utf-8")
+    drive = drive_of(SEED, end_s=END_S)
+    speeds = [sample for sample in drive.samples if sample[0] == "speed"][:100]
+    written(tmp_path / "speeds.mcap", drive.info, speeds)
+    (tmp_path / "file").touch()
+    cases = (
+        ("none.mcap", [str(tmp_path / "none.mcap")]),
+        ("empty.mcap", [str(tmp_path / "empty.mcap")]),
+        ("table.csv", [str(tmp_path / "table.csv")]),
+        ("speeds.mcap", [str(tmp_path / "speeds.mcap")]),
+        ("none.toml", [str(tmp_path / "table.csv"), "--declaration", str(tmp_path / "none.toml")]),
+        ("spaceship", [str(recording), "--vehicle", "spaceship"]),
+        ("file: is no folder", [str(recording), "--out", str(tmp_path / "file")]),
+    )
+    for named, words in cases:
+        assert run(["gap", *words]) == 2
+        (line,) = capsys.readouterr().err.strip().splitlines()
+        assert named in line

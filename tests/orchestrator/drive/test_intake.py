@@ -1,0 +1,148 @@
+"""Where telemetry comes in: every sample is counted, and some give a new state."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.codec import SchemaMismatch, encode
+from foretwin.contracts.drive import DriveEnd, GnssFix, PlannedTrajectory
+from foretwin.contracts.mailbox import Mailbox, Received
+from foretwin.orchestrator.drive.intake import Intake
+from tests.contracts.memory_bus import MemoryBus
+from tests.orchestrator.house import INFO
+from tests.orchestrator.trip import START_NS, states_along, town
+
+STATES = states_along(town().graph.frame, np.array([[0.0, 0.0], [50.0, 0.0]]))
+FIXES = [GnssFix(stamp_ns=s.stamp_ns, position=s.position) for s in STATES]
+
+
+class Telemetry:
+    """A bus with one vehicle on it, and an intake that has taken what it sent."""
+
+    def __init__(self, *, introduced: bool = True) -> None:
+        self.bus, self.mailbox = MemoryBus(), Mailbox(256)
+        for channel in ("gnss", "plan", "end"):
+            self.bus.subscribe(channel, self.mailbox, vehicle="ego")
+        self.intake = Intake(town().vehicle)
+        if introduced:
+            self.intake.take_info(INFO)
+
+    def send(self, *messages: object) -> list[object]:
+        names = {GnssFix: "gnss", PlannedTrajectory: "plan", DriveEnd: "end"}
+        for message in messages:
+            self.bus.publish(names[type(message)], message, vehicle="ego")  # type: ignore[arg-type]
+        taken = []
+        while (item := self.mailbox.take()) is not None:
+            taken.append(self.intake.take(item))  # type: ignore[arg-type]
+        return taken
+
+
+def test_positions_give_states_with_the_time_of_their_receipt() -> None:
+    telemetry = Telemetry()
+    states = telemetry.send(*FIXES)
+
+    assert all(state is not None for state in states)
+    intake = telemetry.intake
+    assert intake.states == intake.counts.received == len(FIXES)
+    assert intake.latest is not None
+    assert intake.latest.state is states[-1]
+    assert intake.latest.receipt_mono_ns > 0
+    assert intake.now_stamp_ns == STATES[-1].stamp_ns
+    assert states[-1].speed_mps == pytest.approx(10.0, abs=0.1)  # type: ignore[attr-defined]
+    assert (intake.start_stamp_ns, intake.first_stamp_ns) == (START_NS, START_NS)
+
+
+def test_before_the_car_has_said_what_it_is_samples_are_counted_alone() -> None:
+    telemetry = Telemetry(introduced=False)
+
+    assert telemetry.send(*FIXES[:3]) == [None, None, None]
+    assert telemetry.intake.counts.received == 3
+    assert telemetry.intake.latest is None
+    assert telemetry.intake.now_stamp_ns == 0
+    telemetry.intake.take_info(INFO)
+    assert telemetry.send(FIXES[3])[0] is not None
+
+
+def test_a_plan_is_kept_and_gives_no_state() -> None:
+    telemetry = Telemetry()
+    one = np.ones(2)
+    plan = PlannedTrajectory(
+        stamp_ns=START_NS, time_from_stamp_s=np.arange(2.0), lat_deg=one, lon_deg=one,
+        yaw_rad=one, speed_mps=one,
+    )  # fmt: skip
+
+    assert telemetry.send(plan) == [None]
+    assert telemetry.intake.plan is not None
+    assert telemetry.intake.plan.stamp_ns == START_NS
+
+
+def test_what_was_refused_is_summed_over_all_who_refuse() -> None:
+    telemetry = Telemetry()
+    telemetry.send(*FIXES[:5], FIXES[0])  # the last one's clock runs backwards
+    foreign = bytearray(encode(FIXES[5]))
+    foreign[4] = 99
+    telemetry.mailbox.put(Received("gnss", "…/gnss", bytes(foreign), GnssFix))
+    with pytest.raises(SchemaMismatch):
+        telemetry.send()
+    telemetry.send(DriveEnd(stamp_ns=START_NS, published={"gnss": 6}, skipped_invalid=3))
+
+    assert telemetry.intake.refused == 1
+    assert telemetry.intake.skipped_invalid == 1 + 1 + 3
+    assert telemetry.intake.counts.received == 6  # the end is no sample
+
+
+def test_an_age_is_never_negative() -> None:
+    telemetry = Telemetry()
+    telemetry.send(*FIXES)
+
+    assert min(telemetry.intake.counts.ages_ms) >= 0.0
+    assert max(telemetry.intake.counts.ages_ms) < 60_000.0
+
+
+def heard(intake: Intake, sample: GnssFix, mono_ns: int) -> list[str]:
+    """Return what is warned of after `sample` came at `mono_ns`."""
+    item = Received("gnss", "…/gnss", encode(sample), GnssFix)
+    item.received_mono_ns = mono_ns
+    intake.take(item)
+    return intake.warnings(mono_ns)
+
+
+def test_a_live_vehicles_clock_is_recorded_and_its_silence_told_once() -> None:
+    intake = Intake(town().vehicle, pace=1.0)
+    intake.take_info(INFO)
+    mono_ns = [1_000_000_000 + fix.stamp_ns - START_NS for fix in FIXES]
+    for fix, at_ns in zip(FIXES, mono_ns, strict=True):
+        assert heard(intake, fix, at_ns) == []
+    heard(intake, FIXES[-1], mono_ns[-1])
+    record = intake.record()
+    assert record["doubled"] == 1
+    assert record["late"] == 0
+    assert record["clock_drift_ppm"] == 0.0
+    assert record["clock_steps_s"] == []
+
+    told = [t for k in range(40) for t in intake.warnings(mono_ns[-1] + k * 50_000_000)]
+    assert told == ["telemetry: gnss is overdue; states go on without"]
+    assert intake.record()["stale"] == {"gnss": 1}
+
+
+def test_a_clock_that_steps_back_is_told_once() -> None:
+    intake = Intake(town().vehicle, pace=1.0)
+    intake.take_info(INFO)
+    said = []
+    for k, fix in enumerate(FIXES):
+        back_ns = 3600 * 10**9 if k >= len(FIXES) // 2 else 0
+        moved = GnssFix(stamp_ns=fix.stamp_ns - back_ns, position=fix.position)
+        said += heard(intake, moved, 1_000_000_000 + fix.stamp_ns - START_NS)
+    assert len([text for text in said if "clock stepped by -3600.000 s" in text]) == 1
+    assert intake.latest is not None
+    assert intake.latest.state.stamp_ns == FIXES[-1].stamp_ns - 3600 * 10**9
+    assert intake.record()["clock_steps_s"] == [-3600.0]
+
+
+def test_in_lock_step_times_of_receipt_mean_nothing() -> None:
+    telemetry = Telemetry()
+    telemetry.send(*FIXES)
+    record = telemetry.intake.record()
+    assert record["clock_offset_ms"] is None
+    assert record["late"] == record["doubled"] == 0

@@ -1,0 +1,249 @@
+"""The live loop: rounds on the grid of the wall clock, late ones missed, nothing waits."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from foretwin.orchestrator.drive import live_loop
+from foretwin.orchestrator.drive.live_loop import LiveLoop
+from foretwin.orchestrator.rounds.pace import Pace
+
+
+class Clock:
+    """Stands in for the module `time`: moves when somebody waits."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+
+class Mailbox:
+    """Items with the second at which each arrives; taking waits, and time passes."""
+
+    def __init__(self, clock: Clock, items: list[tuple[float, str]]) -> None:
+        self._clock = clock
+        self._items = deque(sorted(items))
+
+    def __len__(self) -> int:
+        return sum(at_s <= self._clock.now_s for at_s, _ in self._items)
+
+    def take(self, timeout_s: float) -> str | None:
+        until_s = self._clock.now_s + max(timeout_s, 1e-4)
+        if self._items and self._items[0][0] <= until_s:
+            at_s, item = self._items.popleft()
+            self._clock.now_s = max(self._clock.now_s, at_s)
+            return item
+        self._clock.now_s = until_s
+        return None
+
+
+class Conductor:
+    """Takes states and runs rounds that last `round_s`, beginning at second 100."""
+
+    def __init__(
+        self,
+        clock: Clock,
+        *,
+        states_s: list[float],
+        end_s: float,
+        round_s: float = 0.1,
+        rate_hz: float = 2.0,
+        handling: Callable[[float], None] = lambda _: None,
+        one_of: int = 1,
+        settled_s: float = 0.0,
+    ) -> None:
+        self._clock = clock
+        self._round_s = round_s
+        self._handling = handling
+        self._open_until_s: float | None = None
+        self.plan = SimpleNamespace(config=SimpleNamespace(rate_hz=rate_hz, speed=1.0))
+        self.mailbox = Mailbox(clock, [(100 + s, "state") for s in states_s] + [(100 + end_s, "z")])
+        self.intake = SimpleNamespace(states=0, latest=None, end=None)
+        self._settled_s = settled_s
+        self.tuning = SimpleNamespace(parameters=self)
+        pace = SimpleNamespace(now=Pace(64, one_of))
+        self.rounds = SimpleNamespace(desk=self, drop=self.drop, pace=pace)
+        self.missed_rounds = self.spared_rounds = 0
+        self.started_s: list[float] = []
+        self.dropped_s: list[float] = []
+        self.watched_s: list[float] = []
+        self.changes_made_s: list[float] = []
+
+    @property
+    def open_rounds(self) -> tuple[int, ...]:
+        still = self._open_until_s is not None and self._clock.now_s < self._open_until_s
+        return (len(self.started_s),) if still else ()
+
+    @property
+    def settled(self) -> bool:
+        return self._clock.now_s >= 100.0 + self._settled_s
+
+    def drop(self) -> None:
+        self.dropped_s.append(self._clock.now_s - 100)
+        self._open_until_s = None
+
+    def handle(self, item: str) -> None:
+        self._handling(self._clock.now_s - 100)
+        if item == "state":
+            self.intake.states += 1
+            self.intake.latest = SimpleNamespace(receipt_mono_ns=self._clock.now_s * 1e9)
+        else:
+            self.intake.end = True
+
+    def make_changes(self) -> None:
+        self.changes_made_s.append(self._clock.now_s - 100)
+
+    def watch_telemetry(self, mono_ns: int) -> None:
+        self.watched_s.append(mono_ns * 1e-9 - 100)
+
+    def start_round(self) -> bool:
+        self.started_s.append(self._clock.now_s - 100)
+        self._open_until_s = self._clock.now_s + self._round_s
+        return True
+
+
+@pytest.fixture
+def driven(monkeypatch: pytest.MonkeyPatch) -> Any:
+    def drive(**settings: Any) -> Conductor:
+        clock = Clock()
+        monkeypatch.setattr(live_loop, "time", clock)
+        conductor = Conductor(clock, **settings)
+        loop = LiveLoop(conductor, housekeeping=lambda _: None, stop=lambda: False)  # type: ignore[arg-type]
+        assert loop.run()
+        return conductor
+
+    return drive
+
+
+def every(period_s: float, until_s: float, *, start_s: float = 0.0) -> list[float]:
+    return [start_s + k * period_s for k in range(int((until_s - start_s) / period_s))]
+
+
+def test_rounds_start_on_the_grid(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0)
+
+    assert len(conductor.started_s) == 20
+    for number, started_s in enumerate(conductor.started_s):
+        assert started_s == pytest.approx(0.5 * number, abs=0.021)
+    assert conductor.missed_rounds == 0
+
+
+def test_no_round_starts_while_workers_take_new_parameters(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 5.0), end_s=5.0, settled_s=1.3)
+
+    assert conductor.started_s[0] == pytest.approx(1.3, abs=0.03)
+    assert conductor.started_s[1] == pytest.approx(1.5, abs=0.03)
+
+
+def test_a_round_waits_for_a_fresh_state_but_not_for_long(driven: Any) -> None:
+    often = driven(states_s=every(0.2, 6.0, start_s=0.13), end_s=6.0)
+    for started_s in often.started_s[1:]:
+        since_state_s = (started_s - 0.13) % 0.2
+        assert min(since_state_s, 0.2 - since_state_s) < 1e-3
+
+    seldom = driven(states_s=every(0.8, 6.0, start_s=0.1), end_s=6.0)
+    for number, started_s in enumerate(seldom.started_s[1:], start=1):
+        assert 0.5 * number - 1e-3 <= started_s <= 0.5 * number + 0.251
+
+
+def test_a_late_round_counts_as_missed_and_the_next_is_left_out(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7)
+
+    assert len(conductor.started_s) == 10
+    assert conductor.missed_rounds == 10
+    assert conductor.started_s[:3] == pytest.approx([0.0, 1.0, 2.0], abs=0.03)
+    assert conductor.dropped_s == []
+
+
+def test_a_round_that_never_ends_is_given_up(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 25.0), end_s=25.0, round_s=1e6)
+
+    assert conductor.dropped_s == pytest.approx([10.5, 21.5], abs=0.6)
+    assert len(conductor.started_s) == 3
+    assert conductor.missed_rounds > 40
+
+
+def test_a_machine_that_slept_does_not_catch_up_and_owns_up(driven: Any) -> None:
+    def sleep_once(at_s: float) -> None:
+        if 3.0 <= at_s < 3.02:
+            live_loop.time.now_s += 4.3  # type: ignore[attr-defined]
+
+    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, handling=sleep_once)
+
+    around = [started_s for started_s in conductor.started_s if 2.9 < started_s < 8.1]
+    assert around == pytest.approx([7.3, 7.5, 8.0], abs=0.03)
+    assert conductor.missed_rounds == 8  # those due at 3.5, 4.0 and so on until 7.0
+
+
+def test_no_round_starts_from_a_state_that_is_old(driven: Any) -> None:
+    conductor = driven(states_s=[*every(0.02, 2.0), *every(0.02, 8.0, start_s=6.0)], end_s=8.0)
+
+    assert not [s for s in conductor.started_s if 3.01 < s < 6.0]
+    assert [s for s in conductor.started_s if s >= 6.0]
+
+
+def test_no_round_starts_before_the_first_state(driven: Any) -> None:
+    assert driven(states_s=[], end_s=3.0).started_s == []
+
+
+def test_a_loop_that_is_stopped_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(live_loop, "time", clock)
+    conductor = Conductor(clock, states_s=every(0.02, 10.0), end_s=10.0)
+    kept: list[float] = []
+    loop = LiveLoop(
+        conductor,  # type: ignore[arg-type]
+        housekeeping=kept.append,
+        stop=lambda: clock.now_s > 102.0,
+    )
+
+    assert not loop.run()
+    assert clock.now_s < 102.2
+    assert len(kept) == pytest.approx(20, abs=2)
+
+
+def test_silence_is_looked_into_every_50_ms(driven: Any) -> None:
+    conductor = driven(states_s=[0.0, 0.01, 0.02], end_s=1.0)
+    gaps_s = np.diff([0.02, *conductor.watched_s, 1.0])
+    assert gaps_s.max() < 0.051
+
+
+def test_where_the_machine_is_too_slow_rounds_become_rare_and_are_not_missed(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7, one_of=2)
+
+    assert conductor.started_s == pytest.approx([*range(10)], abs=0.03)
+    assert conductor.missed_rounds == 0
+    assert conductor.spared_rounds == 10
+
+
+def test_something_is_done_each_turn_at_least_every_50_ms(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(live_loop, "time", clock)
+    conductor = Conductor(clock, states_s=[0.0, 0.3], end_s=1.0)
+    turns_s: list[float] = []
+    LiveLoop(
+        conductor,  # type: ignore[arg-type]
+        housekeeping=lambda _: None,
+        stop=lambda: False,
+        each_turn=lambda: turns_s.append(clock.now_s),
+    ).run()
+    assert np.diff([*turns_s, 101.0]).max() < 0.051
+
+
+def test_changes_asked_for_are_looked_at_every_turn(driven: Any) -> None:
+    conductor = driven(states_s=[0.0, 0.3], end_s=1.0)
+    assert np.diff([*conductor.changes_made_s, 1.0]).max() < 0.051
+
+
+def test_changes_are_made_between_rounds_that_follow_one_another(driven: Any) -> None:
+    conductor = driven(states_s=every(0.02, 10.0), end_s=10.0, round_s=0.7)
+    for started_s in conductor.started_s:
+        assert min(abs(made_s - started_s) for made_s in conductor.changes_made_s) < 1e-9

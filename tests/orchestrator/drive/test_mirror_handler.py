@@ -1,0 +1,43 @@
+"""Touches in the mirror: each told once as it begins, all kept."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.orchestrator.drive.mirror_handler import MirrorDesk
+from foretwin.orchestrator.instructions import Tell
+
+HERE = PlaneState(0.0, 0.0, 0.0, 0.0)
+
+
+class Tables:
+    def __init__(self) -> None:
+        self.rows: dict[str, int] = {}
+
+    def add(self, table: str, rows: list[dict[str, Any]]) -> None:
+        self.rows[table] = self.rows.get(table, 0) + len(rows)
+
+
+def sample(at_s: float, *touches: tuple[str, str]) -> MirrorSample:
+    return MirrorSample(
+        stamp_ns=round(at_s * 1e9), world_id=None, real=HERE, twin=HERE, shadow=HERE, ghost=HERE,
+        gap_m=0.0, gap_along_m=0.0, gap_across_m=0.0, gap_yaw_rad=0.0, gap_speed_mps=0.0,
+        since_reset_s=0.0, independent=True, touches=touches,
+    )  # fmt: skip
+
+
+def test_a_touch_is_told_as_it_begins_and_again_only_after_a_while() -> None:
+    tables, told = Tables(), list[Tell]()
+    desk = MirrorDesk(tables, told.append)  # type: ignore[arg-type]
+    for at_s in (1.0, 1.1, 1.2, 2.5, 5.0):
+        desk.take(sample(at_s, ("ego", "van")))
+    desk.take(sample(5.1, ("ego", "van"), ("ego", "world")))
+    assert [tell.text for tell in told] == [
+        "in the mirror, ego and van touch",
+        "in the mirror, ego and van touch",
+        "in the mirror, ego and what stands touch",
+    ]
+    assert desk.touches == 3
+    assert tables.rows == {"mirror": 6, "touches": 7}
+    assert (desk.stamp_ns, desk.independent) == (5_100_000_000, True)

@@ -1,0 +1,205 @@
+"""What a drive needs is read first and checked whole; then, and not before, a folder is made."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.orchestrator.config import ConfigError, DriveConfig
+from foretwin.orchestrator.drive.plan import make_plan, read_inputs
+from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.orchestrator.worlds.opening import open_map
+from foretwin.world_gen.junctions.route_junctions import junctions_on_route
+from tests.orchestrator.trip import NOW, town, town_line, town_plan
+from tests.world_gen.sketch import Sketch
+
+
+def inputs_for(folder: Path, **settings: object) -> object:
+    config = DriveConfig(view="none", out=str(folder / "runs"), **settings)  # type: ignore[arg-type]
+    return read_inputs(config.validate())
+
+
+def test_without_arguments_the_stand_in_car_drives_through_the_drawn_town() -> None:
+    inputs = town()
+
+    assert inputs.map_file == MAP_FILE
+    assert (inputs.route_source, len(inputs.routes)) == ("given", 1)
+    assert inputs.standin is not None
+    assert (inputs.log_file, inputs.info) == (None, None)
+    assert inputs.commands_recorded  # the stand-in publishes its own
+    start = local_from_geo(inputs.drive_frame, inputs.standin.lat_deg[0], inputs.standin.lon_deg[0])
+    assert start == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def test_reading_writes_nothing_and_planning_makes_the_runs_folder(tmp_path: Path) -> None:
+    inputs = inputs_for(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+    plan = make_plan(inputs, NOW)  # type: ignore[arg-type]
+    assert plan.folder.parent == (tmp_path / "runs").resolve()
+    assert plan.run_id.startswith("20300102-030405-")
+    assert {p.name for p in plan.folder.iterdir()} == {"worlds", "results", "processes"}
+    path = json.loads(plan.standin_path_file.read_text())
+    assert set(path) == {"lat_deg", "lon_deg", "speed_mps"}
+
+
+def test_two_runs_of_one_second_have_folders_of_their_own(tmp_path: Path) -> None:
+    one, two = (town_plan(tmp_path) for _ in range(2))
+
+    assert one.folder != two.folder
+
+
+def test_a_bus_of_lock_step_loses_nothing(tmp_path: Path) -> None:
+    assert town_plan(tmp_path, speed=None).bus.lossless
+    assert not town_plan(tmp_path, speed=2.0).bus.lossless
+
+
+def test_without_an_endpoint_a_free_one_is_taken(tmp_path: Path) -> None:
+    config = DriveConfig(view="none", out=str(tmp_path))
+    plan = make_plan(replace(town(), config=config), NOW)
+
+    host, port = plan.bus.endpoint.rsplit(":", 1)
+    assert host == "tcp/127.0.0.1"
+    assert 1024 <= int(port) <= 65535
+    assert town_plan(tmp_path).bus.endpoint == "tcp/127.0.0.1:7447"
+
+
+@pytest.mark.parametrize(("display", "live"), [("", "none"), (":0", "native")])
+def test_view_auto_is_a_window_where_there_is_a_display(
+    display: str, live: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", display)
+
+    assert make_plan(
+        replace(town(), config=DriveConfig(view="auto", out=str(tmp_path))), NOW
+    ).live_view == live  # fmt: skip
+
+
+def gpx(folder: Path, xy: np.ndarray) -> Path:
+    geo = geo_from_local(town().graph.frame, xy)
+    points = "".join(
+        f'<trkpt lat="{lat:.9f}" lon="{lon:.9f}">'
+        f"<time>2030-01-01T00:{k // 60:02d}:{k % 60:02d}Z</time></trkpt>"
+        for k, (lat, lon) in enumerate(geo)
+    )
+    file = folder / "drive.gpx"
+    file.write_text(
+        f'<gpx version="1.1" creator="test" xmlns="http://www.topografix.com/GPX/1/1">'
+        f"<trk><trkseg>{points}</trkseg></trk></gpx>"
+    )
+    return file
+
+
+def test_a_log_gives_the_drives_frame_and_on_request_its_route(tmp_path: Path) -> None:
+    log = gpx(tmp_path, town_line()[::8])
+    settings = {"map": str(MAP_FILE), "log": str(log)}
+    predicted = inputs_for(tmp_path, **settings)
+    followed = inputs_for(tmp_path, route="from-log", **settings)
+
+    assert (predicted.routes, predicted.route_source) == ((), "predicted")  # type: ignore[attr-defined]
+    assert followed.route_source == "from-log"  # type: ignore[attr-defined]
+    (route,) = followed.routes  # type: ignore[attr-defined]
+    names = [e.edge.way_id for e in route.edges]
+    assert set(names) == {e.edge.way_id for e in town().routes[0].edges}
+    assert predicted.standin is None  # type: ignore[attr-defined]
+    assert not predicted.commands_recorded  # type: ignore[attr-defined]
+    assert predicted.info.vehicle_id  # type: ignore[attr-defined]
+
+
+def test_a_log_driven_elsewhere_is_refused_with_both_places(tmp_path: Path) -> None:
+    log = gpx(tmp_path, town_line()[::8] + 20_000.0)
+
+    with pytest.raises(UserError, match="holds no position of the drive") as refused:
+        inputs_for(tmp_path, map=str(MAP_FILE), log=str(log))
+    assert str(log) in str(refused.value)
+    assert "the map covers" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_stretch_without_positions_is_refused(tmp_path: Path) -> None:
+    log = gpx(tmp_path, town_line()[::8])
+
+    with pytest.raises(UserError, match="--start"):
+        inputs_for(tmp_path, map=str(MAP_FILE), log=str(log), start_s=5000.0)
+
+
+def test_an_unknown_planner_is_refused_before_the_map_is_read(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="pure_pursuit_idm"):
+        inputs_for(tmp_path, planner="telepathy", map=str(tmp_path / "none.osm"), route="x.gpx")
+
+
+def _yard(folder: Path) -> tuple[str, str]:
+    """Write a street with a driveway to a yard and a lane to a field, and a route into the yard."""
+    sketch = Sketch()
+    for node, x_m, y_m in (
+        (1, -200.0, 0.0), (2, 0.0, 0.0), (3, 200.0, 0.0), (4, 0.0, 60.0), (5, 100.0, 0.0),
+        (6, 100.0, -60.0),
+    ):  # fmt: skip
+        sketch.node(node, x_m, y_m)
+    sketch.road(10, [1, 2, 5, 3], "Street")
+    sketch.road(11, [2, 4], highway="service")
+    sketch.road(12, [5, 6], highway="service")
+    (folder / "yard.osm").write_text(sketch.xml(), encoding="utf-8")
+    line = geo_from_local(sketch.frame, [[-180.0, 0.0], [0.0, 0.0], [0.0, 55.0]]).tolist()  # type: ignore[arg-type]
+    geometry = {"type": "LineString", "coordinates": [[lon, lat] for lat, lon in line]}
+    (folder / "route.geojson").write_text(json.dumps(geometry), encoding="utf-8")
+    return str(folder / "yard.osm"), str(folder / "route.geojson")
+
+
+def test_where_the_route_leaves_the_street_a_driveway_makes_a_junction(tmp_path: Path) -> None:
+    map_file, route = _yard(tmp_path)
+
+    inputs = inputs_for(tmp_path, map=map_file, route=route)
+
+    assert [j.summary.id for j in inputs.junctions] == ["n2"]  # type: ignore[attr-defined]
+    assert {inputs.graph.edges[i].way_id for i in inputs.added_roads} == {11}  # type: ignore[attr-defined]
+
+
+def test_by_choice_every_driveway_makes_a_junction(tmp_path: Path) -> None:
+    map_file, route = _yard(tmp_path)
+
+    inputs = inputs_for(tmp_path, map=map_file, route=route, service_roads=True)
+
+    assert [j.summary.id for j in inputs.junctions] == ["n2", "n5"]  # type: ignore[attr-defined]
+
+
+@pytest.mark.real_data
+def test_of_a_large_map_the_surroundings_of_the_drive_are_read(
+    data_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = {
+        "map": str(data_dir / "osm-badhersfeld" / "badhersfeld.osm.xml.gz"),
+        "route": str(_way_through_badhersfeld(tmp_path)),
+    }
+    whole = inputs_for(tmp_path, **settings)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(
+        "foretwin.orchestrator.drive.plan.open_map", partial(open_map, large_bytes=1)
+    )
+    monkeypatch.setattr("foretwin.orchestrator.drive.plan.CORRIDOR_M", 300.0)
+
+    part = inputs_for(tmp_path, **settings)
+
+    assert len(part.osm.ways) < 0.7 * len(whole.osm.ways)  # type: ignore[attr-defined]
+    passed = [
+        [passage.junction.summary for passage in junctions_on_route(i.junctions, i.routes[0].edges)]  # type: ignore[attr-defined]
+        for i in (whole, part)
+    ]
+    assert len(passed[0]) == 2
+    assert passed[0] == passed[1]
+
+
+def _way_through_badhersfeld(folder: Path) -> Path:
+    line = [[9.7126, 50.8701], [9.7155, 50.8706]]
+    path = folder / "through.geojson"
+    path.write_text(json.dumps({"type": "LineString", "coordinates": line}), encoding="utf-8")
+    return path

@@ -1,0 +1,153 @@
+"""The supervisor: who died, who is started again, and that nothing is left."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace as Namespace
+
+import pytest
+
+from foretwin.contracts.setup import BusSetup, ProcessSetup
+from foretwin.orchestrator.drive.processes import PROCESSES, ProcessRow, row_of
+from foretwin.orchestrator.drive.supervisor import (
+    MAX_RESTARTS,
+    FreshInterpreter,
+    Supervisor,
+    fold_stderr,
+)
+from tests.contracts.bus_sides import DEADLINE_S
+
+
+class FakeChild:
+    def __init__(self) -> None:
+        self.pid = 2**22 + 1  # beyond any real process
+        self.exit_code: int | None = None
+        self.signals: list[int] = []
+
+    def poll(self) -> int | None:
+        return self.exit_code
+
+    def send_signal(self, sig: int) -> None:
+        self.signals.append(sig)
+        if sig in (signal.SIGTERM, signal.SIGKILL):
+            self.exit_code = -sig
+
+    def wait(self, timeout: float | None = None) -> int:
+        return self.exit_code or 0
+
+
+def setup(process_id: str) -> ProcessSetup:
+    return ProcessSetup(
+        run_id="r", process_id=process_id, vehicle_id="ego",
+        bus=BusSetup(endpoint="tcp/127.0.0.1:1"), log_file=os.devnull,
+    )  # fmt: skip
+
+
+def row(name: str) -> ProcessRow:
+    return next(r for r in PROCESSES if r.name == name)
+
+
+def supervised() -> tuple[Supervisor, list[FakeChild]]:
+    children: list[FakeChild] = []
+
+    def launch(*, module: str, setup: ProcessSetup) -> FakeChild:
+        children.append(FakeChild())
+        return children[-1]
+
+    return Supervisor(launch), children
+
+
+def test_a_dead_worker_is_started_again_and_a_dead_viewer_reported() -> None:
+    supervisor, children = supervised()
+    supervisor.start(row("w"), setup("w0"))
+    supervisor.start(row("viewer"), setup("viewer"))
+    children[0].exit_code = -9
+    children[1].exit_code = 1
+    deaths = supervisor.poll(0.0)
+    assert [(d.process_id, d.exit_code, d.restarted) for d in deaths] == [
+        ("w0", -9, True),
+        ("viewer", 1, False),
+    ]
+    assert (len(children), supervisor.restarted) == (3, 1)
+    assert supervisor.poll(0.1) == []
+
+
+def test_who_writes_for_later_gives_way() -> None:
+    nice = {r.name: r.nice for r in PROCESSES}
+    assert nice["w"] == nice["recorder"] == nice["vehicle"] == 0
+    assert nice["viewer"] == nice["tuning"] > 0
+    child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    try:
+        supervisor = Supervisor(lambda *, module, setup: child)
+        supervisor.start(row("viewer"), setup("viewer"))
+        supervisor.let_give_way({"w0"}, 0.0)
+        before = os.getpriority(os.PRIO_PROCESS, child.pid)
+        assert before == os.getpriority(os.PRIO_PROCESS, 0), "it is still waited for"
+        supervisor.let_give_way({"w0", "viewer"}, 0.1)
+        assert os.getpriority(os.PRIO_PROCESS, child.pid) >= nice["viewer"]
+    finally:
+        child.communicate(b"\n")
+
+
+def test_who_watches_the_vehicle_is_started_again_but_not_in_lock_step() -> None:
+    tuning = row("tuning")
+    live, stepped = (Namespace(config=Namespace(lock_step=step)) for step in (False, True))
+    assert row_of(tuning, live).when_dead == "restart"  # type: ignore[arg-type]
+    assert row_of(tuning, stepped).when_dead == "report"  # type: ignore[arg-type]
+    others = [one for one in PROCESSES if one.name != "tuning"]
+    assert [row_of(one, stepped) for one in others] == others  # type: ignore[arg-type]
+
+
+def test_a_worker_that_keeps_dying_is_given_up() -> None:
+    supervisor, children = supervised()
+    supervisor.start(row("w"), setup("w0"))
+    for attempt in range(MAX_RESTARTS + 1):
+        children[-1].exit_code = 1
+        (death,) = supervisor.poll(float(attempt))
+    assert not death.restarted
+    assert supervisor.running() == []
+
+
+def test_fresh_interpreters_end_and_leave_nothing(tmp_path: Path) -> None:
+    stubborn = tmp_path / "package" / "stubborn.py"
+    stubborn.parent.mkdir()
+    stubborn.write_text(
+        "import signal, sys, time\n"
+        "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "print('up', flush=True)\n"
+        "time.sleep(600)\n"
+    )
+    launch = FreshInterpreter(tmp_path, package="package")
+    supervisor = Supervisor(launch)
+    os.environ["PYTHONPATH"], before = str(tmp_path), os.environ.get("PYTHONPATH")
+    try:
+        supervisor.start(row("w")._replace(module="stubborn"), setup("w0"))
+    finally:
+        if before is None:
+            del os.environ["PYTHONPATH"]
+        else:
+            os.environ["PYTHONPATH"] = before
+    said = tmp_path / "w0.stderr"
+    deadline = time.monotonic() + DEADLINE_S
+    while "up" not in said.read_text() and time.monotonic() < deadline:
+        assert supervisor.running() == ["w0"]
+        time.sleep(0.01)
+    pid = supervisor.pid("w0")
+    assert supervisor.stop(grace_s=0.0, term_s=0.2) == ["w0"]
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+def test_what_a_process_said_last_lands_in_the_log(tmp_path: Path) -> None:
+    (tmp_path / "w0.stderr").write_text("Traceback\n\nKeyError: 3\n")
+    log_file = tmp_path / "log.jsonl"
+    fold_stderr(tmp_path, log_file)
+    lines = [json.loads(line) for line in log_file.read_text().splitlines()]
+    assert [line["text"] for line in lines] == ["Traceback", "KeyError: 3"]
+    assert not list(tmp_path.glob("*.stderr"))

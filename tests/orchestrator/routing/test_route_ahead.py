@@ -1,0 +1,116 @@
+"""The way ahead of a car: which junctions, when, along which path, and at which speed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source
+from foretwin.orchestrator.routing.route import Route
+from foretwin.orchestrator.routing.route_ahead import MIN_PATH_M, WayAhead
+from foretwin.world_gen.roads.road_graph import DirectedEdge
+from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, junctions, road
+from tests.orchestrator.trip import states_along
+
+GRID = grid(5, 4)
+CORNERS = junctions(GRID)
+
+
+def driven(
+    *corners: tuple[float, float], speed_mps: float = 10.0, routes: tuple[Route, ...] = ()
+) -> WayAhead:
+    """The way ahead of a car that has driven along these corners."""
+    way = WayAhead(GRID, CORNERS, routes)
+    for state in states_along(FRAME, drive(list(corners)), speed_mps=speed_mps):
+        way.take_speed(state)
+        way.locate(state)
+    return way
+
+
+def test_junctions_come_in_order_with_distance_and_time() -> None:
+    way = driven((110, 100), (150, 100))
+    ids = [ahead.junction.summary.id for ahead in way.junctions[:2]]
+    near, far = way.junctions[:2]
+
+    assert ids == ["n103", "n104"]
+    assert near.distance_m == pytest.approx(51.0, abs=2.0)
+    assert far.distance_m - near.distance_m == pytest.approx(100.0, abs=1.0)
+    assert 4.0 < near.in_s < 7.0
+    assert far.in_s > near.in_s
+
+
+def test_a_slower_car_is_there_later() -> None:
+    slow, fast = (driven((110, 100), (150, 100), speed_mps=v) for v in (4.0, 12.0))
+
+    assert slow.junctions[0].in_s > fast.junctions[0].in_s
+
+
+def test_off_the_map_nothing_lies_ahead() -> None:
+    way = driven((110, 100), (150, 100))
+    away = states_along(FRAME, drive([(150, 100), (150, 160)]), start_s=4.0)
+    located = [way.locate(state) for state in away]
+
+    assert located[0] is not None
+    assert located[-1] is None
+    assert way.junctions == ()
+
+
+def test_the_path_begins_behind_the_car_and_reaches_past_the_horizon() -> None:
+    path = driven((110, 100), (150, 100)).path(FRAME, speed_mps=10.0, horizon_s=8.0)
+    assert path is not None
+
+    assert path.xy_m[0] == pytest.approx([139.0, 98.5], abs=1.5)  # right of the middle
+    length_m = np.hypot(*np.diff(path.xy_m, axis=0).T).sum()
+    assert length_m > 8.0 * 18.0
+    assert len(path.speed_limit_mps) == len(path.xy_m)
+    assert path.speed_limit_mps == pytest.approx(50 / 3.6)
+
+
+def test_the_same_path_in_another_frame() -> None:
+    way = driven((110, 100), (150, 100))
+    other = LocalFrame(GeoPoint(52.501, 13.403))
+    here = way.path(FRAME, speed_mps=10.0, horizon_s=8.0)
+    there = way.path(other, speed_mps=10.0, horizon_s=8.0)
+    assert here is not None
+    assert there is not None
+
+    back = target_from_source(FRAME, other, there.xy_m, np.zeros(len(there.xy_m)))
+    np.testing.assert_allclose(back.xy_m, here.xy_m, atol=1e-3)
+    assert not np.allclose(there.xy_m, here.xy_m, atol=50.0)
+
+
+def test_no_path_where_the_road_ends() -> None:
+    street = graph_of([road(0, 1, 2, [(0, 0), (100, 0)])])
+    way = WayAhead(street, (), ())
+    for state in states_along(FRAME, drive([(20, 0), (78, 0)])):
+        way.locate(state)
+    assert way.path(FRAME, speed_mps=10.0, horizon_s=8.0) is not None
+    for state in states_along(FRAME, drive([(78, 0), (100 - MIN_PATH_M + 4, 0)]), start_s=5.8):
+        way.locate(state)
+
+    assert way.path(FRAME, speed_mps=10.0, horizon_s=8.0) is None
+
+
+def test_other_turns_are_looked_down_where_the_way_is_predicted() -> None:
+    predicted = driven((110, 100), (150, 100))
+    names = {junction.summary.id for junction in predicted.other_turns}
+    assert "n203" in names
+    assert "n103" not in names
+
+    along_row = Route(tuple(DirectedEdge(GRID.edges[4 + k], False) for k in range(4)), 0.0)
+    given = driven((110, 100), (150, 100), routes=(along_row,))
+    assert given.other_turns == ()
+    assert not given.off_route
+    left = driven((110, 100), (200, 100), (200, 160), routes=(along_row,))
+    assert left.off_route
+    assert left.other_turns != ()
+
+
+def test_the_road_is_named_for_people() -> None:
+    assert driven((110, 100), (150, 100)).road_text == "Row 1 (way 1005)"
+
+
+def test_the_nominal_speed_is_the_cars_own_and_no_more_than_allowed() -> None:
+    assert driven((110, 100), (150, 100), speed_mps=9.0).cruise_speed_mps == pytest.approx(9.0)
+    fast = driven((110, 100), (190, 100), speed_mps=20.0)
+    assert fast.cruise_speed_mps == pytest.approx(20.0)  # it is not slowed down by the limit

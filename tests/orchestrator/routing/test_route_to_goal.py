@@ -1,0 +1,98 @@
+"""From a start to a goal given as poses: over the roads, first as planned; or one line why not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import RoutePose
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
+from foretwin.orchestrator.routing.route import Route, RouteError
+from foretwin.orchestrator.routing.route_to_goal import WayFinder, away_m
+from foretwin.world_gen.roads.road_graph import RoadGraph
+from tests.orchestrator.grid_map import BLOCK_M, FRAME, graph_of, grid, node, road
+
+EAST, NORTH, WEST = 0.0, math.pi / 2.0, math.pi
+TOWN = grid(4, 3)
+
+
+def pose(x_m: float, y_m: float, yaw_rad: float) -> RoutePose:
+    lat, lon = geo_from_local(FRAME, np.array([x_m, y_m])).tolist()
+    return RoutePose(GeoPoint(lat, lon), yaw_rad)
+
+
+def degrees(*points_m: tuple[float, float]) -> np.ndarray:
+    return geo_from_local(FRAME, np.asarray(points_m, dtype=np.float64))
+
+
+def finder(graph: RoadGraph = TOWN) -> WayFinder:
+    return WayFinder(RoadIndex(graph))
+
+
+def names(route: Route) -> list[str]:
+    return [one.edge.name for one in route.edges]
+
+
+def test_the_way_leads_from_start_to_goal_and_is_the_shortest() -> None:
+    found = finder().find(pose(20.0, 2.0, EAST), pose(298.0, 150.0, NORTH), planned_deg=None)
+    assert found.planned_m == 0.0
+    assert found.route.end_m == pytest.approx(5 * BLOCK_M)
+    assert key_of(found.route.edges[0]) == (0, False)
+    assert found.route.edges[-1].edge.name == "Column 3"
+    assert away_m(found.route, np.array([298.0, 150.0])) == pytest.approx(2.0)
+
+
+def test_the_plan_decides_where_it_leads_away_from_the_shortest_way() -> None:
+    # The car turns north at once, where going straight on first would be as short.
+    plan = degrees((20.0, 0.0), (100.0, 0.0), (100.0, 90.0))
+    found = finder().find(pose(20.0, 0.0, EAST), pose(300.0, 150.0, NORTH), planned_deg=plan)
+    assert names(found.route)[:2] == ["Row 0", "Column 1"]
+    assert found.planned_m == pytest.approx(2 * BLOCK_M)
+    assert found.route.edges[-1].edge.name == "Column 3"
+
+
+def test_a_goal_that_the_plan_reaches_ends_the_route() -> None:
+    plan = degrees((20.0, 0.0), (100.0, 0.0), (300.0, 0.0))
+    found = finder().find(pose(20.0, 0.0, EAST), pose(150.0, 0.0, EAST), planned_deg=plan)
+    assert [key_of(one) for one in found.route.edges] == [(0, False), (1, False)]
+
+
+def test_a_plan_that_follows_no_road_is_passed_over() -> None:
+    plan = degrees((5000.0, 5000.0), (5100.0, 5000.0))
+    found = finder().find(pose(20.0, 0.0, EAST), pose(80.0, 0.0, EAST), planned_deg=plan)
+    assert [key_of(one) for one in found.route.edges] == [(0, False)]
+    assert found.planned_m == 0.0
+
+
+def test_a_goal_behind_on_the_same_road_is_come_to_by_driving_round() -> None:
+    found = finder().find(pose(80.0, 0.0, EAST), pose(20.0, 0.0, EAST), planned_deg=None)
+    assert key_of(found.route.edges[0]) == key_of(found.route.edges[-1]) == (0, False)
+    assert len(found.route.edges) > 2
+
+
+@pytest.mark.parametrize(
+    ("goal", "said"),
+    [
+        (pose(50.0, 50.0, EAST), "its goal 52.50045, 13.40074 lies within 30 m of no road"),
+        (pose(150.0, 2.0, NORTH), "lies on no road that leads its way"),
+    ],
+)
+def test_a_goal_on_no_road_is_told_in_one_line(goal: RoutePose, said: str) -> None:
+    with pytest.raises(RouteError) as refused:
+        finder().find(pose(20.0, 0.0, EAST), goal, planned_deg=None)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_goal_against_a_one_way_street_or_on_an_island_is_told() -> None:
+    street = road(0, node(0, 0), node(1, 0), [(0.0, 0.0), (100.0, 0.0)], backward=False)
+    island = road(1, node(0, 9), node(1, 9), [(0.0, 900.0), (100.0, 900.0)])
+    graph = graph_of([street, island])
+    start = pose(10.0, 0.0, EAST)
+    with pytest.raises(RouteError, match="on no road that leads its way"):
+        finder(graph).find(start, pose(50.0, 0.0, WEST), planned_deg=None)
+    with pytest.raises(RouteError, match=r"no road leads from .* to its goal"):
+        finder(graph).find(start, pose(50.0, 900.0, EAST), planned_deg=None)

@@ -1,0 +1,105 @@
+"""The command `world` refuses in one line, naming what is wrong, before anything is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.embedded import MAP_FILE
+from foretwin.world_gen.export.formats import FORMATS
+
+MAP = str(MAP_FILE)
+
+WRONG = [
+    ([], "exactly one of --at"),
+    (["--at", "45,-30", "--all"], "--at and --all"),
+    (["--at", "45"], "LAT,LON"),
+    (["--at", "north,west"], "LAT,LON"),
+    (["--at", "95,-30"], "latitude -90 to 90"),
+    (["--at", "nan,-30"], "LAT,LON"),
+    (["--at", "46,-30"], "nearest intersection"),
+    (["--id", "nowhere"], "nowhere"),
+    (["--id", "n1"], "holds no such intersection"),
+    (["--bbox", "1,2,3"], "W,S,E,N"),
+    (["--bbox", "a,b,c,d"], "W,S,E,N"),
+    (["--bbox", "7,50,8,51"], "outside"),
+    (["--bbox", "-29.996,44.998,-30.004,45.002"], "west must be less than east"),
+    (["--bbox", "179.9,-17.1,-179.9,-16.9"], "antimeridian"),
+    (["--bbox", "-30.004,45.002,-29.996,44.998"], "south must be less than north"),
+    (["--bbox", "-30.004,44.998,-29.996,95"], "latitudes"),
+    (["--bbox", "-30.004,44.998,200,45"], "longitudes"),
+    (["--all", "--format", "stl"], "mjcf, sdf, opendrive, lanelet2, commonroad, geojson, svg, png"),
+    (["--all", "--radius", "5"], "20 to 2000"),
+    (["--all", "--radius", "nan"], "20 to 2000"),
+    (["--all", "--format", "opendrive", "--opendrive-version", "1.9"], "1.8, 1.4"),
+    (["--all", "--format", "sdf", "--simulator", "carla"], "classic, gazebo"),
+    (["--all", "--format", "sdf", "--vehicles", "ego:car"], "twin, shadow, ghost"),
+    (["--all", "--format", "sdf", "--vehicles", "a:twin,a:ghost"], "a name of its own"),
+    (["--all", "--format", "sdf", "--vehicle", "no.toml"], "no.toml"),
+    (["--route", "no.gpx"], "no.gpx"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "named"), WRONG, ids=[" ".join(a) for a, _ in WRONG])
+def test_what_cannot_be_meant_is_named_in_one_line(
+    arguments: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = run(["world", MAP, *arguments, "--out", str(tmp_path / "world")])
+    error = capsys.readouterr().err.strip()
+    assert code == 2, error
+    assert "\n" not in error
+    assert named in error
+
+
+def test_an_output_that_cannot_be_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    for arguments, named in (
+        (["--all", "--out", str(file)], "is a file"),
+        (["--at", "45,-30", "--out", str(tmp_path)], "is a folder"),
+        (["--at", "45,-30", "--out", str(tmp_path / "no" / "w.xml")], "does not exist"),
+        (["--at", "45,-30", "--format", "svg", "--out", str(tmp_path / "w.png")], "ends in .svg"),
+        (["--all", "--out", str(file / "worlds")], "is no folder"),
+    ):
+        assert run(["world", MAP, *arguments]) == 2
+        assert named in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--all", "--out", "new/worlds"], ["--at", "45,-30", "--out", "world.xml"]]
+)
+def test_a_folder_that_cannot_be_written_to_is_named_before_the_map_is_read(
+    arguments: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    assert run(["world", "no.osm", *arguments]) == 2
+    assert "cannot be written to" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_wrong_map_leaves_no_folder_behind(tmp_path: Path) -> None:
+    assert run(["world", "no.osm", "--all", "--out", str(tmp_path / "worlds")]) == 2
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("file_format", ["mjcf", "sdf", "opendrive", "lanelet2", "commonroad",
+                                         "geojson", "svg"])  # fmt: skip
+def test_every_format_names_the_file_that_cannot_be_written(
+    file_format: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Past all checks: a link to nowhere takes no file, whoever writes it.
+    out = tmp_path / f"world{FORMATS[file_format].suffix}"
+    out.symlink_to(tmp_path / "no" / "folder")
+    arguments = ["--at", "45,-30", "--format", file_format, "--out", str(out)]
+    assert run(["world", MAP, *arguments]) == 2
+    error = capsys.readouterr().err.strip()
+    assert out.name in error
+    assert "\n" not in error

@@ -1,0 +1,113 @@
+"""The gap while driving, and of a model that is compared with itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample, VehicleState
+from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.sim_worker.analysis.gap.errors import GapMeter, gap_table
+from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
+from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
+from foretwin.sim_worker.analysis.gap.monitor import GapMonitor
+from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecorder
+from foretwin.telemetry.estimator.estimator import StateEstimator
+from tests.sim_worker.analysis.gap.test_verdict import END_S, SEED
+from tests.sim_worker.faulty_standin import drive_of, model_with
+from tests.telemetry.standin_drive import FRAME
+
+START_NS = 1_767_225_600_000_000_000
+
+
+def test_a_model_compared_with_itself_has_no_gap() -> None:
+    """The "real" motion is the model's own under known commands; its free runs repeat it."""
+    vehicle = model_with(None)
+    count = 300
+    time_s = np.arange(count) * PERIOD_S
+    accel, tire = 0.5 * np.sin(time_s), 0.05 * np.sin(0.9 * time_s)
+    begin = np.zeros((1, 8))
+    begin[0, 3] = 8.0
+    runner = FreeRunner(vehicle)
+    real = runner.run(
+        states=begin, starts=np.array([0]), steps=count - 1, accel_mps2=accel, tire_rad=tire
+    )[0]
+    recorder = MotionRecorder(frame=FRAME)
+    states = []
+    for index, row in enumerate(real):
+        stamp_ns = START_NS + round(time_s[index] * 1e9)
+        lat, lon = geo_from_local(FRAME, row[:2])
+        place = GeoPoint(float(lat), float(lon))
+        recorder.handle("gnss", GnssFix(stamp_ns=stamp_ns, position=place))
+        recorder.handle("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=float(row[3])))
+        force = (0.0, 0.0, 9.81)
+        recorder.handle(
+            "imu",
+            ImuSample(stamp_ns=stamp_ns, accel_mps2=force, rate_radps=(0.0, 0.0, float(row[5]))),
+        )
+        recorder.handle(
+            "control",
+            ControlCommand(
+                stamp_ns=stamp_ns, accel_mps2=float(accel[index]), tire_angle_rad=float(tire[index])
+            ),
+        )
+        states.append(
+            VehicleState(
+                vehicle_id="car", stamp_ns=stamp_ns, position=place, yaw_rad=float(row[2]),
+                speed_mps=float(row[3]), yaw_rate_radps=float(row[5]), accel_mps2=float(row[7]),
+                tire_angle_rad=float(row[6]),
+            )
+        )  # fmt: skip
+    record = recorder.record()
+    motion = motion_on_grid(states, record.stamp_ns, frame=FRAME)
+    samples = GapMeter(runner, vehicle_id="car").samples(
+        record, motion, horizons_s=(1.0, 2.0), from_index=60
+    )
+    assert len(samples) >= 6
+    assert all(sample.independent for sample in samples)
+    for sample in samples:
+        assert math.hypot(sample.along_m, sample.across_m) < 0.03
+        assert abs(sample.yaw_rad) < 0.006
+        assert abs(sample.speed_mps) < 0.02
+    rows = gap_table(samples)
+    assert sum(row.runs for row in rows) == len(samples)
+
+
+@pytest.fixture(scope="module")
+def watched() -> dict[str | None, list[GapSample | GapAlarm | Verdict]]:
+    """What a monitor says of one drive, by the fault of its model."""
+    drive = drive_of(SEED, end_s=END_S)
+    told: dict[str | None, list[GapSample | GapAlarm | Verdict]] = {}
+    for fault in (None, "steering_ratio"):
+        estimator = StateEstimator(drive.info)
+        monitor = GapMonitor(drive.info, model_with(fault), frame=FRAME)
+        told[fault] = []
+        for channel, message in drive.samples:
+            told[fault] += monitor.handle(channel, message)
+            state = estimator.handle(channel, message)
+            if state is not None:
+                told[fault] += monitor.handle("state", state)
+    return told
+
+
+def test_a_monitor_gives_samples_at_each_horizon_and_no_alarm_for_a_fair_model(
+    watched: dict[str | None, list[GapSample | GapAlarm | Verdict]],
+) -> None:
+    samples = [one for one in watched[None] if isinstance(one, GapSample)]
+    assert {sample.horizon_s for sample in samples} == {1.0, 2.0, 4.0, 8.0}
+    short = [sample for sample in samples if sample.horizon_s == 1.0]
+    assert len(short) >= END_S - 3
+    assert max(math.hypot(one.along_m, one.across_m) for one in short) < 0.5
+    assert not [one for one in watched[None] if isinstance(one, GapAlarm | Verdict)]
+
+
+def test_a_wrong_model_raises_an_alarm_and_then_a_verdict(
+    watched: dict[str | None, list[GapSample | GapAlarm | Verdict]],
+) -> None:
+    alarms = [one for one in watched["steering_ratio"] if isinstance(one, GapAlarm)]
+    assert {alarm.quantity for alarm in alarms if alarm.over} & {"across_m", "yaw_rad"}
+    verdicts = [one for one in watched["steering_ratio"] if isinstance(one, Verdict)]
+    assert [verdict.culprit for verdict in verdicts] == ["model"]

@@ -1,0 +1,187 @@
+"""Which of the two is wrong: injected faults are found, and what is right is left alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import ControlCommand, GnssFix, ImuSample, SpeedSample
+from foretwin.contracts.frames import GeoPoint
+from foretwin.sim_worker.analysis.gap.verdict import Judge
+from tests.sim_worker.analysis.gap.judging_faults import (
+    IN_TIME_S,
+    NAMES,
+    culprit_of,
+    drive_with,
+    excited_s,
+    judged,
+    verdicts_of,
+)
+from tests.sim_worker.analysis.gap.real_drives import accused_in
+from tests.sim_worker.driving import altered
+from tests.sim_worker.faulty_standin import CAR_FAULTS, MODEL_FAULTS, drive_of, model_with
+from tests.telemetry.standin_drive import FRAME
+
+SEED, END_S = 2, 12.0
+"""Of the fast tests: one drive simulated once."""
+FOUND = (
+    "steering_read_in_degrees", "steering_commanded_in_degrees", "steering_sign",
+    "offset_steering_sensor", "scaled_gyro", "offset_speed", "steering_ratio", "steering_delay",
+    "friction", "drive_gain",
+)  # fmt: skip
+
+
+def test_a_car_and_a_model_that_agree_are_left_alone() -> None:
+    assert verdicts_of(None, seed=SEED, end_s=END_S) == []
+
+
+@pytest.mark.parametrize("fault", FOUND)
+def test_an_injected_fault_is_found_and_named(fault: str) -> None:
+    (verdict,) = verdicts_of(fault, seed=SEED, end_s=END_S)
+    assert verdict.culprit == culprit_of(fault)
+    assert verdict.cause in NAMES[fault]
+    assert verdict.evidence
+    assert verdict.text
+    assert 0.5 <= verdict.confidence <= 1.0
+    assert excited_s(fault, verdict, seed=SEED, end_s=END_S) <= IN_TIME_S
+
+
+@pytest.mark.parametrize("fault", ["weaker", "gyro"])
+def test_a_fault_that_begins_while_driving_is_dated(fault: str) -> None:
+    """The drive of a sound car goes over into that of one whose commands or gyro are off."""
+    begin_ns = drive_of(SEED, end_s=END_S).info.start_stamp_ns + 8_000_000_000
+    drive = drive_of(SEED, end_s=END_S)
+    judge = Judge(drive.info, model_with(None), frame=FRAME)
+    told = []
+    for channel, message in drive.samples:
+        if message.stamp_ns >= begin_ns:
+            if fault == "gyro" and isinstance(message, ImuSample):
+                x, y, z = message.rate_radps
+                message = msgspec.structs.replace(message, rate_radps=(x, y, z + 0.15))
+            if fault == "weaker" and isinstance(message, ControlCommand):
+                wheel = (message.steering_wheel_rad or 0.0) / 0.4
+                message = msgspec.structs.replace(message, steering_wheel_rad=wheel)
+        told.append(judge.handle(channel, message))
+    (first, *_) = [verdict for verdict in told if verdict]
+    assert first.culprit == "vehicle"
+    assert first.cause == ("gyro_sensor" if fault == "gyro" else "steering_gain")
+    assert abs(first.since_stamp_ns - begin_ns) < 1_000_000_000
+    assert first.stamp_ns - begin_ns < 4_000_000_000
+
+
+def test_without_commands_a_wrong_ratio_is_nobodys_but_degrees_are_the_cars() -> None:
+    def told(fault: str) -> list[str]:
+        drive = drive_with(fault, seed=SEED, end_s=END_S)
+        judge = Judge(drive.info, model_with(fault if fault in MODEL_FAULTS else None), frame=FRAME)
+        verdicts = [judge.handle(*sample) for sample in drive.samples if sample[0] != "control"]
+        return [f"{verdict.culprit} {verdict.cause}" for verdict in verdicts if verdict]
+
+    assert told("steering_ratio")[:1] == ["undecided steering_ratio"]
+    assert told("steering_read_in_degrees")[:1] == ["vehicle steering_in_degrees"]
+
+
+def test_a_model_whose_steering_lags_as_the_cars_does_is_left_alone() -> None:
+    """What was measured has the lag in it already: it must not act twice."""
+    drive = drive_of(SEED, end_s=END_S)
+    judge = Judge(drive.info, altered(model_with(None), steering_lag_s=0.2), frame=FRAME)
+    lags = []
+    for sample in drive.samples[: round(0.75 * len(drive.samples))]:
+        verdict = judge.handle(*sample)
+        assert verdict is None or verdict.cause == "steering_delay"
+        if judge.latest is not None and judge.latest.motion_lag is not None:
+            lags.append(judge.latest.motion_lag.seconds)
+    assert max(lags) <= 0.04
+
+
+def test_late_lost_doubled_and_reordered_samples_accuse_nobody() -> None:
+    """50 ms of jitter, a fifth lost, some twice, in the order of their coming."""
+    drive = drive_of(SEED, end_s=END_S)
+    random = np.random.default_rng(3)
+    came = [
+        (message.stamp_ns + round(random.exponential(5e7)), channel, message)
+        for channel, message in drive.samples
+        for _ in range(random.choice([0, 1, 2], p=[0.2, 0.75, 0.05]))
+    ]
+    came.sort(key=lambda one: one[0])
+    judge = Judge(drive.info, model_with(None), frame=FRAME)
+    assert not any(judge.handle(channel, message) for _, channel, message in came)
+
+
+def test_a_telephones_positions_accuse_no_sensor_and_confirm_none() -> None:
+    drive = drive_of(SEED, end_s=END_S)
+    told = []
+    for fault in (None, "steering_ratio"):
+        judge = Judge(drive.info, model_with(fault), frame=FRAME)
+        for channel, message in drive.samples:
+            if isinstance(message, GnssFix):
+                message = msgspec.structs.replace(message, std_m=3.0)
+            told.append(judge.handle(channel, message))
+    assert [verdict.culprit for verdict in told if verdict] == ["undecided"]
+
+
+def test_no_verdict_without_excitation() -> None:
+    """Creeping straight on under a wrong ratio shows nothing."""
+    drive = drive_of(SEED, end_s=END_S)
+    judge = Judge(drive.info, model_with("steering_ratio"), frame=FRAME)
+    start_ns = drive.info.start_stamp_ns
+    quiet = [s for s in drive.samples if s[1].stamp_ns < start_ns + 3_000_000_000]
+    assert not any(judge.handle(*sample) for sample in quiet)
+
+
+def _dirty(samples: list[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
+    """Yield a drive with NaN, jumps of 500 m and stamps that run back strewn in."""
+    for index, (channel, message) in enumerate(samples):
+        yield channel, message
+        if index % 400 == 7:
+            stamp_ns = message.stamp_ns
+            yield "speed", SpeedSample(stamp_ns=stamp_ns + 1, speed_mps=float("nan"))
+            bad = (float("nan"),) * 3
+            yield "imu", ImuSample(stamp_ns=stamp_ns + 1, accel_mps2=bad, rate_radps=bad)
+            yield "speed", SpeedSample(stamp_ns=stamp_ns - 60_000_000_000, speed_mps=3.0)
+        if index % 1500 == 99 and channel == "imu":
+            there = GeoPoint(FRAME.origin.lat_deg + 0.0045, FRAME.origin.lon_deg)
+            yield "gnss", GnssFix(stamp_ns=message.stamp_ns + 3, position=there, std_m=0.02)
+
+
+def test_dirty_samples_are_survived_and_accuse_nobody() -> None:
+    drive = drive_of(SEED, end_s=END_S)
+    judge = Judge(drive.info, model_with(None), frame=FRAME)
+    with np.errstate(invalid="raise"):
+        told = [judge.handle(*sample) for sample in _dirty(drive.samples)]
+    assert not any(told)
+    judge.handle("speed", msgspec.UNSET)  # a message without a stamp is passed over
+
+
+@pytest.mark.judge
+@pytest.mark.timeout(3600)
+def test_all_faults_and_seeds() -> None:
+    """25 faults times 5 seeds: 95 % accuse the right one within 3 s of excitation."""
+    cases = [
+        judged(fault, seed=seed) for seed in range(1, 6) for fault in (*CAR_FAULTS, *MODEL_FAULTS)
+    ]
+    failed = [case for case in cases if not case.in_time]
+    assert len(failed) <= 0.05 * len(cases), failed
+
+
+@pytest.mark.judge
+@pytest.mark.timeout(3600)
+def test_an_hour_without_faults_raises_one_false_alarm_at_most() -> None:
+    """113 drives of 32 s; each seed has another way."""
+    told = [
+        one for seed in range(100, 213) for one in verdicts_of(None, seed=seed, until_first=False)
+    ]
+    assert len(told) <= 1, told
+
+
+@pytest.mark.judge
+@pytest.mark.real_data
+@pytest.mark.timeout(3600)
+def test_real_drives_raise_one_false_alarm_at_most(data_dir: Path) -> None:
+    """ "Undecided" is none: it says that nobody can be accused."""
+    accused = [(name, one.cause) for name, _, said in accused_in(data_dir) for one in said]
+    assert len(accused) <= 1, accused

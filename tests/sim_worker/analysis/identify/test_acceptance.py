@@ -1,0 +1,62 @@
+"""What is taken of an identification, and the file that holds it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foretwin.contracts.tuning import Identification, ParameterEstimate
+from foretwin.sim_worker.analysis.identify.acceptance import accepted, vehicle_toml
+from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME
+from foretwin.sim_worker.vehicle.parameters import (
+    bundled_vehicles,
+    load_vehicle,
+    understeer_gradient,
+)
+
+
+def told(name: str, value: float, half: float, reason: str = "") -> Identification:
+    found = ParameterEstimate(
+        name=name, value=value, low=value - half, high=value + half, reason=reason
+    )
+    return Identification(vehicle_id="car", from_stamp_ns=0, stamp_ns=60, estimates=(found,))
+
+
+def test_a_value_without_a_reason_against_it_is_taken() -> None:
+    vehicle, changes = accepted(told("steering_ratio", 15.3, 0.1), load_vehicle())
+    assert vehicle.steering_ratio.value == 15.3
+    assert vehicle.steering_ratio.std == pytest.approx(0.1 / 1.96)
+    (change,) = changes
+    assert (change.name, change.before, change.origin) == ("steering_ratio", 16.0, "identified")
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        told("steering_ratio", 15.3, 0.1, reason="nearly straight"),
+        told("drag_npv2", -0.3, 0.1),
+        told(UNDERSTEER_NAME, -0.5, 0.1),
+    ],
+)
+def test_what_speaks_against_itself_is_left(given: Identification) -> None:
+    assert accepted(given, load_vehicle()) == (load_vehicle(), ())
+
+
+def test_what_is_pinned_stays() -> None:
+    given = told("steering_ratio", 15.3, 0.1)
+    assert accepted(given, load_vehicle(), pinned={"steering_ratio"})[1] == ()
+
+
+@pytest.mark.parametrize("gradient", [0.003, -0.001, 0.0])
+def test_an_understeer_gradient_becomes_front_stiffness(gradient: float) -> None:
+    vehicle, (change,) = accepted(told(UNDERSTEER_NAME, gradient, 1e-4), load_vehicle())
+    assert change.name == "front_cornering_stiffness_npr"
+    assert understeer_gradient(vehicle) == pytest.approx(gradient, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", bundled_vehicles())
+def test_a_written_vehicle_reads_back_the_same(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "vehicle.toml"
+    file.write_text(vehicle_toml(load_vehicle(name)), encoding="utf-8")
+    assert load_vehicle(file) == load_vehicle(name)

@@ -1,0 +1,126 @@
+"""A minute of the stand-in car tells what it is; a straight minute tells nothing."""
+
+from __future__ import annotations
+
+import functools
+import time
+
+import numpy as np
+import pytest
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.tuning import Identification
+from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
+from foretwin.sim_worker.analysis.motion_record import MotionRecord
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.telemetry.standin.parameters import read_parameters
+from tests.sim_worker.standin_drives import city_minute, estimate, straight_minute
+
+CAR = read_parameters().car
+TOLD = (
+    ("steering_ratio", CAR.steering_ratio, 0.02 * CAR.steering_ratio),
+    ("steering_offset_rad", CAR.steering_offset_rad, np.radians(0.2)),
+    ("steering_delay_s", CAR.steering_delay_s, 0.010),
+    ("steering_lag_s", 1.0 / CAR.steering_gain_ps, 0.010),
+    (UNDERSTEER_NAME, 0.0, 0.0003),
+    ("drive_gain", CAR.drive_gain, 0.03 * CAR.drive_gain),
+    ("brake_gain", CAR.brake_gain, 0.03 * CAR.brake_gain),
+    ("accel_delay_s", CAR.drive_delay_s, 0.010),
+    ("drag_npv2", CAR.drag_npv2, 0.2),
+    ("rolling_resistance_n", CAR.rolling_resistance_n, 30.0),
+)
+
+
+@functools.cache
+def city() -> Identification:
+    return identify(city_minute(), load_vehicle(), vehicle_id="standin")
+
+
+@pytest.mark.parametrize(("name", "truth", "within"), TOLD)
+def test_a_minute_of_city_driving_tells_the_hidden_car(
+    name: str, truth: float, within: float
+) -> None:
+    found = estimate(city(), name)
+    assert found.reason == ""
+    assert found.value is not None
+    assert found.low is not None
+    assert found.high is not None
+    assert found.value == pytest.approx(truth, abs=within)
+    assert found.low < found.value < found.high
+    assert found.high - found.low < 6.0 * within
+
+
+def test_the_wheelbase_is_not_told_without_a_tyre_angle() -> None:
+    found = estimate(city(), "wheelbase_m")
+    assert found.value is None
+    assert "over steering ratio alone" in found.reason
+
+
+def test_the_wheelbase_is_told_where_the_tyre_angle_is_measured() -> None:
+    record = city_minute()
+    tyre = record.wheel_rad / CAR.steering_ratio + CAR.steering_offset_rad
+    told = identify(record._replace(tire_rad=tyre), load_vehicle(), vehicle_id="standin")
+    assert estimate(told, "wheelbase_m").value == pytest.approx(2.5789, rel=0.01)
+
+
+def test_the_map_says_one_ratio_at_every_speed() -> None:
+    bins = city().steering_map
+    assert len(bins) >= 3
+    for entry in bins:
+        assert entry.ratio == pytest.approx(CAR.steering_ratio, rel=0.02)
+        assert entry.low < entry.ratio < entry.high
+
+
+def test_a_straight_motorway_changes_nothing() -> None:
+    told = identify(straight_minute(), load_vehicle(), vehicle_id="standin")
+    taken = [found.name for found in told.estimates if found.value is not None and not found.reason]
+    assert taken == []
+    assert "nearly straight" in estimate(told, "steering_ratio").reason
+    assert "braked for 0.0 s" in estimate(told, "brake_gain").reason
+
+
+def test_without_grade_gains_and_drag_are_not_told() -> None:
+    record = city_minute()
+    told = identify(
+        record._replace(altitude_m=np.zeros(len(record.stamp_ns))),
+        load_vehicle(),
+        vehicle_id="standin",
+    )
+    for name in ("drive_gain", "brake_gain", "drag_npv2"):
+        found = estimate(told, name)
+        assert found.value is None
+        assert "grade is unknown" in found.reason
+    assert estimate(told, "steering_ratio").value is not None
+
+
+def _nothing(record: MotionRecord) -> Array:
+    return np.full(len(record.stamp_ns), np.nan)
+
+
+def test_less_than_a_second_is_refused() -> None:
+    record = city_minute()
+    short = MotionRecord(*(column[:50] for column in record))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="less than a second"):
+        identify(short, load_vehicle(), vehicle_id="standin")
+
+
+def test_a_manual_drive_tells_the_steering_and_nothing_of_commands() -> None:
+    record = city_minute()
+    absent = _nothing(record)
+    told = identify(
+        record._replace(command_accel_mps2=absent, command_wheel_rad=absent),
+        load_vehicle(),
+        vehicle_id="standin",
+    )
+    assert estimate(told, "steering_ratio").value is not None
+    assert estimate(told, "steering_delay_s").value is None
+    assert estimate(told, "drive_gain").reason == "no acceleration was commanded"
+
+
+@pytest.mark.judge
+def test_one_window_takes_little_time() -> None:
+    city()
+    begun = time.process_time()
+    for _ in range(5):
+        identify(city_minute(), load_vehicle(), vehicle_id="standin")
+    assert (time.process_time() - begun) / 5 <= 0.15

@@ -1,0 +1,70 @@
+"""Pictures of cases: what they show happens, and they name their map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foretwin.geometry.rectangles import clearance
+from foretwin.sim_worker.futures.case_picture import told, write_case_picture
+from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
+from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.scenarios.draw_sheets import SHEETS
+from tests.sim_worker.scenarios.worlds import cross
+
+VEHICLE = load_vehicle()
+WORLD = cross()
+
+
+def first_case(id_: str) -> Cast:
+    scenario = catalogue()[id_]
+    place = places(scenario, WORLD, vehicle=VEHICLE, most=1).places[0]
+    found = cast(scenario, draw_cases(scenario)[0], place, vehicle=VEHICLE)
+    assert isinstance(found, Cast)
+    return found
+
+
+@pytest.mark.parametrize("id_", ["scp", "occluded_pedestrian", "reversing_parking"])
+def test_the_heedless_run_ends_with_the_planned_impact(id_: str) -> None:
+    played = first_case(id_)
+    run = heedless_run(played, VEHICLE, horizon_s=8.0)
+    assert run.collision_with == played.impact_with
+    assert run.time_s[run.moment] == pytest.approx(played.impact_time_s)
+    names = [actor.name for actor in played.actors]
+    gaps = [float(clearance(run.ego_at(run.moment), box)[0]) for box in run.others_at(run.moment)]
+    assert gaps[names.index(played.impact_with)] <= 0.05
+    assert all(gap > 0.1 for name, gap in zip(names, gaps, strict=True)
+               if name != played.impact_with)  # fmt: skip
+
+
+def test_a_planner_drives_the_case_from_the_same_start() -> None:
+    played, scenario = first_case("lead_stopping"), catalogue()["lead_stopping"]
+    heedless = heedless_run(played, VEHICLE, horizon_s=scenario.horizon_s)
+    run = planned_run(played, scenario, WORLD, VEHICLE, planner="pure_pursuit_idm")
+    np.testing.assert_allclose(run.ego_at(0).centre_m, heedless.ego_at(0).centre_m, atol=0.01)
+    for mine, theirs in zip(run.others_at(0), heedless.others_at(0), strict=True):
+        np.testing.assert_allclose(mine.centre_m, theirs.centre_m, atol=0.01)
+    assert run.collision_with == ""
+    assert run.clearance_m > 0.5
+    assert "hits lead" in told(played, heedless, run, "pure_pursuit_idm")
+    assert told(played, heedless, run, "it").endswith(f"{run.clearance_m:.1f} m to the nearest")
+
+
+def test_a_case_is_drawn_with_the_name_of_its_map(tmp_path: Path) -> None:
+    played, scenario = first_case("ccftap"), catalogue()["ccftap"]
+    heedless = heedless_run(played, VEHICLE, horizon_s=scenario.horizon_s)
+    files = tmp_path / "one.png", tmp_path / "two.png"
+    for file in files:
+        write_case_picture(file, played, scenario, WORLD, heedless, None, planner="")
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert b"OpenStreetMap contributors" in files[0].read_bytes()
+
+
+def test_every_scenario_is_on_a_sheet() -> None:
+    assert sorted(id_ for ids in SHEETS.values() for id_ in ids) == sorted(catalogue())

@@ -1,0 +1,204 @@
+"""Cases played by a car that does not intervene: it is hit where, and when, that was planned."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+import pytest
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.frames import GeoPoint
+from foretwin.contracts.futures import FuturesJob, FuturesResult, PathAhead, Variant
+from foretwin.contracts.world import World
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.ego_dry_run import staged_cases
+from foretwin.sim_worker.futures.run_job import result_digest, run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.reading import catalogue
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.scenarios.test_real_junctions import SMALL, worlds_of
+from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
+
+CAR = load_vehicle()
+NEAR_M = 0.1
+CASES = 3
+HEALTHY = (
+    "scp", "ccftap", "cccscp", "cpta", "cbta", "ltap_od", "ltip", "rtip", "lead_stopping",
+    "occluded_pedestrian", "emergency_vehicle",
+)  # fmt: skip
+
+
+class Played(NamedTuple):
+    """A scenario played at its first place in a World: cases, result, and the job."""
+
+    cases: list[Cast]
+    result: FuturesResult
+    job: FuturesJob
+
+
+@functools.cache
+def _stage(world_id: str) -> tuple[Stage, SceneMaker]:
+    world = _WORLDS[world_id]
+    return Stage(world, CAR, nsim=16), SceneMaker(world)
+
+
+_WORLDS: dict[str, World] = {}
+
+
+def play(world: World, scenario_id: str, planner: str = "constant_speed") -> Played | None:
+    """Play a few cases where they are placed first; None where there is no place."""
+    _WORLDS[world.id] = world
+    stage, maker = _stage(world.id)
+    scenario = catalogue()[scenario_id]
+    found = places(scenario, world, network=RoadNetwork(world), vehicle=CAR, most=1).places
+    if not found:
+        return None
+    drawn = draw_cases(scenario)
+    here = world.frame.origin
+    job = FuturesJob(
+        round_id=0, job_index=0, world_id=world.id,
+        state=VehicleState(
+            vehicle_id="car", stamp_ns=0, position=GeoPoint(here.lat_deg, here.lon_deg),
+            yaw_rad=0.0, speed_mps=0.0, yaw_rate_radps=0.0, accel_mps2=0.0,
+        ),
+        path=PathAhead(
+            xy_m=found[0].ego.xy_m, speed_limit_mps=found[0].ego.speed_limit_mps
+        ),
+        variants=tuple(
+            Variant(
+                index=i, name=scenario_id, planner=planner, scenario_id=scenario_id,
+                values=values, place=found[0].name,
+            )
+            for i, values in enumerate(drawn[:: -(-len(drawn) // CASES)])
+        ),
+        horizon_s=round(scenario.horizon_s, 1), step_s=0.1, seed=0, cruise_speed_mps=8.0,
+        scenarios=(scenario,), accidents=True,
+    )  # fmt: skip
+    cases = list(staged_cases(job, stage, maker).values())
+    assert all(isinstance(case, Cast) for case in cases)
+    return Played(cases, run_job(job, stage, scenes=maker), job)  # type: ignore[arg-type]
+
+
+def off_m(played: Played, row: int) -> float:
+    """How far the planned point of the ego's front is from its place as the touch comes."""
+    case, result = played.cases[row], played.result
+    accident = next(a for a in result.accidents if a.future == row)
+    assert case.actors[accident.road_user].name == case.impact_with
+    assert accident.time_s == pytest.approx(case.impact_time_s, abs=0.05)
+    states = result.trajectory.states[row].astype(float)
+    before = int(np.ceil(accident.time_s / 0.1 - 1e-6)) - 1
+    point = _front(case, _moved(states[before], accident.time_s - 0.1 * before))
+    return float(np.hypot(*(point - case.impact_point_m)))
+
+
+def _moved(state: Array, since_s: float) -> Array:
+    x, y, yaw, vx, vy, rate = state[:6]
+    ahead = yaw + rate * since_s / 2.0
+    x += (vx * np.cos(ahead) - vy * np.sin(ahead)) * since_s
+    y += (vx * np.sin(ahead) + vy * np.cos(ahead)) * since_s
+    return np.array([x, y, yaw + rate * since_s])
+
+
+def _front(case: Cast, pose: Array) -> Array:
+    ahead = CAR.length_m.value - CAR.rear_overhang_m.value
+    left = case.place.near_sign * (case.impact_share - 0.5) * CAR.width_m.value
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    return np.array([pose[0] + ahead * cos - left * sin, pose[1] + ahead * sin + left * cos])
+
+
+@pytest.mark.parametrize("scenario_id", HEALTHY)
+def test_without_intervention_the_ego_is_hit_where_that_was_planned(scenario_id: str) -> None:
+    played = play(cross(), scenario_id)
+    assert played is not None
+    planned = [row for row, case in enumerate(played.cases) if case.impact_with]
+    assert planned
+    assert max(off_m(played, row) for row in planned) <= NEAR_M
+
+
+def test_traffic_on_the_left_is_met_as_well() -> None:
+    played = play(cross(left_hand=True), "ccftap")
+    assert played is not None
+    assert max(off_m(played, row) for row in range(len(played.cases))) <= NEAR_M
+
+
+def test_a_ring_is_entered_where_somebody_comes_round() -> None:
+    played = play(ring(), "roundabout_entry")
+    assert played is not None
+    planned = [row for row, case in enumerate(played.cases) if case.impact_with]
+    assert planned
+    assert max(off_m(played, row) for row in planned) <= NEAR_M
+
+
+def test_the_case_gives_the_start() -> None:
+    played = play(cross(), "ccftap")
+    assert played is not None
+    for row, case in enumerate(played.cases):
+        start = played.result.trajectory.states[row, 0]
+        assert start[3] == pytest.approx(played.job.variants[row].values["ego.speed_mps"])
+        pose = case.place.ego.path.pose_at(np.array([case.ego_arc_m]))
+        assert start[:2] == pytest.approx(pose.xy_m[0], abs=1e-3)
+        assert start[2] == pytest.approx(pose.yaw_rad[0], abs=1e-3)
+
+
+def test_lorries_are_come_up_to_on_a_motorway_and_slower_cars_on_a_race_track() -> None:
+    for world, scenario_id in (
+        (motorway(), "overtaking_motorway"),
+        (race_track(), "race_track_lap"),
+    ):
+        played = play(world, scenario_id)
+        assert played is not None
+        assert not any(played.result.left_out)
+        assert played.result.outcome.valid.all()
+        assert (played.result.outcome.progress_m > 60.0).all()
+
+
+def test_a_car_backs_into_its_bay_unless_somebody_walks_behind_it() -> None:
+    played = play(cross(), "reversing_parking", "reverse_pursuit")
+    assert played is not None
+    states = played.result.trajectory.states
+    assert (states[:, 5, 3] < -0.5).all()
+    assert not played.result.outcome.collided.any()
+    end = played.cases[0].place.ego.xy_m[-1]
+    assert (np.hypot(*(states[:, -1, :2] - end).T) < 8.0).all()
+
+
+def test_a_place_that_a_world_lacks_leaves_its_row_out() -> None:
+    played = play(cross(), "scp")
+    assert played is not None
+    stage, maker = _stage(cross().id)
+    lost = msgspec.structs.replace(played.job.variants[0], place="nowhere")
+    job = msgspec.structs.replace(played.job, variants=(lost, *played.job.variants[1:]))
+    left_out = run_job(job, stage, scenes=maker).left_out
+    assert "no place 'nowhere'" in left_out[0]
+    assert not any(left_out[1:])
+
+
+def test_another_maker_of_scenes_gives_the_same_bits() -> None:
+    played = play(cross(), "ccftap")
+    assert played is not None
+    other = Stage(cross(), CAR, nsim=8)
+    assert result_digest(run_job(played.job, other)) == result_digest(played.result)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("name", ["berlin-mitte", "moritzplatz"])
+def test_on_real_junctions_the_ego_is_hit_where_that_was_planned(data_dir: Path, name: str) -> None:
+    off = []
+    for world in worlds_of(data_dir / SMALL[name], most=2):
+        for scenario_id in ("scp", "ccftap", "cpta", "ltip"):
+            played = play(world, scenario_id)
+            if played is None:
+                continue
+            planned = [row for row, case in enumerate(played.cases) if case.impact_with]
+            off += [off_m(played, row) for row in planned]
+    assert len(off) >= 10
+    assert max(off) <= NEAR_M

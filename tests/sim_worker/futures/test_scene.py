@@ -1,0 +1,176 @@
+"""What a job's fields do to its futures: faults, perception, lights, and who was detected."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import SignalState
+from foretwin.contracts.futures import Faults, FuturesJob, PathAhead, SeenRoadUser, Variant
+from foretwin.contracts.world import World
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.futures.scene import SceneMaker
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.places import crossroads, happening, job, state_at
+from tests.sim_worker.road_users.crossroads import crossroads as mapped_crossroads
+from tests.sim_worker.road_users.crossroads import straight_on
+
+CAR = load_vehicle()
+STANDING_LEAD = {"lead__speed_mps": 0.0, "lead__gap_m": 30.0}
+
+
+@pytest.fixture(scope="module")
+def stage() -> Stage:
+    return Stage(crossroads(), CAR, nsim=8)
+
+
+def faulty(index: int, **faults: float) -> Variant:
+    return Variant(index=index, name=str(index), faults=Faults(**faults))
+
+
+def test_who_believes_to_be_farther_left_drives_farther_right(stage: Stage) -> None:
+    variants = (faulty(0), faulty(1, position_offset_m=0.6))
+    states = run_job(job(variants), stage).trajectory.states
+    assert states[1, -1, 1] - states[0, -1, 1] == pytest.approx(-0.6, abs=0.05)
+
+
+def test_a_steering_offset_draws_a_car_aside_and_half_the_steering_turns_less(
+    stage: Stage,
+) -> None:
+    aside = state_at(-50.0, -0.5)
+    shift = Variant(index=0, name="shift", lateral_shift_m=2.0)
+    weak = msgspec.structs.replace(shift, index=1, faults=Faults(steering_gain=0.5))
+    crooked = faulty(2, steering_offset_rad=0.02)
+    states = run_job(job((shift, weak, crooked), state=aside, horizon_s=2.0), stage)
+    y = states.trajectory.states[:, 10, 1]
+    assert y[0] - 0.05 > y[1] > -0.5
+    assert states.trajectory.states[2, 10, 1] > -0.45, "0.02 rad to the left, for a second"
+
+
+def test_weak_brakes_end_in_the_car_ahead(stage: Stage) -> None:
+    # From 20 m/s, 45 m behind somebody who stands, good brakes just do.
+    ahead = {"lead__speed_mps": 0.0, "lead__gap_m": 45.0}
+    sound = happening(0, "lead_stopping", **ahead)
+    weak = msgspec.structs.replace(
+        happening(1, "lead_stopping", **ahead), faults=Faults(brake_gain=0.3)
+    )
+    # A scenario's own faults count where it draws some; this one draws sound brakes.
+    values = {k: v for k, v in weak.values.items() if not k.startswith("faults.")}
+    weak = msgspec.structs.replace(weak, values=values)
+    state = state_at(-59.0, -1.5, speed=18.0)
+    outcome = run_job(job((sound, weak), state=state, cruise=18.0), stage).outcome
+    assert outcome.collision_with.tolist() == [0, 1]
+
+
+def test_who_sees_late_or_nothing_brakes_late_or_not_at_all(stage: Stage) -> None:
+    seen = happening(0, "lead_stopping", **STANDING_LEAD)
+    late = happening(1, "lead_stopping", faults__perception_delay_s=1.0, **STANDING_LEAD)
+    blind = happening(
+        2, "lead_stopping", faults__lost_from_s=0.0, faults__lost_for_s=9.0, **STANDING_LEAD
+    )
+    result = run_job(job((seen, late, blind)), stage)
+    assert result.outcome.collision_with.tolist()[::2] == [0, 1]
+    speed = result.trajectory.states[:, 20, 3]
+    # A lead that always stood is seen where it stands, however late.
+    assert speed[1] == pytest.approx(speed[0], abs=0.2)
+    assert speed[2] > speed[0] + 0.5
+
+
+def detected(**changes: object) -> SeenRoadUser:
+    car = SeenRoadUser(
+        kind="car", x_m=-20.0, y_m=-1.5, yaw_rad=0.0, speed_mps=0.0, length_m=4.5, width_m=1.8
+    )
+    return msgspec.structs.replace(car, **changes)
+
+
+def with_users(question: FuturesJob, *users: SeenRoadUser) -> FuturesJob:
+    return msgspec.structs.replace(question, road_users=users)
+
+
+def test_detected_road_users_are_part_of_every_future(stage: Stage) -> None:
+    variants = (faulty(0), Variant(index=1, name="careless", planner="constant_speed"))
+    result = run_job(with_users(job(variants), detected()), stage)
+    assert result.outcome.collision_with.tolist() == [0, 1]
+    assert result.road_users.poses.shape[2] == 1
+    stands = result.road_users.poses[:, :, 0, :2]
+    assert np.ptp(stands, axis=1).max() == 0.0
+
+
+def test_a_detected_car_goes_on_along_its_lane_and_a_walker_straight_on(stage: Stage) -> None:
+    driver = detected(x_m=1.5, y_m=-60.0, yaw_rad=np.pi / 2, speed_mps=6.0)
+    walker = detected(kind="pedestrian", x_m=-30.0, y_m=12.0, yaw_rad=0.3, speed_mps=1.5)
+    result = run_job(
+        with_users(job((faulty(0),), state=state_at(-59, -1.5)), driver, walker), stage
+    )
+    poses = result.road_users.poses[0]
+    assert poses[:, 0, 0] == pytest.approx(np.full(81, 1.5), abs=0.2)
+    assert poses[-1, 0, 1] > -30.0
+    moved = poses[-1, 1, :2] - poses[0, 1, :2]
+    assert moved == pytest.approx(12.0 * np.array([np.cos(0.3), np.sin(0.3)]), abs=0.05)
+
+
+@pytest.fixture(scope="module")
+def lit(tmp_path_factory: pytest.TempPathFactory) -> World:
+    return mapped_crossroads(tmp_path_factory.mktemp("map"), centre={"highway": "traffic_signals"})
+
+
+def approach(world: World) -> tuple[FuturesJob, SceneMaker, Stage]:
+    """A job that drives east towards the lights, which are 60 m away."""
+    path = straight_on(world, (1.0, 0.0))
+    arc = float(path.locate(np.zeros((1, 2))).arc_m[0]) - 60.0
+    pose = path.pose_at(np.array([arc]))
+    start = np.array([[*pose.xy_m[0], pose.yaw_rad[0], 9.0, 0.0, 0.0, 0.0, 0.0]])
+    arcs = np.arange(0.0, path.length_m)
+    question = FuturesJob(
+        round_id=0, job_index=0, world_id=world.id, state=state_at(0.0, 0.0),
+        path=PathAhead(xy_m=path.point_at(arcs), speed_limit_mps=np.full(len(arcs), 13.9)),
+        variants=(Variant(index=0, name="a"),), horizon_s=12.0, step_s=0.1, seed=0,
+        cruise_speed_mps=9.0, starts=start,
+    )  # fmt: skip
+    return question, SceneMaker(world), Stage(world, CAR, nsim=1)
+
+
+@pytest.mark.parametrize(("colour", "stops"), [("red", True), ("green", False), ("dark", False)])
+def test_lights_that_are_heard_are_obeyed(lit: World, colour: str, stops: bool) -> None:
+    question, scenes, stage = approach(lit)
+    groups = scenes.scene(question, CAR, tick_s=0.05).rules.groups
+    heard = tuple(SignalState(stamp_ns=0, group_id=g, colour=colour) for g in groups)  # type: ignore[arg-type]
+    result = run_job(msgspec.structs.replace(question, signals=heard), stage, scenes=scenes)
+    end = result.trajectory.states[0, -1]
+    assert (end[3] < 0.3) == stops
+    front_m = end[0] + CAR.length_m.value - CAR.rear_overhang_m.value
+    assert (front_m < -4.0) == stops, "it stands before the junction"
+
+
+def test_a_plan_that_no_map_tells_stops_nobody_unless_asked_for(lit: World) -> None:
+    question, scenes, stage = approach(lit)
+    free = run_job(question, stage, scenes=scenes).trajectory.states[0, :, 3]
+    assert free.min() > 7.0
+    slowest = []
+    for drive_time_s in np.arange(0.0, 60.0, 10.0):
+        asked = msgspec.structs.replace(
+            question, lights_by_plan=True, drive_time_s=float(drive_time_s)
+        )
+        slowest.append(run_job(asked, stage, scenes=scenes).trajectory.states[0, :, 3].min())
+    assert min(slowest) < 0.5, "at some time of the cycle it is red"
+    assert max(slowest) > 7.0, "and at another green"
+
+
+def test_an_unknown_scenario_names_those_that_the_job_defines(stage: Stage) -> None:
+    variant = Variant(index=0, name="x", scenario_id="flood")
+    question = msgspec.structs.replace(job((faulty(0),)), variants=(variant,))
+    with pytest.raises(ValueError, match="scenario 'flood'; the job defines none"):
+        run_job(question, stage)
+
+
+def test_metrics_that_a_job_names_come_back_for_every_future(stage: Stage) -> None:
+    variants = (faulty(0), happening(1, "lead_stopping", planner="constant_speed", **STANDING_LEAD))
+    question = msgspec.structs.replace(job(variants), metrics=("ttc", "max_jerk", "on_road"))
+    metrics = run_job(question, stage).metrics
+    assert set(metrics) == {"ttc", "max_jerk", "on_road"}
+    assert np.isinf(metrics["ttc"][0])
+    assert metrics["ttc"][1] < 0.2
+    with pytest.raises(ValueError, match="unknown metric fame"):
+        run_job(msgspec.structs.replace(question, metrics=("fame",)), stage)

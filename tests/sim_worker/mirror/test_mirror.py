@@ -1,0 +1,257 @@
+from __future__ import annotations
+
+import itertools
+import math
+
+import msgspec
+import numpy as np
+import pytest
+
+from foretwin.contracts.drive import ControlCommand, VehicleState
+from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source
+from foretwin.contracts.simulation import MirrorSample
+from foretwin.sim_worker.mirror.mirror import Mirror
+from foretwin.sim_worker.mirror.mirror_world import GHOST, SHADOW, MirrorWorld
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.driving import altered, states
+from tests.sim_worker.places import FRAME, crossroads, state_at
+
+CAR = load_vehicle()
+FRONT_M = CAR.length_m.value - CAR.rear_overhang_m.value
+
+
+def _collision(*, name: str, twin_meets_shadow: bool) -> tuple[MirrorWorld, float]:
+    """Drive the twin at 8 m/s towards the shadow or ghost, which stands 20 m ahead."""
+    scene = MirrorWorld(None, CAR, twin_meets_shadow=twin_meets_shadow)
+    other = GHOST if name == SHADOW else SHADOW
+    scene.place(name, np.array([20.0, 0.0, 0.0]))
+    scene.place(other, np.array([0.0, 500.0, 0.0]))
+    scene.seed_twin(states(1, speed=8.0)[0])
+    force = 0.0
+    for _ in range(500):
+        scene.step(accel_mps2=0.0, tire_angle_rad=0.0)
+        force = max(force, scene.contact_force_n(name))
+    return scene, force
+
+
+def test_a_shadow_stops_a_twin_that_drives_into_it() -> None:
+    scene, force = _collision(name=SHADOW, twin_meets_shadow=True)
+    rear_of_shadow = 20.0 - CAR.rear_overhang_m.value
+    assert scene.twin_state[0] + FRONT_M < rear_of_shadow + 0.3
+    assert scene.twin_state[3] < 0.5
+    assert force > 1000.0
+
+
+def test_a_ghost_does_not_stop_it_and_feels_no_force() -> None:
+    scene, force = _collision(name=GHOST, twin_meets_shadow=True)
+    assert scene.twin_state[0] == pytest.approx(40.0, abs=0.01)
+    assert force == 0.0
+
+
+def test_a_twin_passes_through_the_shadow_of_its_own_car() -> None:
+    scene, force = _collision(name=SHADOW, twin_meets_shadow=False)
+    assert scene.twin_state[0] == pytest.approx(40.0, abs=0.01)
+    assert force == 0.0
+
+
+def _circle(
+    *, hz: float = 50.0, until_s: float = 20.0, radius_m: float = 25.0
+) -> list[VehicleState]:
+    """A car on a circle whose speed goes up and down, measured without steering."""
+    found = []
+    for k in range(int(until_s * hz) + 1):
+        t = k / hz
+        speed = 8.0 + math.sin(0.5 * t)
+        angle = (8.0 * t + 2.0 * (1 - math.cos(0.5 * t))) / radius_m
+        found.append(
+            state_at(
+                -50.0 + radius_m * math.sin(angle),
+                -1.5 + radius_m * (1 - math.cos(angle)),
+                angle,
+                speed,
+                stamp_ns=round(t * 1e9) + 7_000_000_000,
+                yaw_rate=speed / radius_m,
+                tire_angle=None,
+                accel=0.5 * math.cos(0.5 * t),
+            )
+        )
+    return found
+
+
+def _samples(mirror: Mirror, track: list[VehicleState]) -> list[MirrorSample]:
+    return [sample for state in track if (sample := mirror.handle_state(state)) is not None]
+
+
+def test_shadow_and_ghost_stand_at_the_measured_pose_at_every_sample() -> None:
+    drive_frame = LocalFrame(GeoPoint(52.51, 13.38))
+    mirror = Mirror(CAR, drive_frame=drive_frame)
+    mirror.set_world(crossroads())
+    track = _circle(until_s=10.0)
+    samples = {sample.stamp_ns: sample for sample in _samples(mirror, track)}
+    assert len(samples) == 101
+    for k, state in enumerate(track):
+        sample = samples.get(state.stamp_ns)
+        if sample is None:
+            continue
+        t = k / 50.0
+        angle = (8.0 * t + 2.0 * (1 - math.cos(0.5 * t))) / 25.0
+        here = np.array([[-50 + 25 * math.sin(angle), -1.5 + 25 * (1 - math.cos(angle))]])
+        there = target_from_source(drive_frame, FRAME, here, np.array([angle]))
+        for pose in (sample.real, sample.shadow, sample.ghost):
+            assert math.hypot(*(there.xy_m[0] - (pose.x_m, pose.y_m))) < 1e-3
+            assert math.remainder(pose.yaw_rad - there.yaw_rad[0], math.tau) == pytest.approx(
+                0.0, abs=1e-6
+            )
+
+
+def test_without_recorded_commands_the_twin_repeats_the_motion_and_says_so() -> None:
+    mirror = Mirror(CAR, drive_frame=FRAME)
+    samples = _samples(mirror, _circle())
+    assert not any(sample.independent for sample in samples)
+    assert max(sample.gap_m for sample in samples) < 2.0
+    assert max(abs(sample.gap_speed_mps) for sample in samples) < 0.1
+    for sample in samples[5:]:
+        assert sample.twin_yaw_rate_radps == pytest.approx(sample.twin.speed_mps / 25.0, abs=0.03)
+
+
+def test_where_a_map_moves_the_car_the_free_twins_gap_does_not_jump() -> None:
+    track = _circle(until_s=4.0)
+    found = []
+    for moved_m in (0.0, 3.0):
+        mirror = Mirror(CAR, drive_frame=FRAME)
+        states_ = [
+            msgspec.structs.replace(
+                state,
+                position=GeoPoint(
+                    state.position.lat_deg + moved_m / 111_266.0, state.position.lon_deg
+                ),
+                map_shift_m=(0.0, moved_m) if moved_m else None,
+            )
+            if k > 100
+            else state
+            for k, state in enumerate(track)
+        ]
+        found.append([sample.gap_m for sample in _samples(mirror, states_)])
+
+    np.testing.assert_allclose(found[0], found[1], atol=0.2)
+
+
+@pytest.mark.parametrize("hz", [10.0, 50.0, 33.3])
+def test_the_twin_starts_anew_every_window_and_not_between(hz: float) -> None:
+    mirror = Mirror(CAR, drive_frame=FRAME, window_s=4.0)
+    samples = _samples(mirror, _circle(hz=hz))
+    pairs = list(itertools.pairwise(samples))
+    assert sum(after.since_reset_s < before.since_reset_s for before, after in pairs) == 4
+    for before, after in pairs:
+        if after.since_reset_s > before.since_reset_s:
+            moved = math.hypot(after.twin.x_m - before.twin.x_m, after.twin.y_m - before.twin.y_m)
+            passed_s = (after.stamp_ns - before.stamp_ns) / 1e9
+            assert moved == pytest.approx(before.twin.speed_mps * passed_s, abs=0.12)
+
+
+def test_a_new_world_starts_the_twin_anew_at_its_stamp() -> None:
+    mirror = Mirror(CAR, drive_frame=FRAME)
+    mirror.set_world(crossroads(), from_stamp_ns=9_000_000_000)
+    samples = _samples(mirror, _circle(until_s=4.0))
+    assert [sample.world_id for sample in samples[:20]] == [None] * 20
+    assert {sample.world_id for sample in samples[20:]} == {"crossroads"}
+    first = samples[20]
+    assert (first.since_reset_s, first.gap_m) == (0.0, 0.0)
+    mirror.set_world(crossroads(), from_stamp_ns=0)
+    after = _samples(mirror, _circle(until_s=5.0)[201:])
+    assert after[-1].since_reset_s == pytest.approx(3.0, abs=0.01)
+
+
+def test_the_twin_follows_recorded_commands_with_the_vehicles_ratio_offset_and_delay() -> None:
+    car = altered(CAR, steering_delay_s=0.3, steering_offset_rad=0.01, steering_ratio=15.0)
+    mirror = Mirror(car, drive_frame=FRAME, commands_recorded=True, window_s=60.0)
+    turned_at_s, yaw_at = None, {}
+    for k in range(151):
+        t = k / 50.0
+        wheel = 15.0 * ((0.1 if t >= 1.0 else 0.0) - 0.01)
+        mirror.handle_command(
+            ControlCommand(stamp_ns=round(t * 1e9), accel_mps2=0.0, steering_wheel_rad=wheel)
+        )
+        sample = mirror.handle_state(state_at(-50.0 + 8 * t, 0.0, stamp_ns=round(t * 1e9)))
+        if sample is None:
+            continue
+        assert sample.independent
+        yaw_at[round(t, 2)] = sample.twin.yaw_rad
+        if turned_at_s is None and abs(sample.twin.yaw_rad) > 1e-3:
+            turned_at_s = t
+    # Straight until command and delay have passed, then δ = 0.1 at the tyres.
+    assert turned_at_s == pytest.approx(1.4, abs=0.11)
+    rate = (yaw_at[3.0] - yaw_at[2.5]) / 0.5
+    assert rate == pytest.approx(8.0 * math.tan(0.1) / car.wheelbase_m.value, rel=0.03)
+
+
+def test_a_reseeded_twin_remembers_the_commands_still_under_way() -> None:
+    car = altered(CAR, steering_delay_s=0.4)
+    mirror = Mirror(car, drive_frame=FRAME, commands_recorded=True, window_s=2.0)
+    yaw_rates = []
+    for k in range(301):
+        t = k / 50.0
+        mirror.handle_command(
+            ControlCommand(stamp_ns=round(t * 1e9), accel_mps2=0.0, tire_angle_rad=0.1)
+        )
+        angle = 8.0 * math.tan(0.1) / car.wheelbase_m.value
+        state = state_at(
+            0.0, 0.0, angle * t, stamp_ns=round(t * 1e9), yaw_rate=angle, tire_angle=0.1
+        )
+        sample = mirror.handle_state(state)
+        if sample is not None and t > 0.5:
+            yaw_rates.append(sample.gap_yaw_rad)
+    assert np.abs(yaw_rates).max() < 0.02
+
+
+def test_estimated_or_missing_commands_are_not_independent() -> None:
+    mirror = Mirror(CAR, drive_frame=FRAME, commands_recorded=True)
+    first = mirror.handle_state(state_at(0.0, 0.0, stamp_ns=0))
+    assert first is not None
+    assert not first.independent
+    guess = ControlCommand(stamp_ns=50, accel_mps2=0.0, tire_angle_rad=0.0, estimated=True)
+    mirror.handle_command(guess)
+    later = mirror.handle_state(state_at(0.8, 0.0, stamp_ns=100_000_000))
+    assert later is not None
+    assert not later.independent
+
+
+def test_states_without_heading_or_out_of_order_are_passed_over() -> None:
+    import msgspec
+
+    mirror = Mirror(CAR, drive_frame=FRAME)
+    blind = msgspec.structs.replace(state_at(0.0, 0.0, stamp_ns=5), yaw_valid=False)
+    assert mirror.handle_state(blind) is None
+    assert mirror.handle_state(state_at(0.0, 0.0, stamp_ns=1_000_000_000)) is not None
+    assert mirror.handle_state(state_at(0.0, 0.0, stamp_ns=900_000_000)) is None
+
+
+def test_a_standing_car_has_a_standing_twin() -> None:
+    mirror = Mirror(CAR, drive_frame=FRAME)
+    track = [state_at(3.0, 4.0, 0.3, 0.0, stamp_ns=k * 20_000_000) for k in range(400)]
+    samples = _samples(mirror, track)
+    assert max(sample.gap_m for sample in samples) < 1e-3
+
+
+def test_a_twin_goes_on_with_other_parameters_from_where_it_is() -> None:
+    """A third of the ratio makes it turn three times as much; it does not jump there."""
+    quick = altered(CAR, steering_ratio=16.0 / 3.0, wheelbase_m=2.9, cog_from_rear_axle_m=1.5)
+    mirror = Mirror(CAR, drive_frame=FRAME, window_s=60.0, commands_recorded=True)
+    samples = []
+    for k in range(201):
+        stamp_ns = k * 20_000_000
+        if k == 100:
+            mirror.use_vehicle(quick, from_stamp_ns=stamp_ns)
+        mirror.handle_command(
+            ControlCommand(stamp_ns=stamp_ns, accel_mps2=0.0, steering_wheel_rad=0.32)
+        )
+        state = state_at(-50 + 0.16 * k, -1.5, 0.0, 8.0, stamp_ns=stamp_ns)
+        sample = mirror.handle_state(state)
+        samples += [] if sample is None else [sample]
+    way = np.array([(one.twin.x_m, one.twin.y_m, one.twin.yaw_rad) for one in samples])
+    steps = np.diff(way, axis=0)
+    moved = np.hypot(steps[:, 0], steps[:, 1])
+    assert moved == pytest.approx(0.8, abs=0.03)
+    before, after = steps[15:19, 2].mean(), steps[-4:, 2].mean()
+    assert after / before == pytest.approx(3.0 * CAR.wheelbase_m.value / 2.9, rel=0.1)
+    assert np.abs(np.diff(steps[:, 2])).max() < 0.8 * (after - before)

@@ -1,0 +1,80 @@
+"""Samples out of order give what they would have given in order."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from foretwin.contracts.drive import GnssFix, SpeedSample, VehicleState
+from foretwin.telemetry.estimator.motion_track import MotionTrack
+from foretwin.telemetry.estimator.reordering import WINDOW_NS, Reordering
+from tests.telemetry.position_track import Sample, circle, fix, info
+
+
+@functools.cache
+def samples(seconds: float = 4.0) -> list[Sample]:
+    """Return speeds at 20 Hz and positions at 5 Hz on a circle."""
+    result: list[Sample] = []
+    for k in range(round(20 * seconds)):
+        result.append(("speed", SpeedSample(stamp_ns=k * 50_000_000, speed_mps=6.0)))
+        if k % 4 == 0:
+            result.append(fix(k / 20, *circle(k / 20), std_m=0.1))
+    return result
+
+
+@functools.cache
+def in_order(seconds: float = 4.0) -> VehicleState:
+    """Return the state at the last sample."""
+    track = MotionTrack(info())
+    for channel, message in samples(seconds):
+        track.take(channel, message)
+    return track.state(end_ns(seconds))
+
+
+def end_ns(seconds: float) -> int:
+    return round(seconds * 1e9) - 50_000_000
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.booleans(), st.just(1.6))
+@example(84, True, 4.0)
+@example(512, True, 4.0)
+def test_the_order_of_arrival_does_not_matter(seed: int, doubled: bool, seconds: float) -> None:
+    """Over at least five of the windows in which samples may come late."""
+    random = np.random.default_rng(seed)
+    given_samples = samples(seconds) * (2 if doubled else 1)
+    # Out of order by less than the window, with a sample that follows the last of them.
+    delays_ns = random.uniform(0, 0.9 * WINDOW_NS, len(given_samples))
+    stamps_ns = np.array([message.stamp_ns for _, message in given_samples])
+    reordering = Reordering(MotionTrack(info()))
+    for k in np.argsort(stamps_ns + delays_ns, kind="stable"):
+        reordering.add(*given_samples[k])
+        if random.random() < 0.5:
+            reordering.track()
+    assert reordering.track().state(end_ns(seconds)) == in_order(seconds)
+    assert not reordering.late
+    assert reordering.doubled.total() == (len(samples(seconds)) if doubled else 0)
+
+
+def test_what_is_too_late_is_counted_and_left_out() -> None:
+    reordering = Reordering(MotionTrack(info()))
+    for channel, message in samples():
+        reordering.add(channel, message)
+        reordering.track()
+    late = GnssFix(stamp_ns=2_000_000_001, position=samples()[1][1].position)
+    assert not reordering.add("gnss", late)
+    assert reordering.late == {"gnss": 1}
+    assert reordering.track().state(end_ns(4.0)) == in_order()
+
+
+def test_a_flood_between_two_states_stays_bounded() -> None:
+    reordering = Reordering(MotionTrack(info()))
+    reordering.add(*fix(0.0, 0.0, 0.0))
+    flood = 5000
+    for k in range(flood):
+        reordering.add("speed", SpeedSample(stamp_ns=1 + k, speed_mps=1.0))
+    assert reordering.waiting < flood / 2
+    assert reordering.track().state(flood).stamp_ns == flood

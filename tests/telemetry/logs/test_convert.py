@@ -1,0 +1,62 @@
+"""`convert` writes a whole drive, or nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from foretwin.telemetry.logs import LogError, open_log
+from foretwin.telemetry.logs.convert import convert
+from tests.telemetry.test_drive_mcap import assert_same
+
+GOOD = "point3 {} 3784144.3 901246.3 5037714.1 0 0 0 0 0 0 0 0 0\n"
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    "name",
+    ["drive-berlin-gendarmenmarkt/Berlin_Gendarmenmarkt_GT.txt", "drive-comma2k19-sf/segment40"],
+)
+def test_real_drives_come_back_the_same(data_dir: Path, tmp_path: Path, name: str) -> None:
+    source = open_log(data_dir / name)
+    report = convert(data_dir / name, tmp_path / "drive.mcap")
+    back = open_log(tmp_path / "drive.mcap")
+    before, after = list(source.samples()), list(back.samples())
+    assert sum(report.counts.values()) == len(before) == len(after)
+    for (channel, message), (channel_back, message_back) in zip(before, after, strict=True):
+        assert channel_back == channel
+        assert_same(message, message_back)
+    assert back.info == source.info
+
+
+def test_what_is_refused_is_reported(tmp_path: Path) -> None:
+    source = tmp_path / "gt.txt"
+    source.write_text(GOOD.format(0) + "point3 0.5 0 0 0\n" + GOOD.format(1))
+    report = convert(source, tmp_path / "gt.mcap")
+    assert report.counts == {"gnss": 2}
+    assert report.skipped == {"position not finite": 1}
+
+
+def test_nothing_is_left_behind_where_nothing_is_valid(tmp_path: Path) -> None:
+    source = tmp_path / "gt.txt"
+    source.write_text("point3 0.5 0 0 0\n")
+    with pytest.raises(LogError, match=r"gt\.txt: holds no valid sample \(1 x position not fin"):
+        convert(source, tmp_path / "gt.mcap")
+    assert [path.name for path in tmp_path.iterdir()] == ["gt.txt"]
+
+
+def test_an_earlier_file_stays_when_converting_fails(tmp_path: Path) -> None:
+    target = tmp_path / "gt.mcap"
+    target.write_text("precious")
+    with pytest.raises(FileNotFoundError):
+        convert(tmp_path / "missing.txt", target)
+    assert target.read_text() == "precious"
+
+
+def test_a_drive_is_not_converted_onto_itself(tmp_path: Path) -> None:
+    source = tmp_path / "gt.txt"
+    source.write_text(GOOD.format(0))
+    convert(source, tmp_path / "gt.mcap")
+    with pytest.raises(LogError, match="is the log itself"):
+        convert(tmp_path / "gt.mcap", tmp_path / "gt.mcap")

@@ -1,0 +1,246 @@
+"""The recorder process: on a bus in memory, and as a real process."""
+
+from __future__ import annotations
+
+import errno
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from foretwin.contracts.bus import Alive, Mailbox, Received, ZenohBus
+from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.setup import BusSetup, RecorderSetup, write_setup
+from foretwin.contracts.simulation import RunEnd
+from foretwin.telemetry.logs import open_log
+from foretwin.telemetry.logs.write_mcap import DriveWriter, create
+from foretwin.telemetry.processes.recorder import RecorderProcess
+from foretwin.telemetry.processes.recording import Recording
+from tests.contracts.bus_sides import DEADLINE_S
+from tests.contracts.memory_bus import MemoryBus
+from tests.starvation import unhindered_wait_s
+from tests.telemetry.drive_messages import INFO, START_NS, every_channel
+from tests.telemetry.own_recordings import read_drive
+
+ORCHESTRATOR = alive_key(run="r1", process="orchestrator")
+RECORDER = alive_key(run="r1", process="recorder")
+
+
+class Wall:
+    """A clock that is moved by hand."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def recorder(
+    bus: MemoryBus, recording: Recording, *, lossless: bool = True, mono_s: Any = time.monotonic
+) -> RecorderProcess:
+    return RecorderProcess(
+        recording, bus=bus, run_id="r1", process_id="recorder", vehicle_id="car",
+        lossless=lossless, mono_s=mono_s,
+    )  # fmt: skip
+
+
+def publish_all(bus: MemoryBus | ZenohBus) -> None:
+    for channel, message in every_channel():
+        bus.publish(channel, message, vehicle="car")
+
+
+def test_all_channels_and_the_vehicle_are_recorded(tmp_path: Path) -> None:
+    bus, path, questions = MemoryBus(), tmp_path / "drive.mcap", Mailbox(4)
+    bus.serve("info", questions, vehicle="car")
+    process = recorder(bus, Recording(lambda: create(path), name="drive.mcap"))
+    publish_all(bus)
+    assert process.step()
+    questions.take().reply(INFO)
+    bus.publish("run_end", RunEnd(stamp_ns=1), run="r1")
+    assert not process.step()
+    process.finish()
+    assert [channel for channel, _ in read_drive(path)] == [c for c, _ in every_channel()]
+    assert open_log(path).info.body_from_antenna_m == INFO.body_from_antenna_m
+
+
+def test_in_lock_step_nothing_is_left_out_however_slow_the_machine_is(tmp_path: Path) -> None:
+    class Slow(Wall):
+        def __call__(self) -> float:
+            self.now_s += 1.0
+            return self.now_s
+
+    bus, path = MemoryBus(), tmp_path / "drive.mcap"
+    recording = Recording(lambda: create(path), name="drive.mcap")
+    process = recorder(bus, recording, mono_s=Slow())
+    publish_all(bus)
+    process.finish()
+    assert [channel for channel, _ in read_drive(path)] == [c for c, _ in every_channel()]
+
+
+def test_a_vehicle_that_does_not_answer_is_recorded_all_the_same(tmp_path: Path) -> None:
+    bus, path = MemoryBus(), tmp_path / "drive.mcap"
+    process = recorder(bus, Recording(lambda: create(path), name="drive.mcap"))
+    publish_all(bus)
+    assert process.step()
+    process.finish()
+    assert open_log(path).info.start_stamp_ns == START_NS
+
+
+def test_a_write_error_reaches_the_bus_and_the_process_goes_on(tmp_path: Path) -> None:
+    class Broken:
+        def write(self, data: Any) -> int:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        def tell(self) -> int:
+            return 0
+
+        def seek(self, offset: int) -> int:
+            return 0
+
+        def truncate(self, size: int) -> int:
+            return 0
+
+        def close(self) -> None:
+            pass
+
+    bus, events = MemoryBus(), Mailbox(10)
+    bus.subscribe("event", events, run="r1")
+    process = recorder(bus, Recording(lambda: DriveWriter(Broken()), name="drive.mcap"))
+    publish_all(bus)
+    assert process.step()
+    event = events.take().message()
+    assert (event.level, event.source) == ("error", "recorder")
+    assert "No space left on device" in event.text
+    assert len(events) == 0
+
+
+def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path: Path) -> None:
+    bus, wall = MemoryBus(), Wall()
+    recording = Recording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    process = recorder(bus, recording, mono_s=wall)
+    wall.now_s = 100.0
+    assert process.step(), "it never saw the orchestrator"
+    bus.declare_alive(ORCHESTRATOR)
+    assert process.step()
+    bus.lose(ORCHESTRATOR)
+    assert process.step(), "a link may come back"
+    bus.declare_alive(ORCHESTRATOR)
+    wall.now_s += 5.0
+    assert process.step()
+    bus.lose(ORCHESTRATOR)
+    assert process.step()
+    wall.now_s += 1.1
+    assert not process.step()
+    process.finish()
+
+
+def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:
+    bus, events, wall = MemoryBus(), Mailbox(10), Wall()
+    bus.subscribe("event", events, run="r1")
+    recording = Recording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    process = recorder(bus, recording, lossless=False, mono_s=wall)
+    bus.publish("speed", SpeedSample(stamp_ns=START_NS, speed_mps=0.0), vehicle="car")
+    assert process.step()
+    for number in range(1, 20_011):
+        sample = SpeedSample(stamp_ns=START_NS + number, speed_mps=0.0)
+        bus.publish("speed", sample, vehicle="car")
+    wall.now_s = 2.0
+    assert process.step()
+    event = events.take().message()
+    assert event.level == "warning"
+    assert event.text.startswith("10 messages are missing")
+    assert "10 dropped" in event.text
+    process.finish()
+
+
+def test_losses_are_told_again_when_there_are_twice_as_many_and_at_the_end(tmp_path: Path) -> None:
+    bus, events, wall = MemoryBus(), Mailbox(32), Wall()
+    bus.subscribe("event", events, run="r1")
+    recording = Recording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    process = recorder(bus, recording, lossless=False, mono_s=wall)
+    nobody = Mailbox(1)
+    sample = SpeedSample(stamp_ns=START_NS, speed_mps=0.0)
+    process._messages, kept = nobody, process._messages
+    for second in range(10):
+        bus.publish("speed", sample, vehicle="car")
+        bus.publish("speed", sample, vehicle="car")
+        kept.take()  # every second one is lost
+        nobody.put(kept.take())
+        wall.now_s = 2.0 * second
+        assert process.step()
+    process.finish()
+    told = []
+    while (item := events.take()) is not None:
+        told.append(int(item.message().text.split()[0]))
+
+    assert told == [1, 3, 7, 9]
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Iterator[tuple[ZenohBus, Mailbox, Any]]:
+    """A router with an orchestrator's token, what lands there, and a recorder that is ready."""
+    setup = RecorderSetup(
+        run_id="r1", process_id="recorder", vehicle_id="car",
+        bus=BusSetup(endpoint=free_endpoint(), lossless=True),
+        log_file=str(tmp_path / "log"), file=str(tmp_path / "drive.mcap"),
+    )  # fmt: skip
+    write_setup(setup, tmp_path / "setup.json")
+    with ZenohBus(setup.bus, router=True) as bus:
+        bus.declare_alive(ORCHESTRATOR)
+        landed = Mailbox(100)
+        bus.watch_alive(RECORDER, landed)
+        command = [sys.executable, "-m", "foretwin.telemetry.processes.recorder", "--setup"]
+        process = subprocess.Popen([*command, str(tmp_path / "setup.json")])
+        try:
+            alive = landed.take(DEADLINE_S)
+            assert isinstance(alive, Alive)
+            assert alive.up
+            yield bus, landed, process
+        finally:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.parametrize("by", ["run_end", "SIGTERM"])
+def test_the_process_ends_within_a_second_with_a_whole_file(
+    tmp_path: Path, started: tuple[ZenohBus, Mailbox, Any], by: str
+) -> None:
+    bus, _, process = started
+    states = Mailbox(100)
+    bus.subscribe("state", states, vehicle="car")
+    publish_all(bus)
+    assert isinstance(states.take(DEADLINE_S), Received)
+    process.send_signal(signal.SIGINT)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(0.3)
+    if by == "run_end":
+        bus.publish("run_end", RunEnd(stamp_ns=1), run="r1")
+    else:
+        process.send_signal(signal.SIGTERM)
+    assert unhindered_wait_s(process, DEADLINE_S) < 1.5
+    assert process.returncode == 0
+    found = [channel for channel, _ in read_drive(tmp_path / "drive.mcap")]
+    assert found == [channel for channel, _ in every_channel()]
+
+
+def test_a_wrong_setup_is_told_without_a_traceback(tmp_path: Path) -> None:
+    (tmp_path / "setup.json").write_text('{"run_id": 5}')
+    done = subprocess.run(
+        [sys.executable, "-m", "foretwin.telemetry.processes.recorder", "--setup",
+         str(tmp_path / "setup.json")],
+        capture_output=True, text=True, timeout=DEADLINE_S, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert (
+        "foretwin.telemetry.processes.recorder: Expected `str`, got `int` - at `$.run_id`"
+        in done.stderr
+    )
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from foretwin.contracts.bus import Mailbox, Received, Reply
+from foretwin.contracts.drive import (
+    AdvanceReply,
+    AdvanceRequest,
+    DriveEnd,
+    InfoRequest,
+    VehicleInfo,
+)
+from foretwin.contracts.keys import alive_key
+from foretwin.contracts.simulation import RunEnd
+from foretwin.telemetry.processes.replay import ReplaySource
+from foretwin.telemetry.processes.vehicle_process import VehicleProcess
+from tests.contracts.memory_bus import MemoryBus
+from tests.telemetry.processes.test_replay import SECOND_NS, START_NS, RecordedMinute
+
+ORCHESTRATOR = alive_key(run="r", process="orchestrator")
+
+
+class Rig:
+    """A process on a bus in memory, with a clock that only we move."""
+
+    def __init__(self, *, speed: float | None, end_s: float = 3.0) -> None:
+        self.now_s = 100.0
+        self.bus = MemoryBus()
+        self.inbox = Mailbox(1000)
+        for channel in ("gnss", "speed", "end"):
+            self.bus.subscribe(channel, self.inbox, vehicle="car")
+        source = ReplaySource(RecordedMinute(), vehicle_id="car", end_s=end_s)
+        self.process = VehicleProcess(
+            source,
+            bus=self.bus,
+            run_id="r",
+            process_id="vehicle",
+            vehicle_id="car",
+            speed=speed,
+            mono_s=lambda: self.now_s,
+        )
+
+    def received(self) -> list[Received]:
+        items = []
+        while (item := self.inbox.take()) is not None:
+            items.append(item)
+        return items
+
+    def seconds(self) -> list[float]:
+        return [(r.message().stamp_ns - START_NS) / SECOND_NS for r in self.received()]
+
+    def ask(self, channel: str, message: Any) -> Any:
+        answers = Mailbox(1)
+        self.bus.request(channel, message, answers, vehicle="car")
+        assert self.process.step()
+        reply = answers.take(1.0)
+        assert isinstance(reply, Reply)
+        assert reply.error is None
+        return reply.message
+
+    def advance(self, until_s: float) -> AdvanceReply:
+        until_ns = START_NS + round(until_s * SECOND_NS)
+        return self.ask("advance", AdvanceRequest(until_stamp_ns=until_ns))
+
+
+def test_nothing_is_sent_before_the_orchestrator_is_there() -> None:
+    rig = Rig(speed=1.0)
+    rig.now_s += 60.0
+    assert rig.process.step()
+    assert rig.received() == []
+    rig.bus.declare_alive(ORCHESTRATOR)
+    rig.process.step()
+    assert rig.seconds() == [0.0, 0.0]
+
+
+def test_samples_leave_when_their_time_has_come() -> None:
+    rig = Rig(speed=2.0)
+    rig.bus.declare_alive(ORCHESTRATOR)
+    rig.process.step()
+    sent = rig.seconds()
+    for _ in range(5):
+        rig.now_s += 0.101
+        rig.process.step()
+    assert sent + rig.seconds() == [0.0, 0.0, 0.5, 1.0, 1.0]
+
+
+def test_a_pause_is_caught_up_in_portions_that_leave_time_for_questions() -> None:
+    rig = Rig(speed=1.0)
+    rig.bus.declare_alive(ORCHESTRATOR)
+    rig.process.step()
+    rig.now_s += 2.0
+    rig.process.step()
+    assert rig.seconds() == [0.0, 0.0]
+    for _ in range(10):
+        rig.process.step()
+    assert rig.seconds() == [0.5, 1.0, 1.0, 1.5, 2.0, 2.0]
+
+
+def test_lock_step_publishes_before_it_answers() -> None:
+    rig = Rig(speed=None)
+    rig.bus.declare_alive(ORCHESTRATOR)
+    rig.process.step()
+    assert rig.received() == []
+    reply = rig.advance(1.0)
+    assert reply == AdvanceReply(published={"gnss": 2, "speed": 3}, ended=False)
+    assert len(rig.received()) == 5
+    assert rig.advance(1.0) == reply
+    assert rig.received() == []
+    last = rig.advance(9.0)
+    assert last == AdvanceReply(published={"gnss": 4, "speed": 7}, ended=True)
+    *_, end = rig.received()
+    assert end.message() == DriveEnd(
+        stamp_ns=START_NS + 3 * SECOND_NS, published=last.published, skipped_invalid=2
+    )
+
+
+def test_after_the_end_it_still_answers_until_the_run_is_over() -> None:
+    rig = Rig(speed=None)
+    rig.advance(9.0)
+    rig.received()
+    assert rig.advance(10.0).ended
+    assert rig.received() == []
+    info = rig.ask("info", InfoRequest())
+    assert isinstance(info, VehicleInfo)
+    assert info.vehicle_id == "car"
+    rig.bus.publish("run_end", RunEnd(stamp_ns=0), run="r")
+    assert not rig.process.step()
+
+
+def test_it_leaves_when_the_orchestrator_stays_away() -> None:
+    rig = Rig(speed=1.0)
+    rig.bus.declare_alive(ORCHESTRATOR)
+    assert rig.process.step()
+    rig.bus.lose(ORCHESTRATOR)
+    assert rig.process.step()
+    rig.now_s += 1.0
+    rig.bus.declare_alive(ORCHESTRATOR)
+    assert rig.process.step()
+    rig.now_s += 5.0
+    assert rig.process.step()
+    rig.bus.lose(ORCHESTRATOR)
+    rig.process.step()
+    rig.now_s += 2.0
+    assert not rig.process.step()
+
+
+def test_a_speed_must_be_positive() -> None:
+    with pytest.raises(ValueError, match="positive"):
+        Rig(speed=0.0)

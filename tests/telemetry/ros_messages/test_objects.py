@@ -1,0 +1,250 @@
+"""Road users, signals, status, commands and frames as ROS 2 messages, and back."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foretwin.contracts import drive
+from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.telemetry.ros_messages.commands import (
+    ackermann_from_command,
+    command_from_ackermann,
+    command_from_control,
+    control_from_command,
+    state_from_odometry,
+)
+from foretwin.telemetry.ros_messages.motion import ros_from_state
+from foretwin.telemetry.ros_messages.objects import (
+    PlanarPose,
+    detected_from_users,
+    predicted_from_users,
+    users_from_detected,
+    users_from_predicted,
+)
+from foretwin.telemetry.ros_messages.parts import (
+    DETECTED_OBJECTS,
+    PREDICTED_OBJECTS,
+    TRAFFIC_LIGHTS,
+    typestore,
+)
+from foretwin.telemetry.ros_messages.status import (
+    StatusJoiner,
+    gear_from_ros,
+    indicator_from_ros,
+    mode_from_ros,
+    signals_from_ros,
+)
+from foretwin.telemetry.ros_messages.transforms import TransformTree
+from tests.telemetry import drive_messages
+from tests.telemetry.autoware_messages import (
+    ros_from_signals,
+    ros_from_status,
+    transform_message,
+)
+
+FRAME = LocalFrame(GeoPoint(52.5121, 13.3925, 34.0))
+AT = drive_messages.START_NS
+KINDS = ("car", "lorry", "bus", "motorcycle", "bicycle", "pedestrian", "unknown")
+users = st.builds(
+    drive.RoadUser,
+    user_id=st.uuids().map(lambda one: one.hex),
+    kind=st.sampled_from(KINDS),
+    position=drive_messages.positions,
+    yaw_rad=drive_messages.angles,
+    speed_mps=st.floats(-10.0, 60.0),
+    length_m=st.floats(0.3, 30.0),
+    width_m=st.floats(0.3, 4.0),
+)
+
+
+def through_cdr(message: Any, kind: str) -> Any:
+    store = typestore()
+    return store.deserialize_cdr(bytes(store.serialize_cdr(message, kind)), kind)
+
+
+def assert_same_user(found: drive.RoadUser, user: drive.RoadUser) -> None:
+    assert found.kind == user.kind
+    assert found.position.lat_deg == pytest.approx(user.position.lat_deg, abs=1e-9)
+    assert found.position.lon_deg == pytest.approx(user.position.lon_deg, abs=1e-9)
+    assert found.position.alt_m == pytest.approx(user.position.alt_m, abs=1e-6)
+    assert math.cos(found.yaw_rad - user.yaw_rad) == pytest.approx(1.0)
+    assert (found.speed_mps, found.length_m, found.width_m) == (
+        user.speed_mps, user.length_m, user.width_m,
+    )  # fmt: skip
+
+
+@given(said=st.lists(users, max_size=2))
+@settings(max_examples=15, deadline=None)
+def test_road_users_come_back_from_both_kinds_of_message(said: list[drive.RoadUser]) -> None:
+    message = drive.RoadUsers(stamp_ns=AT, users=tuple(said))
+    predicted = through_cdr(predicted_from_users(message, FRAME), PREDICTED_OBJECTS)
+    back = users_from_predicted(predicted, FRAME)
+    assert (back.stamp_ns, [u.user_id for u in back.users]) == (AT, [u.user_id for u in said])
+    detected = through_cdr(detected_from_users(message, FRAME), DETECTED_OBJECTS)
+    for found in (back.users, users_from_detected(detected, FRAME).users):
+        for one, user in zip(found, said, strict=True):
+            assert_same_user(one, user)
+
+
+def one_car(user_id: str = "u1", speed_mps: float = 5.0) -> drive.RoadUsers:
+    user = drive.RoadUser(
+        user_id=user_id, kind="car", position=FRAME.origin, yaw_rad=0.5 * math.pi,
+        speed_mps=speed_mps, length_m=4.5, width_m=1.8,
+    )  # fmt: skip
+    return drive.RoadUsers(stamp_ns=AT, users=(user,))
+
+
+def test_a_predicted_object_goes_straight_on_and_keeps_its_identity() -> None:
+    first = predicted_from_users(one_car(), FRAME, horizon_s=2.0, step_s=0.5).objects[0]
+    again = predicted_from_users(one_car(), FRAME).objects[0]
+    other = predicted_from_users(one_car("u2"), FRAME).objects[0]
+    assert bytes(first.object_id.uuid) == bytes(again.object_id.uuid) != bytes(other.object_id.uuid)
+    path = first.kinematics.predicted_paths[0]
+    assert [round(pose.position.y, 6) for pose in path.path] == [0.0, 2.5, 5.0, 7.5, 10.0]
+    assert (path.time_step.sec, path.time_step.nanosec) == (0, 500_000_000)
+
+
+def test_objects_in_the_axes_of_the_car_need_its_pose() -> None:
+    message = detected_from_users(one_car(), FRAME)
+    message.header.frame_id = "base_link"
+    message.objects[0].kinematics.pose_with_covariance.pose.position.x = 10.0
+    with pytest.raises(ValueError, match="frame 'base_link', whose pose is not known"):
+        users_from_detected(message, FRAME)
+    pose = PlanarPose(100.0, 50.0, 0.5 * math.pi)
+    user = users_from_detected(message, FRAME, header_frame=pose).users[0]
+    assert user.yaw_rad == pytest.approx(math.pi, abs=1e-4) or user.yaw_rad == pytest.approx(
+        -math.pi, abs=1e-4
+    )
+    placed = drive.RoadUsers(stamp_ns=AT, users=(user,))
+    at = detected_from_users(placed, FRAME).objects[0].kinematics.pose_with_covariance.pose
+    assert (at.position.x, at.position.y) == (pytest.approx(100.0), pytest.approx(60.0))
+
+
+def test_what_one_may_drive_over_is_no_road_user() -> None:
+    message = detected_from_users(one_car(), FRAME)
+    message.objects[0].classification[0].label = 10
+    assert users_from_detected(message, FRAME).users == ()
+
+
+def test_a_status_comes_back_from_its_reports() -> None:
+    readers = {"ControlMode": mode_from_ros, "Gear": gear_from_ros, "TurnInd": indicator_from_ros}
+    cases: tuple[tuple[drive.ControlMode, drive.Gear, drive.Indicator], ...] = (
+        ("autonomous", "drive", "left"),
+        ("manual", "reverse", "off"),
+        ("manual", "park", "right"),
+    )
+    for mode, gear, indicator in cases:
+        status = drive.VehicleStatus(stamp_ns=AT, control_mode=mode, gear=gear, indicator=indicator)
+        joiner, joined = StatusJoiner(), None
+        for kind, report in ros_from_status(status):
+            for name, read in readers.items():
+                if name in kind:
+                    joined = joiner.join(read(through_cdr(report, kind)))
+        assert joined == status
+
+
+@pytest.mark.parametrize(
+    ("mode", "means"),
+    [
+        (0, "unknown"),
+        (1, "autonomous"),
+        (2, "manual"),
+        (4, "manual"),
+        (5, "manual"),
+        (6, "unknown"),
+    ],
+)
+def test_who_drives(mode: int, means: str) -> None:
+    report = dict(ros_from_status(drive.VehicleStatus(stamp_ns=AT)))
+    message = report["autoware_vehicle_msgs/msg/ControlModeReport"]
+    message.mode = mode
+    assert mode_from_ros(message, stamp_ns=7) == drive.VehicleStatus(
+        stamp_ns=7,
+        control_mode=means,  # type: ignore[arg-type]
+    )
+
+
+@given(
+    colours=st.lists(
+        st.sampled_from(["red", "red_amber", "amber", "green", "dark", "unknown"]), max_size=4
+    )
+)
+@settings(max_examples=20, deadline=None)
+def test_signal_colours_come_back(colours: list[drive.SignalColour]) -> None:
+    said = tuple(
+        drive.SignalState(stamp_ns=AT, group_id=str(10 + place), colour=colour)
+        for place, colour in enumerate(colours)
+    )
+    assert signals_from_ros(through_cdr(ros_from_signals(AT, said), TRAFFIC_LIGHTS)) == said
+
+
+def test_a_green_arrow_beside_a_red_light_is_no_colour() -> None:
+    message = ros_from_signals(AT, [drive.SignalState(stamp_ns=AT, group_id="7", colour="red")])
+    arrow = ros_from_signals(AT, [drive.SignalState(stamp_ns=AT, group_id="7", colour="green")])
+    message.traffic_light_groups[0].elements += arrow.traffic_light_groups[0].elements
+    assert signals_from_ros(message)[0].colour == "unknown"
+
+
+def test_commands_come_back_from_both_kinds_of_message() -> None:
+    command = drive.ControlCommand(stamp_ns=AT, accel_mps2=-0.5, tire_angle_rad=0.125)
+    assert command_from_control(control_from_command(command, speed_mps=8.0)) == command
+    assert command_from_ackermann(ackermann_from_command(command, speed_mps=8.0)) == command
+
+
+@pytest.mark.parametrize("tire_rad", [None, math.nan, math.inf])
+def test_no_command_is_made_of_a_guess(tire_rad: float | None) -> None:
+    command = drive.ControlCommand(stamp_ns=AT, accel_mps2=0.0, tire_angle_rad=tire_rad)
+    with pytest.raises(ValueError, match="a command needs a finite tire_angle_rad"):
+        control_from_command(command, speed_mps=8.0)
+
+
+def test_a_state_comes_back_from_its_odometry() -> None:
+    state = drive_messages.state(AT)
+    odometry = ros_from_state(state, FRAME)[0][2]
+    back = state_from_odometry(odometry, FRAME, vehicle_id="car")
+    assert back.position.lat_deg == pytest.approx(state.position.lat_deg, abs=1e-9)
+    assert back.position.alt_m == pytest.approx(state.position.alt_m)
+    assert (back.stamp_ns, back.speed_mps, back.yaw_rate_radps) == (AT, 8.25, 0.1)
+    assert back.yaw_rad == pytest.approx(0.5)
+    assert back.position_std_m == pytest.approx(0.2)
+    assert back.yaw_std_rad is None
+    odometry.header.frame_id = "odom"
+    with pytest.raises(ValueError, match="odometry in frame 'odom'"):
+        state_from_odometry(odometry, FRAME, vehicle_id="car")
+
+
+def test_the_antenna_is_found_along_the_chain_of_frames() -> None:
+    tree = TransformTree()
+    tree.add(
+        transform_message(
+            AT, parent="base_link", child="kit", place_m=(1.0, 0.0, 1.5), yaw_rad=0.5 * math.pi
+        )
+    )
+    tree.add(
+        transform_message(
+            AT, parent="kit", child="/gnss_link", place_m=(0.5, 0.0, 0.25), yaw_rad=0.0
+        )
+    )
+    place = tree.place_of("gnss_link", within="base_link")
+    assert place is not None
+    np.testing.assert_allclose(place, (1.0, 0.5, 1.75), atol=1e-12)
+    back = tree.place_of("base_link", within="gnss_link")
+    assert back is not None
+    np.testing.assert_allclose(back, (-0.5, 1.0, -1.75), atol=1e-12)
+    assert tree.place_of("lidar", within="base_link") is None
+    assert tree.place_of("base_link", within="base_link") == (0.0, 0.0, 0.0)
+
+
+def test_frames_in_a_circle_end() -> None:
+    tree = TransformTree()
+    for parent, child in (("a", "b"), ("b", "a")):
+        tree.add(
+            transform_message(AT, parent=parent, child=child, place_m=(1.0, 0.0, 0.0), yaw_rad=0.0)
+        )
+    assert tree.place_of("c", within="a") is None

@@ -1,0 +1,112 @@
+"""Cross-sections: what tags say about lanes, and what is assumed where they are silent."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.lanes.cross_section import cross_section, metres
+from tests.world_gen.road_edges import road as _road
+
+
+def test_two_way_road_keeps_right_around_its_way():
+    section = cross_section(_road(), "right")
+    assert [(lane.reverse, lane.left_m) for lane in section.lanes] == [(True, 1.5), (False, -1.5)]
+    assert (section.left_m, section.right_m) == (3.0, -3.0)
+
+
+def test_two_way_road_keeps_left_around_its_way():
+    section = cross_section(_road(), "left")
+    assert [(lane.reverse, lane.left_m) for lane in section.lanes] == [(False, 1.5), (True, -1.5)]
+
+
+def test_lanes_are_numbered_from_the_left_as_their_driver_sees_them():
+    section = cross_section(_road(forward=2, backward=2), "right")
+    assert [lane.left_m for lane in section.driven(reverse=False)] == [-1.5, -4.5]
+    assert [lane.left_m for lane in section.driven(reverse=True)] == [1.5, 4.5]
+    section = cross_section(_road(forward=2, backward=2), "left")
+    assert [lane.left_m for lane in section.driven(reverse=False)] == [4.5, 1.5]
+    assert [lane.left_m for lane in section.driven(reverse=True)] == [-4.5, -1.5]
+
+
+def test_widths_are_tagged_or_inferred_or_default():
+    lanes = cross_section(_road({"width:lanes": "3.1|2.7"}, forward=2, backward=0), "right").lanes
+    assert [lane.width_m for lane in lanes] == [Quantity(3.1, "tagged"), Quantity(2.7, "tagged")]
+    assert cross_section(_road(), "right").lanes[0].width_m == Quantity(3.0, "inferred")
+    odd = cross_section(_road(road_class="corridor"), "right")
+    assert odd.lanes[0].width_m.source == "default"
+    narrow = cross_section(_road({"width": "5 m"}), "right")
+    assert [lane.width_m for lane in narrow.lanes] == [Quantity(2.5, "inferred")] * 2
+
+
+def test_turn_lanes_of_one_direction():
+    tags = {"turn:lanes:forward": "left|through;right|none", "turn:backward": "slight_right"}
+    section = cross_section(_road(tags, forward=3, backward=1), "right")
+    ahead = section.driven(reverse=False)
+    assert [lane.turns for lane in ahead] == [("left",), ("straight", "right"), ()]
+    assert [lane.turns_source for lane in ahead] == ["tagged", "tagged", "inferred"]
+    assert section.driven(reverse=True)[0].turns == ("right",)
+
+
+def test_bicycle_lanes_take_no_part_in_the_count():
+    tags = {"bicycle:lanes": "|designated|", "turn:lanes": "left|through|right"}
+    lanes = cross_section(_road(tags, forward=2, backward=0), "right").driven(reverse=False)
+    assert [lane.turns for lane in lanes] == [("left",), ("right",)]
+
+
+def test_turn_lanes_that_do_not_fit_are_named_and_ignored():
+    section = cross_section(_road({"turn:lanes": "left|right"}, forward=3, backward=0), "right")
+    assert section.notes == ("way 7: turn:lanes has 2 entries for 3 lanes",)
+    assert all(lane.turns_source == "inferred" for lane in section.lanes)
+
+
+def test_bus_lane():
+    lanes = cross_section(
+        _road({"bus:lanes": "yes|designated"}, forward=2, backward=0), "right"
+    ).driven(reverse=False)
+    assert [lane.kind for lane in lanes] == ["driving", "bus"]
+
+
+@pytest.mark.parametrize(
+    ("placement", "left_edge_m"), [("middle_of:1", 1.5), ("right_of:1", 3.0), ("left_of:1", 0.0)]
+)
+def test_placement_moves_the_carriageway(placement, left_edge_m):
+    section = cross_section(_road({"placement": placement}, forward=2, backward=0), "right")
+    assert section.left_m == pytest.approx(left_edge_m)
+
+
+def test_placement_against_the_way():
+    section = cross_section(_road({"placement:backward": "right_of:1"}, backward=2), "right")
+    # From the left: backward 2, backward 1, forward. The way lies right of backward 1 as its
+    # driver sees it, which is left of it along the way.
+    assert section.left_m == pytest.approx(3.0)
+
+
+@given(
+    forward=st.integers(0, 5),
+    backward=st.integers(0, 5),
+    side=st.sampled_from(["left", "right"]),
+    width=st.one_of(st.none(), st.floats(0.0, 100.0).map(str)),
+)
+def test_lanes_lie_side_by_side_and_fill_the_carriageway(forward, backward, side, width):
+    if forward + backward == 0:
+        return
+    tags = {"width": width} if width else {}
+    section = cross_section(_road(tags, forward=forward, backward=backward), side)
+    assert len(section.lanes) == forward + backward
+    edge = section.left_m
+    for lane in section.lanes:
+        assert lane.width_m.value >= 2.0
+        assert lane.left_m == pytest.approx(edge - lane.width_m.value / 2)
+        edge -= lane.width_m.value
+    assert section.right_m == pytest.approx(edge)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("3.5", 3.5), ("3,5 m", 3.5), ("10 ft", 3.048), ("wide", None), ("-3", None)],
+)
+def test_metres(text, value):
+    assert metres(text) == (value if value is None else pytest.approx(value))

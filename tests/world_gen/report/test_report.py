@@ -1,0 +1,143 @@
+"""The report: every guess of a junction in words, counted, and what it adds up to."""
+
+from __future__ import annotations
+
+import json
+
+import msgspec
+import pytest
+
+from foretwin.contracts.world import ATTRIBUTION, World
+from foretwin.world_gen.report.report import JunctionReport, note_kind, report_of
+from foretwin.world_gen.report.values import SOURCE_CONFIDENCE, SUBJECT_WEIGHT, SubjectReport
+from tests.world_gen.drawn_maps import crossing, roundabout, world_of
+
+SQUARE = {20: (20.0, 20.0), 21: (35.0, 20.0), 22: (35.0, 35.0), 23: (20.0, 35.0)}
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return world_of(
+        crossing(
+            street={"highway": "residential", "name": "Street", "lanes": "3", "maxspeed": "30"},
+            avenue={"highway": "residential", "name": "Avenue", "oneway": "yes", "lanes": "2",
+                    "turn:lanes": "left|through;right"},
+            extra_nodes=SQUARE,
+            extra_ways=[(20, [20, 21, 22, 23, 20], {"building": "yes"})],
+        )
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def junction(world: World) -> JunctionReport:
+    return report_of(world).junctions[0]
+
+
+def _subject(junction: JunctionReport, name: str) -> SubjectReport:
+    return next(s for s in junction.subjects if s.subject == name)
+
+
+def test_sentences_name_the_road_and_the_value(junction):
+    assert "Street: 3 lanes, inferred (2 times)" in _subject(junction, "lane counts").guessed
+    assert (
+        "Street: lane 3.00 m wide, inferred (6 times)" in _subject(junction, "lane widths").guessed
+    )
+    assert _subject(junction, "directions").guessed == (
+        "Street: traffic both ways, inferred (6 times)",
+    )
+    assert all("Avenue" not in words for words in _subject(junction, "lane counts").guessed)
+
+
+def test_what_the_map_says_is_counted_as_tagged(junction):
+    counts = _subject(junction, "lane counts")
+    assert (counts.tagged, counts.inferred, counts.default) == (2, 2, 0)
+    speeds = _subject(junction, "speed limits")
+    assert (speeds.tagged, speeds.inferred, speeds.default) == (6, 0, 4)
+    assert "Avenue: 30 km/h, default (4 times)" in speeds.guessed
+    turns = _subject(junction, "turns")
+    assert turns.tagged == 2
+
+
+def test_who_waits_for_whom_is_told(junction):
+    rules = _subject(junction, "right of way")
+    assert rules.tagged + rules.inferred + rules.default > 0
+    assert any(
+        words.startswith(("Street: waits for", "Avenue: waits for")) for words in rules.guessed
+    )
+
+
+def test_confidence_is_the_stated_formula(world, junction):
+    for subject in junction.subjects:
+        n = (subject.tagged, subject.inferred, subject.default)
+        mean = sum(c * k for c, k in zip(SOURCE_CONFIDENCE.values(), n, strict=True)) / sum(n)
+        assert subject.confidence == pytest.approx(mean, abs=0.005)
+    weights = [SUBJECT_WEIGHT[s.subject] for s in junction.subjects]
+    mean = sum(w * s.confidence for w, s in zip(weights, junction.subjects, strict=True))
+    assert junction.confidence == pytest.approx(mean / sum(weights), abs=0.006)
+    assert 0.0 < report_of(world).confidence < 1.0
+
+
+def test_a_map_that_says_more_is_trusted_more():
+    bare = report_of(world_of(crossing(street={"highway": "road"}, avenue={"highway": "road"})))
+    told = {"highway": "tertiary", "name": "S", "lanes": "2", "lanes:forward": "1",
+            "lanes:backward": "1", "maxspeed": "50", "oneway": "no",
+            "turn:lanes:forward": "through", "turn:lanes:backward": "through",
+            "width:lanes:forward": "3.2", "width:lanes:backward": "3.2"}  # fmt: skip
+    full = report_of(world_of(crossing(street=told, avenue=told)))
+    assert full.junctions[0].confidence > bare.junctions[0].confidence + 0.1
+
+
+def test_a_ring_is_tagged_and_a_crossing_worked_out(junction):
+    ring = report_of(world_of(roundabout())).junctions[0]
+    assert all("roundabout" not in words for words in _subject(ring, "kind").guessed)
+    assert "junction: crossing, inferred" in _subject(junction, "kind").guessed
+
+
+def test_buildings_are_counted_together(world):
+    buildings = report_of(world).buildings
+    assert (buildings.tagged, buildings.default) == (0, 1)
+    assert buildings.guessed == ("1 building: 6.0 m high, default",)
+
+
+def test_every_form_names_the_source_and_fits(world):
+    report = report_of(world)
+    text, page, data = report.as_text(), report.as_markdown(), json.loads(report.as_json())
+    assert text.endswith(ATTRIBUTION + "\n")
+    assert ATTRIBUTION in page
+    assert data["attribution"] == ATTRIBUTION
+    assert max(len(line) for line in text.splitlines()) <= 100
+    for words in ("Street: 3 lanes, inferred", "lane counts", "confidence"):
+        assert words in text
+        assert words in page
+    assert data["junctions"][0]["subjects"][0]["subject"] == "kind"
+
+
+def test_names_from_the_map_cannot_break_a_page():
+    nasty = {"highway": "residential", "name": "A|B *<b>* `x`"}
+    page = report_of(world_of(crossing(street=nasty))).as_markdown()
+    assert r"A\|B \*\<b\>\* \`x\`" in page
+
+
+@pytest.mark.parametrize(
+    ("note", "kind"),
+    [
+        ("way 12: room for a radius of 4.0 m alone into way 34 (right)",
+         "room for a radius of … m alone into way (right)"),
+        ("buildings cut back where a lane passes: w1, w2-1",
+         "buildings cut back where a lane passes"),
+        ("way 5: building outline is not closed; left out",
+         "building outline is not closed; left out"),
+    ],
+)  # fmt: skip
+def test_notes_of_one_kind_are_told_apart_from_others(note, kind):
+    assert note_kind(note) == kind
+
+
+def test_notes_are_counted_by_kind(world):
+    noted = msgspec.structs.replace(
+        world, notes=("way 1: too wide", "way 2: too wide", "buildings cut: w1, w2, w3")
+    )
+    assert [(n.kind, n.count) for n in report_of(noted).notes] == [
+        ("buildings cut", 3),
+        ("too wide", 2),
+    ]

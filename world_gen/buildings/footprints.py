@@ -1,0 +1,234 @@
+"""Buildings of a map, made when a World needs them, and their footprints in a World's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Sequence
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from foretwin.contracts.frames import LocalFrame, target_from_source_m
+from foretwin.contracts.world import Building
+from foretwin.world_gen.buildings.outlines import (
+    MIN_PIECE_M2,
+    Indices,
+    OutlineTable,
+    outline_table,
+    outlines,
+    valid_polygons,
+)
+from foretwin.world_gen.buildings.parts import Footprint as Footprint
+from foretwin.world_gen.buildings.parts import resolve_parts
+from foretwin.world_gen.buildings.tags import building_extent
+from foretwin.world_gen.extent import box_deg
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.polygon_areas import rings_of
+
+GRID_M = 0.001
+"""Outlines are written in millimetres."""
+SILHOUETTE_TOLERANCE_M = 0.25
+"""How far a silhouette may move from the map's outline to the parts that are run into."""
+FOOTPRINT_TOLERANCE_M = 0.05
+"""The share of it that footprints take; convex parts take the rest."""
+HEADROOM_M = 2.5
+"""What begins higher stands in no car's way."""
+
+
+Polygons = npt.NDArray[np.object_]
+
+
+class BuildingIndex:
+    """A map's buildings by place: what no World needs is never made into polygons."""
+
+    def __init__(self, osm: OsmMap) -> None:
+        self._osm = osm
+        self._raw: dict[int, tuple[Footprint, ...]] = {}
+        self._done: dict[int, tuple[Footprint, ...]] = {}
+        self._lost: dict[int, str] = {}
+
+    @cached_property
+    def _table(self) -> OutlineTable:
+        return outline_table(self._osm)
+
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        south, west, north, east = self._table.boxes_deg.T
+        return shapely.STRtree(shapely.box(west, south, east, north))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out so far because it can be no building, in words."""
+        return (*self._table.notes, *(self._lost[k] for k in sorted(self._lost)))
+
+    def __len__(self) -> int:
+        return len(self._table.names)
+
+    def within(self, area: shapely.Geometry) -> tuple[Footprint, ...]:
+        """Return the buildings that reach into `area`, a shape in the map's frame."""
+        near = np.sort(self._tree.query(box_deg(area, self._osm.frame)))
+        self._make(near)
+        found = [footprint for k in near.tolist() for footprint in self._done[k]]
+        shapely.prepare(area)
+        hit = shapely.intersects(area, np.array([f.polygon for f in found], dtype=object))
+        return tuple(f for f, inside in zip(found, hit.tolist(), strict=True) if inside)
+
+    def _make(self, entries: Indices) -> None:
+        todo = np.array([k for k in entries.tolist() if k not in self._done], dtype=np.intp)
+        if not len(todo):
+            return
+        is_part = np.array(self._table.is_part)
+        involved = np.zeros(0, dtype=np.intp)
+        if is_part.any():
+            # An outline gives way to its parts, and a part takes its outline's height.
+            asked, other = self._tree.query(self._tree.geometries[todo])
+            apart = is_part[todo[asked]] != is_part[other]
+            involved = np.concatenate([todo[asked[apart]], other[apart]])
+        self._make_raw(_distinct(np.concatenate([todo, involved])))
+        done = {k: self._raw[k] for k in todo.tolist()}
+        done.update(self._resolved(_distinct(involved), is_part, done))
+        self._done.update(done)
+
+    def _resolved(
+        self, entries: Indices, is_part: npt.NDArray[np.bool_], asked: Container[int]
+    ) -> dict[int, tuple[Footprint, ...]]:
+        """Return those entries that were asked for, outlines without what parts describe."""
+        owners: tuple[list[int], list[int]] = ([], [])
+        shapes: tuple[list[Footprint], list[Footprint]] = ([], [])
+        for k, part in zip(entries.tolist(), is_part[entries].tolist(), strict=True):
+            shapes[part].extend(self._raw[k])
+            owners[part].extend([k] * len(self._raw[k]))
+        left, parts = resolve_parts(*shapes)
+        found: dict[int, tuple[Footprint, ...]] = {k: () for k in entries.tolist() if k in asked}
+        for k, pieces in zip(owners[0], left, strict=True):
+            if k in found:
+                found[k] += tuple(pieces)
+        for k, known in zip(owners[1], parts, strict=True):
+            if k in found:
+                found[k] += (known,)
+        return found
+
+    def _make_raw(self, entries: Indices) -> None:
+        todo = np.array([k for k in entries.tolist() if k not in self._raw], dtype=np.intp)
+        table = self._table
+        made = outlines(self._osm, table, todo)
+        polygons, owner = made.polygons.tolist(), made.owner.tolist()
+        begin = 0
+        for n, k in enumerate(todo.tolist()):
+            end = begin
+            while end < len(owner) and owner[end] == n:
+                end += 1
+            height, low, unclear = building_extent(table.tags[k])
+            name, part = table.names[k], table.is_part[k]
+            note = made.notes.get(n, "")
+            if note or unclear:
+                kind = "way" if name[0] == "w" else "relation"
+                note = f"{kind} {name[1:]}: building {'; '.join(filter(None, (note, unclear)))}"
+                if begin == end:
+                    self._lost[k] = note
+            if end - begin == 1:
+                self._raw[k] = (Footprint(name, polygons[begin], height, low, part, note),)
+            else:
+                self._raw[k] = tuple(
+                    Footprint(name if i == 0 else f"{name}.{i}", polygon, height, low, part, note)
+                    for i, polygon in enumerate(polygons[begin:end])
+                )
+            begin = end
+
+
+def _distinct(rows: Indices) -> Indices:
+    """Return the rows once each, ascending; plain `np.unique` would load masked arrays for this."""
+    return np.unique(rows, return_index=True)[0]
+
+
+def buildings_in_frame(
+    near: Sequence[Footprint], frame: LocalFrame, map_frame: LocalFrame, driven: Polygons
+) -> tuple[tuple[Building, ...], tuple[str, ...]]:
+    """Return buildings in the World's frame, cut back where they stand on what is `driven`.
+
+    Outlines are simplified by `FOOTPRINT_TOLERANCE_M` and written in millimetres. Lanes run
+    through passages and under overhangs, and inferred lane widths can reach into a facade: a car
+    must not collide there. Notes name the buildings that were cut, and what their tags leave
+    unclear.
+    """
+    if not near:
+        return (), ()
+    shapes = np.array([f.polygon for f in near], dtype=object)
+    moved = shapely.transform(shapes, lambda xy: target_from_source_m(frame, map_frame, xy))
+    moved = shapely.simplify(moved, FOOTPRINT_TOLERANCE_M - GRID_M, preserve_topology=True)
+    low = np.flatnonzero([f.min_height_m < HEADROOM_M for f in near])
+    blocked = low[_cut_back(moved, low, driven)]
+    whole = shapely.get_type_id(moved) == _POLYGON
+    owners, pieces = np.arange(len(near)), moved
+    if not whole.all():
+        pieces, owners = shapely.get_parts(moved, return_index=True)
+    pieces = shapely.transform(pieces, lambda xy: np.round(xy, 3))
+    sound = shapely.is_valid(pieces) & (shapely.get_type_id(pieces) == _POLYGON)
+    sound &= (shapely.area(pieces) >= MIN_PIECE_M2) | ~np.isin(owners, blocked)
+    if not sound.all():
+        pieces, owners = _mended(pieces, owners, sound)
+    buildings = _buildings([near[k] for k in owners.tolist()], pieces)
+    notes = list(dict.fromkeys(f.note for f in near if f.note))
+    if len(blocked):
+        cut = ", ".join(dict.fromkeys(near[k].id for k in blocked.tolist()))
+        notes.append(f"buildings cut back where a lane passes: {cut}")
+    return buildings, tuple(notes)
+
+
+def _cut_back(shapes: Polygons, chosen: Indices, driven: Polygons) -> Indices:
+    """Take what is driven out of the chosen shapes, and return which of those it touched."""
+    if not len(driven):
+        return np.zeros(0, dtype=np.intp)
+    building, lane = shapely.STRtree(driven).query(shapes[chosen], predicate="intersects")
+    touched, first = np.unique(building, return_index=True)
+    if not len(touched):
+        return touched
+    for k, lanes in zip(touched.tolist(), np.split(lane, first[1:]), strict=True):
+        row = chosen[k]
+        shape = shapes[row] if shapes[row].is_valid else shapely.make_valid(shapes[row])
+        shapes[row] = shapely.difference(shape, shapely.union_all(driven[lanes]))
+    return touched
+
+
+_POLYGON = 3
+
+
+def _mended(
+    pieces: Polygons, owners: Indices, sound: npt.NDArray[np.bool_]
+) -> tuple[Polygons, Indices]:
+    """Return pieces as polygons that are valid also when written in millimetres."""
+    found: list[shapely.Polygon] = []
+    of: list[int] = []
+    for piece, owner, is_sound in zip(
+        pieces.tolist(), owners.tolist(), sound.tolist(), strict=True
+    ):
+        if is_sound:
+            mine = [piece]
+        else:
+            mine = [
+                part
+                for polygon in valid_polygons(piece)
+                for part in valid_polygons(shapely.set_precision(polygon, GRID_M))
+            ]
+        found.extend(mine)
+        of.extend([owner] * len(mine))
+    return np.array(found, dtype=object), np.array(of, dtype=np.intp)
+
+
+def _buildings(of: Sequence[Footprint], pieces: npt.NDArray[np.object_]) -> tuple[Building, ...]:
+    """Return buildings of valid polygons; the second piece of a footprint is named `-1`."""
+    found: list[Building] = []
+    count: dict[str, int] = {}
+    for footprint, (outline, *holes) in zip(of, rings_of(pieces), strict=True):
+        n = count[footprint.id] = count.get(footprint.id, -1) + 1
+        found.append(
+            Building(
+                id=footprint.id if n == 0 else f"{footprint.id}-{n}",
+                outline=outline,
+                holes=tuple(holes),
+                height_m=footprint.height_m,
+                min_height_m=footprint.min_height_m,
+            )
+        )
+    return tuple(found)

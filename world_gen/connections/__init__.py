@@ -1,0 +1,1 @@
+"""Connections through junctions: legal movements, their lanes and their paths."""

@@ -1,0 +1,177 @@
+"""Legal movements: from which leg of a cluster to which other, along which inner edges."""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+import msgspec
+import numpy as np
+
+from foretwin.contracts.world import DrivingSide, Turn
+from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.clusters import Surroundings
+from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, opposed
+from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
+
+STRAIGHT_RAD = math.radians(45.0)
+FORK_RAD = math.radians(18.0)
+U_TURN_RAD = math.radians(150.0)
+_NOSE_COS = math.cos(math.radians(60.0))
+
+
+class Movement(msgspec.Struct, frozen=True, kw_only=True):
+    """One legal way through a cluster; `toward` ends at it, `away` begins there."""
+
+    toward: DirectedEdge
+    away: DirectedEdge
+    inside: tuple[DirectedEdge, ...]
+    turn: Turn
+    angle_rad: float
+
+
+def movements(
+    cluster: Cluster, around: Surroundings, restrictions: TurnRestrictions
+) -> tuple[Movement, ...]:
+    """Return every movement that one-ways and turn restrictions allow.
+
+    Turning back into the street one comes from is none, unless a lane is marked for it, nor is
+    turning around the nose of the island where a street parts into two carriageways.
+    """
+    inner: dict[int, list[DirectedEdge]] = {}
+    for index in sorted(cluster.inner):
+        edge = around.edges.get(index)
+        if edge is None:
+            continue
+        for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
+            if directed.allowed:
+                inner.setdefault(directed.start_node, []).append(directed)
+    found: list[Movement] = []
+    for leg in cluster.legs:
+        toward = DirectedEdge(leg.edge, not leg.reverse)
+        if not toward.allowed:
+            continue
+        marked = any("u_turn" in lane.turns for lane in around.section(toward).lanes
+                     if lane.reverse == toward.reverse)  # fmt: skip
+        ways = _ways_through(cluster, toward, inner, restrictions, back=marked)
+        # Who has no other way out of a street may turn back.
+        ways = [
+            (away, inside)
+            for away, inside in ways
+            if not _around_a_nose(cluster, toward, away)
+            and (marked or not _back_along(toward, away))
+        ] or ways
+        found.extend(_with_turns(toward, ways, around.heads, around.driving_side))
+    return tuple(found)
+
+
+def _ways_through(
+    cluster: Cluster,
+    toward: DirectedEdge,
+    inner: dict[int, list[DirectedEdge]],
+    restrictions: TurnRestrictions,
+    *,
+    back: bool,
+) -> list[tuple[DirectedEdge, tuple[DirectedEdge, ...]]]:
+    """Return (leg, inner edges) by the shortest legal path to every leg, over pairs of edges."""
+    exits: dict[int, list[DirectedEdge]] = {}
+    for leg in cluster.legs:
+        if leg.allowed:
+            exits.setdefault(leg.start_node, []).append(leg)
+    best: dict[tuple[int, bool], tuple[DirectedEdge, tuple[DirectedEdge, ...]]] = {}
+    done: set[tuple[int, bool]] = set()
+    queue: list[tuple[float, int, DirectedEdge, tuple[DirectedEdge, ...]]] = [(0.0, 0, toward, ())]
+    count = 0
+    while queue:
+        cost, _, last, path = heapq.heappop(queue)
+        state = (last.edge.index, last.reverse)
+        if state in done:
+            continue
+        done.add(state)
+        for leg in exits.get(last.end_node, ()):
+            key = (leg.edge.index, leg.reverse)
+            if key in best or not restrictions.step_allowed(last, leg):
+                continue
+            if leg.edge.index == toward.edge.index and not (back and not path):
+                continue
+            if restrictions.path_allowed((toward, *path, leg)):
+                best[key] = (leg, path)
+        for step in inner.get(last.end_node, ()):
+            if step.edge.index == last.edge.index or not restrictions.step_allowed(last, step):
+                continue
+            count += 1
+            heapq.heappush(queue, (cost + step.edge.length_m, count, step, (*path, step)))
+    return [best[key] for key in sorted(best)]
+
+
+def _around_a_nose(cluster: Cluster, toward: DirectedEdge, away: DirectedEdge) -> bool:
+    """Return whether a way leads from one carriageway back into the other where they part."""
+    if len(cluster.legs) != 3 or len(cluster.nodes) != 1:
+        return False
+    one_way = [leg for leg in cluster.legs if leg.edge.forward != leg.edge.backward]
+    if {leg.edge.index for leg in one_way} != {toward.edge.index, away.edge.index}:
+        return False
+    outward = DirectedEdge(toward.edge, not toward.reverse)
+    return dot(heading_out(outward), heading_out(away)) > _NOSE_COS
+
+
+def _back_along(toward: DirectedEdge, away: DirectedEdge) -> bool:
+    """Return whether a way leads back along the other carriageway of the same street."""
+    a, b = toward.edge, away.edge
+    same = a.name == b.name if a.name or b.name else a.road_class == b.road_class
+    return same and _parting(toward, away) and not (is_ring_edge(a) or is_ring_edge(b))
+
+
+def _parting(toward: DirectedEdge, away: DirectedEdge) -> bool:
+    """Return whether two one-way roads part where one ends and the other begins."""
+    a, b = toward.edge, away.edge
+    if a.forward == a.backward or b.forward == b.backward or toward.end_node != away.start_node:
+        return False
+    return opposed(DirectedEdge(a, not toward.reverse), away)
+
+
+def _with_turns(
+    toward: DirectedEdge,
+    ways: list[tuple[DirectedEdge, tuple[DirectedEdge, ...]]],
+    heads: Heads,
+    driving_side: DrivingSide,
+) -> list[Movement]:
+    x, y = heads[toward.edge.index, not toward.reverse]
+    angles = []
+    for leg, _ in ways:
+        u, v = heads[leg.edge.index, leg.reverse]
+        angles.append(math.atan2(y * u - x * v, -x * u - y * v))
+    straightest = min((abs(a) for a in angles), default=0.0)
+    off_ring = not is_ring_edge(toward.edge)
+    found = []
+    for (leg, path), angle in zip(ways, angles, strict=True):
+        turn = _turn(angle, straightest, angles)
+        if not off_ring or is_ring_edge(leg.edge):
+            turn = _ring_turn(toward, leg, driving_side)
+        elif (
+            toward.edge.index == leg.edge.index
+            or _parting(toward, leg)
+            or (abs(angle) > U_TURN_RAD and (path or toward.end_node != leg.start_node))
+        ):
+            turn = "u_turn"
+        found.append(Movement(toward=toward, away=leg, inside=path, turn=turn, angle_rad=angle))
+    return found
+
+
+def _turn(angle: float, straightest: float, angles: list[float]) -> Turn:
+    if abs(angle) < STRAIGHT_RAD:
+        fork = abs(angle) > straightest + 1e-9 and (
+            abs(angle) > FORK_RAD or np.sign(angle) == 0 or straightest < abs(angle)
+        )
+        if not fork:
+            return "straight"
+        best = min(angles, key=abs)
+        return "left" if angle > best else "right"
+    return "left" if angle > 0 else "right"
+
+
+def _ring_turn(toward: DirectedEdge, away: DirectedEdge, driving_side: DrivingSide) -> Turn:
+    if is_ring_edge(toward.edge) and is_ring_edge(away.edge):
+        return "straight"
+    return "right" if driving_side == "right" else "left"

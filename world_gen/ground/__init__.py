@@ -1,0 +1,1 @@
+"""What lies on the ground: pavement, kerbs, islands, sidewalks, crossings."""

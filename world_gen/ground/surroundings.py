@@ -1,0 +1,58 @@
+"""What lies on the ground of a World and stands on it: pavement, kerbs, sidewalks, buildings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import Area, Building
+from foretwin.world_gen.buildings.footprints import buildings_in_frame
+from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.ground.map_islands import mapped_islands
+from foretwin.world_gen.ground.road_surface import areas
+from foretwin.world_gen.ground.sidewalks import sidewalk_areas
+from foretwin.world_gen.junctions.map_index import MapIndex
+from foretwin.world_gen.lanes.clusters import Surroundings, in_map
+from foretwin.world_gen.lanes.lane_curves import LaneSet
+from foretwin.world_gen.roads.beside_roads import BesideRoads
+
+
+class Ground(NamedTuple):
+    """The parts of a World that a road network does without; `junction_areas` by junction id.
+
+    `notes` name what had to give way to lanes.
+    """
+
+    road_surface: tuple[Area, ...] = ()
+    junction_areas: Mapping[str, Area] = MappingProxyType({})
+    islands: tuple[Area, ...] = ()
+    kerbs: tuple[Array, ...] = ()
+    sidewalks: tuple[Area, ...] = ()
+    buildings: tuple[Building, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def ground_around(
+    index: MapIndex,
+    around: Surroundings,
+    lanes: LaneSet,
+    connections: list[ConnectionDraft],
+    beside: BesideRoads,
+) -> Ground:
+    """Return the ground of a World, given its lanes and connections."""
+    surface = areas(around, lanes, connections)
+    map_frame = index.graph.frame
+    near = index.buildings_in(in_map(around.extent, around.frame, map_frame))
+    buildings, cut = buildings_in_frame(near, around.frame, map_frame, surface.driven)
+    mapped = mapped_islands(around, index.osm, beside, surface.driven)
+    return Ground(
+        road_surface=surface.road_surface,
+        junction_areas=surface.junction_areas,
+        islands=(*surface.islands, *mapped),
+        kerbs=surface.kerbs,
+        sidewalks=sidewalk_areas(around, lanes, surface.road_surface, index.osm, beside),
+        buildings=buildings,
+        notes=tuple(cut),
+    )

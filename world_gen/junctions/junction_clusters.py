@@ -1,0 +1,191 @@
+"""Which branchings of the road graph are one junction to a driver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+
+from foretwin.world_gen.junctions.chains import CarRoads, Chain, Tags
+from foretwin.world_gen.junctions.grouping import Cluster, Grouping
+from foretwin.world_gen.junctions.junction_control import facing
+from foretwin.world_gen.junctions.slip_roads import add_slips, slip_ends
+from foretwin.world_gen.roads.road_graph import RoadGraph
+
+CLOSE_M = 20.0
+"""Branchings so near each other are one junction, staggered perhaps."""
+ONE_PLACE_M = 10.0
+"""Branchings no farther apart are one junction whatever slip roads end there."""
+ISLAND_SIDE_M = 30.0
+"""Traffic islands have no longer side."""
+MEDIAN_M = 60.0
+"""Carriageways of one street are no farther apart where another road crosses them."""
+SIGNALLED_M = 45.0
+"""Signalled branchings so near each other, with no signal between them, are one junction."""
+STAGGER_M = 30.0
+"""Side roads to the left and right of a road that meet it so near each other stagger a crossing."""
+STRAIGHT_RAD, BESIDE_RAD = math.radians(20.0), math.radians(50.0)
+STOP_LINE_M = 30.0
+"""Signals stand no farther before the branching that they govern."""
+FLARE_M = 80.0
+"""Arms of a roundabout part into entry and exit no farther from it."""
+WIDEST_M = 70.0
+"""A junction other than a ring is no wider, but for its slip roads."""
+
+
+def cluster_branchings(
+    roads: CarRoads, graph: RoadGraph, node_tags: Mapping[int, Tags]
+) -> list[Cluster]:
+    """Return the branchings and rings grouped into junctions, by their smallest node id.
+
+    A group may still turn out to be no junction: a street that parts into its carriageways is a
+    group with two arms.
+    """
+    grouping = Grouping(roads, graph.node_xy_m)
+    single = [chain for chains in roads.chains_from.values() for chain in chains]
+    single = [chain for chain in single if chain.start <= chain.end and chain.start != chain.end]
+    single.sort(key=lambda chain: (chain.length_m, chain.key))
+    ends = slip_ends(roads)
+    for chain in single:
+        if chain.length_m > MEDIAN_M:
+            break
+        if _leads_elsewhere(chain, ends) or _leads_elsewhere(chain, ends, back=True):
+            continue
+        if (
+            chain.length_m <= CLOSE_M
+            or _links_carriageways(chain, roads)
+            or _in_island(chain, roads)
+            or (
+                chain.length_m <= SIGNALLED_M
+                and not (chain.link and chain.end in ends.get(chain.start, ()))
+                and _one_signal(chain, roads, node_tags)
+            )
+        ):
+            grouping.join(chain, WIDEST_M)
+        elif _staggers(chain, roads):
+            grouping.join(chain, STAGGER_M)
+    _add_flares(grouping, roads)
+    add_slips(grouping, roads)
+    return grouping.clusters()
+
+
+def _leads_elsewhere(
+    chain: Chain, slip_ends: Mapping[int, frozenset[int]], *, back: bool = False
+) -> bool:
+    """Tell whether a chain leads on from the end of another junction's slip road."""
+    start, end = (chain.end, chain.start) if back else (chain.start, chain.end)
+    return chain.length_m > ONE_PLACE_M and start in slip_ends and end not in slip_ends[start]
+
+
+def _links_carriageways(chain: Chain, roads: CarRoads) -> bool:
+    """Tell whether a chain leads from one carriageway of a street to the opposite one."""
+    for name_a, heading_a in _carriageways(chain.start, chain, roads):
+        for name_b, heading_b in _carriageways(chain.end, chain, roads):
+            opposed = math.cos(heading_a - heading_b) < -0.64
+            if name_a == name_b and opposed:
+                return True
+    return False
+
+
+def _carriageways(node: int, besides: Chain, roads: CarRoads) -> Iterator[tuple[str, float]]:
+    """Yield (name, heading) of the one-way streets that run straight through a node."""
+    others = [chain for chain in roads.chains_from[node] if chain.key != besides.key]
+    for into in others:
+        if not (into.one_way and into.inward):
+            continue
+        heading = into.bearing_rad(15.0) + math.pi
+        for out in others:
+            if out.one_way and out.outward and out.name == into.name:
+                ahead = out.bearing_rad(15.0)
+                if math.cos(ahead - heading) > 0.64:
+                    yield into.name, ahead
+
+
+def _in_island(chain: Chain, roads: CarRoads) -> bool:
+    """Tell whether a chain is a side of a traffic island: a ring of up to four short chains."""
+    if chain.length_m > ISLAND_SIDE_M:
+        return False
+    waiting = [(chain.end, frozenset({chain.key}))]
+    while waiting:
+        node, used = waiting.pop()
+        for side in roads.chains_from[node]:
+            if side.length_m > ISLAND_SIDE_M or side.key in used:
+                continue
+            if side.end == chain.start:
+                return True
+            if len(used) < 3:
+                waiting.append((side.end, used | {side.key}))
+    return False
+
+
+def _one_signal(chain: Chain, roads: CarRoads, node_tags: Mapping[int, Tags]) -> bool:
+    """Tell whether both ends of a chain are signalled and nothing stops a driver in between."""
+    ends = (chain.start, chain.end)
+    if any(
+        mark.node not in ends and mark.tags["highway"] == "traffic_signals" for mark in chain.marks
+    ):
+        return False
+    return all(_has_signal(node, chain, roads, node_tags) for node in ends)
+
+
+def _has_signal(node: int, besides: Chain, roads: CarRoads, node_tags: Mapping[int, Tags]) -> bool:
+    return _is_signal(node, node_tags) or any(
+        True
+        for chain in roads.chains_from[node]
+        if chain.key != besides.key and chain.inward
+        for _ in facing(chain, STOP_LINE_M, "traffic_signals")
+    )
+
+
+def _is_signal(node: int, node_tags: Mapping[int, Tags]) -> bool:
+    return node_tags.get(node, {}).get("highway") == "traffic_signals"
+
+
+def _staggers(chain: Chain, roads: CarRoads) -> bool:
+    """Tell whether a chain is the piece of a straight road between side roads on both sides."""
+    if chain.length_m > STAGGER_M:
+        return False
+    sides = [_side_road(chain, roads, end) for end in (chain.start, chain.end)]
+    return 0.0 not in sides and sides[0] * sides[1] < 0.0
+
+
+def _side_road(chain: Chain, roads: CarRoads, node: int) -> float:
+    """Return on which side of a chain the one road leaves that meets it at an end.
+
+    1 is left and -1 right, seen from the chain's start; 0 where no one road leaves beside a
+    straight one.
+    """
+    at_start = node == chain.start
+    others = [other for other in roads.chains_from[node] if other.key != chain.key]
+    if len(others) != 2 or any(other.one_way for other in (chain, *others)):
+        return 0.0
+    ahead = chain.bearing_rad(chain.length_m)
+    turns = [math.remainder(other.bearing_rad(15.0) - ahead, math.tau) for other in others]
+    along = math.pi if at_start else 0.0
+    turns.sort(key=lambda turn: abs(math.remainder(turn - along, math.tau)))
+    straight = abs(math.remainder(turns[0] - along, math.tau)) < STRAIGHT_RAD
+    beside = abs(math.sin(turns[1])) > math.sin(BESIDE_RAD)
+    return math.copysign(1.0, turns[1]) if straight and beside else 0.0
+
+
+def _add_flares(grouping: Grouping, roads: CarRoads) -> None:
+    """Give each ring the nodes where its arms part into entry and exit."""
+    for node, chains in roads.chains_from.items():
+        own = grouping.of.get(node)
+        if own is None or own.ring:
+            continue
+        to_ring = [
+            (chain, target)
+            for chain in chains
+            if chain.one_way
+            and chain.length_m <= FLARE_M
+            and (target := grouping.of.get(chain.end)) is not None
+            and target.ring
+        ]
+        for (a, target), (b, other) in combinations(to_ring, 2):
+            if (
+                other is target
+                and a.outward != b.outward
+                and grouping.attach(target, own, (a.key, b.key))
+            ):
+                break

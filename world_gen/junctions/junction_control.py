@@ -1,0 +1,105 @@
+"""Who tells drivers at a junction when to go: lights, signs, or the general rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from foretwin.contracts.world import Control
+from foretwin.world_gen.junctions.chains import Chain, Mark, Tags
+
+SIGNALS_WITHIN_M, SIGNS_WITHIN_M = 40.0, 30.0
+PEDESTRIAN_LIGHT_M = 15.0
+"""A light at a crossing farther out than this serves pedestrians alone."""
+
+
+def lights_of(
+    core: frozenset[int],
+    inside: tuple[Chain, ...],
+    incoming: tuple[Chain, ...],
+    node_tags: Mapping[int, Tags],
+) -> frozenset[int]:
+    """Return the nodes of the traffic lights in a junction and on the roads that lead to it.
+
+    A light counts for the nearer junction of the road it stands on, or the one that it faces.
+    """
+    found = {node for node in core if node in node_tags and _is_light(node_tags[node], 0.0)}
+    found.update(mark.node for chain in inside for mark in chain.marks if _is_light(mark.tags, 0.0))
+    for chain in incoming:
+        if not chain.marks:
+            continue
+        for mark in facing(chain, SIGNALS_WITHIN_M, "traffic_signals"):
+            if _is_light(mark.tags, mark.distance_m):
+                found.add(mark.node)
+    return frozenset(found)
+
+
+def control_of(
+    core: frozenset[int],
+    inside: tuple[Chain, ...],
+    incoming: tuple[Chain, ...],
+    node_tags: Mapping[int, Tags],
+    *,
+    lights: bool,
+    ring: bool,
+) -> Control:
+    """Return how the junction is controlled, from the tags in it and on its roads in.
+
+    A sign counts for the nearer junction of the road it stands on, and only where it faces
+    drivers who come in; signs on every road in make an all-way stop.
+    """
+    if lights:
+        return "signals"
+    if ring:
+        return "roundabout"
+    inner = [node_tags[node] for node in core if node in node_tags]
+    inner += [mark.tags for chain in inside for mark in chain.marks]
+    if not inner and all(not chain.marks for chain in incoming):
+        return "uncontrolled"
+    stops = [_sign(chain, "stop") for chain in incoming]
+    all_way = any(
+        tags.get("highway") == "stop" and tags.get("stop") == "all" for tags in inner
+    ) or any(tags.get("stop") == "all" for tags in stops if tags is not None)
+    if all_way or (len(incoming) >= 3 and all(tags is not None for tags in stops)):
+        return "all_way_stop"
+    at_inner = {tags.get("highway") for tags in inner}
+    if "stop" in at_inner or any(tags is not None for tags in stops):
+        return "stop"
+    if "give_way" in at_inner or any(_sign(chain, "give_way") is not None for chain in incoming):
+        return "give_way"
+    return "uncontrolled"
+
+
+def _sign(chain: Chain, word: str) -> Tags | None:
+    if not chain.marks:
+        return None
+    return next((mark.tags for mark in facing(chain, SIGNS_WITHIN_M, word)), None)
+
+
+def _is_light(tags: Tags, distance_m: float) -> bool:
+    if tags.get("highway") != "traffic_signals":
+        return False
+    pedestrians = "crossing" in tags or tags.get("traffic_signals") == "pedestrian_crossing"
+    return distance_m <= PEDESTRIAN_LIGHT_M or not pedestrians
+
+
+def facing(chain: Chain, within_m: float, word: str) -> Iterator[Mark]:
+    """Yield the nodes of `highway=word` that drivers towards a junction obey, nearest first.
+
+    `chain` leaves the junction. A node counts up to `within_m` where it is tagged to face who
+    comes in, or stands on a one-way road and at no crossing; else on the nearer half alone.
+    """
+    nearer_m = min(within_m, chain.length_m / 2.0)
+    for mark in chain.marks:
+        node, tags, distance_m = mark
+        if distance_m > within_m:
+            break
+        if tags["highway"] != word or node in (chain.start, chain.end):
+            continue
+        faced = tags.get(f"{word}:direction") or tags.get("direction")
+        along = next((item for item in chain.edges if node in item.edge.node_ids[1:-1]), None)
+        if along is not None and faced in ("forward", "backward"):
+            # The chain leaves the junction: who comes in drives against it.
+            if faced == ("forward" if along.reverse else "backward"):
+                yield mark
+        elif distance_m <= nearer_m or (chain.one_way and "crossing" not in tags):
+            yield mark

@@ -1,0 +1,88 @@
+"""What many Worlds of one map share: spatial trees over roads and buildings, turn restrictions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.buildings.footprints import BuildingIndex
+from foretwin.world_gen.buildings.parts import Footprint
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.roads.beside_roads import BesideIndex
+from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.road_tags import OTHER_CLASSES
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions, read_turn_restrictions
+
+
+class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
+    """A map prepared for building Worlds; make it once per map with `index_map`."""
+
+    osm: OsmMap
+    graph: RoadGraph
+    car_edges: tuple[int, ...]
+    car_edge_tree: shapely.STRtree
+    buildings: BuildingIndex
+    beside: BesideIndex
+    restrictions: TurnRestrictions
+    junction_of_node: Mapping[int, Junction]
+    junction_lights: frozenset[int]
+    """Nodes of the lights that govern junctions."""
+
+    @property
+    def map_key(self) -> str:
+        """The map's SHA-256, and which roads count as car roads beyond what it says."""
+        edges = (self.graph.edges[i] for i in self.car_edges)
+        added = [
+            f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
+            for edge in edges
+            if edge.road_class in OTHER_CLASSES
+        ]
+        return self.osm.sha256 if not added else f"{self.osm.sha256} with {' '.join(added)}"
+
+    def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:
+        """Return indices of car roads that touch an area in the map's frame."""
+        found = self.car_edge_tree.query(area, predicate="intersects")
+        return tuple(sorted(self.car_edges[i] for i in found))
+
+    def buildings_in(self, area: shapely.Polygon) -> tuple[Footprint, ...]:
+        """Return buildings that reach into an area in the map's frame."""
+        return self.buildings.within(area)
+
+
+def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ()) -> MapIndex:
+    """Prepare a map; `junctions` are all known ones, so that neighbours are built as such."""
+    car = tuple(
+        edge.index
+        for edge in graph.edges
+        if edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
+    )
+    known = tuple(junctions)
+    lines = _lines([graph.edges[i].xy_m for i in car])
+    return MapIndex(
+        osm=osm,
+        graph=graph,
+        car_edges=car,
+        car_edge_tree=shapely.STRtree(lines),
+        buildings=BuildingIndex(osm),
+        beside=BesideIndex(osm),
+        restrictions=read_turn_restrictions(osm),
+        junction_of_node={node: j for j in known for node in sorted(j.nodes)},
+        junction_lights=frozenset().union(*(junction.lights for junction in known)),
+    )
+
+
+def _lines(xy_m: list[Array]) -> npt.NDArray[np.object_]:
+    """Return lines of many arrays of points (N, 2) in one call: shapely takes long to be called."""
+    if not xy_m:
+        return np.empty(0, dtype=object)
+    counts = [len(xy) for xy in xy_m]
+    lines: npt.NDArray[np.object_] = shapely.linestrings(
+        np.concatenate(xy_m), indices=np.repeat(np.arange(len(counts)), counts)
+    )
+    return lines

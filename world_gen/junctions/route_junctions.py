@@ -1,0 +1,39 @@
+"""Which junctions a route passes, and where in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.roads.road_graph import DirectedEdge
+
+
+class Passage(NamedTuple):
+    """A junction on a route and the index of the route's edge that enters it, or ends in it."""
+
+    junction: Junction
+    edge_index: int
+
+
+def junctions_on_route(
+    junctions: Iterable[Junction], directed_edges: Sequence[DirectedEdge]
+) -> list[Passage]:
+    """Return the junctions that a route drives through, in order, once for every passage.
+
+    A route passes a junction when it comes to one of its nodes. The opposite carriageway of a
+    road with a junction on one carriageway alone has no node in it and passes by. A route that
+    begins in a junction passes it only if it returns.
+    """
+    at_node = {node: junction for junction in junctions for node in junction.nodes}
+    passages: list[Passage] = []
+    inside: Junction | None = None
+    if directed_edges:
+        inside = at_node.get(directed_edges[0].start_node)
+    for index, item in enumerate(directed_edges):
+        here = at_node.get(item.end_node)
+        stays = here is inside and here is not None and item.edge.index in here.inner
+        if here is not None and not stays:
+            passages.append(Passage(here, index))
+        inside = here
+    return passages

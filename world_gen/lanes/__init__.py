@@ -1,0 +1,1 @@
+"""Lanes: cross-sections from tags, and curves cut where junctions begin."""

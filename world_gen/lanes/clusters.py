@@ -1,0 +1,250 @@
+"""The roads around a junction in the World's frame, and the places where their lanes meet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+import shapely
+import shapely.ops
+
+from foretwin.contracts.frames import GeoPoint, LocalFrame, target_from_source_m
+from foretwin.contracts.world import DrivingSide
+from foretwin.geometry.polyline_batch import Polylines
+from foretwin.world_gen.extent import Extent
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.junctions.map_index import MapIndex
+from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.cross_section import CrossSection, cross_section
+from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.transitions import transition_shifts
+from foretwin.world_gen.lanes.trims import trims
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.turn_restrictions import restriction_notes
+
+_REPEAT_M = 0.01
+
+
+class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
+    """Everything around a place in the World's frame; edges and sections by edge index.
+
+    `junctions` are all that lie whole in the World, the one it is made for first.
+    """
+
+    frame: LocalFrame
+    junctions: tuple[Junction, ...]
+    extent: Extent
+    driving_side: DrivingSide
+    edges: Mapping[int, RoadEdge]
+    sections: Mapping[int, CrossSection]
+    clusters: tuple[Cluster, ...]
+    trims_m: Mapping[tuple[int, bool], float]
+    """Metres cut off an edge's lanes by (edge index, at its end node)."""
+    heads: Heads
+    """Where every leg of a cluster leaves it."""
+    ring_edges: frozenset[int]
+    shifts_m: Mapping[int, tuple[float, float]]
+    """How far left of their way roads in a transition begin and end, by edge index."""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def inner_edges(self) -> frozenset[int]:
+        """Indices of the edges inside whole junctions."""
+        return frozenset(i for junction in self.junctions for i in junction.inner)
+
+    def section(self, edge: DirectedEdge) -> CrossSection:
+        """Return the cross-section of a directed edge's road."""
+        return self.sections[edge.edge.index]
+
+
+def in_map(extent: Extent, frame: LocalFrame, map_frame: LocalFrame) -> shapely.Polygon:
+    """Return a World's extent in the map's frame."""
+    return shapely.transform(extent.polygon, lambda xy: target_from_source_m(map_frame, frame, xy))
+
+
+def world_frame(junction: Junction) -> LocalFrame:
+    """Return the frame of a junction's World: its origin is the junction's centre."""
+    return LocalFrame(GeoPoint(junction.summary.lat, junction.summary.lon))
+
+
+def surroundings(
+    index: MapIndex,
+    frame: LocalFrame,
+    extent: Extent,
+    made_for: tuple[Junction, ...],
+) -> Surroundings:
+    """Collect the roads within `extent` of the frame's origin and cluster their nodes.
+
+    Roads of the junctions in `made_for` are kept even where they lie beyond.
+    """
+    graph = index.graph
+    area = in_map(extent, frame, graph.frame)
+    wanted = set(index.car_edges_in(area))
+    for junction in made_for:
+        wanted.update(i for i in junction.inner if _drivable(graph.edges[i]))
+        wanted.update(
+            leg.edge.index for arm in junction.arms for leg in arm.outward if _drivable(leg.edge)
+        )
+    edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
+    sections = _sections(index, edges)
+    clusters = _clusters(index, made_for, edges, extent)
+    whole = {id(c.junction): c.junction for c in clusters if c.whole and c.junction is not None}
+    inner = {i for junction in whole.values() for i in junction.inner}
+    ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
+    shifts = transition_shifts(clusters, edges, sections)
+    heads = {(leg.edge.index, leg.reverse): heading_out(leg) for c in clusters for leg in c.legs}
+    return Surroundings(
+        frame=frame,
+        junctions=tuple(whole.values()),
+        extent=extent,
+        driving_side=graph.driving_side,
+        edges=edges,
+        sections=sections,
+        clusters=clusters,
+        trims_m=trims(clusters, edges, sections, shifts, heads),
+        heads=heads,
+        shifts_m=shifts,
+        ring_edges=ring_edges,
+        notes=restriction_notes(index.restrictions, [c.inner for c in clusters], edges),
+    )
+
+
+def _drivable(edge: RoadEdge) -> bool:
+    return edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
+
+
+_SAY_NOTHING_OF_LANES = frozenset(
+    {"name", "ref", "maxspeed", "surface", "lit", "smoothness", "source", "wikidata", "note"}
+)
+
+
+def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, CrossSection]:
+    """Return cross-sections by edge index; ways whose tags say the same share theirs."""
+    of_way: dict[tuple[int, bool, bool, bool], CrossSection] = {}
+    of_tags: dict[object, CrossSection] = {}
+    found: dict[int, CrossSection] = {}
+    for i, edge in edges.items():
+        # A centre lane for turns is driven toward the junction, where there is one.
+        centre_reverse = (
+            "lanes:both_ways" in edge.tags
+            and edge.start_node in index.junction_of_node
+            and edge.end_node not in index.junction_of_node
+        )
+        key = (edge.way_id, edge.forward, edge.backward, centre_reverse)
+        section = of_way.get(key)
+        if section is None:
+            section = of_way[key] = _section(
+                edge, index.graph.driving_side, of_tags, centre_reverse=centre_reverse
+            )
+        found[i] = section
+    return found
+
+
+def _section(
+    edge: RoadEdge,
+    driving_side: DrivingSide,
+    of_tags: dict[object, CrossSection],
+    *,
+    centre_reverse: bool,
+) -> CrossSection:
+    lanes = (edge.lanes_forward, edge.lanes_backward)
+    tags = frozenset(item for item in edge.tags.items() if item[0] not in _SAY_NOTHING_OF_LANES)
+    key = (
+        edge.road_class,
+        edge.forward,
+        edge.backward,
+        centre_reverse,
+        *((count.value, count.source) for count in lanes),
+        tags,
+    )
+    section = of_tags.get(key)
+    if section is None:
+        section = cross_section(edge, driving_side, centre_reverse=centre_reverse)
+        if not section.notes:  # these name the way
+            of_tags[key] = section
+    return section
+
+
+def _in_frame(
+    edges: list[RoadEdge], frame: LocalFrame, map_frame: LocalFrame
+) -> dict[int, RoadEdge]:
+    """Return edges in the World's frame by index, without those that are but a point."""
+    if not edges:
+        return {}
+    lines = Polylines.of([edge.xy_m for edge in edges])
+    moved = Polylines(target_from_source_m(frame, map_frame, lines.xy_m), lines.first)
+    step_m = np.maximum.reduceat(moved.steps[1] * ~moved.is_last, moved.first[:-1]).tolist()
+    return {
+        edge.index: msgspec.structs.replace(edge, xy_m=xy)
+        for edge, xy, longest_m in zip(edges, moved.split(), step_m, strict=True)
+        if longest_m > _REPEAT_M
+    }
+
+
+class _Group(NamedTuple):
+    nodes: frozenset[int]
+    inner: frozenset[int] = frozenset()
+    junction: Junction | None = None
+    whole: bool = False
+    ring: bool = False
+
+
+def _clusters(
+    index: MapIndex, made_for: tuple[Junction, ...], edges: Mapping[int, RoadEdge], extent: Extent
+) -> tuple[Cluster, ...]:
+    leaving: dict[int, list[DirectedEdge]] = {}
+    for edge in edges.values():
+        for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
+            leaving.setdefault(directed.start_node, []).append(directed)
+    known = list(leaving)
+    at = [leaving[node][0].xy_m[0] for node in known]
+    near: set[int] = {node for junction in made_for for node in junction.nodes}
+    if known:
+        near.update(n for n, ok in zip(known, extent.holds(np.array(at)), strict=True) if ok)
+    others = {j.summary.id: j for j in made_for}
+    for node in sorted(near):
+        if found := index.junction_of_node.get(node):
+            others.setdefault(found.summary.id, found)
+    named = {j.summary.id for j in made_for}
+    groups: list[_Group] = []
+    for junction in others.values():
+        whole = junction.summary.id in named or (junction.nodes <= near and _drawn(junction, edges))
+        groups.extend(_groups_of(junction, leaving, whole=whole))
+    taken = frozenset().union(*(group.nodes for group in groups))
+    groups.extend(_Group(frozenset([n])) for n in sorted(near - taken))
+    clusters = []
+    for group in groups:
+        legs = tuple(
+            d
+            for node in sorted(group.nodes)
+            for d in leaving.get(node, ())
+            if d.edge.index not in group.inner
+        )
+        if len(legs) >= 2:
+            clusters.append(Cluster(key=str(min(group.nodes)), legs=legs, **group._asdict()))
+    return tuple(clusters)
+
+
+def _drawn(junction: Junction, edges: Mapping[int, RoadEdge]) -> bool:
+    """Return whether all roads of a junction that cars may use are among `edges`."""
+    legs = (leg.edge for arm in junction.arms for leg in arm.outward)
+    return all(edge.index in edges for edge in legs if _drivable(edge))
+
+
+def _groups_of(
+    junction: Junction, leaving: Mapping[int, list[DirectedEdge]], *, whole: bool
+) -> list[_Group]:
+    """A ring is driven node by node, every other junction in one go."""
+    on_ring = {
+        node for node in junction.nodes if any(is_ring_edge(d.edge) for d in leaving.get(node, ()))
+    }
+    if junction.summary.kind in RING_KINDS and on_ring:
+        # Where a street parts into entry and exit before the ring, nobody has to stop.
+        return [
+            _Group(frozenset([n]), frozenset(), junction, whole and n in on_ring, n in on_ring)
+            for n in sorted(junction.nodes)
+        ]
+    nodes = frozenset(node for node in junction.nodes if node in leaving)
+    return [_Group(nodes, frozenset(junction.inner), junction, whole)] if nodes else []

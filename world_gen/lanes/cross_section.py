@@ -1,0 +1,154 @@
+"""The cross-section of a road from its tags: lanes side by side, widths, turns, placement."""
+
+from __future__ import annotations
+
+import re
+
+import msgspec
+
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import DrivingSide
+from foretwin.world_gen.lanes.lane_plans import CrossSection as CrossSection
+from foretwin.world_gen.lanes.lane_plans import LanePlan as LanePlan
+from foretwin.world_gen.lanes.lane_plans import metres as metres
+from foretwin.world_gen.lanes.lane_tags import (
+    BUS_WIDTH_M,
+    CLASS_WIDTH_M,
+    DEFAULT_WIDTH_M,
+    MAX_WIDTH_M,
+    MIN_WIDTH_M,
+    lanes_of_direction,
+)
+from foretwin.world_gen.lanes.side_lanes import side_lanes
+from foretwin.world_gen.roads.road_graph import RoadEdge
+
+MAX_LANES = 12
+TRANSITION = "transition"
+_PLACEMENT = re.compile(r"^(left_of|right_of|middle_of):(\d+)$")
+
+
+def cross_section(
+    edge: RoadEdge, driving_side: DrivingSide, *, centre_reverse: bool = False
+) -> CrossSection:
+    """Return the lanes of a road by its tags, by its class where tags are missing.
+
+    The way lies in the middle of the lanes that the map counts, unless `placement` says
+    otherwise; lanes for bicycles and parking lie outside. A lane in the middle from which both
+    directions turn becomes one lane, driven along the way, or against it with `centre_reverse`.
+    """
+    notes: list[str] = []
+    forward = _lane_count(edge.lanes_forward) if edge.forward else 0
+    backward = _lane_count(edge.lanes_backward) if edge.backward else 0
+    ahead = lanes_of_direction(
+        edge, forward, driving_side, reverse=False, both=backward > 0, notes=notes
+    )
+    against = lanes_of_direction(
+        edge, backward, driving_side, reverse=True, both=forward > 0, notes=notes
+    )
+    centre = _centre(edge, driving_side, centre_reverse, notes) if ahead and against else []
+    with_bicycles = frozenset(p.reverse for p in (*ahead, *against) if p.kind == "bicycle")
+    beside = side_lanes(edge, driving_side, with_bicycles, BUS_WIDTH_M)
+    ordered = (
+        [*reversed(against), *centre, *ahead]
+        if driving_side == "right"
+        else [*ahead, *centre, *reversed(against)]
+    )
+    ordered = _fit_total_width(edge, ordered)
+    total = _width(ordered)
+    left = total / 2 + _placement_shift(edge, ordered, total, notes)
+    left += _width(beside.left)
+    edge_left, lanes = left, []
+    for lane in (*reversed(beside.left), *ordered, *beside.right):
+        half = lane.width_m.value / 2
+        lanes.append(msgspec.structs.replace(lane, left_m=left - half))
+        left -= 2 * half
+    return CrossSection(lanes=tuple(lanes), left_m=edge_left, right_m=left, notes=tuple(notes))
+
+
+def _lane_count(lanes: Quantity) -> int:
+    return int(min(max(round(lanes.value), 1), MAX_LANES))
+
+
+def _width(lanes: list[LanePlan] | tuple[LanePlan, ...]) -> float:
+    return sum(lane.width_m.value for lane in lanes)
+
+
+def _centre(
+    edge: RoadEdge, driving_side: DrivingSide, reverse: bool, notes: list[str]
+) -> list[LanePlan]:
+    """Return the lane in the middle from which both directions turn, where there is one."""
+    if edge.tags.get("lanes:both_ways", "0") in ("0", "no"):
+        return []
+    tagged = "turn:lanes:both_ways" in edge.tags or "turn:both_ways" in edge.tags
+    notes.append(
+        f"way {edge.way_id}: its centre lane, for turns from both directions, is driven one way"
+    )
+    known = CLASS_WIDTH_M.get(edge.road_class, DEFAULT_WIDTH_M)
+    return [
+        LanePlan(
+            label="centre",
+            reverse=reverse,
+            number=-1,
+            kind="driving",
+            width_m=Quantity(known, "inferred"),
+            turns=("left",) if driving_side == "right" else ("right",),
+            turns_source="tagged" if tagged else "inferred",
+            counted=False,
+        )
+    ]
+
+
+def _fit_total_width(edge: RoadEdge, lanes: list[LanePlan]) -> list[LanePlan]:
+    """Spread a tagged total width over lanes whose own width is not tagged."""
+    total = metres(edge.tags.get("width")) or metres(edge.tags.get("est_width"))
+    if total is None or not lanes or any(lane.width_m.source == "tagged" for lane in lanes):
+        return lanes
+    cars = [lane for lane in lanes if lane.kind != "bicycle"]
+    each = (total - (_width(lanes) - _width(cars))) / max(len(cars), 1)
+    if not MIN_WIDTH_M <= each <= MAX_WIDTH_M:
+        return lanes
+    # The way's width is tagged, a lane's share of it is worked out; kerb-side parking that the
+    # width may include is unknown, so a lane gets no more than 1.5 times its class's width.
+    return [
+        lane
+        if lane.kind == "bicycle"
+        else msgspec.structs.replace(
+            lane, width_m=Quantity(round(min(each, 1.5 * lane.width_m.value), 3), "inferred")
+        )
+        for lane in lanes
+    ]
+
+
+def _placement_shift(
+    edge: RoadEdge, ordered: list[LanePlan], total: float, notes: list[str]
+) -> float:
+    """Return how far the carriageway's centre lies to the left of the way, from `placement`."""
+    tags = edge.tags
+    for reverse, key in (
+        (False, "placement:forward"),
+        (True, "placement:backward"),
+        (False, "placement"),
+    ):
+        text = tags.get(key)
+        if text is None or (key == "placement" and not edge.forward) or text == TRANSITION:
+            continue
+        found = _PLACEMENT.match(text.strip())
+        number = int(found[2]) - 1 if found else -1
+        place = next(
+            (
+                i
+                for i, lane in enumerate(ordered)
+                if lane.reverse == reverse and lane.number == number >= 0
+            ),
+            None,
+        )
+        if found is None or place is None:
+            notes.append(f"way {edge.way_id}: {key}={text} names no lane of this road")
+            continue
+        begin = _width(ordered[:place])
+        width = ordered[place].width_m.value
+        share = {"left_of": 0.0, "middle_of": 0.5, "right_of": 1.0}[found[1]]
+        share = 1.0 - share if reverse else share
+        # The way lies `begin + share * width` right of the left edge.
+        return begin + share * width - total / 2
+    return 0.0

@@ -1,0 +1,215 @@
+"""The lanes of one direction of a road, from its tags that name them one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from foretwin.contracts.provenance import Provenance, Quantity
+from foretwin.contracts.world import DrivingSide, LaneChange, LaneKind, Turn
+from foretwin.world_gen.lanes.lane_plans import LanePlan, metres, of_side
+from foretwin.world_gen.lanes.side_lanes import BICYCLE_WIDTH_M
+from foretwin.world_gen.roads.road_graph import RoadEdge
+
+CLASS_WIDTH_M: Mapping[str, float] = {
+    "motorway": 3.75,
+    "trunk": 3.5,
+    "primary": 3.5,
+    "secondary": 3.25,
+    "tertiary": 3.25,
+    "unclassified": 3.0,
+    "residential": 3.0,
+    "living_street": 2.75,
+    "motorway_link": 3.75,
+    "trunk_link": 3.5,
+    "primary_link": 3.5,
+    "secondary_link": 3.5,
+    "tertiary_link": 3.25,
+    "raceway": 5.0,
+}
+"""Usual lane widths by highway class; what is not listed gets DEFAULT_WIDTH_M."""
+DEFAULT_WIDTH_M = 3.0
+BUS_WIDTH_M = 3.25
+MIN_WIDTH_M, MAX_WIDTH_M = 2.0, 7.5
+
+_TURNS: Mapping[str, Turn | None] = {
+    "through": "straight",
+    "left": "left",
+    "slight_left": "left",
+    "sharp_left": "left",
+    "right": "right",
+    "slight_right": "right",
+    "sharp_right": "right",
+    "reverse": "u_turn",
+    "merge_to_left": "straight",
+    "merge_to_right": "straight",
+    "slide_left": "straight",
+    "slide_right": "straight",
+}
+_CHANGES: Mapping[str, LaneChange] = {
+    "yes": "both", "no": "none",
+    "not_left": "right", "only_right": "right", "not_right": "left", "only_left": "left",
+}  # fmt: skip
+_ALLOWED = frozenset({"designated", "yes"})
+
+
+class Direction:
+    """Tags of one direction of a road, as values for each of its lanes."""
+
+    def __init__(self, edge: RoadEdge, *, reverse: bool, both: bool, notes: list[str]) -> None:
+        self.edge, self.reverse, self.both, self.notes = edge, reverse, both, notes
+        self.word = "backward" if reverse else "forward"
+
+    def text(self, key: str) -> str | None:
+        """Return a tag of this direction; the tag without a direction speaks for one-ways."""
+        tags = self.edge.tags
+        return tags.get(f"{key}:{self.word}") or (None if self.both else tags.get(key))
+
+    def each(self, key: str) -> list[str]:
+        """Return a tag's values lane by lane from the left, none where it is missing."""
+        text = self.text(key)
+        return [value.strip() for value in text.split("|")] if text else []
+
+    def fitted(self, key: str, count: int, bicycles: Sequence[int]) -> list[str]:
+        """Return a tag's values for the counted lanes, and note where they do not fit."""
+        values = self.each(key)
+        if not values or len(values) == count:
+            return values
+        cars = [value for i, value in enumerate(values) if i not in bicycles]
+        if len(cars) == count:
+            return cars
+        self.notes.append(
+            f"way {self.edge.way_id}: {key} has {len(values)} entries for {count} lanes"
+        )
+        return []
+
+
+def lanes_of_direction(
+    edge: RoadEdge,
+    count: int,
+    driving_side: DrivingSide,
+    *,
+    reverse: bool,
+    both: bool,
+    notes: list[str],
+) -> list[LanePlan]:
+    """Return the lanes of one direction from the left as their driver sees them.
+
+    `count` lanes are counted; bicycle lanes that the tags put among them come on top. `both`
+    tells that the road is driven both ways.
+    """
+    if count == 0:
+        return []
+    tags = Direction(edge, reverse=reverse, both=both, notes=notes)
+    single = tags.text("turn")
+    bicycle = tags.each("bicycle:lanes")
+    designated = [i for i, word in enumerate(bicycle) if word == "designated"]
+    beside = designated if len(bicycle) == count + len(designated) else []
+    turns = tags.fitted("turn:lanes", count, designated) or [single or ""] * count
+    widths = tags.fitted("width:lanes", count, designated)
+    changes = tags.fitted("change:lanes", count, designated) or [tags.text("change") or ""] * count
+    kinds = _kinds(tags, count, bicycle, designated, driving_side)
+    source: Provenance = (
+        "tagged" if "oneway" in edge.tags or "junction" in edge.tags else "inferred"
+    )
+    letter = "b" if reverse else "f"
+    lanes = []
+    for i in range(count):
+        named = _turns(turns[i])
+        change = _CHANGES.get(changes[i])
+        lanes.append(
+            LanePlan(
+                label=f"{letter}{i}",
+                reverse=reverse,
+                number=i,
+                kind=kinds[i],
+                width_m=_lane_width(edge, widths[i] if widths else None, kinds[i]),
+                turns=named,
+                turns_source="tagged" if named else "inferred",
+                direction_source=source,
+                change=change or "both",
+                change_source="tagged" if change else "default",
+                # Counted, as the map counts it, but cars have no business there.
+                counted=kinds[i] != "bicycle",
+            )
+        )
+    for place in beside:
+        lanes.insert(
+            place,
+            LanePlan(
+                label=f"bicycle_{letter}{place}",
+                reverse=reverse,
+                number=-10 - place,
+                kind="bicycle",
+                width_m=Quantity(BICYCLE_WIDTH_M, "default"),
+                direction_source=source,
+                counted=False,
+            ),
+        )
+    return lanes
+
+
+def _kinds(
+    tags: Direction,
+    count: int,
+    bicycle: Sequence[str],
+    designated: Sequence[int],
+    driving_side: DrivingSide,
+) -> list[LaneKind]:
+    """Return what each counted lane is for."""
+    kinds: list[LaneKind] = ["driving"] * count
+    bus = (
+        tags.fitted("bus:lanes", count, designated)
+        or tags.fitted("psv:lanes", count, designated)
+        or [""] * count
+    )
+    barred = [""] * count
+    for key in ("motor_vehicle:lanes", "vehicle:lanes", "access:lanes"):
+        if values := tags.fitted(key, count, designated):
+            barred = values
+            break
+    for i in range(count):
+        if bus[i] == "designated" or (barred[i] == "no" and bus[i] in _ALLOWED):
+            kinds[i] = "bus"
+        elif barred[i] == "no" and len(bicycle) == count and bicycle[i] in _ALLOWED:
+            kinds[i] = "bicycle"
+    if "bus" not in kinds and not any(bus):
+        outermost = min(_outer_bus_lanes(tags, driving_side), count - 1)
+        for k in range(outermost):
+            kinds[count - 1 - k if driving_side == "right" else k] = "bus"
+    if "driving" not in kinds and "busway" not in tags.edge.road_class:
+        tags.notes.append(f"way {tags.edge.way_id}: no lane is left for cars; taken as for all")
+        return ["driving"] * count
+    return kinds
+
+
+def _outer_bus_lanes(tags: Direction, driving_side: DrivingSide) -> int:
+    """Return how many lanes at the kerb are for buses, from tags that only count them."""
+    for key in ("lanes:bus", "lanes:psv"):
+        text = tags.text(key)
+        if text and text.isdigit():
+            return int(text)
+    kerb = driving_side if not tags.reverse else ("left" if driving_side == "right" else "right")
+    return int(of_side(tags.edge.tags, "busway", kerb) == "lane")
+
+
+def _turns(words: str) -> tuple[Turn, ...]:
+    found = (_TURNS.get(word.strip()) for word in words.split(";"))
+    return tuple(dict.fromkeys(turn for turn in found if turn))
+
+
+def _lane_width(edge: RoadEdge, tagged: str | None, kind: LaneKind) -> Quantity:
+    value = metres(tagged)
+    least = 0.8 if kind == "bicycle" else MIN_WIDTH_M
+    if value is not None and least <= value <= MAX_WIDTH_M:
+        return Quantity(value, "tagged")
+    if kind == "bus":
+        return Quantity(BUS_WIDTH_M, "inferred")
+    if kind == "bicycle":
+        return Quantity(BICYCLE_WIDTH_M, "default")
+    known = CLASS_WIDTH_M.get(edge.road_class)
+    base = Quantity(DEFAULT_WIDTH_M, "default") if known is None else Quantity(known, "inferred")
+    ring = edge.tags.get("junction") in ("roundabout", "circular")
+    if ring and edge.lanes_forward.value < 1.5:
+        # A single ring lane is wide enough for a lorry's swept path (RASt 06: 6.5 to 9 m).
+        return Quantity(max(base.value, 4.5), "inferred")
+    return base

@@ -1,0 +1,74 @@
+"""The roads that leave a place where lanes meet: where they head, and which lanes lie where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from foretwin.world_gen.lanes.cross_section import CrossSection
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+
+_PARTED_M = 25.0
+_BESIDE_COS = math.cos(math.radians(30.0))
+RING_KINDS = ("roundabout", "circular")
+
+
+def is_ring_edge(edge: RoadEdge) -> bool:
+    """Return whether an edge is part of a roundabout's or other circular junction's ring."""
+    return edge.tags.get("junction") in RING_KINDS
+
+
+Heads = Mapping[tuple[int, bool], tuple[float, float]]
+"""Unit directions in which legs leave, by (edge index, reverse)."""
+
+
+def heading_out(leg: DirectedEdge, look_m: float = 8.0) -> tuple[float, float]:
+    """Return the unit direction in which a leg leaves, averaged over `look_m`."""
+    # Most legs need one or two points: plain floats are faster here than arrays.
+    points = iter(leg.xy_m.tolist())
+    x0, y0 = x, y = next(points)
+    ahead, gone_m = (1.0, 0.0), 0.0
+    for nx, ny in points:
+        step_m = math.hypot(nx - x, ny - y)
+        if step_m <= 0.01:
+            continue
+        if gone_m == 0.0:
+            ahead = (nx - x) / step_m, (ny - y) / step_m
+        share = min((look_m - gone_m) / step_m, 1.0)
+        x, y = x + share * (nx - x), y + share * (ny - y)
+        gone_m += step_m
+        if gone_m >= look_m:
+            break
+    span_m = math.hypot(x - x0, y - y0)
+    return ((x - x0) / span_m, (y - y0) / span_m) if span_m > 0.1 else ahead
+
+
+def dot(a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Return the cosine between two unit directions."""
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def opposed(leg: DirectedEdge, other: DirectedEdge) -> bool:
+    """Return whether two one-way roads leave a place side by side, as carriageways of a street."""
+    if leg.edge.index == other.edge.index or any(
+        d.edge.forward == d.edge.backward for d in (leg, other)
+    ):
+        return False
+    return any(
+        dot(heading_out(leg, look_m), heading_out(other, look_m)) > _BESIDE_COS
+        for look_m in (8.0, _PARTED_M)
+    )
+
+
+def lateral_positions(
+    leg: DirectedEdge, section: CrossSection, *, outward: bool, shift_m: float = 0.0
+) -> list[tuple[float, bool]]:
+    """Return (metres left, driven that way) of car lanes, seen along or against an outward leg."""
+    flip = leg.reverse == outward
+    side = -1.0 if flip else 1.0
+    found = [
+        (round(side * (lane.left_m + shift_m), 2) + 0.0, lane.reverse == flip)
+        for lane in section.lanes
+        if lane.kind in ("driving", "bus")
+    ]
+    return sorted(found)

@@ -1,0 +1,97 @@
+"""Tram tracks as lanes of their own: where they lie, and which roads they cross."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import Lane, Road
+from foretwin.geometry.polyline import cut, length, without_repeats
+from foretwin.world_gen.extent import stretches_inside
+from foretwin.world_gen.lanes.clusters import Surroundings
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.roads.beside_roads import BesideRoads, in_frame
+from foretwin.world_gen.roads.road_tags import road_layer, speed_limit
+
+TRAM_WIDTH_M = 2.65
+"""Width of a usual tram (BOStrab: no wider)."""
+
+
+class TramTracks(NamedTuple):
+    """Roads of class `tram` with one lane each, and notes on the car roads that they cross."""
+
+    roads: tuple[Road, ...]
+    lanes: tuple[Lane, ...]
+    notes: tuple[str, ...]
+
+
+def tram_tracks(around: Surroundings, osm: OsmMap, beside: BesideRoads) -> TramTracks:
+    """Return the tracks within a World; cars neither drive on these lanes nor yield to them.
+
+    A track is driven along its way's nodes: most tracks are mapped one by one, in the direction
+    in which trams run.
+    """
+    roads: list[Road] = []
+    lanes: list[Lane] = []
+    on_roads = {node: edge for edge in around.edges.values() for node in edge.node_ids}
+    notes: list[str] = []
+    for way, xy in zip(beside.tracks, in_frame(beside.tracks, osm, around.frame), strict=True):
+        line = without_repeats(xy)
+        if len(line) < 2:
+            continue
+        pieces = stretches_inside(line, around.extent)
+        total = length(line)
+        for i, (begin, stop) in enumerate(pieces):
+            inside = line if (begin, stop) == (0.0, total) else cut(line, begin, stop)
+            _lay(way.id, way.tags, inside, i, roads, lanes)
+        if pieces:
+            crossed = {on_roads[n].way_id for n in way.nodes if n in on_roads}
+            notes.extend(
+                f"way {crossed_way}: crossed by a tram line, way {way.id}, in nobody's conflicts"
+                for crossed_way in sorted(crossed)
+            )
+    return TramTracks(tuple(roads), tuple(lanes), tuple(notes))
+
+
+def _lay(
+    way: int, tags: Mapping[str, str], line: np.ndarray, piece: int, roads: list[Road],
+    lanes: list[Lane],
+) -> None:  # fmt: skip
+    road = f"w{way}.tram" if piece == 0 else f"w{way}.tram#{piece + 1}"
+    rounded = np.round(line, 3)
+    name = tags.get("name", "")
+    limit = speed_limit(tags)
+    lanes.append(
+        Lane(
+            id=f"{road}.f0",
+            osm_way=way,
+            name=name,
+            kind="tram",
+            centerline=rounded,
+            width_m=Quantity(TRAM_WIDTH_M, "default"),
+            speed_limit_mps=limit,
+            role="other",
+            direction_source="default",
+            change="none",
+            road_id=road,
+            layer=road_layer(tags),
+        )
+    )
+    roads.append(
+        Road(
+            id=road,
+            osm_way=way,
+            name=name,
+            road_class="tram",
+            reference_line=rounded,
+            left_m=TRAM_WIDTH_M / 2,
+            right_m=-TRAM_WIDTH_M / 2,
+            lane_ids=(f"{road}.f0",),
+            layer=road_layer(tags),
+            bridge=tags.get("bridge", "no") != "no",
+            tunnel=tags.get("tunnel", "no") not in ("no", "building_passage"),
+        )
+    )

@@ -1,0 +1,1 @@
+"""A map as OpenStreetMap has it: read whole, or clipped from an index on disk."""

@@ -1,0 +1,279 @@
+"""Build the index of a map of any size, in bounded memory.
+
+One pass decodes the file: positions of nodes, ways and kept relations go to files. Then ways are
+taken in batches, their nodes looked up, and each is put into the cells that it touches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from foretwin.world_gen.osm.map_assembly import (
+    NO_WAYS,
+    UNITS_PER_DEG,
+    BoolArray,
+    WayNote,
+    bounds_of,
+    centre_of,
+    sound_ways,
+)
+from foretwin.world_gen.osm.map_cells import Boxes, CellNodes, CellWays, differences, place
+from foretwin.world_gen.osm.map_tables import NODES, NOTES, RELATIONS, WAYS, MapMeta, TableWriter
+from foretwin.world_gen.osm.node_spool import NodeSpool
+from foretwin.world_gen.osm.opl import (
+    IntArray,
+    NodeObjects,
+    NodePositions,
+    TagReader,
+    WayLines,
+    any_key,
+    read_nodes,
+    read_relations,
+    sections,
+    way_lines,
+    way_nodes,
+)
+from foretwin.world_gen.osm.opl_stream import OplStream, Progress
+from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError
+from foretwin.world_gen.osm.read_osm import NODE_KEYS, WAY_KEYS, is_kept_relation
+
+WANTED_WAYS, WANTED_NODES = any_key(WAY_KEYS), any_key(NODE_KEYS)
+BATCH_BYTES = 24 << 20
+"""Text of ways that is looked at in one go; some 2 million nodes of ways."""
+LINES_BYTES = 4 << 20
+WIDEST_FRAME_DEG = 2.0
+"""Up to this width a map has one frame, the same as when it is read as a whole."""
+MOST_NOTES = 1000
+
+
+def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress | None) -> str:
+    """Write the index to `target`, with `part` as folder for what is needed meanwhile.
+
+    Returns the map's SHA-256. Raises `MapError` where the map cannot be read or has no roads.
+    """
+    table, nodes = TableWriter(target), NodeSpool(part)
+    try:
+        with (
+            OplStream(map_file, progress) as stream,
+            (part / "ways.opl").open("wb") as ways,
+            (part / "relations.opl").open("wb") as relations,
+        ):
+            members: list[IntArray] = []
+            for block in stream.blocks():
+                for letter, section in sections(block):
+                    if letter == "n":
+                        found = read_nodes(section, WANTED_NODES.search)
+                        nodes.add(found.positions)
+                        _add_tagged(table, found)
+                    elif letter == "w":
+                        ways.write(section)
+                    else:
+                        members.append(_add_relations(section, relations.write))
+        nodes.finish()
+        batches = _WayBatches(table, nodes, np.unique(np.concatenate([_NONE, *members])))
+        for lines in _batches(part / "ways.opl", batches.members):
+            batches.add(lines)
+        _place_relations(table, part / "relations.opl", batches, nodes.notes)
+        box = batches.road_box(map_file)
+        declared = stream.header.bounds
+        near_pole = max(abs(box.south), abs(box.north)) > 89.0
+        width_deg = 0.0 if near_pole else (box.east - box.west) % 360.0
+        narrow = max(box.north - box.south, width_deg) <= WIDEST_FRAME_DEG
+        centre = centre_of(box)
+        meta = MapMeta(
+            sha256=stream.sha256,
+            attribution=stream.header.attribution,
+            bounds=declared or box,
+            origin=(centre.lat_deg, centre.lon_deg) if narrow else None,
+            ways=batches.count,
+            nodes=nodes.count,
+            notes=tuple(dict.fromkeys(nodes.notes))[:MOST_NOTES],
+        )
+    except BaseException:
+        table.abandon()
+        nodes.close()
+        raise
+    table.finish(meta)
+    return meta.sha256
+
+
+_NONE: IntArray = np.empty(0, dtype=np.int64)
+
+
+def _add_tagged(table: TableWriter, found: NodeObjects) -> None:
+    if not found.tag_texts:
+        return
+    ids, lat, lon = found.positions
+    on_earth = (np.abs(lat) <= 90 * UNITS_PER_DEG) & (np.abs(lon) <= 180 * UNITS_PER_DEG)
+    rows = np.flatnonzero(np.isin(ids, np.array(list(found.tag_texts))) & on_earth)
+    ids, lat, lon = ids[rows], lat[rows], lon[rows]
+    placed = place(Boxes(lat, lon, lat, lon))
+    for cell, at in _by_cell(placed.cells, placed.boxes):
+        content = CellNodes(
+            ids=differences(ids[at], "<i8"),
+            lat=differences(lat[at], "<i4"),
+            lon=differences(lon[at], "<i4"),
+            tags="\n".join(found.tag_texts[node] for node in ids[at].tolist()),
+        )
+        table.add(cell, NODES, content)
+
+
+def _add_relations(section: bytes, write: Callable[[bytes], object]) -> IntArray:
+    tags_of = TagReader()
+    members: list[int] = []
+    for line in section.split(b"\n"):
+        found = read_relations(line, is_kept_relation, tags_of) if b"type=" in line else {}
+        for relation in found.values():
+            write(line + b"\n")
+            members.extend(member.ref for member in relation.members if member.kind == "w")
+    return np.array(members, dtype=np.int64)
+
+
+def _batches(path: Path, members: IntArray) -> Iterator[WayLines]:
+    """Yield the ways that matter, as many at a time as fit into a batch."""
+    wanted = set(members.tolist())
+    batch, size = WayLines([], [], []), 0
+    with path.open("rb") as file:
+        while lines := file.readlines(LINES_BYTES):
+            some = way_lines(b"".join(lines))
+            for way, tags, nodes in zip(*some, strict=True):
+                if way in wanted or WANTED_WAYS.search(tags):
+                    batch.ids.append(way)
+                    batch.tag_texts.append(tags)
+                    batch.node_texts.append(nodes)
+                    size += len(tags) + len(nodes)
+            if size >= BATCH_BYTES:
+                yield batch
+                batch, size = WayLines([], [], []), 0
+    if batch.ids:
+        yield batch
+
+
+class _WayBatches:
+    """Puts ways into cells, and remembers where those are that relations name."""
+
+    def __init__(self, table: TableWriter, nodes: NodeSpool, members: IntArray) -> None:
+        self.members = members
+        self.member_boxes = Boxes(*(np.full(len(members), -1, dtype=np.int64) for _ in range(4)))
+        self.member_placed: BoolArray = np.zeros(len(members), dtype=bool)
+        self.count = 0
+        self._table = table
+        self._nodes = nodes
+        self._road_extremes: list[NodePositions] = []
+
+    def add(self, lines: WayLines) -> None:
+        """Look up the nodes of a batch and put its ways into their cells."""
+        nodes = way_nodes(lines.node_texts)
+        positions = self._nodes.find(nodes.nodes)
+        is_road = np.array([_is_road(text) for text in lines.tag_texts], dtype=bool)
+        sound = sound_ways(lines.ids, is_road, nodes, positions)
+        self._note(sound.notes, positions)
+        if not len(sound.picked):
+            return
+        counts = sound.nodes.counts
+        begins = np.cumsum(counts) - counts
+        lat, lon = positions.lat_1e7[sound.rows], positions.lon_1e7[sound.rows]
+        lows = [np.minimum.reduceat(values, begins) for values in (lat, lon)]
+        highs = [np.maximum.reduceat(values, begins) for values in (lat, lon)]
+        boxes = Boxes(*lows, *highs)
+        ids = np.array(lines.ids, dtype=np.int64)[sound.picked]
+        placed = place(boxes)
+        for cell, at in _by_cell(placed.cells, placed.boxes):
+            flat = np.repeat(begins[at] - np.cumsum(counts[at]) + counts[at], counts[at])
+            flat += np.arange(len(flat))
+            content = CellWays(
+                ids=differences(ids[at], "<i8"),
+                counts=counts[at].astype("<i4").tobytes(),
+                nodes=differences(sound.nodes.nodes[flat], "<i8"),
+                lat=differences(lat[flat], "<i4"),
+                lon=differences(lon[flat], "<i4"),
+                tags="\n".join(lines.tag_texts[i] for i in sound.picked[at].tolist()),
+            )
+            self._table.add(cell, WAYS, content)
+        self._remember(ids, boxes, placed.cells[: len(ids)])
+        roads = np.repeat(is_road[sound.picked], counts)
+        self._road_extremes.append(_extremes(lat[roads], lon[roads]))
+        self.count += len(ids)
+
+    def _remember(self, ids: IntArray, boxes: Boxes, cells: IntArray) -> None:
+        if not len(self.members):
+            return
+        rows = np.minimum(np.searchsorted(self.members, ids), len(self.members) - 1)
+        named = np.flatnonzero(self.members[rows] == ids)
+        for column, values in zip(self.member_boxes, boxes, strict=True):
+            column[rows[named]] = values[named]
+        self.member_placed[rows[named]] = True
+        self._table.add_members(zip(ids[named].tolist(), cells[named].tolist(), strict=True))
+
+    def _note(self, notes: Sequence[WayNote], positions: NodePositions) -> None:
+        """Put what is said of a way where its first known node is."""
+        for text, row in notes:
+            if row is not None:
+                lat, lon = positions.lat_1e7[[row]], positions.lon_1e7[[row]]
+                cell = int(place(Boxes(lat, lon, lat, lon)).cells[0])
+                self._table.add(cell, NOTES, f"{lat[0]} {lon[0]} {text}")
+            else:
+                self._nodes.notes.append(text)
+
+    def road_box(self, map_file: Path) -> LatLonBounds:
+        """Return the box around all roads."""
+        lat, lon = (
+            np.concatenate([_NONE, *(getattr(e, name) for e in self._road_extremes)])
+            for name in ("lat_1e7", "lon_1e7")
+        )
+        if not len(lat):
+            raise MapError(
+                f"{map_file}: the map holds no roads (no way with a highway tag and positions)"
+            )
+        return bounds_of(
+            str(map_file), np.stack([lat, lon], axis=-1) / UNITS_PER_DEG, widest_deg=360.0
+        )
+
+
+def _is_road(tag_text: str) -> bool:
+    return tag_text.startswith("highway=") or ",highway=" in tag_text
+
+
+def _extremes(lat: IntArray, lon: IntArray) -> NodePositions:
+    """Return the few positions that set a box, whether or not it crosses the antimeridian."""
+    if not len(lat):
+        return NodePositions(_NONE, _NONE, _NONE)
+    beyond = np.where(lon < 0, lon + 360 * UNITS_PER_DEG, lon)
+    rows = [np.argmin(lat), np.argmax(lat), np.argmin(lon), np.argmax(lon)]
+    rows += [np.argmin(beyond), np.argmax(beyond)]
+    return NodePositions(_NONE, lat[rows], lon[rows])
+
+
+def _by_cell(cells: IntArray, held: IntArray) -> Iterator[tuple[int, IntArray]]:
+    """Yield every cell with what it holds, in the order given."""
+    order = np.argsort(cells, kind="stable")
+    cells, held = cells[order], held[order]
+    cuts = np.flatnonzero(np.diff(cells, prepend=-1))
+    for begin, end in zip(cuts.tolist(), [*cuts[1:].tolist(), len(cells)], strict=True):
+        yield int(cells[begin]), held[begin:end]
+
+
+def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: list[str]) -> None:
+    tags_of = TagReader()
+    with path.open("rb") as file:
+        while lines := file.readlines(LINES_BYTES):
+            of_cell: dict[int, list[str]] = {}
+            for line in lines:
+                (relation,) = read_relations(line, is_kept_relation, tags_of).values()
+                refs = np.array([m.ref for m in relation.members if m.kind == "w"], dtype=np.int64)
+                rows = np.searchsorted(ways.members, refs)
+                rows = rows[ways.member_placed[rows]]
+                if not len(rows):
+                    notes.append(f"relation {relation.id}: {NO_WAYS}")
+                else:
+                    south, west, north, east = (column[rows] for column in ways.member_boxes)
+                    box = Boxes(south.min(keepdims=True), west.min(keepdims=True),
+                                north.max(keepdims=True), east.max(keepdims=True))  # fmt: skip
+                    for cell in place(box).cells.tolist():
+                        of_cell.setdefault(cell, []).append(line.decode())
+            for cell, texts in sorted(of_cell.items()):
+                table.add(cell, RELATIONS, "".join(texts))
+            tags_of = TagReader()

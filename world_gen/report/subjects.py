@@ -1,0 +1,234 @@
+"""What a junction's World says by subject, and from where: tagged, inferred or a default."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+
+import msgspec
+import numpy as np
+
+from foretwin.contracts.signals import Signal
+from foretwin.contracts.world import (
+    Building,
+    Conflict,
+    Connection,
+    Crossing,
+    Lane,
+    Road,
+    StopLine,
+    Turn,
+    World,
+    WorldJunction,
+    YieldRule,
+)
+from foretwin.world_gen.report.values import SubjectReport, Value, subject_report
+
+CROSSING_REACH_M = 40.0
+"""A crossing counts for the nearest junction within this."""
+_FROM_LEFT: tuple[Turn, ...] = ("u_turn", "left", "straight", "right")
+_MPS_TO_KMPH = 3.6
+_RULES: Mapping[YieldRule, str] = {
+    "stop": "stop sign",
+    "give_way": "give-way sign",
+    "roundabout": "the ring goes first",
+    "priority_road": "priority road",
+    "lesser_road": "lesser road",
+    "turn_across": "turns across oncoming traffic",
+    "near_side": "who comes from the near side goes first",
+    "u_turn": "turns back",
+    "merge_order": "merging lanes",
+    "order": "no rule says; a fixed order",
+}
+
+
+class Neighbourhood:
+    """A World by id: what belongs to each of its junctions."""
+
+    def __init__(self, world: World) -> None:
+        self.roads = {road.id: road for road in world.roads}
+        self.lanes = {lane.id: lane for lane in world.lanes}
+        self.connections = {c.id: c for c in world.connections}
+        self.of_junction: dict[str, list[Connection]] = {}
+        for connection in world.connections:
+            self.of_junction.setdefault(connection.junction_id, []).append(connection)
+        self.lines: dict[str, list[StopLine]] = {}
+        for line in world.stop_lines:
+            self.lines.setdefault(line.lane_id, []).append(line)
+        self.heads: dict[str, list[Signal]] = {}
+        for head in world.signals:
+            for lane in head.lane_ids:
+                self.heads.setdefault(lane, []).append(head)
+        self.conflicts: dict[str, list[Conflict]] = {}
+        for conflict in world.conflicts:
+            junction = self.connections[conflict.first_id].junction_id
+            self.conflicts.setdefault(junction, []).append(conflict)
+        self.crossings = _crossings_by_junction(world)
+
+    def road_name(self, lane: Lane) -> str:
+        """Return what to call the road of a lane."""
+        road = self.roads.get(lane.road_id)
+        return _called(lane.name, lane.osm_way, road)
+
+
+def _called(name: str, osm_way: int, road: Road | None) -> str:
+    if name:
+        return name
+    kind = road.road_class.replace("_", " ") if road is not None else "road"
+    return f"unnamed {kind} (way {osm_way})"
+
+
+def _crossings_by_junction(world: World) -> dict[str, list[Crossing]]:
+    found: dict[str, list[Crossing]] = {}
+    places = [
+        (j.summary.id, j.area.outline.mean(axis=0)) for j in world.junctions if j.area is not None
+    ]
+    if not places:
+        return found
+    centres = np.array([centre for _, centre in places])
+    for crossing in world.crossings:
+        away = np.hypot(*(centres - crossing.line.mean(axis=0)).T)
+        nearest = int(away.argmin())
+        if away[nearest] <= CROSSING_REACH_M:
+            found.setdefault(places[nearest][0], []).append(crossing)
+    return found
+
+
+def junction_subjects(at: Neighbourhood, junction: WorldJunction) -> tuple[SubjectReport, ...]:
+    """Return all subjects of one junction that have values."""
+    place = junction.summary.id
+    connections = at.of_junction.get(place, [])
+    entering = _lanes(at, (c.from_lane_id for c in connections))
+    touching = _lanes(at, (i for c in connections for i in (c.from_lane_id, c.to_lane_id)))
+    roads = {lane.road_id: at.roads[lane.road_id] for lane in touching if lane.road_id in at.roads}
+    heads = {head.id: head for lane in entering for head in at.heads.get(lane.id, ())}
+    lines = [line for lane in entering for line in at.lines.get(lane.id, ())]
+    reports = (
+        subject_report("kind", _kind(junction)),
+        subject_report("lane counts", _lane_counts(roads.values())),
+        subject_report("lane widths", [_width(at, lane) for lane in touching]),
+        subject_report("turns", [_turns(at, lane) for lane in entering]),
+        subject_report("directions", [_direction(at, lane) for lane in touching]),
+        subject_report("speed limits", [_speed(at, lane) for lane in touching]),
+        subject_report("control", [_line(at, line) for line in lines]),
+        subject_report("signals", _signals(at, junction, heads.values())),
+        subject_report("right of way", _right_of_way(at, at.conflicts.get(place, ()))),
+        subject_report("crossings", _crossings(at.crossings.get(place, ()))),
+    )
+    return tuple(r for r in reports if r.confidence is not None)
+
+
+def building_subject(buildings: Sequence[Building]) -> SubjectReport:
+    """Return where building heights came from; those guessed alike stand in one sentence."""
+    alike = Counter(
+        (f"{b.height_m.value:.1f} m high", b.height_m.source)
+        for b in buildings
+        if b.height_m.source != "tagged"
+    )
+    report = subject_report(
+        "building heights", [Value("", "", b.height_m.source) for b in buildings]
+    )
+    reason = {"inferred": "from their levels", "default": "default"}
+    return msgspec.structs.replace(
+        report,
+        guessed=tuple(
+            f"{n} building{'s' if n > 1 else ''}: {words}, {reason[source]}"
+            for (words, source), n in sorted(alike.items(), key=lambda i: (i[0][1], -i[1], i[0][0]))
+        ),
+    )
+
+
+def _lanes(at: Neighbourhood, ids: Iterable[str]) -> list[Lane]:
+    return [at.lanes[i] for i in dict.fromkeys(ids) if i in at.lanes]
+
+
+def _kind(junction: WorldJunction) -> list[Value]:
+    kind = junction.summary.kind
+    ring = kind in ("roundabout", "circular", "mini_roundabout")
+    found = [Value("junction", kind.replace("_", " "), "tagged" if ring else "inferred")]
+    for arm in junction.arms:
+        one = len(arm.osm_ways) == 1
+        words = "one arm" if one else f"one arm made of {len(arm.osm_ways)} ways"
+        found.append(
+            Value(arm.name or f"way {arm.osm_ways[0]}", words, "tagged" if one else "inferred")
+        )
+    return found
+
+
+def _lane_counts(roads: Iterable[Road]) -> list[Value]:
+    ways = {road.osm_way: road for road in roads}
+    return [
+        Value(
+            _called(road.name, road.osm_way, road),
+            f"{len(road.lane_ids)} lane{'s' if len(road.lane_ids) != 1 else ''}",
+            road.lane_count_source,
+        )
+        for road in ways.values()
+    ]
+
+
+def _width(at: Neighbourhood, lane: Lane) -> Value:
+    return Value(at.road_name(lane), f"lane {lane.width_m.value:.2f} m wide", lane.width_m.source)
+
+
+def _turns(at: Neighbourhood, lane: Lane) -> Value:
+    turns = sorted(lane.turns, key=_FROM_LEFT.index)
+    words = ", ".join(turn.replace("_", "-") for turn in turns) or "no turn"
+    return Value(at.road_name(lane), f"lane for {words}", lane.turns_source)
+
+
+def _direction(at: Neighbourhood, lane: Lane) -> Value:
+    road = at.roads.get(lane.road_id)
+    ways = {at.lanes[i].reverse for i in road.lane_ids if i in at.lanes} if road else {lane.reverse}
+    words = "traffic both ways" if len(ways) == 2 else "one-way traffic"
+    return Value(at.road_name(lane), words, lane.direction_source)
+
+
+def _speed(at: Neighbourhood, lane: Lane) -> Value:
+    limit = lane.speed_limit_mps
+    return Value(at.road_name(lane), f"{limit.value * _MPS_TO_KMPH:.0f} km/h", limit.source)
+
+
+def _line(at: Neighbourhood, line: StopLine) -> Value:
+    words = {
+        "signal": "stops at a signal", "stop": "stops at a sign", "give_way": "gives way at a sign",
+        "none": "no sign or signal",
+    }  # fmt: skip
+    told = words.get(line.control.value, line.control.value)
+    onto = at.connections.get(line.connection_id or "")
+    if onto is not None:
+        told = f"{told} on the way into {at.road_name(at.lanes[onto.to_lane_id])}"
+    return Value(at.road_name(at.lanes[line.lane_id]), told, line.control.source)
+
+
+def _signals(at: Neighbourhood, junction: WorldJunction, heads: Iterable[Signal]) -> list[Value]:
+    found = [
+        Value(at.road_name(at.lanes[head.lane_ids[0]]), "signal head", head.source)
+        for head in heads
+    ]
+    plan = junction.plan
+    if plan is not None:
+        words = f"signal plan of {len(plan.phases)} phases"
+        found.append(Value("junction", words, plan.source))
+    return found
+
+
+def _right_of_way(at: Neighbourhood, conflicts: Iterable[Conflict]) -> list[Value]:
+    found = []
+    for conflict in conflicts:
+        waits = at.connections[conflict.yields_id]
+        goes = at.connections[conflict.goes_id]
+        waits_road = at.road_name(at.lanes[waits.from_lane_id])
+        goes_road = at.road_name(at.lanes[goes.from_lane_id])
+        words = f"waits for {goes_road} ({_RULES[conflict.rule]})"
+        found.append(Value(waits_road, words, conflict.source))
+    return found
+
+
+def _crossings(crossings: Iterable[Crossing]) -> list[Value]:
+    found = []
+    for crossing in crossings:
+        kind, width = crossing.kind, crossing.width_m
+        found.append(Value("crossing", kind.value.replace("_", " "), kind.source))
+        found.append(Value("crossing", f"{width.value:.1f} m wide", width.source))
+    return found

@@ -1,0 +1,155 @@
+"""Cut the ways of a map into the edges of its road graph."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping
+from itertools import chain, pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.osm.driving_side import driving_side
+from foretwin.world_gen.osm.node_locations import NodeLocations
+from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.roads.road_tags import (
+    Directions,
+    LaneCounts,
+    directions,
+    is_car_road,
+    is_kept_road,
+    lane_counts,
+    open_to_cars,
+    road_layer,
+    speed_limit,
+)
+
+_SAYS_NOTHING = ("name", "ref", "wiki", "note", "description", "addr:", "alt_name")
+"""Keys that begin so have no meaning for how a road is driven."""
+
+
+def build_road_graph(osm: OsmMap) -> RoadGraph:
+    """Return the graph of everything a car's wheels might follow, in the map's frame.
+
+    Ways are cut where they share a node with themselves or another kept way, and at their ends.
+    Ways are taken in the order of their ids, so that edges, and with them all that follows, are
+    the same for the same map. Raises `MapError` where the map holds no road for cars.
+    """
+    ways = [way for way in osm.ways.values() if is_kept_road(way.tags)]
+    if not any(is_car_road(way.tags) for way in ways):
+        raise MapError(f"{osm.file}: the map holds no roads for cars")
+    paths = [_without_repeats(way.nodes) for way in ways]
+    kept = [(way, path) for way, path in zip(ways, paths, strict=True) if len(path) >= 2]
+    flat = np.fromiter(chain.from_iterable(path for _, path in kept), dtype=np.int64)
+    ids, row, uses = np.unique(flat, return_inverse=True, return_counts=True)
+    lat_lon = _positions(osm, ids)
+    xy_m = local_from_geo(osm.frame, lat_lon[:, 0], lat_lon[:, 1])
+    edges = _edges(kept, flat.tolist(), xy_m[row], uses[row] > 1)
+    at = dict(zip(ids.tolist(), xy_m.tolist(), strict=True))
+    nodes = {node for edge in edges for node in (edge.start_node, edge.end_node)}
+    leaving: dict[int, list[DirectedEdge]] = {node: [] for node in sorted(nodes)}
+    for edge in edges:
+        leaving[edge.start_node].append(DirectedEdge(edge, False))
+        leaving[edge.end_node].append(DirectedEdge(edge, True))
+    return RoadGraph(
+        frame=osm.frame,
+        driving_side=driving_side(osm),
+        edges=tuple(edges),
+        node_xy_m={node: (at[node][0], at[node][1]) for node in leaving},
+        leaving={node: tuple(directed) for node, directed in leaving.items()},
+    )
+
+
+def _without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
+    if not any(map(operator.eq, nodes, nodes[1:])):
+        return nodes
+    return nodes[:1] + tuple(b for a, b in pairwise(nodes) if a != b)
+
+
+def _positions(osm: OsmMap, ids: npt.NDArray[np.int64]) -> Array:
+    """Return (N, 2) degrees of nodes."""
+    if isinstance(osm.locations, NodeLocations):
+        return osm.locations.of(ids)
+    return np.array([osm.locations[node] for node in ids.tolist()], dtype=np.float64)
+
+
+class _Meaning(NamedTuple):
+    """What a way's tags mean to a driver."""
+
+    allowed: Directions
+    lanes: LaneCounts
+    limit: Quantity
+    layer: int
+    car: bool
+
+
+def _meaning(
+    tags: Mapping[str, str], known: dict[frozenset[tuple[str, str]], _Meaning]
+) -> _Meaning:
+    """Return what tags mean; most ways of a town say the same but for their names."""
+    key = frozenset(item for item in tags.items() if not item[0].startswith(_SAYS_NOTHING))
+    found = known.get(key)
+    if found is None:
+        allowed = directions(tags)
+        found = known[key] = _Meaning(
+            allowed,
+            lane_counts(tags, allowed),
+            speed_limit(tags),
+            road_layer(tags),
+            is_car_road(tags) and open_to_cars(tags),
+        )
+    return found
+
+
+def _edges(
+    ways: list[tuple[OsmWay, tuple[int, ...]]],
+    nodes: list[int],
+    points: Array,
+    shared: npt.NDArray[np.bool_],
+) -> list[RoadEdge]:
+    """Return the edges of ways whose nodes stand one after the other in `nodes` and `points`."""
+    points.setflags(write=False)
+    first = np.cumsum([0, *(len(path) for _, path in ways)])
+    steps = np.hypot(*np.diff(points, axis=0).T) if len(points) else np.zeros(0)
+    cut_here = shared.copy()
+    cut_here[first[:-1]] = cut_here[first[1:] - 1] = True
+    cuts = np.nonzero(cut_here)[0]
+    of_way = np.searchsorted(cuts, first).tolist()
+    at = cuts.tolist()
+    # One sum from each cut to the next; those from one way to another are never asked for.
+    lengths = np.add.reduceat(steps, cuts[:-1]).tolist() if len(cuts) > 1 else []
+    edges: list[RoadEdge] = []
+    known: dict[frozenset[tuple[str, str]], _Meaning] = {}
+    for i, (way, _) in enumerate(ways):
+        tags = way.tags
+        means = _meaning(tags, known)
+        name = tags.get("name") or tags.get("ref", "")
+        for k in range(of_way[i], of_way[i + 1] - 1):
+            begin, end = at[k], at[k + 1]
+            edges.append(
+                RoadEdge(
+                    index=len(edges),
+                    way_id=way.id,
+                    start_node=nodes[begin],
+                    end_node=nodes[end],
+                    node_ids=tuple(nodes[begin : end + 1]),
+                    xy_m=points[begin : end + 1],
+                    length_m=lengths[k],
+                    forward=means.allowed.forward,
+                    backward=means.allowed.backward,
+                    car=means.car,
+                    road_class=tags["highway"],
+                    name=name,
+                    speed_limit_mps=means.limit,
+                    lanes_forward=means.lanes.forward,
+                    lanes_backward=means.lanes.backward,
+                    layer=means.layer,
+                    tags=tags,
+                )
+            )
+    return edges

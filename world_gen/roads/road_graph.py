@@ -1,0 +1,87 @@
+"""The road graph: OSM ways cut into edges at every node where roads meet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import msgspec
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.provenance import Quantity
+from foretwin.contracts.world import DrivingSide
+
+
+class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
+    """A stretch of one way between two graph nodes; `xy_m` (N, 2) in the map's frame.
+
+    `forward` and `backward` say whether cars may drive along and against the node order.
+    `car` is true for public car roads; pedestrian streets, service roads, tracks and the like
+    are kept with `car` false, since a recorded drive may use them, but no junction counts them.
+    """
+
+    index: int
+    way_id: int
+    start_node: int
+    end_node: int
+    node_ids: tuple[int, ...]
+    xy_m: Array
+    length_m: float
+    forward: bool
+    backward: bool
+    car: bool
+    road_class: str
+    name: str
+    speed_limit_mps: Quantity
+    lanes_forward: Quantity
+    lanes_backward: Quantity
+    layer: int
+    tags: Mapping[str, str]
+
+
+class DirectedEdge(NamedTuple):
+    """An edge with the direction in which it is driven."""
+
+    edge: RoadEdge
+    reverse: bool
+
+    @property
+    def start_node(self) -> int:
+        """OSM id of the node where driving begins."""
+        return self.edge.end_node if self.reverse else self.edge.start_node
+
+    @property
+    def end_node(self) -> int:
+        """OSM id of the node where driving ends."""
+        return self.edge.start_node if self.reverse else self.edge.end_node
+
+    @property
+    def xy_m(self) -> Array:
+        """Geometry (N, 2) in driving order."""
+        return self.edge.xy_m[::-1] if self.reverse else self.edge.xy_m
+
+    @property
+    def allowed(self) -> bool:
+        """Whether cars may drive this way round."""
+        return self.edge.backward if self.reverse else self.edge.forward
+
+    @property
+    def lanes(self) -> Quantity:
+        """Number of lanes in driving direction."""
+        return self.edge.lanes_backward if self.reverse else self.edge.lanes_forward
+
+
+class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
+    """All edges of a map with who leaves from which node (both directions, allowed or not)."""
+
+    frame: LocalFrame
+    driving_side: DrivingSide
+    edges: tuple[RoadEdge, ...]
+    node_xy_m: Mapping[int, tuple[float, float]]
+    leaving: Mapping[int, tuple[DirectedEdge, ...]]
+    """Directed edges that start at a node, in a fixed order."""
+
+    def at_node(self, node: int) -> tuple[DirectedEdge, ...]:
+        """Return the directed edges that start at `node`, allowed or not."""
+        return self.leaving.get(node, ())

@@ -1,0 +1,206 @@
+"""What the tags of a road mean to a driver: access, one-way, lanes, speed limit, level."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from foretwin.contracts.provenance import Quantity
+
+CAR_CLASSES = frozenset({
+    "motorway", "motorway_link", "trunk", "trunk_link", "primary", "primary_link", "secondary",
+    "secondary_link", "tertiary", "tertiary_link", "unclassified", "residential", "living_street",
+    "road", "raceway",
+})  # fmt: skip
+OTHER_CLASSES = frozenset({"pedestrian", "service", "track", "busway"})
+_MOTOR_SPORTS = frozenset({"motor", "motor_sports", "motor_racing", "autocross", "rallycross"})
+"""What races on a track for cars; kart, horse, bicycle and motocross tracks are none."""
+RING_TAGS = frozenset({"roundabout", "circular"})
+
+_FORBIDDEN = frozenset({
+    "no", "private", "agricultural", "forestry", "emergency", "official", "military",
+})  # fmt: skip
+_ACCESS_KEYS = ("motorcar", "motor_vehicle", "vehicle", "access")
+
+# km/h; what is usual where a map says nothing.
+_DEFAULT_KMPH = {
+    "motorway": 120.0, "motorway_link": 60.0, "trunk": 100.0, "trunk_link": 60.0,
+    "residential": 30.0, "living_street": 10.0, "service": 10.0, "pedestrian": 7.0, "track": 20.0,
+    "raceway": 100.0,
+}  # fmt: skip
+_ZONE_KMPH = {
+    "urban": 50.0, "rural": 100.0, "motorway": 130.0, "trunk": 120.0, "living_street": 10.0,
+    "bicycle_road": 30.0, "pedestrian_zone": 7.0, "walk": 7.0,
+    "nsl_restricted": 48.28, "nsl_single": 96.56, "nsl_dual": 112.65,
+}  # fmt: skip
+# Km/h of rural roads where a country differs from the hundred of the table above.
+_RURAL_KMPH = {
+    "BE": 70.0, "NL": 80.0, "FR": 80.0, "CH": 80.0, "LI": 80.0, "DK": 80.0, "NO": 80.0, "SE": 70.0,
+    "IT": 90.0, "ES": 90.0, "PL": 90.0, "CZ": 90.0, "HU": 90.0, "SK": 90.0, "SI": 90.0, "GR": 90.0,
+}  # fmt: skip
+_KMPH_FROM_UNIT = {"": 1.0, "kmh": 1.0, "km/h": 1.0, "kph": 1.0, "mph": 1.609344, "knots": 1.852}
+_SPEED = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*([a-z/]*)\s*$")
+
+
+class Directions(NamedTuple):
+    """Whether cars may drive along (`forward`) and against the order of a way's nodes."""
+
+    forward: bool
+    backward: bool
+
+
+def is_car_road(tags: Mapping[str, str]) -> bool:
+    """Tell whether the tags describe a public road for cars, closed to them or not."""
+    highway = tags.get("highway")
+    if highway == "raceway" and tags.get("sport", "motor") not in _MOTOR_SPORTS:
+        return False
+    return highway in CAR_CLASSES and tags.get("area") != "yes"
+
+
+def is_kept_road(tags: Mapping[str, str]) -> bool:
+    """Tell whether a way belongs into the road graph: anything a car's wheels might follow."""
+    highway = tags.get("highway")
+    return (highway in CAR_CLASSES or highway in OTHER_CLASSES) and tags.get("area") != "yes"
+
+
+def open_to_cars(tags: Mapping[str, str]) -> bool:
+    """Tell whether cars of the public may use the road, by its most specific access tag."""
+    for key in _ACCESS_KEYS:
+        value = tags.get(key)
+        if value is not None and value != "unknown":
+            return any(part.strip() not in _FORBIDDEN for part in value.split(";"))
+    return tags.get("highway") not in ("pedestrian", "busway")
+
+
+def directions(tags: Mapping[str, str]) -> Directions:
+    """Return which ways round cars may drive: one-way signs, implied one-way, access."""
+    if not open_to_cars(tags):
+        return Directions(False, False)
+    oneway = tags.get("oneway:motor_vehicle") or tags.get("oneway:vehicle") or tags.get("oneway")
+    if oneway in ("yes", "true", "1"):
+        forward, backward = True, False
+    elif oneway in ("-1", "reverse"):
+        forward, backward = False, True
+    elif oneway is None or oneway not in ("no", "false", "0", "reversible", "alternating"):
+        ring = tags.get("junction") in RING_TAGS
+        forward, backward = True, not (ring or tags.get("highway") == "motorway")
+    else:
+        forward, backward = True, True
+    for key in ("motor_vehicle", "vehicle"):
+        forward = forward and tags.get(f"{key}:forward") != "no"
+        backward = backward and tags.get(f"{key}:backward") != "no"
+    return Directions(forward, backward)
+
+
+class LaneCounts(NamedTuple):
+    """Lanes along and against the order of the nodes; 0 where nobody may drive."""
+
+    forward: Quantity
+    backward: Quantity
+
+
+def lane_counts(tags: Mapping[str, str], allowed: Directions) -> LaneCounts:
+    """Return lanes each way: tagged, inferred from the total or from turn lanes, or a default.
+
+    A closed road keeps the lanes it would have with traffic both ways, since it has a width.
+    """
+    if not any(allowed):
+        allowed = Directions(True, True)
+    total = _count(tags.get("lanes"))
+    sides: list[Quantity | None] = [None, None]
+    one_way = allowed.forward != allowed.backward
+    for side, word in enumerate(("forward", "backward")):
+        turns = tags.get(f"turn:lanes:{word}")
+        if not allowed[side]:
+            sides[side] = Quantity(0.0, "inferred")
+        elif (tagged := _count(tags.get(f"lanes:{word}"))) is not None:
+            sides[side] = Quantity(float(tagged), "tagged")
+        elif one_way and total is not None:
+            sides[side] = Quantity(float(total), "tagged")
+        elif turns or (one_way and (turns := tags.get("turn:lanes"))):
+            sides[side] = Quantity(float(turns.count("|") + 1), "inferred")
+    forward, backward = sides
+    middle = _count(tags.get("lanes:both_ways")) or 0
+    if forward is None and backward is None and total is not None:
+        # An odd lane cannot be shared out; along the way's own direction is as good a guess.
+        backward = Quantity(float(max(1, (total - middle) // 2)), "inferred")
+    if forward is None:
+        forward = _rest(total, middle, backward, tags)
+    if backward is None:
+        backward = _rest(total, middle, forward, tags)
+    return LaneCounts(forward, backward)
+
+
+def _rest(
+    total: int | None, middle: int, other: Quantity | None, tags: Mapping[str, str]
+) -> Quantity:
+    if total is not None and other is not None:
+        return Quantity(float(max(1, total - middle - int(other.value))), "inferred")
+    return Quantity(2.0 if tags.get("highway") in ("motorway", "trunk") else 1.0, "default")
+
+
+def _count(text: str | None) -> int | None:
+    if text is None:
+        return None
+    try:
+        return max(1, int(float(text.split(";")[0])))
+    except (ValueError, OverflowError):
+        return None
+
+
+def speed_limit(tags: Mapping[str, str]) -> Quantity:
+    """Return the speed limit in m/s: a sign's number is tagged, a zone's inferred, else default.
+
+    Where the two directions differ the higher one counts. An unlimited motorway gets the
+    recommended 130 km/h.
+    """
+    numbers = [
+        speed
+        for key in ("maxspeed", "maxspeed:forward", "maxspeed:backward")
+        if (speed := _signed_kmph(tags.get(key))) is not None
+    ]
+    if "maxspeed" in tags and numbers:
+        numbers = numbers[:1] if _signed_kmph(tags["maxspeed"]) is not None else numbers
+    if numbers:
+        return Quantity(max(numbers) / 3.6, "tagged")
+    if tags.get("maxspeed") == "none":
+        return Quantity(130.0 / 3.6, "inferred")
+    for key in ("maxspeed", "maxspeed:type", "source:maxspeed", "zone:maxspeed", "zone:traffic"):
+        if (speed := _zone_kmph(tags.get(key))) is not None:
+            return Quantity(speed / 3.6, "inferred")
+    return Quantity(_DEFAULT_KMPH.get(tags.get("highway", ""), 50.0) / 3.6, "default")
+
+
+def _signed_kmph(text: str | None) -> float | None:
+    if text is None:
+        return None
+    match = _SPEED.match(text.split(";")[0].lower())
+    if match is None or match[2] not in _KMPH_FROM_UNIT:
+        return None
+    speed = float(match[1]) * _KMPH_FROM_UNIT[match[2]]
+    return speed if speed > 0.0 else None
+
+
+def _zone_kmph(text: str | None) -> float | None:
+    if text is None or text.startswith("http"):
+        return None
+    country, _, zone = text.rpartition(":") if ":" in text else ("", "", text)
+    zone = zone.lower()
+    if zone == "rural":
+        return _RURAL_KMPH.get(country.upper()[:2], _ZONE_KMPH["rural"])
+    if zone in _ZONE_KMPH:
+        return _ZONE_KMPH[zone]
+    number = re.fullmatch(r"(?:zone)?(\d{1,3})", zone)
+    return float(number[1]) if number is not None and int(number[1]) > 0 else None
+
+
+def road_layer(tags: Mapping[str, str]) -> int:
+    """Return the level of the road: the `layer` tag, else 1 for a bridge, -1 for a tunnel."""
+    try:
+        return int(tags["layer"])
+    except (KeyError, ValueError):
+        pass
+    if tags.get("bridge", "no") != "no":
+        return 1
+    return -1 if tags.get("tunnel", "no") not in ("no", "building_passage") else 0

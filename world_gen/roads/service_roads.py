@@ -1,0 +1,55 @@
+"""Driveways, parking aisles and other service roads as roads that junctions count, by choice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import msgspec
+
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
+
+
+def with_service_roads(graph: RoadGraph) -> RoadGraph:
+    """Return the graph with every service road that is open to cars counted as a car road."""
+    return with_roads(graph, open_service_roads(graph.edges))
+
+
+def open_service_roads(edges: Iterable[RoadEdge]) -> tuple[int, ...]:
+    """Return the indices, ascending, of those edges that are service roads open to cars."""
+    found = {
+        edge.index
+        for edge in edges
+        if edge.road_class == "service" and not edge.car and (edge.forward or edge.backward)
+    }
+    return tuple(sorted(found))
+
+
+def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
+    """Return the graph with these edges, say those of a route, counted as car roads.
+
+    They are open to the car that is to use them even where the public may not drive.
+
+    Junctions and Worlds found in it know the places where they meet a street; edges keep their
+    indices, so what was found in one graph holds in the other.
+    """
+    added = {index for index in edges if not graph.edges[index].car}
+    if not added:
+        return graph
+    changed = tuple(_opened(edge) if edge.index in added else edge for edge in graph.edges)
+    leaving = dict(graph.leaving)
+    ends = {
+        node for index in added for node in (changed[index].start_node, changed[index].end_node)
+    }
+    for node in ends:
+        leaving[node] = tuple(
+            DirectedEdge(changed[item.edge.index], item.reverse) for item in graph.leaving[node]
+        )
+    return msgspec.structs.replace(graph, edges=changed, leaving=leaving)
+
+
+def _opened(edge: RoadEdge) -> RoadEdge:
+    if edge.forward or edge.backward:
+        return msgspec.structs.replace(edge, car=True)
+    against = edge.tags.get("oneway") in ("-1", "reverse")
+    along = edge.tags.get("oneway") in ("yes", "true", "1")
+    return msgspec.structs.replace(edge, car=True, forward=not against, backward=not along)

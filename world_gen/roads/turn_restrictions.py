@@ -1,0 +1,134 @@
+"""Turn restrictions of the map: which way after which way may not, or must, be taken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import msgspec
+
+from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+
+_KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehicle", "restriction")
+"""The most specific word holds; one for lorries or buses alone does not, nor one at times."""
+_CARS = frozenset({"motorcar", "motor_vehicle", "vehicle"})
+
+
+class NodeRule(NamedTuple):
+    """A restriction at one node; `only` means: from there nowhere but to `to_ways`."""
+
+    relation: int
+    from_way: int
+    to_ways: frozenset[int]
+    only: bool
+    u_turn: bool
+
+
+class WayRule(NamedTuple):
+    """A restriction over one or more ways between."""
+
+    relation: int
+    from_way: int
+    via_ways: tuple[int, ...]
+    to_ways: frozenset[int]
+    only: bool
+
+
+class TurnRestrictions(msgspec.Struct, frozen=True):
+    """All restrictions for cars, by via node, and those with via ways."""
+
+    at_node: Mapping[int, tuple[NodeRule, ...]]
+    over_ways: tuple[WayRule, ...]
+
+    def step_allowed(self, before: DirectedEdge, after: DirectedEdge) -> bool:
+        """Return whether a car may go from one edge onto the next at their common node."""
+        rules = self.at_node.get(before.end_node)
+        if rules is None:
+            return True
+        turns_back = before.edge.index == after.edge.index and before.reverse != after.reverse
+        for rule in rules:
+            if rule.from_way != before.edge.way_id:
+                continue
+            meant = after.edge.way_id in rule.to_ways
+            if meant and rule.from_way == after.edge.way_id:
+                # A way that goes on beyond the node: only the word tells straight on from back.
+                meant = meant and turns_back == rule.u_turn
+            if meant != rule.only:
+                return False
+        return True
+
+    def path_allowed(self, path: Sequence[DirectedEdge]) -> bool:
+        """Return whether no restriction over via ways forbids this sequence of edges."""
+        if len(path) < 3:
+            return True
+        ways = [path[0].edge.way_id]
+        for part in path[1:]:
+            if part.edge.way_id != ways[-1]:
+                ways.append(part.edge.way_id)
+        for rule in self.over_ways:
+            start = (rule.from_way, *rule.via_ways)
+            n = len(start)
+            for i in range(len(ways) - n):
+                if tuple(ways[i : i + n]) == start and (ways[i + n] in rule.to_ways) != rule.only:
+                    return False
+        return True
+
+
+def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
+    """Return the map's restrictions that hold for cars at all times."""
+    at_node: dict[int, list[NodeRule]] = {}
+    over_ways: list[WayRule] = []
+    for relation in sorted(osm.relations.values(), key=lambda r: r.id):
+        tags = relation.tags
+        if tags.get("type") != "restriction":
+            continue
+        word = next((tags[key] for key in _KEYS if key in tags), "")
+        exempt = {part.strip() for part in tags.get("except", "").split(";")}
+        if not word.startswith(("no_", "only_")) or exempt & _CARS:
+            continue
+        role = {
+            name: [m for m in relation.members if m.role == name] for name in ("from", "to", "via")
+        }
+        only = word.startswith("only_")
+        via_ways = tuple(m.ref for m in role["via"] if m.kind == "w")
+        via_nodes = [m.ref for m in role["via"] if m.kind == "n"]
+        ends = frozenset(m.ref for m in role["to"] if m.kind == "w")
+        if not ends:
+            continue
+        for start in (m.ref for m in role["from"] if m.kind == "w"):
+            if via_ways:
+                over_ways.append(WayRule(relation.id, start, via_ways, ends, only))
+            for node in via_nodes:
+                rule = NodeRule(relation.id, start, ends, only, word.endswith("u_turn"))
+                at_node.setdefault(node, []).append(rule)
+    return TurnRestrictions({k: tuple(v) for k, v in at_node.items()}, tuple(over_ways))
+
+
+def restriction_notes(
+    restrictions: TurnRestrictions,
+    inner: Sequence[frozenset[int]],
+    edges: Mapping[int, RoadEdge],
+) -> tuple[str, ...]:
+    """Return a line for each restriction over ways that do not lie within one place.
+
+    `inner` are the edges within each place.
+    """
+    if not restrictions.over_ways:
+        return ()
+    of_way: dict[int, set[int]] = {}
+    for index, edge in edges.items():
+        of_way.setdefault(edge.way_id, set()).add(index)
+    notes = []
+    for rule in restrictions.over_ways:
+        if not {rule.from_way, *rule.via_ways} <= of_way.keys():
+            continue
+        inside = set().union(*(of_way[way] for way in rule.via_ways))
+        if not any(inside <= edges_inside for edges_inside in inner):
+            ways = ", ".join(str(way) for way in rule.via_ways)
+            notes.append(
+                f"relation {rule.relation}: its turn restriction from way {rule.from_way} leads "
+                f"over way {ways}, part of which lies outside a junction; held there alone "
+                "where the ways follow each other within one"
+            )
+    return tuple(dict.fromkeys(notes))

@@ -1,0 +1,103 @@
+"""Stop lines, lights and right of way of all junctions that lie whole in a World."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+from foretwin.contracts.signals import Signal, SignalPlan
+from foretwin.contracts.world import Conflict, Crossing, StopLine
+from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.lanes.clusters import Surroundings
+from foretwin.world_gen.lanes.lane_curves import LaneSet
+from foretwin.world_gen.rules.approaches import Approach, approaches
+from foretwin.world_gen.rules.control_devices import NodeTags, lights_inside
+from foretwin.world_gen.rules.lone_lights import lone_lights
+from foretwin.world_gen.rules.right_of_way import right_of_way
+from foretwin.world_gen.rules.signal_groups import lane_groups, walk_groups
+from foretwin.world_gen.rules.signal_heads import signal_heads
+from foretwin.world_gen.rules.signal_plan import signal_plans
+from foretwin.world_gen.rules.signs_inside import SignsInside, signs_inside
+from foretwin.world_gen.rules.stop_lines import line_controls, lines_at_signs, stop_lines
+
+
+class JunctionRules(NamedTuple):
+    """What tells drivers when to go.
+
+    `plans` are by junction id, `crossing_plans` those of lights away from junctions.
+    """
+
+    stop_lines: tuple[StopLine, ...]
+    signals: tuple[Signal, ...]
+    conflicts: tuple[Conflict, ...]
+    plans: Mapping[str, SignalPlan]
+    crossing_plans: tuple[SignalPlan, ...]
+
+
+def junction_rules(
+    around: Surroundings,
+    node_tags: NodeTags,
+    lanes: LaneSet,
+    connections: Sequence[ConnectionDraft],
+    crossings: Sequence[Crossing],
+    junction_lights: Collection[int],
+) -> JunctionRules:
+    """Return the rules of every whole junction, and of every light away from one.
+
+    `junction_lights` are the nodes of the lights of all junctions of the map.
+    Connections learn their control, their signal group and their conflicts.
+    """
+    signs = signs_inside(connections, node_tags, around)
+    found = approaches(around, node_tags, connections, junction_lights, signs)
+    lines = stop_lines(found, around, lanes)
+    _control(connections, found, lines, signs, node_tags, around)
+    whole = {id(junction) for junction in around.junctions}
+    ruled = [c for c in connections if id(c.cluster.junction) in whole]
+    conflicts, met = right_of_way(ruled, found, signs, around.driving_side)
+    groups = lane_groups(found, around, lanes, ruled)
+    walks = walk_groups(groups, crossings, around)
+    heads = signal_heads(groups, {line.lane_id: line for line in lines}, around)
+    known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
+    lone = lone_lights(around, node_tags, lanes, crossings, known)
+    return JunctionRules(
+        # Where a lane has two lines the one at the junction stands last, so that it wins by lane.
+        stop_lines=(*lone.stop_lines, *lines, *lines_at_signs(connections, signs)),
+        signals=(*heads, *lone.signals),
+        conflicts=conflicts,
+        plans=signal_plans(groups, walks, ruled, conflicts, met),
+        crossing_plans=lone.plans,
+    )
+
+
+def _control(
+    connections: Sequence[ConnectionDraft],
+    found: Sequence[Approach],
+    lines: Sequence[StopLine],
+    signs: SignsInside,
+    node_tags: NodeTags,
+    around: Surroundings,
+) -> None:
+    """Tell connections what controls them: their lane's line, or a sign on a slip road.
+
+    A slip road to the near side that passes no light of its own is not under the junction's.
+    Elsewhere a sign farther in counts where the lane has neither a light nor a tagged sign.
+    """
+    controls = line_controls(lines)
+    near = "right" if around.driving_side == "right" else "left"
+    by_road = {approach.key: approach for approach in found}
+    for c in connections:
+        c.control = controls.get(c.start.id, "none")
+        toward = c.movement.toward
+        approach = by_road.get((toward.edge.index, toward.reverse))
+        if approach is None or not c.movement.inside:
+            continue
+        sign = next((sign.rule for sign in signs.get(c.id, ())), None)
+        told = approach.control
+        if c.turn == near:
+            slips = not lights_inside(c.movement.inside, node_tags)
+        else:
+            slips = told.value == "none" or (told.value != "signal" and told.source != "tagged")
+        if slips and sign is not None:
+            c.control = "stop" if sign == "stop" else "give_way"
+        elif slips and c.turn == near and approach.lit_inside:
+            c.control = "give_way"

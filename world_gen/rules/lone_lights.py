@@ -1,0 +1,147 @@
+"""Lights that stand away from junctions, most of them for people on foot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.provenance import Choice
+from foretwin.contracts.signals import Signal, SignalGroup, SignalPhase, SignalPlan
+from foretwin.contracts.world import Crossing, StopLine
+from foretwin.geometry.polyline import length, locate, points_at
+from foretwin.world_gen.lanes.clusters import Surroundings
+from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
+from foretwin.world_gen.rules.approaches import BEFORE_CROSSING_M
+from foretwin.world_gen.rules.control_devices import NodeTags, faces, is_light
+from foretwin.world_gen.rules.signal_heads import (
+    BESIDE_HEIGHT_M,
+    beside,
+    nearest_kerb,
+    to_kerb_m,
+    towards_drivers_rad,
+)
+from foretwin.world_gen.rules.stop_lines import lines_across
+
+DRIVING_S, WALKING_S = 40.0, 10.0
+AMBER_S, ALL_RED_S = 3.0, 2.0
+_REACH_M = 9.0
+"""Lanes end up to this far from a node where they change their number."""
+
+
+class LoneLights(NamedTuple):
+    """Stop lines, heads and plans of the lights away from junctions."""
+
+    stop_lines: tuple[StopLine, ...]
+    signals: tuple[Signal, ...]
+    plans: tuple[SignalPlan, ...]
+
+
+def lone_lights(
+    around: Surroundings,
+    node_tags: NodeTags,
+    lanes: LaneSet,
+    crossings: Sequence[Crossing],
+    known: Collection[int],
+) -> LoneLights:
+    """Return what governs the lanes at each light that belongs to no junction.
+
+    `known` are the map's nodes of the lights at junctions.
+    Where the light does not say whom it faces it stops both directions; its plan lets cars drive
+    for most of the time, and those on foot after them.
+    """
+    taken = set(known)
+    inner: set[int] = set()
+    for cluster in around.clusters:
+        inner |= cluster.inner
+        if cluster.junction is not None:
+            taken |= cluster.junction.lights | cluster.junction.nodes
+    on_edge: dict[int, list[LaneDraft]] = {}
+    for lane in lanes.lanes.values():
+        on_edge.setdefault(lane.key.edge, []).append(lane)
+    places: dict[int, list[tuple[int, int]]] = {}
+    for index, edge in sorted(around.edges.items()):
+        if index not in inner:
+            for i, node in enumerate(edge.node_ids):
+                if node not in taken and is_light(node_tags.get(node, {})):
+                    places.setdefault(node, []).append((index, i))
+    by_node = {c.osm_node: c for c in crossings}
+    lines: list[StopLine] = []
+    heads: list[Signal] = []
+    plans: list[SignalPlan] = []
+    for node, found in sorted(places.items()):
+        stopped = []
+        for index, i in found:
+            for lane in on_edge.get(index, ()):
+                if faces(node_tags[node], not lane.key.reverse) is not False:
+                    line = _line(lane, node, around.edges[index].xy_m[i], node_tags)
+                    if line is not None:
+                        stopped.append((lane, line))
+        if not stopped:
+            continue
+        lines.extend(line for _, line in stopped)
+        heads.extend(_heads(stopped, node, around))
+        plans.append(_plan(node, by_node.get(node)))
+    return LoneLights(tuple(lines), tuple(heads), tuple(plans))
+
+
+def _line(
+    lane: LaneDraft, node: int, at_xy: np.ndarray[tuple[int], np.dtype[np.float64]], tags: NodeTags
+) -> StopLine | None:
+    at_m = locate(lane.centerline, at_xy)
+    reach = abs(lane.plan.left_m) + _REACH_M
+    if at_m <= 0.5 or math.hypot(*(points_at(lane.centerline, at_m) - at_xy)) > reach:
+        return None  # the lane begins here or does not come this way
+    if "crossing" in tags[node]:
+        at_m -= BEFORE_CROSSING_M
+    back_m = length(lane.centerline) - at_m
+    (line,) = lines_across([lane], [back_m], [Choice("signal", "tagged")], f"light{node}")
+    return line
+
+
+def _heads(
+    stopped: list[tuple[LaneDraft, StopLine]], node: int, around: Surroundings
+) -> list[Signal]:
+    """Return a head beside the outermost lane of each direction of each road."""
+    roads: dict[tuple[str, bool], list[tuple[LaneDraft, StopLine]]] = {}
+    for lane, line in stopped:
+        roads.setdefault((lane.road_id, lane.key.reverse), []).append((lane, line))
+    heads = []
+    for mine in roads.values():
+        outermost = nearest_kerb([lane for lane, _ in mine], around.driving_side)
+        lane, line = next(item for item in mine if item[0] is outermost)
+        place = beside(line.ends, to_kerb_m(lane, around), around.driving_side)
+        heads.append(
+            Signal(
+                id=f"{lane.id}:light{node}",
+                osm_node=node,
+                group_id=f"n{node}:g0",
+                lane_ids=tuple(item.id for item, _ in mine),
+                position=np.round(np.array([place[0], place[1], BESIDE_HEIGHT_M]), 3),
+                yaw_rad=towards_drivers_rad(line.ends),
+                source="tagged",
+                osm_nodes=(node,),
+            )
+        )
+    return heads
+
+
+def _plan(node: int, crossing: Crossing | None) -> SignalPlan:
+    drive = SignalGroup(id=f"n{node}:g0", connection_ids=())
+    walk = (
+        [SignalGroup(id=f"n{node}:g1", connection_ids=(), crossing_ids=(crossing.id,))]
+        if crossing
+        else []
+    )
+    return SignalPlan(
+        groups=(drive, *walk),
+        phases=(
+            SignalPhase(green_s=DRIVING_S, green_group_ids=(drive.id,)),
+            SignalPhase(green_s=WALKING_S, green_group_ids=tuple(group.id for group in walk)),
+        ),
+        amber_s=AMBER_S,
+        all_red_s=ALL_RED_S,
+        source="default",
+    )

@@ -1,0 +1,148 @@
+"""Which lanes and connections of a junction see green together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import msgspec
+
+from foretwin.contracts.signals import SignalGroup
+from foretwin.contracts.world import Crossing
+from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.lanes.clusters import Surroundings
+from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
+from foretwin.world_gen.rules.approaches import Approach
+from foretwin.world_gen.rules.stop_lines import entering
+
+CROSSING_WITHIN_M = 25.0
+
+
+class LaneGroup(msgspec.Struct, kw_only=True):
+    """Lanes of one approach with lights of their own; `turning` ones turn across alone."""
+
+    id: str
+    approach: Approach
+    lanes: tuple[LaneDraft, ...]
+    turning: bool
+    connections: list[ConnectionDraft] = msgspec.field(default_factory=list)
+
+    def finished(self) -> SignalGroup:
+        """Return the group as the World holds it."""
+        return SignalGroup(id=self.id, connection_ids=tuple(sorted(c.id for c in self.connections)))
+
+    def order(self) -> tuple[int, int, bool, str]:
+        """Return what the group is numbered by: its way, its road's end, turning lanes last."""
+        toward = self.approach.toward
+        return toward.edge.way_id, toward.end_node, self.turning, self.lanes[0].id
+
+
+def lane_groups(
+    found: Sequence[Approach],
+    around: Surroundings,
+    lanes: LaneSet,
+    connections: Sequence[ConnectionDraft],
+) -> list[LaneGroup]:
+    """Return the groups of all signalled approaches; connections learn their group.
+
+    Lanes that the map tags for the turn across oncoming traffic alone have lights of their own.
+    Groups of a junction are numbered in the order of their ways, so that every World that holds
+    the junction, and every map of the same place, has the same ids.
+    """
+    across = "left" if around.driving_side == "right" else "right"
+    by_junction: dict[str, list[LaneGroup]] = {}
+    for approach in found:
+        mine = entering(approach, around, lanes)
+        if approach.control.value != "signal" or not mine:
+            continue
+        own = [
+            lane
+            for lane in mine
+            if lane.plan.turns_source == "tagged"
+            and across in lane.turns
+            and set(lane.turns) <= {across, "u_turn"}
+        ]
+        rest = [lane for lane in mine if lane not in own]
+        groups = by_junction.setdefault(approach.junction_id, [])
+        for part in (rest, own):
+            if part:
+                groups.append(
+                    LaneGroup(
+                        id="",
+                        approach=approach,
+                        lanes=tuple(part),
+                        turning=part is own and bool(rest),
+                    )
+                )
+    of_lane: dict[str, LaneGroup] = {}
+    for name, groups in by_junction.items():
+        groups.sort(key=LaneGroup.order)
+        for i, group in enumerate(groups):
+            group.id = f"{name}:g{i}"
+            of_lane.update((lane.id, group) for lane in group.lanes)
+    for c in connections:
+        known = of_lane.get(c.start.id)
+        if known is not None and c.control == "signal":
+            known.connections.append(c)
+            c.signal_group_id = known.id
+    return [group for groups in by_junction.values() for group in groups]
+
+
+class WalkGroup(msgspec.Struct, frozen=True, kw_only=True):
+    """A crossing with lights for those on foot, and the groups that may not drive meanwhile."""
+
+    id: str
+    crossing: Crossing
+    against: frozenset[str]
+
+    def finished(self) -> SignalGroup:
+        """Return the group as the World holds it."""
+        return SignalGroup(id=self.id, connection_ids=(), crossing_ids=(self.crossing.id,))
+
+
+def walk_groups(
+    groups: Sequence[LaneGroup], crossings: Sequence[Crossing], around: Surroundings
+) -> dict[str, list[WalkGroup]]:
+    """Return the groups of signalled crossings by junction.
+
+    Who enters by the crossed road may not drive meanwhile, nor who leaves by it straight on;
+    who turns into it waits for those on foot (StVO §9 (3), RiLSA 2015 2.3.1).
+    """
+    lit = {c.osm_node: c for c in crossings if c.kind.value == "traffic_signals" and c.osm_node}
+    found: dict[str, list[WalkGroup]] = {}
+    by_junction: dict[str, list[LaneGroup]] = {}
+    for group in groups:
+        by_junction.setdefault(group.approach.junction_id, []).append(group)
+    for name, mine in by_junction.items():
+        against: dict[int, set[str]] = {}
+        for cluster in around.clusters:
+            if cluster.junction is None or cluster.junction.summary.id != name:
+                continue
+            for leg in cluster.legs:
+                nodes = leg.edge.node_ids[::-1] if leg.reverse else leg.edge.node_ids
+                for node in nodes:
+                    if node in lit:
+                        at = leg.edge.xy_m[leg.edge.node_ids.index(node)]
+                        if math.hypot(*(at - leg.xy_m[0])) <= CROSSING_WITHIN_M:
+                            against.setdefault(node, set())
+            for index in sorted(cluster.inner):
+                edge = around.edges.get(index)
+                for node in edge.node_ids if edge is not None else ():
+                    if node in lit:
+                        against.setdefault(node, set())
+        for group in mine:
+            for c in group.connections:
+                way = [c.movement.toward, *c.movement.inside]
+                if c.turn == "straight":
+                    way.append(c.movement.away)
+                for part in way:
+                    for node in part.edge.node_ids:
+                        if node in against:
+                            against[node].add(group.id)
+        found[name] = [
+            WalkGroup(
+                id=f"{name}:g{len(mine) + i}", crossing=lit[node], against=frozenset(against[node])
+            )
+            for i, node in enumerate(sorted(against))
+        ]
+    return found

@@ -1,0 +1,186 @@
+"""A fixed-time plan for each signalised junction: phases, greens, amber and clearing times.
+
+The map does not know the real plan. This one is a default after RiLSA 2015: a cycle of 90 s, of
+120 s with more than three phases (2.7.3: at most 120 s), amber 3 s up to 50 km/h, 4 s at 60, 5 s
+at 70 (2.4), at least 5 s of green (2.7.4), all red for as long as the last car needs to clear the
+ground it shares with the first one of the next phase (2.5): clearing 6 m of car and the way there
+at 10 m/s, entering at 40 km/h. Who walks is let go in every phase whose cars stay clear; their
+own longer clearing time is not in the plan.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from foretwin.contracts.signals import SignalPhase, SignalPlan
+from foretwin.contracts.world import Conflict, YieldRule
+from foretwin.world_gen.connections.conflicts import Meetings
+from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.rules.signal_groups import LaneGroup, WalkGroup
+
+CYCLE_S, LONG_CYCLE_S, MANY_PHASES = 90.0, 120.0, 4
+LEAST_GREEN_S = 5.0
+LEAST_ALL_RED_S = 1.0
+_AMBER_S = ((50.0, 3.0), (60.0, 4.0), (math.inf, 5.0))
+_CAR_M, _CLEARING_MPS, _ENTERING_MPS = 6.0, 10.0, 40.0 / 3.6
+_WALKING_MPS = 1.2
+_WAITS: tuple[YieldRule, ...] = ("turn_across", "u_turn")
+
+
+class Between(NamedTuple):
+    """What two groups of a junction are to each other.
+
+    `crossing` where they must never be green together, `waiting` where one turns across the
+    other and waits. `clear_s` is how long after the one the other may start.
+    """
+
+    crossing: bool
+    waiting: bool
+    clear_s: float
+
+
+def signal_plans(
+    groups: Sequence[LaneGroup],
+    walks: Mapping[str, Sequence[WalkGroup]],
+    connections: Sequence[ConnectionDraft],
+    conflicts: Sequence[Conflict],
+    met: Meetings,
+) -> dict[str, SignalPlan]:
+    """Return a plan for each junction with groups, by its id; `met` are the conflicts' places."""
+    of = {c.id: g for g in groups for c in g.connections}
+    pairs: dict[tuple[str, str], Between] = {}
+    rows = zip(conflicts, met.first_m.tolist(), met.second_m.tolist(), strict=True)
+    for conflict, first_m, second_m in rows:
+        a, b = of.get(conflict.first_id), of.get(conflict.second_id)
+        if a is None or b is None or a is b:
+            continue
+        waits = conflict.rule in _WAITS and oncoming(a, b)
+        key = (a.id, b.id) if a.id < b.id else (b.id, a.id)
+        old = pairs.get(key, Between(False, False, 0.0))
+        clear_s = max(_clear_s(first_m, second_m), _clear_s(second_m, first_m), old.clear_s)
+        pairs[key] = Between(old.crossing or not waits, old.waiting or waits, clear_s)
+    by_junction: dict[str, list[LaneGroup]] = {}
+    for group in groups:
+        by_junction.setdefault(group.approach.junction_id, []).append(group)
+    return {name: _plan(mine, walks.get(name, ()), pairs) for name, mine in by_junction.items()}
+
+
+def oncoming(a: LaneGroup, b: LaneGroup) -> bool:
+    """Return whether the roads of two groups lie opposite each other."""
+    return a.approach.opposite == b.approach.key and b.approach.opposite == a.approach.key
+
+
+def _clear_s(clearing_m: float, entering_m: float) -> float:
+    return (clearing_m + _CAR_M) / _CLEARING_MPS - entering_m / _ENTERING_MPS
+
+
+def _plan(
+    groups: Sequence[LaneGroup],
+    walks: Sequence[WalkGroup],
+    pairs: Mapping[tuple[str, str], Between],
+) -> SignalPlan:
+    phases = _phases(groups, pairs)
+    names = [[group.id for group in phase] for phase in phases]
+    weights = [max(len(group.lanes) for group in phase) for phase in phases]
+    least = [LEAST_GREEN_S for _ in phases]
+    for walk in walks:
+        free = [mine for mine in names if not walk.against & set(mine)]
+        for mine in free:
+            mine.append(walk.id)
+        if not free:
+            names.append([walk.id])
+            weights.append(0)
+            least.append(max(LEAST_GREEN_S, _walking_s(walk)))
+    if len(names) == 1:
+        # One road alone has a light: the others, or those on foot, need their turn too.
+        names.append([])
+        weights.append(0)
+        least.append(2.0 * LEAST_GREEN_S)
+    amber_s = _amber_s(groups)
+    clear_s = max((b.clear_s for b in _within(groups, pairs)), default=0.0)
+    # Half seconds; amber is no time to enter, so it counts for clearing only from its end.
+    all_red_s = max(LEAST_ALL_RED_S, math.ceil(2.0 * clear_s) / 2.0)
+    cycle_s = CYCLE_S if len(names) < MANY_PHASES else LONG_CYCLE_S
+    greens = share_green(weights, least, cycle_s - len(names) * (amber_s + all_red_s))
+    return SignalPlan(
+        groups=(*(group.finished() for group in groups), *(walk.finished() for walk in walks)),
+        phases=tuple(
+            SignalPhase(green_s=green_s, green_group_ids=tuple(mine))
+            for green_s, mine in zip(greens, names, strict=True)
+        ),
+        amber_s=amber_s,
+        all_red_s=all_red_s,
+        source="default",
+    )
+
+
+def _within(groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]) -> list[Between]:
+    names = sorted(group.id for group in groups)
+    return [
+        found
+        for i, a in enumerate(names)
+        for b in names[i + 1 :]
+        if (found := pairs.get((a, b))) is not None
+    ]
+
+
+def _phases(
+    groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]
+) -> list[list[LaneGroup]]:
+    """Return groups that are green together: roads that face each other first.
+
+    Where two roads that face each other both have lanes of their own for the turn across, these
+    go in a phase of theirs; else who turns across waits.
+    """
+    protected = {
+        g.id
+        for g in groups
+        if g.turning and any(other.turning and oncoming(g, other) for other in groups)
+    }
+
+    def together(a: LaneGroup, b: LaneGroup) -> bool:
+        between = pairs.get((a.id, b.id) if a.id < b.id else (b.id, a.id))
+        if between is None:
+            return True
+        guarded = bool(protected & {a.id, b.id})
+        return not (between.crossing or (between.waiting and guarded))
+
+    waiting = sorted(groups, key=lambda g: g.turning and g.id in protected)
+    found: list[list[LaneGroup]] = []
+    while waiting:
+        first = waiting[0]
+        phase = [first]
+        for other in sorted(waiting[1:], key=lambda g: not oncoming(first, g)):
+            if all(together(other, mine) for mine in phase):
+                phase.append(other)
+        taken = {group.id for group in phase}
+        waiting = [group for group in waiting if group.id not in taken]
+        found.append(sorted(phase, key=lambda g: g.id))
+    return found
+
+
+def _amber_s(groups: Sequence[LaneGroup]) -> float:
+    limit_mps = max(lane.edge.speed_limit_mps.value for g in groups for lane in g.lanes)
+    return next(amber_s for kmph, amber_s in _AMBER_S if limit_mps * 3.6 <= kmph + 0.5)
+
+
+def _walking_s(walk: WalkGroup) -> float:
+    return math.ceil(
+        float(np.hypot(*(walk.crossing.line[1] - walk.crossing.line[0]))) / _WALKING_MPS
+    )
+
+
+def share_green(weights: Sequence[float], least_s: Sequence[float], total_s: float) -> list[float]:
+    """Return half seconds of green for each phase: its least, and its share of what is left.
+
+    Where `total_s` is too short for all the least ones the cycle grows.
+    """
+    spare = max(total_s - sum(least_s), 0.0)
+    whole = max(sum(weights), 1e-9)
+    ends = np.floor(2.0 * np.cumsum([spare * weight / whole for weight in weights]) + 0.5) / 2.0
+    extra = np.diff(ends, prepend=0.0)
+    return [float(least + more) for least, more in zip(least_s, extra, strict=True)]
