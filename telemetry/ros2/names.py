@@ -127,9 +127,16 @@ def qos_text(qos: QosProfile) -> str:
 def token(entity: Entity) -> str:
     """Return the liveliness token of an entity."""
     parts = [
-        _TOKEN_ROOT, str(entity.domain), entity.session, str(entity.node_id),
-        str(entity.entity_id), entity.entity, "%", _mangled(entity.namespace), entity.node,
-    ]  # fmt: skip
+        _TOKEN_ROOT,
+        str(entity.domain),
+        entity.session,
+        str(entity.node_id),
+        str(entity.entity_id),
+        entity.entity,
+        "%",
+        _mangled(entity.namespace),
+        entity.node,
+    ]
     if entity.topic is not None:
         assert entity.kind is not None
         parts += [

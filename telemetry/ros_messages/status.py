@@ -18,8 +18,12 @@ from foretwin.telemetry.ros_messages.parts import (
 _AUTONOMOUS, _MANUAL = 1, 4
 _MODES: dict[int, drive.ControlMode] = {
     # Steering alone or speed alone: a human drives the rest, so no comparison of the whole holds.
-    _AUTONOMOUS: "autonomous", 2: "manual", 3: "manual", _MANUAL: "manual", 5: "manual",
-}  # fmt: skip
+    _AUTONOMOUS: "autonomous",
+    2: "manual",
+    3: "manual",
+    _MANUAL: "manual",
+    5: "manual",
+}
 """ControlModeReport.mode; NO_COMMAND and NOT_READY are unknown."""
 _RED, _AMBER, _GREEN = 1, 2, 3
 _CIRCLE, _OFF, _ON = 1, 1, 2

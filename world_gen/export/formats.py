@@ -90,4 +90,4 @@ FORMATS: dict[str, Format] = {
         Format("svg", ".svg", _picture, True),
         Format("png", ".png", _picture, True),
     )
-}  # fmt: skip
+}
