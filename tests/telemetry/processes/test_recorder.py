@@ -17,7 +17,8 @@ from foretwin.contracts.bus import Alive, Mailbox, Received, ZenohBus
 from foretwin.contracts.drive import SpeedSample
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
-from foretwin.contracts.setup import BusSetup, RecorderSetup, write_setup
+from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
+from foretwin.contracts.setup import BusSetup, ProcessSetup, RecorderSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
@@ -46,9 +47,12 @@ class Wall:
 def recorder(
     bus: MemoryBus, recording: Recording, *, lossless: bool = True, mono_s: Any = time.monotonic
 ) -> RecorderProcess:
+    setup = ProcessSetup(
+        run_id="r1", process_id="recorder", vehicle_id="car", bus=BusSetup(endpoint=""), log_file=""
+    )
     return RecorderProcess(
-        recording, bus=bus, run_id="r1", process_id="recorder", vehicle_id="car",
-        lossless=lossless, mono_s=mono_s,
+        recording, bus=bus, life=ProcessLife(setup, bus, mono_s=mono_s), run_id="r1",
+        vehicle_id="car", lossless=lossless, mono_s=mono_s,
     )  # fmt: skip
 
 
@@ -133,11 +137,11 @@ def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path
     bus.lose(ORCHESTRATOR)
     assert process.step(), "a link may come back"
     bus.declare_alive(ORCHESTRATOR)
-    wall.now_s += 5.0
+    wall.now_s += 2.0 * ORCHESTRATOR_GRACE_S
     assert process.step()
     bus.lose(ORCHESTRATOR)
     assert process.step()
-    wall.now_s += 1.1
+    wall.now_s += 1.1 * ORCHESTRATOR_GRACE_S
     assert not process.step()
     process.finish()
 
@@ -239,8 +243,5 @@ def test_a_wrong_setup_is_told_without_a_traceback(tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=DEADLINE_S, check=False,
     )  # fmt: skip
     assert done.returncode == 2
-    assert (
-        "foretwin.telemetry.processes.recorder: Expected `str`, got `int` - at `$.run_id`"
-        in done.stderr
-    )
+    assert "setup.json: Expected `str`, got `int` - at `$.run_id`" in done.stderr
     assert "Traceback" not in done.stderr
