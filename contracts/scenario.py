@@ -2,7 +2,8 @@
 
 A `Scenario` is abstract: relations instead of places, spans instead of numbers. Sides are named
 by the traffic: `near` is where one drives (right where traffic keeps right), `across` the other.
-A `ConcreteScenario` is one of its cases, at one place of one World, with every number drawn.
+Every number of one of its cases has a name: `ego.speed_mps`, `<actor>.gap_m`,
+`faults.friction_factor` and so on.
 """
 
 from __future__ import annotations
@@ -131,16 +132,3 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     seed: int = 0
     samples: int = 1
     """How many cases to draw for each combination of listed values."""
-
-
-class ConcreteScenario(msgspec.Struct, frozen=True, kw_only=True):
-    """One case of a scenario at one place; `values` holds every number that was drawn, named
-    `ego.speed_mps`, `<actor>.speed_mps`, `faults.friction_factor` and so on."""
-
-    scenario_id: str
-    world_id: str
-    junction_id: str
-    place: str
-    """The connection that the ego takes and, after a `/`, that of the first other road user."""
-    values: dict[str, float]
-    seed: int

@@ -118,8 +118,11 @@ class TuningLog:
             if found.name not in PLOTTED:
                 continue
             values = {
-                "in_use": found.prior, "value": found.value, "low": found.low, "high": found.high,
-            }  # fmt: skip
+                "in_use": found.prior,
+                "value": found.value,
+                "low": found.low,
+                "high": found.high,
+            }
             rows += [
                 Row(f"parameters/{found.name}/{curve}", drive_ns, rr.Scalars(value))
                 for curve, value in values.items()
@@ -142,9 +145,7 @@ class TuningLog:
         lines = ["| parameter | in use | driving says | 95 % | |", "|---|---|---|---|---|"]
         for found in self._estimates.values():
             interval = "" if found.low is None else f"{_number(found.low)} to {_number(found.high)}"
-            cells = (
-                found.name, _number(found.prior), _number(found.value), interval, found.reason,
-            )  # fmt: skip
+            cells = (found.name, _number(found.prior), _number(found.value), interval, found.reason)
             lines.append("| " + " | ".join(table_cell(cell) for cell in cells) + " |")
         return "\n".join(lines)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -32,8 +31,6 @@ from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.sim_worker.metrics.comparison import compare_plan
-
-log = logging.getLogger("orchestrator")
 
 JOB_TIMEOUT_S = 20.0
 

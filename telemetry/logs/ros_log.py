@@ -34,7 +34,6 @@ from foretwin.telemetry.ros_messages.table import (
     INFO_TOPIC,
     TOPIC_PREFIX,
     kind_of,
-    message_from,
     message_of,
 )
 
@@ -67,23 +66,6 @@ def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
     for record in recording.chosen(known, Counter()):
         texts[record.topic] = decode(record).data
     return _open_own(recording, _Told(texts.get(FRAME_TOPIC), texts.get(INFO_TOPIC)))
-
-
-def read_drive(path: Path) -> Iterator[Sample]:
-    """Yield every message of our own MCAP by log time, the vehicle's states and `end` included.
-
-    Unlike `open_mcap(path).samples()` nothing is refused. Raises LogError for another's file.
-    """
-    recording = mcap_recording(path)
-    contents = recording.contents
-    if FORMAT_METADATA not in contents.metadata:
-        raise LogError(f"{path}: not written by foretwin: no metadata {FORMAT_METADATA!r}")
-    told = contents.metadata.get(FRAME_METADATA)
-    frame = _Told(None if told is None else told["json"], None).frame()
-    for record in recording.read(set(contents.counts), Counter()):
-        sample = message_from(record.topic, record.data, frame)
-        if sample is not None:
-            yield sample
 
 
 class _Told(NamedTuple):

@@ -90,7 +90,7 @@ FORMATS: dict[str, Format] = {
         Format("svg", ".svg", _picture, True),
         Format("png", ".png", _picture, True),
     )
-}  # fmt: skip
+}
 DEFAULT_FORMAT = "mjcf"
 """What is written into a folder, and what a suffix of several formats means."""
 

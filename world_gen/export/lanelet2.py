@@ -30,9 +30,12 @@ from foretwin.world_gen.export.road_heights import RoadHeights
 AUTOWARE_MAP_NAME = "lanelet2_map.osm"
 """A map of this name gets the projector file under the name that Autoware looks for beside it."""
 _SUBTYPES: dict[LaneKind, str] = {
-    "driving": "road", "bus": "bus_lane", "bicycle": "bicycle_lane", "parking": "parking",
+    "driving": "road",
+    "bus": "bus_lane",
+    "bicycle": "bicycle_lane",
+    "parking": "parking",
     "tram": "rail",
-}  # fmt: skip
+}
 _PARTICIPANTS: dict[LaneKind, tuple[str, ...]] = {
     "driving": ("vehicle",),
     "bus": ("vehicle:bus", "vehicle:emergency", "vehicle:taxi"),

@@ -101,9 +101,11 @@ def _road_ends(lanes: LaneSet) -> tuple[dict[tuple[int, bool], int], _Mouths]:
         return np.stack([points[start, 0], points[stop, 1]], axis=1).reshape(-1, 2)
 
     return row_of, _Mouths(
-        left=outward(ends, left, right), left_next=outward(after, left, right),
-        right=outward(ends, right, left), right_next=outward(after, right, left),
-    )  # fmt: skip
+        left=outward(ends, left, right),
+        left_next=outward(after, left, right),
+        right=outward(ends, right, left),
+        right_next=outward(after, right, left),
+    )
 
 
 def _polygons(mouths: _Mouths, count: np.ndarray) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -29,10 +28,8 @@ BESIDE_RAD = math.radians(45.0)
 """The stem of a T meets a road that bends no more, at no smaller angle; else the three make a Y."""
 
 
-def find_intersections(
-    osm: OsmMap, graph: RoadGraph, *, edges: Collection[int] | None = None
-) -> tuple[Junction, ...]:
-    """Return the junctions of a map, by id; with `edges`, those that touch one of these edges.
+def find_intersections(osm: OsmMap, graph: RoadGraph) -> tuple[Junction, ...]:
+    """Return the junctions of a map, by id.
 
     One roundabout is one junction with the nodes where its arms part; so are the crossings of
     dual carriageways, offset branchings close to each other, and corners with slip roads. Where
@@ -41,18 +38,9 @@ def find_intersections(
     no node and do not meet. The result for one place does not depend on the rest of the map.
     """
     roads = car_roads(osm, graph)
-    wanted = None
-    if edges is not None:
-        wanted = {
-            node
-            for index in edges
-            for node in (graph.edges[index].start_node, graph.edges[index].end_node)
-        }
-    places = []
-    for cluster in cluster_branchings(roads, graph, osm.node_tags):
-        place = _place(cluster, roads, osm, graph)
-        if place is not None and (wanted is None or not wanted.isdisjoint(place.nodes)):
-            places.append(place)
+    clusters = cluster_branchings(roads, graph, osm.node_tags)
+    found_places = (_place(cluster, roads, osm, graph) for cluster in clusters)
+    places = [place for place in found_places if place is not None]
     if not places:
         return ()
     centres = np.array([_centre_xy_m(place.cluster, graph) for place in places])

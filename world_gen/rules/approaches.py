@@ -58,7 +58,7 @@ class Approach(msgspec.Struct, kw_only=True):
     line_m: float | None
     signal_nodes: tuple[int, ...]
     standing: Standing
-    opposite: tuple[int, bool] | None
+    opposite: tuple[int, bool] | None = None
     """Key of the approach that lies straight ahead."""
     lit_inside: bool = False
     """Its light stands on the way through the junction, past where a slip road may part."""
@@ -227,9 +227,8 @@ def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approa
     )
     lights_for_all = control == "signals" and kind not in RING_KINDS and _for_all(drafts)
     found = []
-    for d, entry, rank in zip(drafts, entries, ranks, strict=True):
+    for d, entry, standing in zip(drafts, entries, ranks, strict=True):
         ahead = None if entry.opposite is None else drafts[entry.opposite].toward
-        standing = rank
         entering = d.cluster.ring and not is_ring_edge(d.toward.edge)
         if (entering and ring_has_way) or kind == "mini_roundabout":
             source = "tagged" if d.sign or kind != "circular" else "inferred"
@@ -262,23 +261,25 @@ def _approach(d: _ApproachDraft, standing: Standing, signalled: bool, for_all: b
         far = max(on_leg, key=lambda m: m.distance_m, default=None)
         line = _before_crossing(d.met)
         if far is not None and far.distance_m > OWN_LINE_M:
-            on_crossing = "crossing" in far.tags
-            line = far.distance_m + (BEFORE_CROSSING_M if on_crossing else 0.0)
+            line = far.distance_m + (BEFORE_CROSSING_M if "crossing" in far.tags else 0.0)
         nodes = tuple(dict.fromkeys(m.node for m in d.lights))
         word = Choice("signal", "tagged" if nodes else "inferred")
-        return Approach(
-            cluster=d.cluster, toward=d.toward, control=word, line_m=line, signal_nodes=nodes,
-            standing=standing, opposite=None, lit_inside=bool(d.lights) and not on_leg,
-            signed_inside=inside,
-        )  # fmt: skip
-    line = None
-    if d.sign is not None and OWN_LINE_M < d.sign.distance_m <= _SIGN_NEAR_M:
-        line = d.sign.distance_m
+        lit_inside = bool(d.lights) and not on_leg
+    else:
+        line, nodes, lit_inside = None, (), False
+        if d.sign is not None and OWN_LINE_M < d.sign.distance_m <= _SIGN_NEAR_M:
+            line = d.sign.distance_m
+        word = Choice("none", "inferred") if inside else _word(standing)
     return Approach(
-        cluster=d.cluster, toward=d.toward,
-        control=Choice("none", "inferred") if inside else _word(standing), line_m=line,
-        signal_nodes=(), standing=standing, opposite=None, signed_inside=inside,
-    )  # fmt: skip
+        cluster=d.cluster,
+        toward=d.toward,
+        control=word,
+        line_m=line,
+        signal_nodes=nodes,
+        standing=standing,
+        lit_inside=lit_inside,
+        signed_inside=inside,
+    )
 
 
 def _word(standing: Standing) -> Choice:

@@ -106,17 +106,14 @@ def right_of_way(
     conflicts = []
     conflicting: list[list[str]] = [[] for _ in ways]
     waiting: list[list[str]] = [[] for _ in ways]
-    rows = zip(
-        met.first.tolist(), met.second.tolist(), met.merging.tolist(), met.points, met.areas,
-        met.apart_m.tolist(), angle.tolist(), strict=True,
-    )  # fmt: skip
-    for i, j, merging, point, area, apart_m, from_first in rows:
+    told = (column.tolist() for column in (met.first, met.second, met.merging, met.apart_m, angle))
+    rows = zip(*told, met.points, met.areas, strict=True)
+    for i, j, merging, apart_m, from_first, point, area in rows:
         a, b = ways[i], ways[j]
         standing = a.standing, b.standing
         if a.sign_node != b.sign_node:
-            standing = (
-                _standing_at(a, area, point, merging), _standing_at(b, area, point, merging)
-            )  # fmt: skip
+            own, other = (_standing_at(way, area, point, merging) for way in (a, b))
+            standing = own, other
         answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side)
         loser, winner = (i, j) if answer.first_waits else (j, i)
         conflicting[i].append(b.id)
@@ -161,10 +158,8 @@ def _ways(
     ahead = np.arctan2(gap[:, 1], gap[:, 0])
     start, end = ahead[paths.first[:-1]], ahead[paths.first[1:] - 2]
     bend = np.abs((end - start + math.pi) % math.tau - math.pi)
-    rows = zip(
-        connections, start.tolist(), end.tolist(), bend.tolist(), paths.length_m.tolist(),
-        strict=True,
-    )  # fmt: skip
+    told = (column.tolist() for column in (start, end, bend, paths.length_m))
+    rows = zip(connections, *told, strict=True)
     ways = []
     for c, heading, exit_heading, bend_rad, length_m in rows:
         toward = c.movement.toward

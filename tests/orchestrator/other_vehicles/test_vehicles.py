@@ -20,7 +20,6 @@ from foretwin.contracts.drive import (
 )
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.mailbox import Mailbox
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.orchestrator.config import VehicleBeside
 from foretwin.orchestrator.drive.intake import LatestReports
@@ -29,6 +28,7 @@ from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.telemetry.logs.write_mcap import create
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
 

@@ -16,19 +16,19 @@ import pytest
 from foretwin.contracts.bus import Alive, Mailbox, Received, ZenohBus
 from foretwin.contracts.drive import SpeedSample
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup, RecorderSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.logs import open_log
-from foretwin.telemetry.logs.ros_log import read_drive
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 from foretwin.telemetry.processes.recorder import RecorderProcess
 from foretwin.telemetry.processes.recording import DriveRecording
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.contracts.memory_bus import MemoryBus
 from tests.starvation import unhindered_wait_s
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
+from tests.telemetry.own_recordings import read_drive
 
 ORCHESTRATOR = alive_key(run="r1", process="orchestrator")
 RECORDER = alive_key(run="r1", process="recorder")

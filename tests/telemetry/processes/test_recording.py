@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.drive import ImuSample, SpeedSample
-from foretwin.telemetry.logs.ros_log import read_drive
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 from foretwin.telemetry.processes.recording import DriveRecording
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
+from tests.telemetry.own_recordings import read_drive
 
 
 class SmallDisk(io.BytesIO):
