@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 
+Flags = npt.NDArray[np.bool_]
 _MITRE_LIMIT = 2.0
 
 
@@ -26,9 +28,13 @@ def without_repeats(xy_m: Array, *, tolerance_m: float = 0.01) -> Array:
     """Return the polyline without points closer than `tolerance_m` to the one before."""
     if len(xy_m) < 2:
         return xy_m
-    keep = np.concatenate([[True], np.hypot(*np.diff(xy_m, axis=0).T) > tolerance_m])
-    kept: Array = xy_m[keep]
+    kept: Array = xy_m[apart(xy_m, tolerance_m=tolerance_m)]
     return kept
+
+
+def apart(xy_m: Array, *, tolerance_m: float) -> Flags:
+    """Return (N,) whether points are farther than `tolerance_m` from the one before."""
+    return np.concatenate([[True], np.hypot(*np.diff(xy_m, axis=0).T) > tolerance_m])
 
 
 def points_at(xy_m: Array, at_m: Array | float) -> Array:

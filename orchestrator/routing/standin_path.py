@@ -10,6 +10,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import geo_from_local
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.driving_path import driving_path
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.osm.osm_map import OsmMap
@@ -58,7 +59,7 @@ def stop_signs(osm: OsmMap, route: Route) -> list[float]:
     found = []
     for place, directed in enumerate(route.edges):
         xy = directed.xy_m
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+        along = arc_lengths(xy)
         nodes = directed.edge.node_ids[::-1] if directed.reverse else directed.edge.node_ids
         for node, s_m in zip(nodes[1:], along[1:], strict=True):
             tags = osm.node_tags.get(node, {})

@@ -12,6 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.telemetry.standin.parameters import DriverParameters
 
 _SPACING_M = 0.5
@@ -62,7 +63,7 @@ class DrivenPath:
             raise UserError("path holds a negative speed; the stand-in drives forwards")
         self.frame = LocalFrame(GeoPoint(float(lat_deg[0]), float(lon_deg[0])))
         xy = local_from_geo(self.frame, lat_deg, lon_deg)
-        given_s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+        given_s = arc_lengths(xy)
         if given_s[-1] < 5.0:
             raise UserError(f"path is {given_s[-1]:.1f} m long; at least 5 m are needed")
         fresh = np.concatenate([[True], np.diff(given_s) > 1e-6])
@@ -72,7 +73,7 @@ class DrivenPath:
         for sigma_m in _SMOOTHING_M:
             self.xy_m = _smoothed(dense, sigma_m / (even_s[1] - even_s[0]))
             step = np.hypot(*np.diff(self.xy_m, axis=0).T)
-            self.s_m: Array = np.concatenate([[0.0], np.cumsum(step)])
+            self.s_m: Array = arc_lengths(self.xy_m)
             tangent = np.gradient(self.xy_m, self.s_m, axis=0)
             self.yaw_rad: Array = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
             self.curvature_pm: Array = np.gradient(self.yaw_rad, self.s_m)

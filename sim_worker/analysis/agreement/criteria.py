@@ -11,6 +11,7 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Flags, Rollout
 from foretwin.sim_worker.metrics.route_rules import LineAhead, RouteRules
@@ -149,8 +150,7 @@ class Court:
         time_s = self._window.time_s
         future, crossed_s = line_crossings(front, line.ends_m, time_s)
         for row, at_s in zip(future, crossed_s, strict=True):
-            steps = np.hypot(*np.diff(front[row], axis=0).T)
-            gone_m = np.concatenate([[0.0], np.cumsum(steps)])
+            gone_m = arc_lengths(front[row])
             line_m = float(np.interp(at_s, time_s, gone_m))
             before = (time_s <= at_s) & (gone_m >= line_m - _STOP_WITHIN_M)
             if line_m >= _STOP_WITHIN_M:
