@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.speed_profile import speed_in_bends_mps
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.path_table import Indices, PathTable
 from foretwin.sim_worker.road_users.right_of_way import PathRules
@@ -77,7 +78,7 @@ class LawAbiding:
         wanted = STANDSTILL_GAP_M * (~nearer) + np.maximum(
             speed * TIME_GAP_S + speed * (speed - lead_speed) / (2.0 * np.sqrt(most * decel)), 0.0
         )
-        curve = np.sqrt(_LATERAL_ACCEL_MPS2 / np.maximum(np.abs(bend), 1e-6))
+        curve = speed_in_bends_mps(bend, _LATERAL_ACCEL_MPS2)
         allowed = np.minimum(self._desired, curve)
         free = 1.0 - (speed / np.maximum(allowed, 0.1)) ** 4
         accel = most * (free - np.square(wanted / np.maximum(gap, 0.1)))
