@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.rectangles import (
     Rectangles,
@@ -143,10 +144,10 @@ class _Motion:
         after = np.minimum(tick + 1, states.shape[1] - 1)
         self.state = states[future, tick]
         self.state_change = states[future, after] - self.state
-        self.state_change[:, 2] = _wrapped(self.state_change[:, 2])
+        self.state_change[:, 2] = wrap_angle(self.state_change[:, 2])
         self.pose = users[future, tick, user]
         change = users[future, after, user] - self.pose
-        change[:, 2] = _wrapped(change[:, 2])
+        change[:, 2] = wrap_angle(change[:, 2])
         # Who is absent at the next tick stays where it was last seen.
         self.pose_change = np.where(np.isfinite(change), change, 0.0)
         self.size_m = user_size_m[future, user]
@@ -268,7 +269,3 @@ def _normal(ego: Rectangles, user: Rectangles) -> Array:
     between = user.centre_m - ego.centre_m
     sign = np.where((normal * between).sum(axis=-1) < 0.0, -1.0, 1.0)
     return np.asarray(normal * sign[..., None])
-
-
-def _wrapped(angle: Array) -> Array:
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
