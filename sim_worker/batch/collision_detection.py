@@ -22,14 +22,13 @@ from foretwin.geometry.rectangles import (
     overlapping,
     separations,
 )
+from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 Indices = npt.NDArray[np.intp]
 
 _SEARCH_STEP_S = 0.01
 _PRECISION_S = 1e-5
-_MAX_CLOSING_MPS = 100.0
-"""Faster than any two road users approach each other."""
 _FUTURES_AT_ONCE = 8
 _TOUCHING_M = 0.02
 """Corners this near to the other's outline count as touching it."""
@@ -200,7 +199,7 @@ def _near(
     """Return future, tick and user of all pairs whose circles may meet before the next tick."""
     radius = np.hypot(user_size_m[..., 0], user_size_m[..., 1]) / 2.0
     reach = radius + math.hypot(vehicle.length_m.value, vehicle.width_m.value) / 2.0
-    reach += _MAX_CLOSING_MPS * tick_s / 2.0
+    reach += MAX_CLOSING_MPS * tick_s / 2.0
     reach_square = np.square(reach)
     centre = ego_rectangles(vehicle, states).centre_m
     near = []

@@ -11,12 +11,12 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ControlCommand
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
+from foretwin.sim_worker.driver_model import HOLD_MPS2
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 STEP_BACK_NS = 1_000_000_000
 """A stamp that lies this far behind the last one is of a clock that has stepped back."""
 _STANDS_MPS = 0.05
-_HOLD_MPS2 = -2.0
 
 
 class TwinCommand(NamedTuple):
@@ -98,7 +98,7 @@ def estimated_command(
     """
     speed, slip, rate, angle = 0.5 * (before[3:7] + after[3:7])
     if abs(before[3]) < _STANDS_MPS and abs(after[3]) < _STANDS_MPS:
-        return TwinCommand(stamp_ns, _HOLD_MPS2, float(after[6]))
+        return TwinCommand(stamp_ns, HOLD_MPS2, float(after[6]))
     rear = vehicle.cog_from_rear_axle_m.value
     front_force = rear / vehicle.wheelbase_m.value * speed * rate / np.cos(angle)
     wanted = float(after[3] - before[3]) / duration_s

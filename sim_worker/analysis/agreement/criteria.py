@@ -12,6 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.polyline import arc_lengths
+from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Flags, Rollout
 from foretwin.sim_worker.metrics.route_rules import LineAhead, RouteRules
@@ -22,7 +23,6 @@ from foretwin.sim_worker.metrics.violations import line_crossings
 CRITERIA = ("clearance", "drivable_area", "red_light", "stop_line", "comfort")
 LEAST_CLEARANCE_M = 0.2
 """Nearer to another road user is a failure; boxes as detected are no more exact than that."""
-_STANDING_MPS = 0.5
 _STOP_WITHIN_M = 6.0
 """Whoever stands within so much before a stop line has stopped for it."""
 _HEARD_FOR_NS = 2_000_000_000
@@ -154,7 +154,7 @@ class Court:
             line_m = float(np.interp(at_s, time_s, gone_m))
             before = (time_s <= at_s) & (gone_m >= line_m - _STOP_WITHIN_M)
             if line_m >= _STOP_WITHIN_M:
-                unstopped[row] |= bool(np.abs(speed_mps[row, before]).min() > _STANDING_MPS)
+                unstopped[row] |= bool(np.abs(speed_mps[row, before]).min() > STANDING_MPS)
 
 
 class Verdicts(NamedTuple):
