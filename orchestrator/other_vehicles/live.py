@@ -10,7 +10,8 @@ from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates, estimator_of
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates
+from foretwin.telemetry.estimator.estimator import estimator_of
 
 APART_NS = 1_000_000_000
 """Stamps that differ by more are not by one clock."""

@@ -6,9 +6,8 @@ from typing import Protocol
 
 import msgspec
 
-from foretwin.contracts.drive import ControlCommand, VehicleInfo, VehicleState
+from foretwin.contracts.drive import ControlCommand, VehicleState
 from foretwin.contracts.roles import OtherVehicle
-from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.estimator import StateEstimator
 
 PERIOD_NS = 18_000_000
@@ -24,16 +23,6 @@ class OtherVehicleSource(Protocol):
 
     def close(self) -> None:
         """Let go of files and threads; idempotent."""
-
-
-def estimator_of(info: VehicleInfo, vehicle: VehicleParameters) -> StateEstimator:
-    """Return the estimator of a vehicle's state."""
-    return StateEstimator(
-        info,
-        wheelbase_m=vehicle.wheelbase_m.value,
-        steering_ratio=vehicle.steering_ratio.value,
-        steering_offset_rad=vehicle.steering_offset_rad.value,
-    )
 
 
 class OtherVehicleStates:

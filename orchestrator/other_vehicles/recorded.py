@@ -13,7 +13,8 @@ from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates, estimator_of
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates
+from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.processes.replay import ReplaySource
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw, wrap_angle
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.map_matching import Match
 from foretwin.orchestrator.routing.road_index import EdgeKey, NearEdge, key_of, legality
@@ -135,7 +135,7 @@ def _straight(route: Route, place: int, s_m: float) -> float | None:
     course = np.arctan2(legs[inside, 1], legs[inside, 0])
     here = np.searchsorted(arc[1:-1], s_m)
     at = math.atan2(legs[here, 1], legs[here, 0])
-    bend = np.abs((course - at + math.pi) % math.tau - math.pi)
+    bend = np.abs(wrap_angle(course - at))
     return None if bend.size == 0 or bend.max() > _MOST_BEND_RAD else at
 
 

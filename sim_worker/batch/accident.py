@@ -16,7 +16,9 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.polyline import left_of
 from foretwin.geometry.rectangles import Rectangles, separations
 from foretwin.sim_worker.batch.accident_bodies import (
     Bodies,
@@ -217,16 +219,14 @@ def _results(
     turned = touches.user_poses[:, 2] - touches.ego_states[:, 2]
     centre = cog_from_base(vehicle, touches.ego_states)[0][:, :2]
     arms = touches.point_m - np.stack([centre, touches.user_poses[:, :2]])
-    at_point = velocities[..., :2] + velocities[..., 2:] * np.stack(
-        [-arms[..., 1], arms[..., 0]], axis=-1
-    )
+    at_point = velocities[..., :2] + velocities[..., 2:] * left_of(arms)
     closing = ((at_point[0] - at_point[1]) * touches.normal).sum(axis=-1)
     return Accidents(
         future=touches.future,
         user=touches.user,
         time_s=touches.time_s,
         point_m=touches.point_m,
-        angle_rad=np.asarray((turned + np.pi) % (2.0 * np.pi) - np.pi),
+        angle_rad=wrap_angle(turned),
         closing_mps=np.where(touches.from_start, np.nan, closing),
         ego_delta_v_mps=delta_v[0],
         user_delta_v_mps=delta_v[1],

@@ -12,12 +12,11 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import PlannedTrajectory
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.futures import PathAhead, Trajectory
-from foretwin.contracts.simulation import Comparison, PlanComparison
+from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
 from foretwin.sim_worker.metrics.displacement import horizon_error
 
-HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 _MAX_GAP_S = 1.5
 """Across a longer hole in the track nothing is interpolated: no truth is known there."""
 _MIN_PLAN_S = 0.5

@@ -16,6 +16,7 @@ import numpy as np
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.driver_model import LEAST_START_MPS
 from foretwin.sim_worker.road_users.cast import Player
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S
@@ -26,8 +27,6 @@ from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor
 from foretwin.sim_worker.scenarios.staged import player_on
 from foretwin.sim_worker.scenarios.ways import Way
 
-_LEAST_SPEED_MPS = 2.0
-"""A car that stands is taken to set off with this speed."""
 _LATE = ".arrives_after_s"
 
 
@@ -98,7 +97,7 @@ class PathScenarios(NamedTuple):
         played = self.known.cast(scenario, values, place, self.vehicle)
         if isinstance(played, Unplaced):
             return played
-        speed = max(ego_speed_mps, _LEAST_SPEED_MPS)
+        speed = max(ego_speed_mps, LEAST_START_MPS)
         later_s = 0.0
         if math.isfinite(played.impact_time_s):
             met = played.ego_arc_m + played.ego_speed_mps * played.impact_time_s

@@ -12,7 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import TrafficTurn
 from foretwin.contracts.world import Connection, DrivingSide, Lane, World
-from foretwin.geometry.polyline import arc_lengths, length
+from foretwin.geometry.polyline import apart, arc_lengths, length
 from foretwin.sim_worker.scenarios.walls import Walls
 from foretwin.sim_worker.scenarios.ways import (
     APPROACH_M,
@@ -240,7 +240,7 @@ class RoadNetwork:
         parts = [self._line(i) for i in (*before, *middle, *after)]
         limits = [np.full(len(self._line(i)), self._limit(i)) for i in (*before, *middle, *after)]
         xy, limit = np.concatenate(parts), np.concatenate(limits)
-        keep = np.concatenate([[True], np.hypot(*np.diff(xy, axis=0).T) > 0.02])
+        keep = apart(xy, tolerance_m=0.02)
         count = sum(len(part) for part in parts[: len(before)])
         inside = sum(len(part) for part in parts[len(before) : len(before) + len(middle)])
         arc_all = arc_lengths(xy)

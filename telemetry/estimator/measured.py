@@ -7,6 +7,7 @@ from collections import Counter
 from typing import Any
 
 from foretwin.contracts.drive import SpeedSample, SteeringSample
+from foretwin.geometry.steering import SteeringColumn
 
 FRESH_NS = 1_000_000_000
 """A quantity counts as measured while its last sample is younger than this."""
@@ -38,8 +39,7 @@ class MotionSamples:
     def __init__(
         self, *, steering_ratio: float, steering_offset_rad: float, skipped: Counter[str]
     ) -> None:
-        self._steering_ratio = steering_ratio
-        self._steering_offset_rad = steering_offset_rad
+        self._column = SteeringColumn(steering_ratio, steering_offset_rad)
         self._skipped = skipped
         self._sample_ns: dict[str, int] = {}
         self._field_ns: dict[str, int] = {}
@@ -118,7 +118,7 @@ class MotionSamples:
         if self._steering.tire_angle_rad is not None:
             return self._steering.tire_angle_rad
         wheel = self._steering.steering_wheel_rad
-        return None if wheel is None else wheel / self._steering_ratio + self._steering_offset_rad
+        return None if wheel is None else self._column.tire_rad(wheel)
 
 
 class Doubt:

@@ -32,6 +32,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import Conflict, DrivingSide, YieldRule
 from foretwin.geometry.polyline import arc_lengths, locate
@@ -157,7 +158,7 @@ def _ways(
     gap = paths.steps[0]
     ahead = np.arctan2(gap[:, 1], gap[:, 0])
     start, end = ahead[paths.first[:-1]], ahead[paths.first[1:] - 2]
-    bend = np.abs((end - start + math.pi) % math.tau - math.pi)
+    bend = np.abs(wrap_angle(end - start))
     told = (column.tolist() for column in (start, end, bend, paths.length_m))
     rows = zip(connections, *told, strict=True)
     ways = []

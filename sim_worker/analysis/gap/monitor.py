@@ -9,8 +9,9 @@ from typing import Any
 from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import ALARM_LIMITS_PER_S, GapAlarm, GapSample, Verdict
+from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.gap.errors import HORIZONS_S, GapMeter
+from foretwin.sim_worker.analysis.gap.errors import GapMeter
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.limits import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
