@@ -18,6 +18,9 @@ import pyproj
 
 from foretwin.contracts.arrays import Array
 
+METRES_PER_DEG = 111_195.0
+"""Of latitude, on a sphere of the Earth's mean radius, 6371 km (IUGG): for margins, not places."""
+
 
 class GeoPoint(msgspec.Struct, frozen=True):
     """A position on WGS84; `alt_m` is above the ellipsoid and 0 where unknown."""

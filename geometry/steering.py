@@ -7,9 +7,10 @@ from typing import NamedTuple, TypeVar
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 
-MAX_CURVATURE_PM = 0.25
-"""1/m, of base_link's path: a turning circle of 8 m across, tighter than any passenger car's (10 m
-and more from kerb to kerb)."""
+LEAST_RADIUS_M = 4.0
+"""Of base_link's path: cars turn hardly tighter. Chosen: passenger cars' turning circles are 10 to
+12 m across from kerb to kerb, as the outer front wheel goes; those of base_link some 8 m."""
+MAX_CURVATURE_PM = 1.0 / LEAST_RADIUS_M
 
 _Angle = TypeVar("_Angle", float, Array)
 

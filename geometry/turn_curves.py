@@ -11,9 +11,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import left_of
 from foretwin.geometry.polyline_batch import Polylines
 
-LEAST_RADIUS_M = 4.0
-"""No car turns tighter (turning circle of a passenger car: 10 m and more from kerb to kerb)."""
 WANTED_RADIUS_M = 4.5
+"""Tighter arcs count as longer. Chosen: a little wider than the tightest that cars turn."""
 LEAST_DRAWN_M = 0.2
 """Tighter arcs are no path: a wheel is larger, and the millimetre grid would bend them."""
 LEAD_M = 0.4

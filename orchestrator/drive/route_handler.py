@@ -15,12 +15,12 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import local_from_geo
 from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import Tell
+from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_to_goal import FoundWay, WayFinder, away_m
 
 LOOK_EVERY_NS = 1_000_000_000
-FRESH_PLAN_NS = 1_000_000_000
 PLAN_AWAY_M = 25.0
 """A plan that ends farther from the route leads elsewhere."""
 
@@ -70,7 +70,7 @@ class RouteDesk:
                 self._take_found(found)
         if self._said is None or self._looking is not None:
             return
-        fresh = plan is not None and abs(state.stamp_ns - plan.stamp_ns) <= FRESH_PLAN_NS
+        fresh = plan is not None and abs(state.stamp_ns - plan.stamp_ns) <= PLAN_FRESH_NS
         line_deg = _line(plan) if fresh and plan is not None else None
         if not self._wanted:
             if abs(state.stamp_ns - self._looked_ns) < LOOK_EVERY_NS or line_deg is None:

@@ -7,8 +7,8 @@ import numpy as np
 from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.futures import SeenRoadUser
+from foretwin.orchestrator.other_vehicles.measured import FRESH_NS
 
-_FRESH_NS = 500_000_000
 WITHIN_M = 120.0
 """Of the car: who is farther away does not meet it within a horizon."""
 
@@ -17,7 +17,7 @@ def near_car(
     users: RoadUsers | None, state: VehicleState, frame: LocalFrame
 ) -> tuple[SeenRoadUser, ...]:
     """Return the road users seen at about the state's time, in the World's frame."""
-    if users is None or abs(state.stamp_ns - users.stamp_ns) > _FRESH_NS:
+    if users is None or abs(state.stamp_ns - users.stamp_ns) > FRESH_NS:
         return ()
     here = local_from_geo(frame, state.position.lat_deg, state.position.lon_deg)
     seen = {}  # by id: nobody is there twice

@@ -9,13 +9,13 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import METRES_PER_DEG
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
 SIMPLIFIED_M = 20.0
 """A route is asked for within its margin plus this, so that fewer points say where it runs."""
 MOST_POINTS = 2000
-METRES_PER_DEG = 111_195.0
 
 
 def parse_bbox(text: str) -> LatLonBounds:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.sim_worker.driver_model import ALONG_COS, STANDING_MPS
 from foretwin.sim_worker.metrics import compiled_pairs
 from foretwin.sim_worker.metrics.rollout import Measure
@@ -20,7 +21,6 @@ from foretwin.sim_worker.metrics.scene import Scene
 Indices = npt.NDArray[np.intp]
 _SLOW_MPS = 1.0
 """Below this speed a yaw rate says nothing about the course, which is then taken as straight."""
-_MAX_CURVATURE_PM = 0.25
 _MOVES_MPS = 0.1
 """An ego slower than this has no headway in time."""
 
@@ -105,7 +105,7 @@ def leaders(scene: Scene) -> Leaders:
     curvature = np.where(
         np.abs(speed) > _SLOW_MPS, scene.states[..., 5] / np.maximum(np.abs(speed), _SLOW_MPS), 0.0
     )
-    curvature = np.clip(curvature, -_MAX_CURVATURE_PM, _MAX_CURVATURE_PM)
+    curvature = np.clip(curvature, -MAX_CURVATURE_PM, MAX_CURVATURE_PM)
     pairs = np.empty(seen.ahead_m.size, dtype=np.intp)
     found = np.empty((5, len(pairs)))
     count = compiled_pairs.find_leaders(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from foretwin.telemetry.estimator.clock import ClockEstimator
+from foretwin.telemetry.estimator.measured import CLOCK_LEAP_NS
 
 CONFIRM_NS = 1_000_000_000
 """A clock that stepped is believed after this long of stamps that agree with one another."""
@@ -16,7 +17,6 @@ _BEHIND_NS = 1_000_000_000
 """Late samples are dropped; older ones than this raise the doubt that the clock stepped."""
 _SAME_STEP_NS = 250_000_000
 _GAP_NS = 5_000_000_000
-_LEAP_NS = 10_000_000_000
 _SETTLING_NS = 2_000_000_000
 
 
@@ -94,7 +94,7 @@ class ClockSteps:
         if received_ns is None and known.last_ns is not None and placed_ns > known.last_ns:
             # A leap ahead without a witness: the track decides; a second one makes it the time.
             doubt = known.doubt
-            if doubt is not None and 0 <= stamp_ns - doubt.last_ns <= _LEAP_NS:
+            if doubt is not None and 0 <= stamp_ns - doubt.last_ns <= CLOCK_LEAP_NS:
                 return self._believe(known, placed_ns, None)
             known.doubt = _Doubt(stamp_ns, stamp_ns, 0, 0)
             return placed_ns
@@ -105,7 +105,7 @@ class ClockSteps:
     def _fits(self, known: _ChannelTime, placed_ns: int, received_ns: int | None) -> bool:
         if received_ns is None:
             assert known.last_ns is not None
-            return 0 <= placed_ns - known.last_ns <= _LEAP_NS
+            return 0 <= placed_ns - known.last_ns <= CLOCK_LEAP_NS
         if known.last_ns is not None and placed_ns < known.last_ns - _BEHIND_NS:
             return False
         if not self._clock.known:
@@ -117,7 +117,7 @@ class ClockSteps:
         ahead_ns = placed_ns - self._clock.stamp_at(received_ns)
         settled = received_ns - (self._first_received_ns or 0) > _SETTLING_NS
         # What came first may have waited for the connection: then others may be ahead of it.
-        return ahead_ns <= (_AHEAD_NS if settled else _LEAP_NS)
+        return ahead_ns <= (_AHEAD_NS if settled else CLOCK_LEAP_NS)
 
     def _believe(self, known: _ChannelTime, placed_ns: int, received_ns: int | None) -> int:
         if known.last_ns is not None and 0 < placed_ns - known.last_ns < _GAP_NS:

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.telemetry.estimator import motion_noise
 
 X, Y, YAW, SPEED, ACCEL, CURVATURE, GYRO_BIAS, ACCEL_BIAS = range(8)
@@ -23,8 +24,6 @@ ROAD_OFFSET = SIZE
 """Metres to the left of the map's line; only in a filter that has been told of one."""
 _IDENTITY = np.eye(SIZE + 1)
 
-MAX_CURVATURE_PM = 0.25
-"""A turning circle of 8 m across: tighter than any passenger car's."""
 _MAX_STEP_S = 0.05
 _DRIFT_M = 0.03
 _STANDING_CURVATURE_PM = 0.1

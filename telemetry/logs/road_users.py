@@ -23,12 +23,11 @@ from foretwin.contracts.frames import (
     local_from_geo,
     wrap_angle,
 )
+from foretwin.telemetry.estimator.position_gate import MAX_SPEED_MPS
 from foretwin.telemetry.logs.log import TIME_DOUBLED, VALUE_NOT_FINITE, Declared, fault_of_position
 
 LONGEST_GAP_S = 1.0
 """Who is not seen for longer is taken to be away until seen again."""
-FASTEST_MPS = 70.0
-"""Whoever would have to be faster from one sample to the next was somewhere else by mistake."""
 _NOISE_M = 0.5
 """Of positions: two samples may follow each other at once."""
 SEEN_ONCE = "seen once"
@@ -187,7 +186,7 @@ def _track(
 def _breaks(time_s: Array, xy: Array, longest_gap_s: float) -> Flags:
     """Return (N + 1,) before which samples, and after the last, a course does not go on."""
     steps_s, steps_m = np.diff(time_s), np.hypot(*np.diff(xy, axis=0).T)
-    within = (steps_s > longest_gap_s) | (steps_m > FASTEST_MPS * steps_s + _NOISE_M)
+    within = (steps_s > longest_gap_s) | (steps_m > MAX_SPEED_MPS * steps_s + _NOISE_M)
     return np.concatenate([[True], within, [True]])
 
 

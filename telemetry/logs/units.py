@@ -11,7 +11,9 @@ LENGTH = {"m": 1.0, "km": 1000.0, "ft": 0.3048}
 SPEED = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "kn": 1852.0 / 3600.0}
 """Into m/s."""
 
-ACCELERATION = {"m/s2": 1.0, "m/s²": 1.0, "g": 9.80665}
+STANDARD_GRAVITY_MPS2 = 9.80665
+"""By definition: 3rd CGPM (1901), ISO 80000-3."""
+ACCELERATION = {"m/s2": 1.0, "m/s²": 1.0, "g": STANDARD_GRAVITY_MPS2}
 """Into m/s²; g is the standard gravity."""
 
 ANGLE = {"rad": 1.0, "deg": math.pi / 180.0}

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.telemetry.standin.car import CarMotion
 from foretwin.telemetry.standin.parameters import CarParameters, DriverParameters
 from foretwin.telemetry.standin.path import DrivenPath
@@ -117,7 +118,8 @@ class Driver:
         curvature = (
             ahead.curvature_pm - stiffness * stiffness * offset - 2.0 * stiffness * math.sin(turned)
         )
-        angle = math.atan(self._wheelbase_m * min(max(curvature, -0.25), 0.25))
+        curvature = min(max(curvature, -MAX_CURVATURE_PM), MAX_CURVATURE_PM)
+        angle = math.atan(self._wheelbase_m * curvature)
         return angle * self._car.steering_ratio
 
     def plan(self, speed_mps: float) -> list[PlanPoint]:

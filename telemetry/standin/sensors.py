@@ -18,12 +18,11 @@ from foretwin.contracts.drive import (
 )
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
 from foretwin.geometry.steering import SteeringColumn
+from foretwin.telemetry.logs.units import STANDARD_GRAVITY_MPS2
 from foretwin.telemetry.standin.car import CarMotion
 from foretwin.telemetry.standin.driver import PlanPoint
 from foretwin.telemetry.standin.parameters import CarParameters, SensorParameters
 from foretwin.telemetry.standin.path import DrivenPath
-
-_GRAVITY_MPS2 = 9.80665
 
 
 class Period(NamedTuple):
@@ -85,10 +84,10 @@ class Sensors:
             stamp_ns=stamp_ns,
             accel_mps2=(
                 motion.accel_x_mps2
-                + _GRAVITY_MPS2 * math.sin(math.atan(motion.grade))
+                + STANDARD_GRAVITY_MPS2 * math.sin(math.atan(motion.grade))
                 + float(force[0]),
                 motion.accel_y_mps2 + float(force[1]),
-                _GRAVITY_MPS2 + float(force[2]),
+                STANDARD_GRAVITY_MPS2 + float(force[2]),
             ),
             rate_radps=(
                 float(rate[0]),

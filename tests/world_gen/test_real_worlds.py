@@ -14,7 +14,7 @@ from shapely.geometry import LineString
 
 from foretwin.contracts.codec import content_bytes, decode, encode
 from foretwin.contracts.world import Lane, Road, World
-from foretwin.geometry.turn_curves import LEAST_RADIUS_M
+from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.export.mjcf import world_spec
 from foretwin.world_gen.junctions.find_intersections import find_intersections

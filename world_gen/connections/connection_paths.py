@@ -9,7 +9,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.geometry.bends import rounded_through
 from foretwin.geometry.polyline import offset, without_repeats
 from foretwin.geometry.polyline_batch import Polylines
-from foretwin.geometry.turn_curves import LEAST_RADIUS_M, turn_curves
+from foretwin.geometry.steering import LEAST_RADIUS_M
+from foretwin.geometry.turn_curves import turn_curves
 from foretwin.world_gen.connections.inner_lanes import paths_along_inner_lanes
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.clusters import Surroundings

@@ -9,7 +9,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import length, offset, points_at, without_repeats
-from foretwin.geometry.turn_curves import LEAST_RADIUS_M, turn_curves
+from foretwin.geometry.steering import LEAST_RADIUS_M
+from foretwin.geometry.turn_curves import turn_curves
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_plans import LanePlan

@@ -9,7 +9,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Connection, DrivingSide, LineControl, Turn
 from foretwin.geometry.polyline import unit
-from foretwin.geometry.turn_curves import LEAST_RADIUS_M
+from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.world_gen.connections.forks import beside_at_fork, merged_ends, merges
 from foretwin.world_gen.connections.movements import Movement
 from foretwin.world_gen.lanes.cluster import Cluster

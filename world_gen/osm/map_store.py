@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.contracts.frames import METRES_PER_DEG, GeoPoint, LocalFrame
 from foretwin.world_gen.osm.build_map_store import build_map_store
 from foretwin.world_gen.osm.clip import clip_map, find_node
 from foretwin.world_gen.osm.map_file import file_fault
@@ -31,7 +31,6 @@ FRAME_GRID_DEG = 0.5
 """Maps too wide for one frame have one at each point of this grid."""
 STRETCH_M = 1000.0
 LEFTOVER_AGE_S = 24.0 * 3600.0
-METRES_PER_DEG = 111_195.0
 
 
 class MapStore:

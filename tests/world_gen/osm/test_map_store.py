@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foretwin.contracts.frames import GeoPoint, geo_from_local
+from foretwin.contracts.frames import METRES_PER_DEG, GeoPoint, geo_from_local
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.map_index import index_map
@@ -222,7 +222,7 @@ def test_worlds_of_a_clip_are_those_of_the_whole_map(
     index = index_map(osm, graph, junctions)
     for junction in junctions[::every]:
         lat, lon = junction.summary.lat, junction.summary.lon
-        north = 600.0 / 111_195.0
+        north = 600.0 / METRES_PER_DEG
         east = north / math.cos(math.radians(lat))
         clip = store.clip(LatLonBounds(lat - north, lon - east, lat + north, lon + east))
         of_clip = build_road_graph(clip)
