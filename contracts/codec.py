@@ -70,14 +70,21 @@ def decode(data: bytes, kind: type[Message], *, where: str = "message") -> Envel
         raise SchemaMismatch(
             f"{where}: schema version {version}; this foretwin reads version {SCHEMA_VERSION}"
         )
+    return Envelope(
+        seq, sent_ns, decode_content(memoryview(data)[_HEADER.size :], kind, where=where)
+    )
+
+
+def decode_content(data: bytes | memoryview, kind: type[Message], *, where: str) -> Message:
+    """Return the message of a body alone; raises SchemaMismatch where it does not fit `kind`."""
     decoder = _decoders.get(kind)
     if decoder is None:
         decoder = _decoders[kind] = msgspec.msgpack.Decoder(kind, dec_hook=_from_wire)
     try:
-        body = decoder.decode(memoryview(data)[_HEADER.size :])
+        message: Message = decoder.decode(data)
     except (msgspec.DecodeError, ValueError, TypeError) as error:
         raise SchemaMismatch(f"{where}: no valid {kind.__name__}: {error}") from error
-    return Envelope(seq, sent_ns, body)
+    return message
 
 
 def content_bytes(message: msgspec.Struct) -> bytes:

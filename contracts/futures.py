@@ -7,15 +7,22 @@ tire_angle_rad, accel_mps2. `STATE_COLUMNS` names them.
 
 from __future__ import annotations
 
+from typing import Literal
+
 import msgspec
 
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
-from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.numbers import FUTURE_NUMBERS
+from foretwin.contracts.scenario import FAULTS, Scenario
 
 STATE_COLUMNS = (
     "x_m", "y_m", "yaw_rad", "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2",
 )  # fmt: skip
+
+
+JOB_SCHEMA_VERSION = 1
+"""Of `Job`, which is recorded: raised where its bytes mean something else."""
 
 
 class PathAhead(msgspec.Struct, frozen=True, kw_only=True):
@@ -28,48 +35,49 @@ class PathAhead(msgspec.Struct, frozen=True, kw_only=True):
     speed_limit_mps: Array
 
 
-class Faults(msgspec.Struct, frozen=True, kw_only=True):
-    """What is wrong with the car of one future, or with the ground below it, in numbers."""
-
-    friction_factor: float = 1.0
-    extra_steering_delay_s: float = 0.0
-    steering_gain: float = 1.0
-    steering_offset_rad: float = 0.0
-    brake_gain: float = 1.0
-    perception_delay_s: float = 0.0
-    position_offset_m: float = 0.0
-    """How far to the left of the truth the planner believes to be."""
-    lost_from_s: float = 0.0
-    lost_for_s: float = 0.0
-
-
-class Variant(msgspec.Struct, frozen=True, kw_only=True):
+class Future(msgspec.Struct, frozen=True, kw_only=True):
     """One alternative future: what differs from the nominal one (index 0).
 
-    With `scenario_id`, one of the job's scenarios happens in it: `values` are its numbers, named
-    as in `ConcreteScenario`, and `place_rank` says which of the places that fit the car's path,
-    modulo their number. With `place`, a place's name, it is staged there as the case says, away
-    from any drive: the job's path is that place's, and the car starts where the case begins.
+    `numbers` are those of `contracts.numbers` that are not neutral. With `scenario_id`, one of the
+    job's scenarios happens in it: `values` are its numbers, named as in `ConcreteScenario`, and
+    `place_rank` says which of the places that fit the car's path, modulo their number. With
+    `place`, a place's name, it is staged there as the case says, away from any drive: the job's
+    path is that place's, and the car starts where the case begins.
     """
 
     index: int
     name: str
     planner: str = "pure_pursuit_idm"
-    target_speed_factor: float = 1.0
-    """Of the speed that the nominal future aims at."""
-    target_speed_offset_mps: float = 0.0
-    lateral_shift_m: float = 0.0
-    faults: Faults = Faults()
+    numbers: dict[str, float] = {}
     scenario_id: str = ""
     values: dict[str, float] = {}
     place_rank: int = 0
     place: str = ""
 
 
+def numbers_of(future: Future) -> dict[str, float]:
+    """Return all numbers of a future by name: its own, joined with those that its scenario draws.
+
+    Raises ValueError for a name that the table lacks.
+    """
+    if unknown := future.numbers.keys() - FUTURE_NUMBERS.keys():
+        raise ValueError(
+            f"future {future.name!r} has a number {min(unknown)!r}; known: "
+            f"{', '.join(FUTURE_NUMBERS)}"
+        )
+    drawn = future.values if future.scenario_id else {}
+    found = {}
+    for name, row in FUTURE_NUMBERS.items():
+        value = drawn.get(f"{FAULTS}.{name}", row.neutral)
+        found[name] = row.joined(value, future.numbers[name]) if name in future.numbers else value
+    return found
+
+
 class SeenRoadUser(msgspec.Struct, frozen=True, kw_only=True):
     """A road user that the car detected as its state was measured; x, y, yaw of its box centre in
     the World's frame. In every future it goes on along its lane, lawfully, or else straight on."""
 
+    user_id: str = ""
     kind: RoadUserKind
     x_m: float
     y_m: float
@@ -113,15 +121,18 @@ class CarPlan(msgspec.Struct, frozen=True, kw_only=True):
     speed_mps: Array
 
 
-class FuturesJob(msgspec.Struct, frozen=True, kw_only=True):
-    """Simulate `variants` from `state` for `horizon_s`; the result is a function of this alone."""
+class Job(msgspec.Struct, frozen=True, kw_only=True):
+    """Simulate `futures` from `state` for `horizon_s`, live or staged.
+
+    The result is a function of this, of the World and of the car's parameters alone.
+    """
 
     round_id: int
     job_index: int
     world_id: str
     state: VehicleState
     path: PathAhead
-    variants: tuple[Variant, ...]
+    futures: tuple[Future, ...]
     horizon_s: float
     step_s: float
     """Between the instants of the result."""
@@ -129,7 +140,7 @@ class FuturesJob(msgspec.Struct, frozen=True, kw_only=True):
     cruise_speed_mps: float
     """The speed that the nominal future aims at where nothing is in the way."""
     scenarios: tuple[Scenario, ...] = ()
-    """Definitions that variants name."""
+    """Definitions that futures name."""
     starts: Array | None = None
     """(S, 8) where futures do not begin with the car's state, in the World's frame."""
     road_users: tuple[SeenRoadUser, ...] = ()
@@ -146,8 +157,20 @@ class FuturesJob(msgspec.Struct, frozen=True, kw_only=True):
     """What to measure besides the outcome, by the names of the table of metrics."""
     accidents: bool = False
     """Whether collisions with road users are run on as two bodies in motion."""
+    accident_motion: bool = True
+    """Whether trajectories show that motion; else the ego stands from the collision on."""
+    vehicle: str = ""
+    """Digest of the car's parameters; without one, whoever plays it knows them."""
     vehicle_version: int = 0
-    """Which of a run's sets of parameters the car has; 0 is the vehicle file's."""
+    """Which of a run's sets of parameters that is; 0 is the vehicle file's."""
+    control_hz: float = 20.0
+    """How often planners decide."""
+    engine: Literal["mujoco"] = "mujoco"
+    anchor: str | None = None
+    """Name of what ties the simulation to reality; None for nothing."""
+    model: dict[str, float] = {}
+    """Numbers of a learnt model of the car; none without one."""
+    schema_version: int = JOB_SCHEMA_VERSION
 
 
 class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
@@ -158,11 +181,15 @@ class Trajectory(msgspec.Struct, frozen=True, kw_only=True):
     states: Array32
 
 
+COLLISION_WITH = ("", "road_user", "static")
+"""Nothing; a road user; a building or island."""
+
+
 class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     """What became of each of S futures; times and distances are NaN where `valid` is false.
 
-    `collided` (S,) bool, `collision_time_s` (S,), `collision_with` (S,): 0 nothing, 1 road user,
-    2 building or island; `min_clearance_m` (S,) to any road user; `progress_m` (S,) along the path.
+    `collided` (S,) bool, `collision_time_s` (S,), `collision_with` (S,) places in
+    `COLLISION_WITH`; `min_clearance_m` (S,) to any road user; `progress_m` (S,) along the path.
     """
 
     collided: Array
@@ -210,14 +237,29 @@ class Accident(msgspec.Struct, frozen=True, kw_only=True):
     user_delta_v_mps: float
 
 
+class PlannedImpacts(msgspec.Struct, frozen=True, kw_only=True):
+    """What was to happen in S staged futures if nobody intervened; NaN and empty where nothing.
+
+    `time_s` (S,); `met` by the names of road users; `off_m` (S,) how far the ego's point that was
+    to be hit is from where that was planned, where it met the one planned.
+    """
+
+    time_s: Array
+    met: tuple[str, ...]
+    off_m: Array
+
+
 class FuturesResult(msgspec.Struct, frozen=True, kw_only=True):
-    """The answer to a FuturesJob; `metrics` are (S,) by name, NaN where one does not apply."""
+    """The answer to a Job: S of its futures were played, those of `future_indices`.
+
+    `metrics` are (S,) by name, NaN where one does not apply.
+    """
 
     round_id: int
     job_index: int
     worker_id: str
     world_id: str
-    variant_indices: tuple[int, ...]
+    future_indices: tuple[int, ...]
     trajectory: Trajectory
     road_users: RoadUserTracks
     outcome: Outcome
@@ -229,4 +271,8 @@ class FuturesResult(msgspec.Struct, frozen=True, kw_only=True):
     cpu_seconds: float
     wall_seconds: float
     vehicle_version: int = 0
-    """The parameters that simulated it; see FuturesJob."""
+    """The parameters that simulated it; see Job."""
+    planned: PlannedImpacts | None = None
+    """None where no future is staged."""
+    unplaced: tuple[tuple[int, str], ...] = ()
+    """Indices of futures that were not played since they cannot be staged, and why."""

@@ -92,7 +92,7 @@ CHANNELS: dict[str, Channel] = {
         _row("advance", "vehicle/{vehicle}/advance", drive.AdvanceRequest, None, REQUEST,
              "lock step: go on until", drive.AdvanceReply),
         # Work.
-        _row("job", f"{_RUN}/worker/{{process}}/job", futures.FuturesJob, 2, REQUEST,
+        _row("job", f"{_RUN}/worker/{{process}}/job", futures.Job, 2, REQUEST,
              "simulate futures", futures.FuturesResult),
         _row("prepare", f"{_RUN}/worker/{{process}}/prepare", simulation.PrepareRequest, None,
              REQUEST, "load a World", simulation.PrepareReply),

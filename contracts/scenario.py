@@ -7,11 +7,12 @@ A `ConcreteScenario` is one of its cases, at one place of one World, with every 
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 
 from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.world import Control, JunctionKind
 
 TrafficTurn = Literal["straight", "across", "near"]
@@ -87,20 +88,21 @@ class ActorPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Name of another actor behind which this one stays unseen until it comes out."""
 
 
-class FaultPart(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is wrong with the car under test, or with the ground below it."""
+if TYPE_CHECKING:
 
-    friction_factor: Number = 1.0
-    extra_steering_delay_s: Number = 0.0
-    steering_gain: Number = 1.0
-    steering_offset_rad: Number = 0.0
-    brake_gain: Number = 1.0
-    perception_delay_s: Number = 0.0
-    position_offset_m: Number = 0.0
-    """How far to the left of the truth the planner believes to be."""
-    lost_from_s: Number = 0.0
-    lost_for_s: Number = 0.0
-    """Detections are lost for so long, from `lost_from_s` on."""
+    class FaultPart(msgspec.Struct, frozen=True):
+        """What is wrong with the car under test, or with the ground below it."""
+
+else:
+    FaultPart = msgspec.defstruct(
+        "FaultPart",
+        [
+            (name, Number, row.neutral)
+            for name, row in FUTURE_NUMBERS.items()
+            if row.part == "fault"
+        ],
+        frozen=True, kw_only=True, forbid_unknown_fields=True, module=__name__,
+    )  # fmt: skip
 
 
 class Where(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -16,7 +16,7 @@ import scipy.spatial  # noqa: F401  A search for many points needs it: not withi
 from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import local_from_geo
-from foretwin.contracts.futures import FuturesJob, FuturesResult
+from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
@@ -137,7 +137,7 @@ class FuturesWorker:
         return question
 
     def _job(self, question: msgspec.Struct) -> FuturesResult:
-        assert isinstance(question, FuturesJob)
+        assert isinstance(question, Job)
         if question.vehicle_version != self._version:
             raise ValueError(
                 f"job for version {question.vehicle_version} of the vehicle's parameters at a "

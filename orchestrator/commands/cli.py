@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judge
+from foretwin.contracts.numbers import FUTURE_NUMBERS
+from foretwin.orchestrator.commands.cli_logs import convert, gap, identify, judge, repeat
 from foretwin.orchestrator.commands.cli_options import MapArgument, OutOption, ServiceRoadsOption
 from foretwin.orchestrator.commands.cli_scenarios import scenarios
 from foretwin.orchestrator.commands.cli_set import set_value
@@ -62,7 +63,7 @@ def drive(
     rate: Annotated[float | None, typer.Option(help="rounds per wall second [default: 2]")] = None,
     horizon: Annotated[float | None, typer.Option(help="seconds ahead [default: 8]")] = None,
     planner: Annotated[str | None, typer.Option(help="planner under test")] = None,
-    seed: Annotated[int | None, typer.Option(help="seed of the variants [default: 0]")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of the futures [default: 0]")] = None,
     vehicle: Annotated[str | None, typer.Option(help="vehicle parameters, TOML")] = None,
     tuning: Annotated[
         str | None,
@@ -202,7 +203,12 @@ def index_map(
 
 @app.command()
 def sweep(
-    spec: Annotated[Path, typer.Argument(help="what to sweep over, TOML")],
+    spec: Annotated[
+        Path,
+        typer.Argument(
+            help="what to sweep over, TOML; [parameters] lists " + ", ".join(FUTURE_NUMBERS)
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="folder of the rows [default: sweeps/SPEC]")
     ] = None,
@@ -219,7 +225,7 @@ def sweep(
     raise typer.Exit(run_sweep(SweepRequest(spec, out, workers, fresh, as_json)))
 
 
-for about_logs in (convert, identify, gap, judge):
+for about_logs in (convert, identify, gap, judge, repeat):
     app.command()(about_logs)
 
 app.command("set")(set_value)

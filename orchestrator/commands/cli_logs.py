@@ -70,6 +70,18 @@ def judge(
     raise typer.Exit(judge_run(request))
 
 
+def repeat(
+    folder: Annotated[Path, typer.Argument(metavar="RUN", help="folder of a run or sweep")],
+    future: Annotated[str, typer.Argument(help="future_id of the table of futures")],
+    as_json: Annotated[bool, typer.Option("--json", help="both hashes as JSON")] = False,
+    view: Annotated[bool, typer.Option("--view", help="also draw it, into RUN/repeated")] = False,
+) -> None:
+    """Play a recorded future again, bit for bit: exit code 3 where it comes to something else."""
+    from foretwin.orchestrator.commands.repeat import repeat as repeat_future
+
+    raise typer.Exit(repeat_future(folder, future, as_json=as_json, view=view))
+
+
 def gap(
     recording: Annotated[Path, typer.Argument(metavar="LOG", help="recorded drive")],
     vehicle: Annotated[

@@ -11,15 +11,20 @@ from typing import Any, NamedTuple
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.futures import FuturesResult
+from foretwin.contracts.job_identity import job_bytes
 from foretwin.orchestrator.commands.progress_bar import progress_bar
+from foretwin.orchestrator.record.job_tables import keep_vehicles
 from foretwin.orchestrator.sweep.folder import (
     FoundPlaces,
     SweepFolder,
     built_worlds,
     fingerprint_of,
+    keep_worlds,
 )
+from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows
 from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
-from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, failed_rows, start_worker
+from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, start_worker
 from foretwin.orchestrator.sweep.pool import Crew, Lost, Task
 from foretwin.orchestrator.sweep.rows import Parts, RowsHash
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec, worlds_folder
@@ -70,10 +75,13 @@ def run_sweep(loaded: Loaded, out: Path, crew: Crew, *, fresh: bool = False) -> 
     folder.begin(loaded)
     places = folder.places() or _find_places(loaded, folder, crew)
     plan = plan_sweep(loaded, places.worlds)
-    parts = Parts(folder.rows_dir, loaded.spec)
+    parts = Parts(folder.path)
+    keep_vehicles(folder.path, loaded.vehicles.values())
+    keep_worlds(worlds_folder(loaded.spec), folder.worlds_dir, places.worlds)
     there = parts.done(plan.jobs)
     started_s = time.monotonic()
-    _play([job for job in plan.jobs if job.number not in there], loaded, parts, crew)
+    left = [job for job in plan.jobs if job.number not in there]
+    _play(left, JobMaker(loaded, plan.worlds), parts, crew)
     return folder.summarise(
         _summary(loaded, plan, places, parts)
         | {"jobs_played": len(plan.jobs) - len(there),
@@ -124,20 +132,24 @@ class _counting:  # noqa: N801
             self._bar.__exit__(*what)
 
 
-def _play(jobs: Sequence[SweepJob], loaded: Loaded, parts: Parts, crew: Crew) -> None:
+def _play(left: Sequence[SweepJob], maker: JobMaker, parts: Parts, crew: Crew) -> None:
     """Play jobs and write their rows as they come."""
-    with progress_bar(sum(len(job.cells) for job in jobs), "futures") as (advance, say):
+    planned = {one.number: one for one in left}
+    with progress_bar(sum(len(one.cells) for one in left), "futures") as (advance, say):
 
-        def done(task: Task, answer: list[dict[str, Any]] | Lost) -> None:
-            job: SweepJob = task.question
+        def done(task: Task, answer: FuturesResult | Lost) -> None:
+            one, job = planned[task.number], task.question
+            recorded = job_bytes(job)
             if isinstance(answer, Lost):
-                say(f"failed: job {job.number}: {answer.reason}")
-                answer = failed_rows(job, loaded, answer.reason)
-            parts.write(job.number, answer)
-            for _ in job.cells:
-                advance(f"{job.cells[0].junction_id} {job.planner}")
+                say(f"failed: job {one.number}: {answer.reason}")
+                rows = cell_rows(one, job, recorded.sha256, None, failure=answer.reason)
+            else:
+                rows = cell_rows(one, job, recorded.sha256, answer)
+            parts.write(rows, job, recorded)
+            for _ in one.cells:
+                advance(f"{one.cells[0].junction_id} {one.planner}")
 
-        crew.run([Task(job.number, job.world_id, job) for job in jobs], done)
+        crew.run([Task(one.number, one.world_id, maker.job(one)) for one in left], done)
 
 
 def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts) -> dict[str, Any]:

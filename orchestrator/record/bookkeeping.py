@@ -79,7 +79,7 @@ class FuturesCount:
             self.sim_seconds += result.sim_seconds
             self.cpu_seconds += result.cpu_seconds
         self._hash.update(own.digest())
-        futures = sum(len(result.variant_indices) for result in done.results)
+        futures = sum(len(result.future_indices) for result in done.results)
         self.count += futures
         self.rounds_of[futures] += 1
         self.rounds += 1

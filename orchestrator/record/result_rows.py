@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.futures import FuturesResult, Variant
 from foretwin.contracts.simulation import Comparison, HorizonError, PlanComparison
 from foretwin.orchestrator.rounds.dispatch import RoundDone
+from foretwin.sim_worker.futures.future_rows import Row, future_rows
 from foretwin.sim_worker.metrics.displacement import distinct_count
 
 DISTINCT_M = 0.1
@@ -29,65 +28,37 @@ class FutureRows(NamedTuple):
     """A round's futures joined, their table rows, and how many end apart from the others."""
 
     futures: RoundFutures
-    rows: list[dict[str, Any]]
+    rows: list[Row]
     distinct: int
 
 
-def future_rows(done: RoundDone, variants: Sequence[Variant]) -> FutureRows:
-    """Return the futures of a round as rows, each with its difference from the nominal one.
-
-    `variants` are those of the round, in the order of its jobs.
-    """
-    futures = RoundFutures(
+def round_futures(done: RoundDone, *, vehicle: str = "") -> FutureRows:
+    """Return the futures of a round as rows, each with its difference from the nominal one."""
+    joined = RoundFutures(
         np.concatenate([r.trajectory.states for r in done.results]).astype(np.float64),
         np.concatenate([r.outcome.collided for r in done.results]).astype(bool),
         np.concatenate([r.outcome.min_clearance_m for r in done.results]),
         np.concatenate([r.outcome.valid for r in done.results]).astype(bool),
     )
     away_m = np.hypot(
-        futures.states[:, :, 0] - futures.states[0, :, 0],
-        futures.states[:, :, 1] - futures.states[0, :, 1],
+        joined.states[:, :, 0] - joined.states[0, :, 0],
+        joined.states[:, :, 1] - joined.states[0, :, 1],
     )
-    rows = []
-    number = 0
-    for result in done.results:
-        outcome = result.outcome
-        for place, variant_index in enumerate(result.variant_indices):
-            variant = variants[number]
-            end = futures.states[number, -1]
-            rows.append(
-                {
-                    "round_id": done.order.round_id,
-                    "stamp_ns": done.order.stamp_ns,
-                    "variant": variant_index,
-                    "name": variant.name,
-                    "planner": variant.planner,
-                    "scenario": _happened(result, place, variant),
-                    "failure": outcome.failures[place] if outcome.failures else "",
-                    "remark": outcome.remarks[place] if outcome.remarks else "",
-                    "worker_id": result.worker_id,
-                    "valid": bool(outcome.valid[place]),
-                    "collided": bool(outcome.collided[place]),
-                    "collision_time_s": _or_none(outcome.collision_time_s[place]),
-                    "collision_with": int(outcome.collision_with[place]),
-                    "min_clearance_m": _or_none(outcome.min_clearance_m[place]),
-                    "progress_m": _or_none(outcome.progress_m[place]),
-                    "end_x_m": float(end[0]),
-                    "end_y_m": float(end[1]),
-                    "end_yaw_rad": float(end[2]),
-                    "end_speed_mps": float(np.hypot(end[3], end[4])),
-                    "end_difference_from_nominal_m": float(away_m[number, -1]),
-                    "max_difference_from_nominal_m": float(away_m[number].max()),
-                }
-            )
-            number += 1
-    distinct = distinct_count(futures.states[futures.valid, -1, :2], DISTINCT_M)
-    return FutureRows(futures, rows, distinct)
-
-
-def _happened(result: FuturesResult, place: int, variant: Variant) -> str:
-    """Return the scenario of a future; empty where it has none, or it was left out."""
-    return "" if result.left_out and result.left_out[place] else variant.scenario_id
+    order = done.order
+    rows = [
+        row
+        for job, recorded, result in zip(order.jobs, order.recorded, done.results, strict=True)
+        for row in future_rows(job, result, job_sha256=recorded.sha256)
+    ]
+    for row, away in zip(rows, away_m, strict=True):
+        row |= {
+            "junction_id": order.junction_id,
+            "vehicle": vehicle,
+            "end_difference_from_nominal_m": float(away[-1]),
+            "max_difference_from_nominal_m": float(away.max()),
+        }
+    distinct = distinct_count(joined.states[joined.valid, -1, :2], DISTINCT_M)
+    return FutureRows(joined, rows, distinct)
 
 
 def round_row(
@@ -100,7 +71,7 @@ def round_row(
         "drive_time_s": (done.order.stamp_ns - start_stamp_ns) / 1e9,
         "intersection_id": done.order.junction_id,
         "world_id": done.order.world_id,
-        "futures": sum(len(r.variant_indices) for r in done.results),
+        "futures": sum(len(r.future_indices) for r in done.results),
         "distinct": distinct,
         "collided": int(sum(np.count_nonzero(r.outcome.collided) for r in done.results)),
         "cruise_speed_mps": cruise_speed_mps,
@@ -139,7 +110,3 @@ def plan_row(comparison: PlanComparison) -> dict[str, Any]:
 
 def _error(error: HorizonError) -> dict[str, float]:
     return {name: getattr(error, name) for name in HorizonError.__struct_fields__}
-
-
-def _or_none(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

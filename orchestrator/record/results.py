@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from foretwin.contracts.errors import one_line
+from foretwin.orchestrator.record.job_tables import JOB_TABLES, metric_rows, played_with
 
 log = logging.getLogger("results")
 
@@ -37,16 +38,7 @@ TABLES: dict[str, pa.Schema] = {
             ("sha256", _S), ("vehicle_version", _I),
         ]
     ),
-    "futures": pa.schema(
-        [
-            ("round_id", _I), ("stamp_ns", _I), ("variant", _I), ("name", _S), ("planner", _S),
-            ("scenario", _S), ("failure", _S), ("remark", _S), ("worker_id", _S), ("valid", _B),
-            ("collided", _B), ("collision_time_s", _F),
-            ("collision_with", _I), ("min_clearance_m", _F), ("progress_m", _F), ("end_x_m", _F),
-            ("end_y_m", _F), ("end_yaw_rad", _F), ("end_speed_mps", _F),
-            ("end_difference_from_nominal_m", _F), ("max_difference_from_nominal_m", _F),
-        ]
-    ),
+    **JOB_TABLES,
     "comparisons": pa.schema(
         [("round_id", _I), ("stamp_ns", _I), ("intersection_id", _S), ("horizon_s", _F)]
         + [
@@ -136,7 +128,7 @@ TABLES: dict[str, pa.Schema] = {
 }  # fmt: skip
 """Every table of `results/` with its columns."""
 
-FLUSH_ROWS = 2000
+FLUSH_ROWS, FLUSH_JOBS = 2000, 128
 QUEUE_DEPTH = 4096
 CLOSE_S, LOCK_STEP_CLOSE_S = 10.0, 120.0
 """How long the last rows may take to be written, live and where nothing may be missing."""
@@ -150,7 +142,7 @@ class ResultTables:
     ) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
-        self._metadata = {key.encode(): value.encode() for key, value in metadata.items()}
+        self._metadata = {**metadata, **played_with()}
         self._queue: queue.Queue[tuple[str, Sequence[Mapping[str, Any]]] | None] = queue.Queue(
             QUEUE_DEPTH
         )
@@ -159,6 +151,7 @@ class ResultTables:
         self.failed: str | None = None
         self._thread = threading.Thread(target=self._run, name="results", daemon=True)
         self._thread.start()
+        self.add("metrics", metric_rows())
 
     def add(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
         """Hand over rows for one table of TABLES; what does not fit the queue is counted."""
@@ -183,12 +176,14 @@ class ResultTables:
         try:
             for name, schema in TABLES.items():
                 writers[name] = pq.ParquetWriter(
-                    self._folder / f"{name}.parquet", schema.with_metadata(self._metadata)
+                    self._folder / f"{name}.parquet",
+                    schema.with_metadata(self._metadata),
+                    compression="zstd",
                 )
             while (item := self._queue.get()) is not None:
                 name, rows = item
                 pending[name].extend(rows)
-                if len(pending[name]) >= FLUSH_ROWS:
+                if len(pending[name]) >= (FLUSH_JOBS if name == "jobs" else FLUSH_ROWS):
                     _write(writers[name], name, pending[name])
             for name, rows in pending.items():
                 _write(writers[name], name, rows)

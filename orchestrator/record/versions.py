@@ -7,6 +7,7 @@ import platform
 
 _PACKAGES = (
     "foretwin", "mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "numpy", "scipy", "shapely",
+    "numba",
 )  # fmt: skip
 
 

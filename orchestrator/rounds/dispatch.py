@@ -9,7 +9,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from foretwin.contracts.futures import FuturesJob, FuturesResult
+from foretwin.contracts.futures import Future, FuturesResult, Job
+from foretwin.contracts.job_identity import JobBytes, job_bytes
 
 MAX_REFUSALS = 3
 """A round whose jobs are refused so often is given up: the same job would be refused for ever."""
@@ -19,7 +20,7 @@ class Assignment(NamedTuple):
     """One job for one worker."""
 
     worker_id: str
-    job: FuturesJob
+    job: Job
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +33,18 @@ class RoundOrder:
     world_id: str
     receipt_mono_ns: int
     started_mono_ns: int
-    jobs: tuple[FuturesJob, ...]
+    jobs: tuple[Job, ...]
+    recorded: tuple[JobBytes, ...] = field(init=False)
+    """The jobs as they are recorded."""
+
+    def __post_init__(self) -> None:
+        """Put the jobs into bytes: what is known of them is known by their hash."""
+        object.__setattr__(self, "recorded", tuple(job_bytes(job) for job in self.jobs))
+
+    @property
+    def futures(self) -> tuple[Future, ...]:
+        """All futures of the round, in the order of its jobs."""
+        return tuple(future for job in self.jobs for future in job.futures)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +63,7 @@ class RoundDone:
 @dataclass(slots=True)
 class _Open:
     order: RoundOrder
-    waiting: deque[FuturesJob]
+    waiting: deque[Job]
     results: dict[int, FuturesResult] = field(default_factory=dict)
     refusals: int = 0
 
@@ -65,7 +77,7 @@ class RoundDesk:
     given_up_rounds: int = 0
     _open: dict[int, _Open] = field(default_factory=dict)
     _idle: dict[str, None] = field(default_factory=dict)
-    _busy: dict[str, FuturesJob] = field(default_factory=dict)
+    _busy: dict[str, Job] = field(default_factory=dict)
 
     @property
     def workers(self) -> tuple[str, ...]:
@@ -73,7 +85,7 @@ class RoundDesk:
         return tuple(sorted({*self._idle, *self._busy}))
 
     @property
-    def busy(self) -> dict[str, FuturesJob]:
+    def busy(self) -> dict[str, Job]:
         """Which worker is at which job."""
         return dict(self._busy)
 
@@ -118,7 +130,7 @@ class RoundDesk:
     def result(
         self,
         worker_id: str,
-        job: FuturesJob,
+        job: Job,
         result: FuturesResult | None,
         received_mono_ns: int,
         *,
@@ -160,7 +172,7 @@ class RoundDesk:
             seconds=(received_mono_ns - round_.order.started_mono_ns) / 1e9,
         )
 
-    def _holds(self, round_: _Open, job: FuturesJob) -> bool:
+    def _holds(self, round_: _Open, job: Job) -> bool:
         """Whether the job has a result, waits already, or is with another worker."""
         return (
             job.job_index in round_.results

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from foretwin.contracts.futures import Variant
+from foretwin.contracts.futures import Future
 
 
-def some_of(variants: Sequence[Variant], count: int, *, turn: int) -> tuple[Variant, ...]:
-    """Return `count` of the variants in their order: the nominal one and a fair mix of the others.
+def some_of(futures: Sequence[Future], count: int, *, turn: int) -> tuple[Future, ...]:
+    """Return `count` of the futures in their order: the nominal one and a fair mix of the others.
 
     Those with a scenario and those without keep their shares. Either kind, ordered by the speed
     aimed at, is cut into as many strata as it may have futures, and each stratum gives one: turn
@@ -17,21 +17,25 @@ def some_of(variants: Sequence[Variant], count: int, *, turn: int) -> tuple[Vari
     """
     if count < 1:
         raise ValueError(f"{count} futures: at least 1 is needed")
-    if count >= len(variants):
-        return tuple(variants)
-    nominal, *others = variants
-    happening = [variant for variant in others if variant.scenario_id]
-    alone = [variant for variant in others if not variant.scenario_id]
+    if count >= len(futures):
+        return tuple(futures)
+    nominal, *others = futures
+    happening = [future for future in others if future.scenario_id]
+    alone = [future for future in others if not future.scenario_id]
     share = round((count - 1) * len(happening) / len(others))
     kept = [
         nominal,
         *_one_of_each_stratum(happening, share, turn),
         *_one_of_each_stratum(alone, count - 1 - share, turn),
     ]
-    return tuple(sorted(kept, key=lambda variant: variant.index))
+    return tuple(sorted(kept, key=lambda future: future.index))
 
 
-def _one_of_each_stratum(variants: list[Variant], count: int, turn: int) -> list[Variant]:
-    ordered = sorted(variants, key=lambda variant: (variant.target_speed_factor, variant.index))
+def _one_of_each_stratum(futures: list[Future], count: int, turn: int) -> list[Future]:
+    ordered = sorted(futures, key=_by_speed)
     cuts = [len(ordered) * stratum // count for stratum in range(count + 1)] if count else []
     return [ordered[low + turn % (high - low)] for low, high in pairwise(cuts)]
+
+
+def _by_speed(future: Future) -> tuple[float, int]:
+    return future.numbers.get("target_speed_factor", 1.0), future.index

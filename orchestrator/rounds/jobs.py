@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.drive import PlannedTrajectory, SignalState, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from foretwin.contracts.futures import CarPlan, FuturesJob, PathAhead, Variant
+from foretwin.contracts.futures import CarPlan, Future, Job, PathAhead
+from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -22,7 +22,7 @@ from foretwin.orchestrator.instructions import RoundIntent
 from foretwin.orchestrator.rounds.fewer_futures import some_of
 from foretwin.orchestrator.rounds.seen_users import near_car
 from foretwin.orchestrator.routing.route_ahead import PATH_BEHIND_M
-from foretwin.sim_worker.futures.variants import cases_of, plan_variants
+from foretwin.sim_worker.futures.future_mix import cases_of, plan_futures
 from foretwin.sim_worker.scenarios.live import LiveScenarios
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
@@ -35,13 +35,6 @@ PLAN_FRESH_NS = 1_000_000_000
 _KEPT_WORLDS = 8
 LEAST_IN_JOB = 16
 """A job costs about as much as 30 of its futures before the first one: smaller ones save little."""
-
-
-class RoundPlan(NamedTuple):
-    """One round's futures and the jobs that they are cut into."""
-
-    variants: tuple[Variant, ...]
-    jobs: tuple[FuturesJob, ...]
 
 
 def planners_of(planner: str) -> list[str]:
@@ -70,15 +63,16 @@ class RoundPlanner:
     """Plans rounds: a function of World, intent and what the car says; keeps what is costly."""
 
     def __init__(self, config: DriveConfig, vehicle: VehicleParameters) -> None:
-        self._config, self._vehicle = config, vehicle
-        self._vehicle_version = 0
+        self._config = config
+        self.use_vehicle(vehicle, 0)
         self._scenarios = scenarios_of(config)
         self._known: dict[str, LiveScenarios] = {}
-        self._variants: dict[tuple[str, ...], tuple[Variant, ...]] = {}
+        self._futures: dict[tuple[str, ...], tuple[Future, ...]] = {}
 
     def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
         """Plan for these parameters from now on."""
         self._vehicle, self._vehicle_version = vehicle, version
+        self._vehicle_digest = vehicle_digest(vehicle)
 
     def draw_cases(self) -> None:
         """Draw the cases of all scenarios: before the drive, not in its first round."""
@@ -95,25 +89,25 @@ class RoundPlanner:
         *,
         start_stamp_ns: int,
         count: int,
-    ) -> RoundPlan:
-        """Return a round's `count` futures and its jobs."""
+    ) -> tuple[Job, ...]:
+        """Return the jobs of a round of `count` futures."""
         config = self._config
         scenarios = self._fitting(world, intent.path)
-        variants = some_of(self._variants_with(scenarios), count, turn=round_id)
-        users = tuple(near_car(said.road_users, state, world.frame).values())
+        futures = some_of(self._futures_with(scenarios), count, turn=round_id)
+        users = near_car(said.road_users, state, world.frame)
         signals = _signals(said.signals, state)
         car_plan = _car_plan(said.plan, state, world.frame)
         jobs = []
-        for index, mine in enumerate(self._cut(variants)):
-            named = {variant.scenario_id for variant in mine}
+        for index, mine in enumerate(self._cut(futures)):
+            named = {future.scenario_id for future in mine}
             jobs.append(
-                FuturesJob(
+                Job(
                     round_id=round_id,
                     job_index=index,
                     world_id=intent.world_id,
                     state=state,
                     path=intent.path,
-                    variants=mine,
+                    futures=mine,
                     horizon_s=config.horizon_s,
                     step_s=STEP_S,
                     seed=config.seed,
@@ -123,30 +117,31 @@ class RoundPlanner:
                     signals=signals,
                     drive_time_s=(state.stamp_ns - start_stamp_ns) / 1e9,
                     car_plan=car_plan,
+                    vehicle=self._vehicle_digest,
                     vehicle_version=self._vehicle_version,
                 )
             )
-        return RoundPlan(variants, tuple(jobs))
+        return tuple(jobs)
 
-    def _cut(self, variants: tuple[Variant, ...]) -> list[tuple[Variant, ...]]:
+    def _cut(self, futures: tuple[Future, ...]) -> list[tuple[Future, ...]]:
         """Return the futures of each job: as many jobs as for all, unless that makes them small."""
-        size, count = self._config.futures_per_job, len(variants)
+        size, count = self._config.futures_per_job, len(futures)
         for_all = math.ceil(self._config.futures / size)
         jobs = max(math.ceil(count / size), min(for_all, count // LEAST_IN_JOB))
         cuts = [count * job // jobs for job in range(jobs + 1)]
-        return [variants[low:high] for low, high in pairwise(cuts)]
+        return [futures[low:high] for low, high in pairwise(cuts)]
 
-    def _variants_with(self, scenarios: tuple[Scenario, ...]) -> tuple[Variant, ...]:
+    def _futures_with(self, scenarios: tuple[Scenario, ...]) -> tuple[Future, ...]:
         key = tuple(scenario.id for scenario in scenarios)
-        if key not in self._variants:
+        if key not in self._futures:
             config = self._config
-            self._variants[key] = plan_variants(
+            self._futures[key] = plan_futures(
                 count=config.futures,
                 seed=config.seed,
                 planners=planners_of(config.planner),
                 scenarios=scenarios,
             )
-        return self._variants[key]
+        return self._futures[key]
 
     def _fitting(self, world: World, path: PathAhead) -> tuple[Scenario, ...]:
         """Return the scenarios that can take place on the way through the junction ahead."""

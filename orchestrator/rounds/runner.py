@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from foretwin.contracts.bus import Bus, Mailbox, Reply
 from foretwin.contracts.drive import PlannedTrajectory, VehicleState
-from foretwin.contracts.futures import Variant
 from foretwin.contracts.simulation import Comparison
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -19,10 +18,11 @@ from foretwin.orchestrator.drive.intake import LatestState, Surroundings
 from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import RoundIntent, Tell
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
+from foretwin.orchestrator.record.job_tables import job_row, keep_vehicles, road_user_rows
 from foretwin.orchestrator.record.result_rows import (
     comparison_row,
-    future_rows,
     plan_row,
+    round_futures,
     round_row,
 )
 from foretwin.orchestrator.record.results import ResultTables
@@ -44,7 +44,6 @@ class _Seed(NamedTuple):
     state: VehicleState
     plan: PlannedTrajectory | None
     intent: RoundIntent
-    variants: tuple[Variant, ...]
     pace: Pace
 
 
@@ -80,6 +79,7 @@ class RoundRunner:
         self.windows = WindowDesk(plan.vehicle, horizon_s=plan.config.horizon_s)
         self._planner = RoundPlanner(plan.config, plan.vehicle)
         self.draw_cases = self._planner.draw_cases
+        keep_vehicles(plan.folder, [plan.vehicle])
         self.pace = RoundPace(
             most=plan.config.futures,
             least=plan.config.fewest_futures,
@@ -110,7 +110,7 @@ class RoundRunner:
         """Open a round and give its jobs out."""
         round_id, self._next_round_id = self._next_round_id, self._next_round_id + 1
         pace = self.pace.now
-        variants, jobs = self._planner.plan(
+        jobs = self._planner.plan(
             round_id,
             intent,
             latest.state,
@@ -119,7 +119,7 @@ class RoundRunner:
             start_stamp_ns=self.start_stamp_ns,
             count=pace.futures,
         )
-        self._seeds[round_id] = _Seed(latest.state, said.plan, intent, variants, pace)
+        self._seeds[round_id] = _Seed(latest.state, said.plan, intent, pace)
         self.desk.open(
             RoundOrder(
                 round_id=round_id,
@@ -136,6 +136,7 @@ class RoundRunner:
     def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
         """Plan rounds for these parameters from now on, which workers have as `version`."""
         self._planner.use_vehicle(vehicle, version)
+        keep_vehicles(self._plan.folder, [vehicle])
 
     def drop(self) -> None:
         """Give up the open rounds: they take too long."""
@@ -192,10 +193,13 @@ class RoundRunner:
             del self._seeds[expired]
         self._take_time(seed.pace, done.seconds)
         world = self._world_of(order.world_id)
-        futures, rows, distinct = future_rows(done, seed.variants)
+        futures, rows, distinct = round_futures(done, vehicle=self._plan.vehicle.name)
         sha = self.futures.take(done, distinct=distinct)
         self._on_round(order.junction_id, len(rows))
         self._tables.add("futures", rows)
+        for job, recorded in zip(order.jobs, order.recorded, strict=True):
+            self._tables.add("jobs", [job_row(job, recorded)])
+            self._tables.add("road_users", road_user_rows(job, recorded.sha256))
         row = round_row(
             done,
             start_stamp_ns=self.start_stamp_ns,
@@ -204,20 +208,20 @@ class RoundRunner:
             cruise_speed_mps=seed.intent.cruise_speed_mps,
         )
         self._tables.add("rounds", [row])
-        view = round_view(done, futures, world.frame, self._plan.drive_frame, seed.variants)
+        view = round_view(done, futures, world.frame, self._plan.drive_frame)
         self._bus.publish("round", view, run=self._plan.run_id)
-        self._tell_of_planners(done, seed.variants)
+        self._tell_of_planners(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
             self._comparison_desk.take_round(done, world.frame, seed.state)
             self.windows.take_round(done, seed.intent.path, world)
             self._compare_plans(done, seed, world)
 
-    def _tell_of_planners(self, done: RoundDone, variants: tuple[Variant, ...]) -> None:
+    def _tell_of_planners(self, done: RoundDone) -> None:
         """Say once of each planner that it failed, or that another one had to act for it."""
-        planners = iter(variant.planner for variant in variants)
+        planners = iter(future.planner for future in done.order.futures)
         for result in done.results:
             failures, remarks = result.outcome.failures, result.outcome.remarks
-            for place, planner in zip(range(len(result.variant_indices)), planners, strict=False):
+            for place, planner in zip(range(len(result.future_indices)), planners, strict=False):
                 words = (failures[place] if failures else "") or (remarks[place] if remarks else "")
                 if words and planner not in self._told_planners:
                     self._told_planners.add(planner)

@@ -15,18 +15,19 @@ WITHIN_M = 120.0
 
 def near_car(
     users: RoadUsers | None, state: VehicleState, frame: LocalFrame
-) -> dict[str, SeenRoadUser]:
-    """Return the road users seen at about the state's time, in the World's frame, by their ids."""
+) -> tuple[SeenRoadUser, ...]:
+    """Return the road users seen at about the state's time, in the World's frame."""
     if users is None or abs(state.stamp_ns - users.stamp_ns) > _FRESH_NS:
-        return {}
+        return ()
     here = local_from_geo(frame, state.position.lat_deg, state.position.lon_deg)
-    seen = {}
+    seen = {}  # by id: nobody is there twice
     for user in users.users:
         lat, lon = user.position.lat_deg, user.position.lon_deg
         xy = local_from_geo(frame, lat, lon)
         if float(np.hypot(*(xy - here))) > WITHIN_M:
             continue
         seen[user.user_id] = SeenRoadUser(
+            user_id=user.user_id,
             kind=user.kind,
             x_m=float(xy[0]),
             y_m=float(xy[1]),
@@ -35,4 +36,4 @@ def near_car(
             length_m=user.length_m,
             width_m=user.width_m,
         )
-    return seen
+    return tuple(seen.values())

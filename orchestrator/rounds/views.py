@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.frames import LocalFrame, target_from_source
-from foretwin.contracts.futures import Variant
+from foretwin.contracts.futures import COLLISION_WITH
 from foretwin.contracts.simulation import RoundView
 from foretwin.orchestrator.record.result_rows import RoundFutures
 from foretwin.orchestrator.rounds.dispatch import RoundDone
@@ -19,7 +18,7 @@ SAFE_CLEARANCE_M = 10.0
 _SHOWN = 16
 """Of so many futures, the worst first, one sees the road user that they meet."""
 _SHOWN_FROM = 0.3
-_ROAD_USER = 1
+_ROAD_USER = COLLISION_WITH.index("road_user")
 
 
 def round_view(
@@ -27,7 +26,6 @@ def round_view(
     futures: RoundFutures,
     world_frame: LocalFrame,
     drive_frame: LocalFrame,
-    variants: Sequence[Variant],
 ) -> RoundView:
     """Return a round for those who watch: fewer points, in the drive's frame, with criticality."""
     count, instants = futures.states.shape[:2]
@@ -43,7 +41,7 @@ def round_view(
         futures.collided, 1.0, np.clip(1.0 - clearance / SAFE_CLEARANCE_M, 0.0, 0.95)
     )
     nearest = float(clearance.min()) if count else np.inf
-    met = _met(done, variants, criticality, kept)
+    met = _met(done, criticality, kept)
     return RoundView(
         round_id=done.order.round_id,
         stamp_ns=done.order.stamp_ns,
@@ -52,7 +50,7 @@ def round_view(
         xy_m=in_drive(futures.states[:, kept, :2]),
         criticality=criticality.astype(np.float32),
         nominal_index=0,
-        names=_names(done, variants),
+        names=_names(done),
         collided=int(np.count_nonzero(futures.collided)),
         min_clearance_m=nearest if np.isfinite(nearest) else None,
         latency_ms=done.latency_ms,
@@ -62,12 +60,12 @@ def round_view(
     )
 
 
-def _names(done: RoundDone, variants: Sequence[Variant]) -> tuple[str, ...]:
+def _names(done: RoundDone) -> tuple[str, ...]:
     """Return the futures' names; one whose scenario is left out says so."""
     left_out = [reason for result in done.results for reason in result.left_out]
     return tuple(
-        f"{variant.name} (left out)" if reason else variant.name
-        for variant, reason in zip(variants, left_out, strict=True)
+        f"{future.name} (left out)" if reason else future.name
+        for future, reason in zip(done.order.futures, left_out, strict=True)
     )
 
 
@@ -79,18 +77,16 @@ class _Met(NamedTuple):
     touch_names: tuple[str, ...]
 
 
-def _met(
-    done: RoundDone, variants: Sequence[Variant], criticality: Array, kept: np.ndarray[Any, Any]
-) -> _Met:
+def _met(done: RoundDone, criticality: Array, kept: np.ndarray[Any, Any]) -> _Met:
     """Return the nearest road user of each of the worst futures, and where cars touch theirs."""
     tracks, touches, names = [], [], []
     worst = {int(i) for i in np.argsort(-criticality, kind="stable")[:_SHOWN]}
     number = 0
     for result in done.results:
         poses, states = result.road_users.poses, result.trajectory.states
-        for place in range(len(result.variant_indices)):
+        for place in range(len(result.future_indices)):
             shown = number in worst and criticality[number] >= _SHOWN_FROM
-            variant = variants[number]
+            future = done.order.futures[number]
             number += 1
             there = np.flatnonzero(np.isfinite(poses[place, 0, :, 0]))
             if not len(there):
@@ -103,6 +99,6 @@ def _met(
                 time_s = float(result.outcome.collision_time_s[place])
                 instant = int(np.searchsorted(result.trajectory.time_s, time_s))
                 touches.append(poses[place, min(instant, poses.shape[1] - 1), nearest, :2])
-                names.append(variant.scenario_id)
+                names.append(future.scenario_id)
     found = np.array(tracks, dtype=np.float64).reshape(-1, len(kept), 2)
     return _Met(found, np.array(touches, dtype=np.float64).reshape(-1, 2), tuple(names))

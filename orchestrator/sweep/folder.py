@@ -9,14 +9,17 @@ from typing import Any
 
 import msgspec
 
+from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.record.job_tables import RESULT_SCHEMA_VERSION, VEHICLES
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.sweep.plan import WorldPlaces
 from foretwin.orchestrator.sweep.road_users import digest_of
+from foretwin.orchestrator.sweep.rows import FOLDERS
 from foretwin.orchestrator.sweep.spec import Loaded
 from foretwin.world_gen.build import GENERATOR_VERSION
 
-SUMMARY, PLAN, ROWS, WORLDS = "sweep.json", "places.msgpack", "rows", "worlds"
+SUMMARY, PLAN, WORLDS = "sweep.json", "places.msgpack", "worlds"
 
 
 class FoundPlaces(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,11 +47,6 @@ class SweepFolder:
     def worlds_dir(self) -> Path:
         """Return where Worlds are built."""
         return built_worlds(self.path)
-
-    @property
-    def rows_dir(self) -> Path:
-        """Return where the rows are."""
-        return self.path / ROWS
 
     def _check(self) -> None:
         summary = self.path / SUMMARY
@@ -84,7 +82,7 @@ class SweepFolder:
     def save_places(self, found: tuple[WorldPlaces, ...], failures: dict[str, str]) -> FoundPlaces:
         """Keep where scenarios take place: it need not be found out again."""
         places = FoundPlaces(fingerprint=self.fingerprint, worlds=found, failures=failures)
-        self._write(PLAN, msgspec.msgpack.encode(places))
+        self._write(PLAN, encode(places))
         return places
 
     def _write(self, name: str, data: bytes) -> None:
@@ -96,8 +94,8 @@ class SweepFolder:
     def places(self) -> FoundPlaces | None:
         """Return what was kept, None where there is nothing."""
         try:
-            kept = msgspec.msgpack.decode((self.path / PLAN).read_bytes(), type=FoundPlaces)
-        except (FileNotFoundError, msgspec.DecodeError):
+            kept = read_message(self.path / PLAN, FoundPlaces)
+        except (FileNotFoundError, SchemaMismatch):
             return None
         return kept if kept.fingerprint == self.fingerprint else None
 
@@ -105,6 +103,16 @@ class SweepFolder:
 def built_worlds(out: Path) -> Path:
     """Return where the Worlds of a sweep are built."""
     return out / WORLDS
+
+
+def keep_worlds(source: Path | None, folder: Path, used: tuple[WorldPlaces, ...]) -> None:
+    """Copy Worlds that lie elsewhere beside the rows, to play their futures again from there."""
+    if source is None:
+        return
+    for world in used:
+        name = f"{world.world_id}.world"
+        if not (folder / name).exists():
+            shutil.copyfile(source / name, folder / name)
 
 
 def fingerprint_of(loaded: Loaded, source: str) -> str:
@@ -120,6 +128,7 @@ def fingerprint_of(loaded: Loaded, source: str) -> str:
         source,
         GENERATOR_VERSION,
         versions(),
+        RESULT_SCHEMA_VERSION,
     )
     return hashlib.sha256(msgspec.json.encode(parts)).hexdigest()
 
@@ -130,5 +139,5 @@ def _clear(path: Path) -> None:
         return
     for name in (SUMMARY, PLAN):
         (path / name).unlink(missing_ok=True)
-    for name in (ROWS, WORLDS):
+    for name in (*FOLDERS.values(), VEHICLES, WORLDS):
         shutil.rmtree(path / name, ignore_errors=True)

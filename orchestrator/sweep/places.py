@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
@@ -22,15 +23,19 @@ def places_in(world: World, loaded: Loaded) -> WorldPlaces:
     if loaded.starts:
         return _places_recorded(network, loaded, vehicle)
     placed, unplaced = [], []
+    ways: dict[str, PathAhead] = {}
     for scenario in loaded.scenarios:
         found = places(scenario, world, network=network, vehicle=vehicle, most=loaded.spec.places)
-        placed += [
-            PlacedHere(
-                scenario_id=scenario.id, junction_id=place.junction_id, place=place.name,
-                ego=place.ego.name,
+        for place in found.places:
+            placed.append(
+                PlacedHere(
+                    scenario_id=scenario.id, junction_id=place.junction_id, place=place.name,
+                    ego=place.ego.name,
+                )
+            )  # fmt: skip
+            ways[place.ego.name] = PathAhead(
+                xy_m=place.ego.xy_m, speed_limit_mps=place.ego.speed_limit_mps
             )
-            for place in found.places
-        ]  # fmt: skip
         unplaced += [
             NotPlaced(
                 scenario_id=scenario.id, junction_id=one.junction_id, reason=one.reason,
@@ -38,7 +43,10 @@ def places_in(world: World, loaded: Loaded) -> WorldPlaces:
             )
             for one in found.unplaced
         ]  # fmt: skip
-    return WorldPlaces(world_id=world.id, placed=tuple(placed), unplaced=tuple(unplaced))
+    return WorldPlaces(
+        world_id=world.id, frame=world.frame, placed=tuple(placed), unplaced=tuple(unplaced),
+        ways=ways,
+    )  # fmt: skip
 
 
 def _places_recorded(
@@ -82,4 +90,6 @@ def _places_recorded(
                         reason=f"{name}: {reason}", applies=False,
                     )
                 )  # fmt: skip
-    return WorldPlaces(world_id=world.id, placed=tuple(placed), unplaced=tuple(unplaced))
+    return WorldPlaces(
+        world_id=world.id, frame=world.frame, placed=tuple(placed), unplaced=tuple(unplaced)
+    )

@@ -14,11 +14,11 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.scenario import FAULTS, Scenario
 from foretwin.orchestrator.sweep.spec import (
-    AIM_NAMES,
     AS_RECORDED,
-    FACTORS,
     FUTURES_PER_JOB,
     STEP_S,
     Loaded,
@@ -58,8 +58,11 @@ class WorldPlaces(msgspec.Struct, frozen=True, kw_only=True):
     """Where scenarios take place in one World."""
 
     world_id: str
+    frame: LocalFrame
     placed: tuple[PlacedHere, ...]
     unplaced: tuple[NotPlaced, ...]
+    ways: dict[str, PathAhead] = {}
+    """Those that staged egos take, by name."""
 
 
 class Cell(msgspec.Struct, frozen=True, kw_only=True):
@@ -69,6 +72,7 @@ class Cell(msgspec.Struct, frozen=True, kw_only=True):
     scenario_id: str
     junction_id: str
     place: str
+    ego: str
     start: int | None
     rank: int
     case: int
@@ -122,16 +126,6 @@ def parameter_sets(spec: SweepSpec) -> tuple[dict[str, float], ...]:
     )
 
 
-def with_parameters(values: Values, parameters: Mapping[str, float]) -> Values:
-    """Return a case's numbers with the faults of a parameter set on top of its own."""
-    changed = dict(values)
-    for name, value in parameters.items():
-        if name not in AIM_NAMES:
-            own = changed[f"faults.{name}"]
-            changed[f"faults.{name}"] = own * value if name in FACTORS else own + value
-    return changed
-
-
 def planners_for(scenario: Scenario, spec: SweepSpec) -> tuple[str, ...]:
     """Return which of the planners drive a scenario: backwards, only those that can."""
     able = tuple(name for name in spec.planners if drives_backwards(name) == scenario.ego.reverse)
@@ -163,7 +157,7 @@ def plan_sweep(loaded: Loaded, worlds: Sequence[WorldPlaces]) -> SweepPlan:
     for world in worlds:
         for (vehicle, planner, horizon_s), placed in _groups(world, scenarios, spec):
             cells = (
-                (here, case, with_parameters(values, parameters), parameters)
+                (here, case, values, parameters)
                 for here in placed
                 for case, values in cases[here.scenario_id]
                 for parameters in sets
@@ -172,7 +166,8 @@ def plan_sweep(loaded: Loaded, worlds: Sequence[WorldPlaces]) -> SweepPlan:
                 made = tuple(
                     Cell(
                         number=number + i, scenario_id=here.scenario_id,
-                        junction_id=here.junction_id, place=here.place, start=here.start,
+                        junction_id=here.junction_id, place=here.place, ego=here.ego,
+                        start=here.start,
                         rank=here.rank, case=case,
                         values=values, parameters=parameters,
                     )

@@ -32,14 +32,10 @@ RoadUserMode = Literal["replayed", "predicted", "none"]
 
 
 class Others(NamedTuple):
-    """Those around a recorded car: as they then moved, or as a live round foresees them.
-
-    `names` are theirs, in the order of the columns in which futures have them.
-    """
+    """Those around a recorded car: as they then moved, or as a live round foresees them."""
 
     replayed: tuple[RecordedRoadUser, ...] = ()
     predicted: tuple[SeenRoadUser, ...] = ()
-    names: tuple[str, ...] = ()
 
 
 NOBODY = Others()
@@ -56,16 +52,14 @@ def others_at(
 ) -> Others:
     """Return who is around a car in a state from which it goes along a way (N, 2)."""
     if mode == "replayed":
-        users = replayed_from(
-            log, state.stamp_ns, horizon_s=horizon_s, frame=frame, way_xy_m=way_xy_m
+        return Others(
+            replayed=replayed_from(
+                log, state.stamp_ns, horizon_s=horizon_s, frame=frame, way_xy_m=way_xy_m
+            )
         )
-        return Others(replayed=users, names=tuple(f"recorded {u.user_id}" for u in users))
     if mode == "none":
         return NOBODY
-    seen = near_car(seen_at(log, state.stamp_ns), state, frame)
-    return Others(
-        predicted=tuple(seen.values()), names=tuple(f"seen {user_id}" for user_id in seen)
-    )
+    return Others(predicted=near_car(seen_at(log, state.stamp_ns), state, frame))
 
 
 def named_log(

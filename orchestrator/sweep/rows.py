@@ -3,81 +3,60 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from foretwin.orchestrator.sweep.plan import Cell, SweepJob
-from foretwin.orchestrator.sweep.spec import SweepSpec
+from foretwin.contracts.futures import Job
+from foretwin.contracts.job_identity import JobBytes
+from foretwin.orchestrator.record.job_tables import (
+    as_table,
+    job_row,
+    metric_rows,
+    played_with,
+    road_user_rows,
+)
+from foretwin.orchestrator.sweep.plan import SweepJob
+from foretwin.sim_worker.futures.future_rows import Row
 
-Row = dict[str, Any]
-
-_CELL = (
-    ("cell", pa.int64()), ("job", pa.int32()), ("world", pa.string()), ("junction", pa.string()),
-    ("place", pa.string()), ("scenario", pa.string()), ("case", pa.int32()),
-    ("values", pa.map_(pa.string(), pa.float64())), ("planner", pa.string()),
-    ("vehicle", pa.string()), ("seed", pa.int64()),
-    ("start_stamp_ns", pa.int64()), ("road_users", pa.string()), ("horizon_s", pa.float64()),
-)  # fmt: skip
-_PLAYED = (
-    ("recorded_road_users", pa.int32()),
-    ("valid", pa.bool_()), ("failure", pa.string()), ("left_out", pa.string()),
-    ("planned_impact_time_s", pa.float64()), ("planned_impact_with", pa.string()),
-    ("planned_impact_off_m", pa.float64()),
-    ("collided", pa.bool_()), ("collision_time_s", pa.float64()), ("collision_with", pa.string()),
-    ("min_clearance_m", pa.float64()), ("progress_m", pa.float64()),
-    ("accident_with", pa.string()), ("accident_kind", pa.string()),
-    ("accident_time_s", pa.float64()),
-    ("accident_x_m", pa.float64()), ("accident_y_m", pa.float64()),
-    ("accident_angle_rad", pa.float64()), ("accident_closing_mps", pa.float64()),
-    ("accident_ego_delta_v_mps", pa.float64()), ("accident_user_delta_v_mps", pa.float64()),
-    ("trajectory_sha256", pa.string()),
-)  # fmt: skip
-
-
-def schema_of(spec: SweepSpec) -> pa.Schema:
-    """Return the columns of a sweep's rows; what a cell did not come to is null in them."""
-    parameters = [(f"parameter_{name}", pa.float64()) for name in spec.parameters]
-    metrics = [(f"metric_{name}", pa.float64()) for name in spec.metrics]
-    return pa.schema([*_CELL, *parameters, *_PLAYED, *metrics])
-
-
-def blank_row(job: SweepJob, cell: Cell, spec: SweepSpec) -> Row:
-    """Return what is known of a cell before it is played."""
-    return {
-        "cell": cell.number, "job": job.number, "world": job.world_id,
-        "junction": cell.junction_id, "place": cell.place, "scenario": cell.scenario_id,
-        "case": cell.case, "values": list(cell.values.items()), "planner": job.planner,
-        "vehicle": job.vehicle, "seed": spec.seed, "horizon_s": job.horizon_s,
-        "road_users": None if spec.recorded is None else spec.recorded.road_users,
-        **{f"parameter_{name}": value for name, value in cell.parameters.items()},
-        "failure": "", "left_out": "",
-    }  # fmt: skip
+FOLDERS = {"road_users": "road_users", "jobs": "jobs", "futures": "rows"}
+"""Where the parts of a table lie; whose rows are there is done, so these are written last."""
 
 
 class Parts:
-    """A folder of Parquet files, one for each job that is done; each is whole or not there."""
+    """The tables of a sweep in its folder: Parquet files for each job that is done, each of which
+    is whole or not there."""
 
-    def __init__(self, folder: Path, spec: SweepSpec) -> None:
-        self.folder = folder
-        self._schema = schema_of(spec)
-        folder.mkdir(parents=True, exist_ok=True)
-        for left in folder.glob("*.writing"):
-            left.unlink()
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._metadata = folder, played_with()
+        for name in FOLDERS.values():
+            (folder / name).mkdir(parents=True, exist_ok=True)
+            for left in (folder / name).glob("*.writing"):
+                left.unlink()
+        self._write("metrics", folder / "metrics.parquet", metric_rows())
 
     def path_of(self, job: int) -> Path:
-        """Return where the rows of a job are, or would be."""
-        return self.folder / f"job-{job:06d}.parquet"
+        """Return where the rows of a job's futures are, or would be."""
+        return self._part("futures", job)
 
-    def write(self, job: int, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Write the rows of a job."""
-        path = self.path_of(job)
+    def write(self, rows: list[Row], job: Job, recorded: JobBytes) -> None:
+        """Write a job, the road users in it, and the rows of its futures."""
+        tables = {
+            "road_users": road_user_rows(job, recorded.sha256), "jobs": [job_row(job, recorded)],
+            "futures": rows,
+        }  # fmt: skip
+        for table in FOLDERS:
+            self._write(table, self._part(table, job.job_index), tables[table])
+
+    def _part(self, table: str, job: int) -> Path:
+        return self._folder / FOLDERS[table] / f"job-{job:06d}.parquet"
+
+    def _write(self, table: str, path: Path, rows: list[Row]) -> None:
         partial = path.with_suffix(".writing")
-        pq.write_table(pa.Table.from_pylist(list(rows), schema=self._schema), partial)
+        pq.write_table(as_table(table, rows, self._metadata), partial, compression="zstd")
         partial.replace(path)
 
     def done(self, jobs: Sequence[SweepJob]) -> set[int]:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import Faults
+from foretwin.contracts.numbers import FUTURE_NUMBERS, out_of_range
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.world import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, RecordedStart, read_drive
 from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
-from foretwin.sim_worker.metrics.table import METRICS
+from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -27,16 +26,6 @@ DEFAULT_METRICS = (
     "max_deceleration", "max_lateral_acceleration", "max_jerk", "comfortable", "off_road_share",
     "red_light_violations", "right_of_way_violations", "driving_score",
 )  # fmt: skip
-FAULT_NAMES = tuple(field.name for field in msgspec.structs.fields(Faults))
-FACTORS = frozenset({"friction_factor", "steering_gain", "brake_gain"})
-"""Faults that multiply what a case has of its own; the others add to it."""
-AIM_NAMES = ("target_speed_factor", "target_speed_offset_mps", "lateral_shift_m")
-PARAMETERS = (*FAULT_NAMES, *AIM_NAMES)
-_NOT_NEGATIVE = frozenset({
-    "friction_factor", "extra_steering_delay_s", "brake_gain", "perception_delay_s", "lost_from_s",
-    "lost_for_s", "target_speed_factor",
-})  # fmt: skip
-_MAX_EXTRA_DELAY_S = 0.4
 STEP_S = 0.1
 AS_RECORDED = "as_recorded"
 JUST_RECORDED = Scenario(
@@ -188,33 +177,26 @@ def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
 
 
 def _check_metrics(names: tuple[str, ...]) -> None:
-    known = [n for n, m in METRICS.items() if not m.series and "reference" not in m.needs]
     for name in names:
         if name in METRICS and "reference" in METRICS[name].needs:
             raise UserError(f"metrics: {name} compares with a reference, of which a sweep has none")
         if name in METRICS and METRICS[name].series:
             raise UserError(f"metrics: {name} is a series; a row holds single numbers")
         if name not in METRICS:
-            raise UserError(f"metrics: unknown {name!r}; known: {', '.join(known)}")
+            raise UserError(f"metrics: unknown {name!r}; known: {', '.join(ROW_METRICS)}")
     if len(set(names)) != len(names):
         raise UserError("metrics: each only once")
 
 
 def _check_parameters(parameters: dict[str, tuple[float, ...]]) -> None:
     for name, values in parameters.items():
-        if name not in PARAMETERS:
-            raise UserError(f"parameters: unknown {name!r}; known: {', '.join(PARAMETERS)}")
+        if name not in FUTURE_NUMBERS:
+            raise UserError(f"parameters: unknown {name!r}; known: {', '.join(FUTURE_NUMBERS)}")
         if not values or len(set(values)) != len(values):
             raise UserError(f"parameters.{name}: at least one value, each only once")
         for value in values:
-            if not math.isfinite(value):
-                raise UserError(f"parameters.{name} {value}: must be finite")
-            if name in _NOT_NEGATIVE and value < 0.0:
-                raise UserError(f"parameters.{name} {value:g}: zero or more")
-            if name == "friction_factor" and value == 0.0:
-                raise UserError("parameters.friction_factor 0: must be above 0")
-            if name == "extra_steering_delay_s" and value > _MAX_EXTRA_DELAY_S:
-                raise UserError(f"parameters.{name} {value:g}: at most {_MAX_EXTRA_DELAY_S:g}")
+            if wrong := out_of_range(name, value, value):
+                raise UserError(f"parameters.{name} {wrong}")
 
 
 def _scenarios(spec: SweepSpec) -> tuple[Scenario, ...]:

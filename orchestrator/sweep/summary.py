@@ -7,8 +7,8 @@ import statistics
 from pathlib import Path
 from typing import Any
 
-from foretwin.orchestrator.sweep.rows import Row
 from foretwin.orchestrator.sweep.spec import SweepSpec
+from foretwin.sim_worker.futures.future_rows import Row
 
 _SCORE = "metric_driving_score"
 _PLAIN_WIDTH = 120

@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import offset
@@ -49,16 +50,18 @@ def draw_case(
     """
     view = view or _view(heedless, planned, aspect)
     draw_ground(axes, world, view)
-    _draw_lanes(axes, world, view)
+    draw_lanes(axes, world, view)
     _draw_paths(axes, played, heedless)
     runs = ((heedless, EGO), *(((planned, PLANNED),) if planned is not None else ()))
     for run, colour in runs:
         axes.plot(*run.ego.centre_m.T, color=colour, linewidth=1.6, zorder=12.0)
-        _box(axes, run.ego_at(0), facecolor="none", edgecolor=colour, linewidth=1.1, zorder=12.1)
-        _box(axes, run.ego_at(run.moment), facecolor=colour, edgecolor="black", linewidth=0.7,
+        draw_box(
+            axes, run.ego_at(0), facecolor="none", edgecolor=colour, linewidth=1.1, zorder=12.1
+        )
+        draw_box(axes, run.ego_at(run.moment), facecolor=colour, edgecolor="black", linewidth=0.7,
              alpha=0.85, zorder=13.0 if run is heedless else 12.8)  # fmt: skip
     for instant in _ghosts(heedless):
-        _box(axes, heedless.ego_at(instant), facecolor="none", edgecolor=EGO, linewidth=0.5,
+        draw_box(axes, heedless.ego_at(instant), facecolor="none", edgecolor=EGO, linewidth=0.5,
              alpha=0.55, zorder=12.0)  # fmt: skip
     for number, actor in enumerate(played.actors):
         colour = OTHERS if actor.speed_mps > 0.0 else STANDING
@@ -66,16 +69,16 @@ def draw_case(
         if actor.speed_mps > 0.0:
             axes.plot(*box.centre_m.T, color=colour, linewidth=1.3, zorder=12.0)
             start = heedless.others_at(0)[number]
-            _box(axes, start, facecolor="none", edgecolor=colour, linewidth=1.1, zorder=12.2)
+            draw_box(axes, start, facecolor="none", edgecolor=colour, linewidth=1.1, zorder=12.2)
             for instant in _ghosts(heedless):
-                _box(axes, heedless.others_at(instant)[number], facecolor="none",
+                draw_box(axes, heedless.others_at(instant)[number], facecolor="none",
                      edgecolor=colour, linewidth=0.5, alpha=0.55, zorder=12.0)  # fmt: skip
         at = heedless.others_at(heedless.moment)[number]
-        _box(axes, at, facecolor=colour, edgecolor="black", linewidth=0.7, alpha=0.85,
+        draw_box(axes, at, facecolor=colour, edgecolor="black", linewidth=0.7, alpha=0.85,
              zorder=12.9)  # fmt: skip
         if planned is not None and actor.speed_mps > 0.0:
             at = planned.others_at(planned.moment)[number]
-            _box(axes, at, facecolor="none", edgecolor=PLANNED, linewidth=1.4, zorder=13.1)
+            draw_box(axes, at, facecolor="none", edgecolor=PLANNED, linewidth=1.4, zorder=13.1)
     if played.impact_with:
         axes.plot(
             *played.impact_point_m, marker="*", markersize=11.0, color=IMPACT,
@@ -161,12 +164,11 @@ def _words(name: str) -> str:
 
 def _faults(played: Cast) -> str:
     """Name the faults of the case that are not none."""
-    none = {"friction_factor": 1.0, "steering_gain": 1.0, "brake_gain": 1.0}
     said = [
         f"{_words(field)} {value:.2g}"
         for name, value in played.values.items()
         if name.startswith("faults.")
-        and value != none.get(field := name.removeprefix("faults."), 0.0)
+        and value != FUTURE_NUMBERS[field := name.removeprefix("faults.")].neutral
     ]
     return f"; {', '.join(said)}" if said else ""
 
@@ -195,7 +197,8 @@ def _ghosts(run: Run) -> list[int]:
     return list(range(every, run.moment, every))
 
 
-def _draw_lanes(axes: Axes, world: World, view: View) -> None:
+def draw_lanes(axes: Axes, world: World, view: View) -> None:
+    """Draw the edges of lanes, and stop lines."""
     lines = [
         offset(lane.centerline, side * lane.width_m.value / 2.0)
         for lane in world.lanes
@@ -217,6 +220,7 @@ def _draw_paths(axes: Axes, played: Cast, heedless: Run) -> None:
                   zorder=11.0)  # fmt: skip
 
 
-def _box(axes: Axes, box: Rectangles, **style: Any) -> None:
+def draw_box(axes: Axes, box: Rectangles, **style: Any) -> None:
+    """Draw the outlines of boxes."""
     outline: Array = corners(box)
     axes.add_collection(PolyCollection(list(outline), **style))

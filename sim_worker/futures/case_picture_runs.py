@@ -9,7 +9,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.futures import FuturesJob, FuturesResult, PathAhead, Variant
+from foretwin.contracts.futures import Future, FuturesResult, Job, PathAhead
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -90,8 +90,8 @@ def planned_run(
     return _result_run(result, played, vehicle)
 
 
-def _job(played: Cast, scenario: Scenario, world: World, planner: str) -> FuturesJob:
-    variant = Variant(
+def _job(played: Cast, scenario: Scenario, world: World, planner: str) -> Job:
+    future = Future(
         index=0, name=scenario.id, planner=planner, scenario_id=scenario.id,
         values=dict(played.values), place=played.place.name,
     )  # fmt: skip
@@ -101,10 +101,10 @@ def _job(played: Cast, scenario: Scenario, world: World, planner: str) -> Future
         yaw_rate_radps=0.0, accel_mps2=0.0, tire_angle_rad=0.0,
     )  # fmt: skip
     horizon_s = math.ceil(scenario.horizon_s / STEP_S - 1e-9) * STEP_S
-    return FuturesJob(
+    return Job(
         round_id=0, job_index=0, world_id=world.id, state=anywhere,
         path=PathAhead(xy_m=played.ego_xy_m, speed_limit_mps=played.ego_speed_limit_mps),
-        variants=(variant,), horizon_s=horizon_s, step_s=STEP_S, seed=0,
+        futures=(future,), horizon_s=horizon_s, step_s=STEP_S, seed=0,
         cruise_speed_mps=played.ego_speed_mps, scenarios=(scenario,),
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.futures import FuturesJob, Variant
+from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.scenario import EGO
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import Stage
@@ -58,7 +58,7 @@ class _Ego(NamedTuple):
     start_m: float | None
 
 
-def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, Cast | Unplaced]:
+def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | Unplaced]:
     """Return the cases of the rows that name their place, met where the car really drives.
 
     A function of the job, as what it leads to: the drives of one job are driven together, and kept
@@ -75,13 +75,13 @@ def staged_cases(job: FuturesJob, stage: Stage, maker: SceneMaker) -> dict[int, 
     lines = _lines(job, bent, stage, maker)
     groups: dict[tuple[str, str, _Ego], list[int]] = {}
     for row, case in bent.items():
-        variant = job.variants[row]
-        groups.setdefault((variant.scenario_id, variant.place, _ego(case)), []).append(row)
+        future = job.futures[row]
+        groups.setdefault((future.scenario_id, future.place, _ego(case)), []).append(row)
     scenarios = {scenario.id: scenario for scenario in job.scenarios}
     on_time: dict[int, Cast] = {}
     for (scenario_id, place, ego), rows in groups.items():
         line = lines[ego]
-        cases = [job.variants[row].values for row in rows]
+        cases = [job.futures[row].values for row in rows]
         again = maker.staged.cast(
             scenarios[scenario_id], cases, place, stage.vehicle, ego_way=line.way,
             ego_arc_m=ego.start_m,
@@ -169,7 +169,7 @@ def _bends(case: Cast) -> bool:
 
 
 def _lines(
-    job: FuturesJob, bent: Mapping[int, Cast], stage: Stage, maker: SceneMaker
+    job: Job, bent: Mapping[int, Cast], stage: Stage, maker: SceneMaker
 ) -> dict[_Ego, DrivenLine]:
     """Return the line of each ego, all driven side by side."""
     first: dict[_Ego, Cast] = {}
@@ -198,24 +198,22 @@ def _lines(
     return lines
 
 
-def _drive_alone(
-    job: FuturesJob, cases: list[Cast], stage: Stage, maker: SceneMaker, ticks: int
-) -> Array:
+def _drive_alone(job: Job, cases: list[Cast], stage: Stage, maker: SceneMaker, ticks: int) -> Array:
     """Return states (S, T, 8) of egos that nobody meets."""
-    variants = tuple(
-        Variant(
+    futures = tuple(
+        Future(
             index=index, name="alone", planner=_BACKWARDS if case.reverse else _FORWARDS,
             values={f"{EGO}.speed_mps": case.ego_speed_mps},
         )
         for index, case in enumerate(cases)
     )  # fmt: skip
-    alone = FuturesJob(
+    alone = Job(
         round_id=job.round_id,
         job_index=job.job_index,
         world_id=job.world_id,
         state=job.state,
         path=job.path,
-        variants=variants,
+        futures=futures,
         horizon_s=ticks * stage.control_dt_s,
         step_s=job.step_s,
         seed=job.seed,

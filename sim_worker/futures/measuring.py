@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.futures import FuturesJob
+from foretwin.contracts.futures import Job
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.futures.closed_loop import DriveRecord
 from foretwin.sim_worker.futures.scene import Scene, SceneMaker
@@ -29,7 +29,7 @@ class Measured(NamedTuple):
 
 
 def measure(
-    job: FuturesJob,
+    job: Job,
     scene: Scene,
     record: DriveRecord,
     user_size_m: Array,

@@ -38,7 +38,7 @@ class Play:
         stage.seed(
             scene.starts,
             steering_delay_s=_steering_delay_s(scene, stage),
-            friction_factor=scene.faults.friction_factor,
+            friction_factor=scene.numbers.applied("ground.friction_factor", 1.0),
             backwards=scene.backwards,
         )
         self.arc_m = scene.start_arc_m.copy()
@@ -62,7 +62,7 @@ class Play:
             rows,
             scene.starts[rows],
             steering_delay_s=_steering_delay_s(scene, self.stage)[rows],
-            friction_factor=scene.faults.friction_factor[rows],
+            friction_factor=scene.numbers.applied("ground.friction_factor", 1.0)[rows],
         )
         self.arc_m = np.where(others, self.arc_m, scene.start_arc_m)
         if scene.traffic is not None and before.traffic is not None:
@@ -95,7 +95,7 @@ class Play:
     def act(self, time_s: float | Array, answer: PlannerOutput) -> None:
         """Move everybody on by one control tick; `time_s` is one, or (S, 1)."""
         scene, stage = self.scene, self.stage
-        accel, angle = scene.faults.spoil(answer)
+        accel, angle = scene.numbers.spoil(answer)
         stage.step(Controls(accel, angle))
         if scene.traffic is not None:
             scene.traffic.step(time_s=time_s, dt_s=stage.control_dt_s)
@@ -148,7 +148,7 @@ class Play:
             lines = np.broadcast_to(self._red[..., 0, :], (len(now), self._red.shape[-1]))
             passed = lines < (place.arc_m + self.front_m)[:, None]
             stop = np.where(passed, np.inf, lines).min(axis=1)
-        believed = scene.faults.believed(now, place)
+        believed = scene.numbers.believed(now, place)
         return PlannerView(
             time_s=time_s,
             states=believed.states,
@@ -170,4 +170,5 @@ class Play:
 
 
 def _steering_delay_s(scene: Scene, stage: Stage) -> Array:
-    return np.asarray(stage.vehicle.steering_delay_s.value + scene.faults.steering_delay_s)
+    delay_s = stage.vehicle.steering_delay_s.value
+    return scene.numbers.applied("vehicle.steering_delay_s", delay_s)

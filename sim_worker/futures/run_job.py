@@ -1,4 +1,4 @@
-"""Futures of the car: a job's variants simulated side by side from its live state.
+"""Futures of the car: a job's futures simulated side by side from its live state.
 
 `run_job` is a pure function of World, vehicle and job: its result is the same bits whichever
 worker runs it, however often, whatever the stage did before. Collisions with road users are
@@ -10,15 +10,19 @@ from __future__ import annotations
 
 import hashlib
 import time
+from collections.abc import Mapping
 
+import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import content_bytes
 from foretwin.contracts.futures import (
+    JOB_SCHEMA_VERSION,
     Accident,
-    FuturesJob,
     FuturesResult,
+    Job,
+    Outcome,
     RoadUserTracks,
     Trajectory,
 )
@@ -29,12 +33,15 @@ from foretwin.sim_worker.futures.closed_loop import DriveRecord, drive
 from foretwin.sim_worker.futures.ego_dry_run import staged_cases
 from foretwin.sim_worker.futures.measuring import measure
 from foretwin.sim_worker.futures.outcomes import judge, with_collisions
+from foretwin.sim_worker.futures.planned_impacts import planned_impacts
 from foretwin.sim_worker.futures.scene import Scene, SceneMaker
 from foretwin.sim_worker.road_users.cast import KIND_NAMES
+from foretwin.sim_worker.scenarios.places import Unplaced
+from foretwin.sim_worker.scenarios.roles import Cast
 
 
 def run_job(
-    job: FuturesJob,
+    job: Job,
     stage: Stage,
     *,
     worker_id: str = "",
@@ -42,17 +49,21 @@ def run_job(
 ) -> FuturesResult:
     """Simulate a job on a stage that holds the job's World; `scenes` are those of that World.
 
-    Raises ValueError for another World, more variants than simulations, an unknown planner or
-    scenario, a step that is no multiple of the control tick, or a state that is not finite.
+    A staged future whose case has no place there is not played, and told in `unplaced`. Raises
+    ValueError for another World, more futures than simulations, an unknown planner, scenario or
+    number, a step that is no multiple of the control tick, or a state that is not finite.
     """
     wall_start, cpu_start = time.perf_counter(), time.process_time()
     world = stage.world
     if world is None or world.id != job.world_id:
         held = "open ground" if world is None else world.id
         raise ValueError(f"job for world {job.world_id} on a stage that holds {held}")
+    check_job(job, stage)
     ticks, every = _ticks(job, stage)
     maker = SceneMaker(world) if scenes is None else scenes
-    staged = staged_cases(job, stage, maker)
+    job, staged, unplaced = _placed(job, staged_cases(job, stage, maker))
+    if not job.futures:
+        return _nothing_played(job, unplaced, worker_id, ticks // every + 1)
     scene = maker.scene(job, stage.vehicle, tick_s=stage.control_dt_s, staged=staged)
     with np.errstate(over="ignore", invalid="ignore"):
         record = drive(scene, stage, ticks=ticks)
@@ -62,35 +73,103 @@ def run_job(
     outcome, touches = judge(
         stage.vehicle, record, sizes, measured.clearance_m, tick_s=stage.control_dt_s
     )
-    accidents = _accidents(job, scene, stage, touches) if job.accidents else None
+    ran_on = _accidents(job, scene, stage, touches) if job.accidents else None
+    motion = ran_on if job.accident_motion else None
+    states = with_collisions(states, outcome, motion, step_s=job.step_s)
+    accidents = () if ran_on is None else _told(ran_on)
     return FuturesResult(
         round_id=job.round_id,
         job_index=job.job_index,
         worker_id=worker_id,
         world_id=job.world_id,
-        variant_indices=tuple(variant.index for variant in job.variants),
+        future_indices=tuple(future.index for future in job.futures),
         trajectory=Trajectory(
             stamp_ns=job.state.stamp_ns,
             time_s=np.arange(0, ticks + 1, every, dtype=np.float64) * stage.control_dt_s,
-            states=with_collisions(states, outcome, accidents, step_s=job.step_s),
+            states=states,
         ),
         road_users=_tracks(scene, record, sizes, every),
         outcome=outcome,
         metrics=measured.values,
-        accidents=() if accidents is None else _told(accidents),
+        accidents=accidents,
         left_out=scene.left_out,
-        sim_seconds=len(job.variants) * job.horizon_s,
+        planned=planned_impacts(staged, states, accidents, stage.vehicle, step_s=job.step_s),
+        unplaced=unplaced,
+        sim_seconds=len(job.futures) * job.horizon_s,
         cpu_seconds=time.process_time() - cpu_start,
         wall_seconds=time.perf_counter() - wall_start,
         vehicle_version=job.vehicle_version,
     )
 
 
+def check_job(job: Job, stage: Stage) -> None:
+    """Raise ValueError for a job that this version, or this stage, cannot play."""
+    if job.schema_version != JOB_SCHEMA_VERSION:
+        raise ValueError(
+            f"a job of schema version {job.schema_version}; this foretwin plays version "
+            f"{JOB_SCHEMA_VERSION}"
+        )
+    if job.anchor is not None or job.model:
+        raise ValueError("a job with an anchor or a learnt model; this foretwin knows neither")
+    if abs(job.control_hz * stage.control_dt_s - 1.0) > 1e-9:
+        raise ValueError(
+            f"a job of {job.control_hz:g} control ticks a second on a stage of "
+            f"{1.0 / stage.control_dt_s:g}"
+        )
+
+
+def _placed(
+    job: Job, staged: Mapping[int, Cast | Unplaced]
+) -> tuple[Job, dict[int, Cast], tuple[tuple[int, str], ...]]:
+    """Return the job of those futures that can be played, their cases, and why others cannot."""
+    unplaced = {
+        job.futures[row].index: case.reason
+        for row, case in staged.items()
+        if isinstance(case, Unplaced)
+    }
+    rows = [row for row, future in enumerate(job.futures) if future.index not in unplaced]
+    cases = {
+        place: case for place, row in enumerate(rows) if isinstance(case := staged.get(row), Cast)
+    }
+    if unplaced:
+        starts = None if job.starts is None else job.starts[rows]
+        placed = tuple(job.futures[row] for row in rows)
+        job = msgspec.structs.replace(job, futures=placed, starts=starts)
+    return job, cases, tuple(unplaced.items())
+
+
+def _nothing_played(
+    job: Job, unplaced: tuple[tuple[int, str], ...], worker_id: str, instants: int
+) -> FuturesResult:
+    none, flags = np.zeros(0), np.zeros(0, dtype=bool)
+    return FuturesResult(
+        round_id=job.round_id, job_index=job.job_index, worker_id=worker_id,
+        world_id=job.world_id, future_indices=(),
+        trajectory=Trajectory(
+            stamp_ns=job.state.stamp_ns, time_s=job.step_s * np.arange(instants, dtype=np.float64),
+            states=np.zeros((0, instants, 8), np.float32),
+        ),
+        road_users=RoadUserTracks(
+            poses=np.zeros((0, instants, 0, 3), np.float32),
+            speed_mps=np.zeros((0, instants, 0), np.float32),
+            size_m=np.zeros((0, 0, 2), np.float32), kinds=np.zeros((0, 0), np.int32),
+            kind_names=KIND_NAMES,
+        ),
+        outcome=Outcome(
+            collided=flags, collision_time_s=none, collision_with=none, min_clearance_m=none,
+            progress_m=none, valid=flags,
+        ),
+        metrics=dict.fromkeys(job.metrics, none), accidents=(), left_out=(),
+        unplaced=unplaced,
+        sim_seconds=0.0, cpu_seconds=0.0, wall_seconds=0.0, vehicle_version=job.vehicle_version,
+    )  # fmt: skip
+
+
 def result_digest(result: FuturesResult) -> str:
     """Return the SHA-256 of everything in a result that does not depend on who computed it."""
     parts = (result.trajectory, result.outcome, result.road_users, *result.accidents)
     digest = hashlib.sha256(
-        f"{result.round_id} {result.job_index} {result.world_id} {result.variant_indices}".encode()
+        f"{result.round_id} {result.job_index} {result.world_id} {result.future_indices}".encode()
     )
     for part in parts:
         digest.update(content_bytes(part))
@@ -99,7 +178,7 @@ def result_digest(result: FuturesResult) -> str:
     return digest.hexdigest()
 
 
-def _ticks(job: FuturesJob, stage: Stage) -> tuple[int, int]:
+def _ticks(job: Job, stage: Stage) -> tuple[int, int]:
     """Return the number of control ticks and of ticks between two instants of the result."""
     every = job.step_s / stage.control_dt_s
     if every < 1.0 - 1e-9 or abs(every - round(every)) > 1e-6:
@@ -133,7 +212,7 @@ def _tracks(scene: Scene, record: DriveRecord, sizes: Array, every: int) -> Road
     )
 
 
-def _accidents(job: FuturesJob, scene: Scene, stage: Stage, touches: Touches) -> Accidents:
+def _accidents(job: Job, scene: Scene, stage: Stage, touches: Touches) -> Accidents:
     assert scene.casts is not None or not len(touches.future)
     kinds = (
         []
@@ -144,7 +223,7 @@ def _accidents(job: FuturesJob, scene: Scene, stage: Stage, touches: Touches) ->
         stage.vehicle,
         touches,
         kinds=kinds,
-        friction_factor=scene.faults.friction_factor[touches.future],
+        friction_factor=scene.numbers.applied("ground.friction_factor", 1.0)[touches.future],
         step_s=job.step_s,
     )
 

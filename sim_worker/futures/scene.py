@@ -6,24 +6,23 @@ import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import SignalColour
-from foretwin.contracts.futures import Faults, FuturesJob, Variant
-from foretwin.contracts.scenario import FAULTS, Scenario
+from foretwin.contracts.futures import Future, Job
+from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.futures.faults import FaultArrays, fault_arrays
+from foretwin.sim_worker.futures.number_columns import NumberColumns, number_columns
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
 from foretwin.sim_worker.planners.registry import drives_backwards
 from foretwin.sim_worker.road_users.cast import Casting, Player, casting
 from foretwin.sim_worker.road_users.path_table import PathTable
-from foretwin.sim_worker.road_users.perception import Sight
+from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.scenarios.live import LiveScenarios
@@ -59,7 +58,7 @@ class Scene(NamedTuple):
     start_arc_m: Array
     aims: Aims
     planners: tuple[str, ...]
-    faults: FaultArrays
+    numbers: NumberColumns
     limit_share: Array | None
     casts: Casting | None
     traffic: Traffic | None
@@ -122,7 +121,7 @@ class SceneMaker:
 
     def scene(
         self,
-        job: FuturesJob,
+        job: Job,
         vehicle: VehicleParameters,
         *,
         tick_s: float,
@@ -137,10 +136,10 @@ class SceneMaker:
         Raises ValueError for a scenario that the job does not define, or a state that is not
         finite.
         """
-        count = len(job.variants)
+        count = len(job.futures)
         path = FrenetPath(job.path.xy_m, job.path.speed_limit_mps)
         scenarios = {scenario.id: scenario for scenario in job.scenarios}
-        scenario_of = [_scenario_of(variant, scenarios) for variant in job.variants]
+        scenario_of = [_scenario_of(future, scenarios) for future in job.futures]
         if staged is None:
             staged = self.staged_cases(job, vehicle)
         if job.starts is None:
@@ -159,15 +158,14 @@ class SceneMaker:
         if start_arc_m is not None:
             # Ways may be long, and cross themselves.
             place = path.locate(starts[:, :2], near_arc_m=start_arc_m)
-        aims = _aims(job, place.offset_m)
-        live = any(v.scenario_id and not v.place for v in job.variants)
+        numbers = number_columns(job.futures)
+        aims = _aims(job, place.offset_m, numbers)
+        live = any(v.scenario_id and not v.place for v in job.futures)
         on_path = self._live.on(path, float(place.arc_m[0]), vehicle) if live else None
         seen = self._seen.actors(job.road_users)
         casts: list[tuple[Player, ...]] = []
-        faults = []
         left_out = [""] * count
-        for row, (variant, scenario) in enumerate(zip(job.variants, scenario_of, strict=True)):
-            faults.append(_faults(variant, scenario))
+        for row, (future, scenario) in enumerate(zip(job.futures, scenario_of, strict=True)):
             cast = seen
             players: tuple[Player, ...] | Unplaced = ()
             if row in staged:
@@ -176,8 +174,8 @@ class SceneMaker:
             elif scenario is not None and on_path is not None:
                 players = on_path.players(
                     scenario,
-                    variant.values,
-                    place_rank=variant.place_rank,
+                    future.values,
+                    place_rank=future.place_rank,
                     ego_arc_m=float(place.arc_m[row]),
                     ego_speed_mps=float(starts[row, 3]),
                 )
@@ -186,7 +184,6 @@ class SceneMaker:
             else:
                 cast = (*seen, *players)
             casts.append(cast)
-        fault_columns = fault_arrays(faults)
         crowd = casting(casts, ego_path=path, replayed=job.replayed)
         # Where recorded road users go, no rule binds.
         taken = [self._rules.taken(one) for one in crowd.paths] + [()] * len(job.replayed)
@@ -200,7 +197,11 @@ class SceneMaker:
                 traffic,
                 table.along(path),
                 vehicle,
-                fault_columns.perception,
+                PerceptionFaults(
+                    numbers.applied("perception.delay_s", 0.0),
+                    numbers.applied("perception.lost_from_s", 0.0),
+                    numbers.applied("perception.lost_for_s", 0.0),
+                ),
                 hidden_by=crowd.hidden_by,
                 walks=crowd.walks,
                 tick_s=tick_s,
@@ -211,8 +212,8 @@ class SceneMaker:
             starts=starts,
             start_arc_m=place.arc_m,
             aims=aims,
-            planners=tuple(variant.planner for variant in job.variants),
-            faults=fault_columns,
+            planners=tuple(future.planner for future in job.futures),
+            numbers=numbers,
             # Staged, a case says how fast the ego drives.
             limit_share=None if staged else _limit_share(path, float(place.arc_m[0])),
             casts=crowd if traffic is not None else None,
@@ -225,66 +226,49 @@ class SceneMaker:
             left_out=tuple(left_out),
         )
 
-    def staged_cases(
-        self, job: FuturesJob, vehicle: VehicleParameters
-    ) -> dict[int, Cast | Unplaced]:
+    def staged_cases(self, job: Job, vehicle: VehicleParameters) -> dict[int, Cast | Unplaced]:
         """Return the cases of the rows that name their place, on its path as it is."""
         known = {scenario.id: scenario for scenario in job.scenarios}
         rows: dict[tuple[str, str], list[int]] = {}
-        for row, variant in enumerate(job.variants):
-            if variant.place and variant.scenario_id:
-                rows.setdefault((variant.scenario_id, variant.place), []).append(row)
+        for row, future in enumerate(job.futures):
+            if future.place and future.scenario_id:
+                rows.setdefault((future.scenario_id, future.place), []).append(row)
         found: dict[int, Cast | Unplaced] = {}
         for (_, place), mine in rows.items():
-            scenario = _scenario_of(job.variants[mine[0]], known)
+            scenario = _scenario_of(job.futures[mine[0]], known)
             assert scenario is not None
-            cases = [job.variants[row].values for row in mine]
+            cases = [job.futures[row].values for row in mine]
             found.update(zip(mine, self.staged.cast(scenario, cases, place, vehicle), strict=True))
         return found
 
 
-def _scenario_of(variant: Variant, known: Mapping[str, Scenario]) -> Scenario | None:
-    if not variant.scenario_id:
+def _scenario_of(future: Future, known: Mapping[str, Scenario]) -> Scenario | None:
+    if not future.scenario_id:
         return None
-    if variant.scenario_id not in known:
+    if future.scenario_id not in known:
         raise ValueError(
-            f"future {variant.name!r} names scenario {variant.scenario_id!r}; the job defines "
+            f"future {future.name!r} names scenario {future.scenario_id!r}; the job defines "
             f"{', '.join(known) or 'none'}"
         )
-    return known[variant.scenario_id]
+    return known[future.scenario_id]
 
 
-def _faults(variant: Variant, scenario: Scenario | None) -> Faults:
-    """Return a variant's faults; those that its scenario draws count instead."""
-    if scenario is None:
-        return variant.faults
-    drawn = {
-        name.removeprefix(f"{FAULTS}."): value
-        for name, value in variant.values.items()
-        if name.startswith(f"{FAULTS}.")
-    }
-    return msgspec.structs.replace(variant.faults, **drawn)
-
-
-def _known_plan(job: FuturesJob) -> KnownPlan | None:
+def _known_plan(job: Job) -> KnownPlan | None:
     plan = job.car_plan
     return None if plan is None else KnownPlan(plan.time_s, plan.xy_m, plan.yaw_rad, plan.speed_mps)
 
 
-def _aims(job: FuturesJob, present_offset_m: Array) -> Aims:
-    variants = job.variants
-    cruise = np.array([v.values.get("ego.speed_mps", np.nan) for v in variants])
+def _aims(job: Job, present_offset_m: Array, numbers: NumberColumns) -> Aims:
+    cruise = np.array([future.values.get("ego.speed_mps", np.nan) for future in job.futures])
     if job.starts is None:
-        cruise[[not v.place for v in variants]] = np.nan
+        cruise[[not future.place for future in job.futures]] = np.nan
     cruise = np.where(np.isfinite(cruise), cruise, job.cruise_speed_mps)
-    target = cruise * np.array([v.target_speed_factor for v in variants])
-    target += np.array([v.target_speed_offset_mps for v in variants])
-    factor = np.array([v.target_speed_factor for v in variants])
+    target = numbers.applied("aim.target_speed_mps", cruise)
+    factor = numbers.factor("aim.target_speed_mps")
     factor = np.where(cruise > 1.0, target / np.maximum(cruise, 1.0), factor)
     # The future keeps the car's present offset, or one would measure the map's error.
     present = np.minimum(np.maximum(present_offset_m, -_MAX_OFFSET_M), _MAX_OFFSET_M)
-    offset = present + np.array([v.lateral_shift_m for v in variants])
-    return Aims(np.maximum(target, 0.0), factor, offset)
+    return Aims(np.maximum(target, 0.0), factor, numbers.applied("aim.offset_m", present))
 
 
 def _limit_share(path: FrenetPath, start_arc_m: float) -> Array | None:

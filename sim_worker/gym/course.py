@@ -11,7 +11,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import FuturesJob, PathAhead
+from foretwin.contracts.futures import Job, PathAhead
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -43,7 +43,7 @@ class Source(NamedTuple):
     scenario: Scenario | str | None = None
     values: Mapping[str, float] | None = None
     place: str | int = 0
-    job: FuturesJob | str | Path | None = None
+    job: Job | str | Path | None = None
     states: Sequence[VehicleState] = ()
     path: PathAhead | None = None
     cases: int = 64

@@ -14,7 +14,7 @@ from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
-from foretwin.contracts.futures import FuturesJob, PathAhead, Variant
+from foretwin.contracts.futures import Future, Job, PathAhead
 from foretwin.contracts.scenario import EGO, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -42,7 +42,7 @@ class Episodes(NamedTuple):
     """
 
     world: World
-    job: FuturesJob
+    job: Job
     end_arc_m: float
     scenes: SceneMaker
 
@@ -78,30 +78,30 @@ def episodes_of_scenario(
         raise UserError(f"{scenario.id} is driven backwards at {at.name}; learners drive forwards")
     drawn = _cases(scenario, values or {}, cases, cases_seed, early_or_late_s)
     played = scenes.staged.cast(scenario, drawn, at.name, vehicle)
-    variants: list[Variant] = []
+    futures: list[Future] = []
     starts: list[Array] = []
     reasons: list[str] = []
     for case, one in zip(drawn, played, strict=True):
         if isinstance(one, Unplaced):
             reasons.append(one.reason)
             continue
-        name = f"{scenario.id} {len(variants)}"
-        variants.append(
-            Variant(
-                index=len(variants), name=name, planner=_PLANNER, scenario_id=scenario.id,
+        name = f"{scenario.id} {len(futures)}"
+        futures.append(
+            Future(
+                index=len(futures), name=name, planner=_PLANNER, scenario_id=scenario.id,
                 values=case, place=at.name,
             )
         )  # fmt: skip
         starts.append(staged_start(one, vehicle))
-    if not variants:
+    if not futures:
         raise UserError(f"{scenario.id} at {at.name}: no case can be played: {reasons[0]}")
-    job = FuturesJob(
+    job = Job(
         round_id=0,
         job_index=0,
         world_id=world.id,
         state=_somewhere(world, starts[0]),
         path=PathAhead(xy_m=at.ego.xy_m, speed_limit_mps=at.ego.speed_limit_mps),
-        variants=tuple(variants),
+        futures=tuple(futures),
         horizon_s=scenario.horizon_s,
         step_s=0.1,
         seed=cases_seed,
@@ -114,13 +114,13 @@ def episodes_of_scenario(
     return Episodes(world, job, min(end + BEYOND_JUNCTION_M, at.ego.path.length_m), scenes)
 
 
-def episodes_of_job(world: World | str | Path, job: FuturesJob | str | Path) -> Episodes:
+def episodes_of_job(world: World | str | Path, job: Job | str | Path) -> Episodes:
     """Return the futures of a job, as recorded or read from its file, as ways to begin.
 
     Raises UserError where the job is for another World.
     """
     world = read_world(world)
-    job = job if isinstance(job, FuturesJob) else read_message(Path(job), FuturesJob)
+    job = job if isinstance(job, Job) else read_message(Path(job), Job)
     if job.world_id != world.id:
         raise UserError(f"the job is for World {job.world_id}; given is {world.id}")
     return Episodes(world, job, FrenetPath(job.path.xy_m).length_m - 1.0, SceneMaker(world))
@@ -156,20 +156,20 @@ def episodes_of_states(
         fixed = {f"{EGO}.speed_mps": cruise, **(values or {})}
         drawn = _cases(scenario, fixed, cases, cases_seed, early_or_late_s)
     begun = [(row, case) for row in rows for case in drawn]
-    variants = tuple(
-        Variant(
+    futures = tuple(
+        Future(
             index=index, name=f"recorded {index}", planner=_PLANNER,
             scenario_id="" if scenario is None else scenario.id, values=case or {},
         )
         for index, (_, case) in enumerate(begun)
     )  # fmt: skip
-    job = FuturesJob(
+    job = Job(
         round_id=0,
         job_index=0,
         world_id=world.id,
         state=states[0],
         path=path,
-        variants=variants,
+        futures=futures,
         horizon_s=8.0,
         step_s=0.1,
         seed=cases_seed,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,6 @@ from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
 from foretwin.sim_worker.road_users.cast import Casting
-from foretwin.sim_worker.road_users.perception import PerceptionFaults
 from foretwin.world_gen.rules.signal_state import cycle_s
 
 Flags = npt.NDArray[np.bool_]
@@ -214,19 +213,12 @@ def scene_of(pool: Scene, cases: Rows) -> Scene:
             traffic.crowd, casts.paths, casts.kinds[cases], casts.hidden_by[cases],
             casts.walks[cases],
         )  # fmt: skip
-    faults = pool.faults
-    columns: dict[str, Any] = {
-        name: column[cases]
-        for name, column in faults._asdict().items()
-        if isinstance(column, np.ndarray)
-    }
-    perception = PerceptionFaults._make(column[cases] for column in faults.perception)
     return pool._replace(
         starts=pool.starts[cases],
         start_arc_m=pool.start_arc_m[cases],
         aims=Aims._make(column[cases] for column in pool.aims),
         planners=tuple(pool.planners[k] for k in cases),
-        faults=faults._replace(**columns, perception=perception),
+        numbers=pool.numbers.of(cases),
         casts=casts,
         traffic=traffic,
         sight=sight,

@@ -91,6 +91,11 @@ METRICS = MappingProxyType(
     }
 )  # fmt: skip
 
+ROW_METRICS = tuple(
+    name for name, row in METRICS.items() if not row.series and "reference" not in row.needs
+)
+"""Metrics that are one number of one future, without a drive to compare it with."""
+
 
 def computable(context: Context) -> tuple[str, ...]:
     """Return the names of all metrics that `context` suffices for, in the table's order."""

@@ -57,6 +57,11 @@ def check_planner(name: str) -> None:
         planner.close()
 
 
+def in_another_process(name: str) -> bool:
+    """Return whether a planner answers from a process that is not foretwin's own."""
+    return name == "remote" or name not in _BUILT_IN
+
+
 def drives_backwards(name: str) -> bool:
     """Return whether a planner has its cars driven in reverse: of foretwin's own, some do."""
     return bool(getattr(_BUILT_IN.get(name), "drives_backwards", False))

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from lxml import etree
 
+from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import FAULTS, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import ATTRIBUTION, World
@@ -77,8 +78,8 @@ def openscenario_element(
     root.append(etree.Comment(f" Made by foretwin from map data: {in_comment(world.attribution)} "))
     root.append(_header(played, scenario, world, written_at))
     parameters = {"horizon_s": scenario.horizon_s}
-    if _slippery(played):
-        parameters["friction_factor"] = played.values[f"{FAULTS}.friction_factor"]
+    if (friction := _friction_factor(played)) != 1.0:
+        parameters["friction_factor"] = friction
     for motion in motions:
         parameters |= motion.parameters
     declared = etree.SubElement(root, "ParameterDeclarations")
@@ -136,14 +137,19 @@ def _header(
     return header
 
 
-def _slippery(played: Cast) -> bool:
-    return played.values.get(f"{FAULTS}.friction_factor", 1.0) != 1.0
+def _friction_factor(played: Cast) -> float:
+    """Return what the case's numbers make of the ground's friction: all that OpenSCENARIO takes."""
+    factor = 1.0
+    for name, row in FUTURE_NUMBERS.items():
+        if row.acts_on == "ground.friction_factor":
+            factor = row.joined(factor, played.values.get(f"{FAULTS}.{name}", row.neutral))
+    return factor
 
 
 def _storyboard(played: Cast, motions: list[Motion]) -> etree._Element:
     board = etree.Element("Storyboard")
     init = etree.SubElement(etree.SubElement(board, "Init"), "Actions")
-    if _slippery(played):
+    if _friction_factor(played) != 1.0:
         action = etree.SubElement(init, "GlobalAction")
         action = etree.SubElement(action, "EnvironmentAction")
         road = etree.SubElement(action, "Environment", name="road surface")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import re
 import tomllib
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from typing import get_args
 import msgspec
 
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.numbers import out_of_range
 from foretwin.contracts.scenario import (
     EGO,
     FAULTS,
@@ -27,11 +27,6 @@ from foretwin.contracts.scenario import (
 
 CATALOGUE = Path(__file__).with_name("catalogue")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-_AT_LEAST_ZERO = frozenset({
-    "speed_mps", "gap_m", "acts_after_s", "decel_mps2", "friction_factor",
-    "extra_steering_delay_s", "brake_gain", "perception_delay_s", "lost_from_s", "lost_for_s",
-})  # fmt: skip
-_SHARE = "impact_share"
 _ON_FOOT_ONLY: frozenset[Relation] = frozenset({"crosses_exit", "crosses_entry"})
 
 
@@ -172,12 +167,8 @@ def _check_number(name: str, value: Number) -> None:
         most = max((*value.values, *(v for v in (value.max,) if v is not None)), default=0.0)
     else:
         least = most = value
-    if not (math.isfinite(least) and math.isfinite(most)):
-        raise ValueError(f"{name} must be finite")
-    if field in _AT_LEAST_ZERO and least < 0.0:
-        raise ValueError(f"{name} reaches {least:g}; it must be zero or more")
-    if field == _SHARE and not (least >= 0.0 and most <= 1.0):
-        raise ValueError(f"{name} reaches {least if least < 0.0 else most:g}; it is from 0 to 1")
+    if wrong := out_of_range(field, least, most):
+        raise ValueError(f"{name} {wrong}")
 
 
 def _check_span(name: str, span: Span) -> None:

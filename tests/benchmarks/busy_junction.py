@@ -7,9 +7,9 @@ import math
 import msgspec
 import numpy as np
 
-from foretwin.contracts.futures import FuturesJob, SeenRoadUser
+from foretwin.contracts.futures import Job, SeenRoadUser
 from foretwin.contracts.world import Building, World
-from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.metrics.table import METRICS
 from tests.benchmarks import scenes
 from tests.sim_worker.metrics.junction import junction
@@ -34,11 +34,11 @@ def world() -> World:
     return msgspec.structs.replace(junction(lights=False), buildings=tuple(houses))
 
 
-def busy_job() -> FuturesJob:
+def busy_job() -> Job:
     """Return a job of 64 futures in which 20 others drive lawfully, and everything is measured."""
     names = [name for name, row in METRICS.items() if "reference" not in row.needs]
     return msgspec.structs.replace(
-        job(plan_variants(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])),
+        job(plan_futures(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])),
         horizon_s=scenes.HORIZON_S,
         road_users=_road_users(),
         metrics=tuple(name for name in names if not METRICS[name].series),

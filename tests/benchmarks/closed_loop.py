@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from foretwin.contracts.futures import FuturesJob, FuturesResult
+import msgspec
+
+from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
-from foretwin.sim_worker.futures.variants import plan_variants
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.benchmarks import scenes
 from tests.benchmarks.bare_loop import bare_loop
@@ -33,11 +35,12 @@ def flat_job(control_hz: float) -> tuple[Stage, Callable[[], FuturesResult]]:
     """Return a stage without buildings and what runs a job on it."""
     world = scenes.street(buildings=0)
     stage = Stage(world, load_vehicle(), nsim=scenes.FUTURES, control_hz=control_hz, threads=1)
-    variants = plan_variants(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])
-    return stage, job_runner(stage, scenes.job(world, variants))
+    futures = plan_futures(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])
+    job = msgspec.structs.replace(scenes.job(world, futures), control_hz=control_hz)
+    return stage, job_runner(stage, job)
 
 
-def job_runner(stage: Stage, job: FuturesJob) -> Callable[[], FuturesResult]:
+def job_runner(stage: Stage, job: Job) -> Callable[[], FuturesResult]:
     """Return what runs a job as a worker does, whose World is prepared; it ran once already."""
     assert stage.world is not None
     maker = SceneMaker(stage.world)

@@ -10,7 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.contracts.futures import FuturesJob, PathAhead, Variant
+from foretwin.contracts.futures import Future, Job, PathAhead
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Area, Building, IntersectionSummary, World
 
@@ -55,21 +55,21 @@ def street(*, buildings: int) -> World:
     )  # fmt: skip
 
 
-def job(world: World, variants: tuple[Variant, ...]) -> FuturesJob:
-    """Return a job of `variants` that starts on the street at 10 m/s."""
+def job(world: World, futures: tuple[Future, ...]) -> Job:
+    """Return a job of `futures` that starts on the street at 10 m/s."""
     state = VehicleState(
         vehicle_id="ego", stamp_ns=0, position=_ORIGIN, yaw_rad=0.0, speed_mps=SPEED_MPS,
         yaw_rate_radps=0.0, accel_mps2=0.0, tire_angle_rad=0.0,
     )  # fmt: skip
     along_m = np.arange(-10.0, 240.0)
     xy_m, _ = _path(along_m)
-    return FuturesJob(
+    return Job(
         round_id=1,
         job_index=0,
         world_id=world.id,
         state=state,
         path=PathAhead(xy_m=xy_m, speed_limit_mps=np.full(len(along_m), 14.0)),
-        variants=variants,
+        futures=futures,
         horizon_s=HORIZON_S,
         step_s=0.1,
         seed=0,
@@ -77,9 +77,9 @@ def job(world: World, variants: tuple[Variant, ...]) -> FuturesJob:
     )
 
 
-def without_road_users(variants: tuple[Variant, ...]) -> tuple[Variant, ...]:
-    """Return the same variants with nobody else on the road."""
-    return tuple(msgspec.structs.replace(variant, scenario_id="") for variant in variants)
+def without_road_users(futures: tuple[Future, ...]) -> tuple[Future, ...]:
+    """Return the same futures with nobody else on the road."""
+    return tuple(msgspec.structs.replace(future, scenario_id="") for future in futures)
 
 
 def _path(along_m: Array) -> tuple[Array, Array]:

@@ -16,12 +16,12 @@ import zenoh
 
 from foretwin.contracts.bus import Bus, Mailbox, Reply, ZenohBus, ask, zenoh_config
 from foretwin.contracts.codec import encode
-from foretwin.contracts.futures import FuturesJob
+from foretwin.contracts.futures import Job
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import PrepareRequest
-from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.world_store import WorldStore
 from tests.benchmarks import scenes
@@ -58,14 +58,14 @@ def measure() -> Measurement:
         folder = Path(name)
         world = scenes.street(buildings=200)
         WorldStore(folder / "worlds").save(world)
-        variants = plan_variants(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])
+        futures = plan_futures(count=scenes.FUTURES, seed=0, planners=["pure_pursuit_idm"])
         half = scenes.FUTURES // 2
-        jobs = [scenes.job(world, variants[:half]), scenes.job(world, variants[half:])]
+        jobs = [scenes.job(world, futures[:half]), scenes.job(world, futures[half:])]
         round_ms, result_bytes = _round_ms(folder, jobs)
     return Measurement(round_ms, "ms", _bare_ms(len(encode(jobs[0])), result_bytes))
 
 
-def _round_ms(folder: Path, jobs: list[FuturesJob]) -> tuple[float, int]:
+def _round_ms(folder: Path, jobs: list[Job]) -> tuple[float, int]:
     setup = BusSetup(endpoint=free_endpoint())
     replies = Mailbox(len(WORKERS))
     with ExitStack() as stack:

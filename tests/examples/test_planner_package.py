@@ -13,7 +13,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from foretwin.contracts.futures import Variant
+from foretwin.contracts.futures import Future
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planners.hosted import HostedPlanner
@@ -50,13 +50,13 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
 def test_both_planners_are_found_and_drive_and_stop() -> None:
     assert {"calm", "calm_one"} <= set(planner_names())
     lead = {"lead__speed_mps": 0.0, "lead__gap_m": 30.0}
-    variants = (
-        Variant(index=0, name="alone", planner="calm"),
-        Variant(index=1, name="alone", planner="calm_one"),
+    futures = (
+        Future(index=0, name="alone", planner="calm"),
+        Future(index=1, name="alone", planner="calm_one"),
         happening(2, "lead_stopping", planner="calm", **lead),
         happening(3, "lead_stopping", planner="calm_one", **lead),
     )
-    outcome = run_job(job(variants, horizon_s=8.0), Stage(crossroads(), load_vehicle(), nsim=4))
+    outcome = run_job(job(futures, horizon_s=8.0), Stage(crossroads(), load_vehicle(), nsim=4))
     outcome = outcome.outcome
     assert outcome.valid.all(), outcome.failures
     assert not outcome.collided.any()

@@ -6,13 +6,13 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import (
-    FuturesJob,
+    Future,
     FuturesResult,
+    Job,
     Outcome,
     PathAhead,
     RoadUserTracks,
     Trajectory,
-    Variant,
 )
 from foretwin.orchestrator.rounds.dispatch import RoundDone, RoundOrder
 from tests.orchestrator.trip import START_NS, states_along, town_world
@@ -31,8 +31,11 @@ def nobody(count: int, instants: int) -> RoadUserTracks:
     )
 
 
-def variants(count: int) -> tuple[Variant, ...]:
-    return tuple(Variant(index=i, name=f"variant {i}" if i else "nominal") for i in range(count))
+def futures(count: int, scenario_id: str = "") -> tuple[Future, ...]:
+    return tuple(
+        Future(index=i, name=f"future {i}" if i else "nominal", scenario_id=scenario_id)
+        for i in range(count)
+    )
 
 
 def straight(
@@ -57,6 +60,7 @@ def round_done(
     time_s: Array = TIME_S,
     outcome: dict[str, Array] | None = None,
     latency_ms: float = 100.0,
+    scenario_id: str = "",
 ) -> RoundDone:
     """A round whose jobs gave these states (S, N, 8); `outcome` replaces fields of every job's."""
     orders, results, first = [], [], 0
@@ -73,7 +77,7 @@ def round_done(
         results.append(
             FuturesResult(
                 round_id=round_id, job_index=index, worker_id=f"w{index}", world_id="w",
-                variant_indices=tuple(range(first, first + count)),
+                future_indices=tuple(range(first, first + count)),
                 trajectory=Trajectory(
                     stamp_ns=stamp_ns, time_s=time_s, states=states.astype(np.float32)
                 ),
@@ -84,12 +88,12 @@ def round_done(
             )
         )  # fmt: skip
         orders.append(
-            FuturesJob(
+            Job(
                 round_id=round_id, job_index=index, world_id="w",
                 state=states_along(town_world("n4").frame, np.array([[0.0, 0.0], [5.0, 0.0]]))[0],
                 path=PathAhead(xy_m=np.zeros((2, 2)), speed_limit_mps=np.ones(2)),
-                variants=variants(first + count)[first:], horizon_s=8.0, step_s=0.1, seed=0,
-                cruise_speed_mps=10.0,
+                futures=futures(first + count, scenario_id)[first:], horizon_s=8.0, step_s=0.1,
+                seed=0, cruise_speed_mps=10.0,
             )
         )  # fmt: skip
         first += count

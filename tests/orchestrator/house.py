@@ -12,7 +12,7 @@ import numpy as np
 from foretwin.contracts.codec import read_message
 from foretwin.contracts.drive import DriveEnd, GnssFix, VehicleInfo, VehicleState
 from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw
-from foretwin.contracts.futures import FuturesJob, FuturesResult, Outcome, Trajectory
+from foretwin.contracts.futures import FuturesResult, Job, Outcome, Trajectory
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.mailbox import Mailbox, Request
 from foretwin.contracts.memory_bus import MemoryBus
@@ -32,27 +32,27 @@ INFO = VehicleInfo(
 )
 
 
-def straight_futures(job: FuturesJob, world: World, worker_id: str) -> FuturesResult:
-    """Futures that go straight on at the car's speed, each variant 3 % slower than the last."""
+def straight_futures(job: Job, world: World, worker_id: str) -> FuturesResult:
+    """Futures that go straight on at the car's speed, each future 3 % slower than the last."""
     position, speed = job.state.position, job.state.speed_mps
     xy = local_from_geo(world.frame, position.lat_deg, position.lon_deg)
     yaw = float(
         local_from_geo_yaw(world.frame, job.state.yaw_rad, position.lat_deg, position.lon_deg)
     )
     time_s = np.arange(round(job.horizon_s / job.step_s) + 1) * job.step_s
-    states = np.zeros((len(job.variants), len(time_s), 8), dtype=np.float32)
-    for row, variant in zip(states, job.variants, strict=True):
-        way_m = speed * (1.0 - 0.03 * variant.index) * time_s
+    states = np.zeros((len(job.futures), len(time_s), 8), dtype=np.float32)
+    for row, future in zip(states, job.futures, strict=True):
+        way_m = speed * (1.0 - 0.03 * future.index) * time_s
         row[:, 0], row[:, 1], row[:, 2] = (
             xy[0] + way_m * np.cos(yaw),
             xy[1] + way_m * np.sin(yaw),
             yaw,
         )
         row[:, 3] = speed
-    count = len(job.variants)
+    count = len(job.futures)
     return FuturesResult(
         round_id=job.round_id, job_index=job.job_index, worker_id=worker_id,
-        world_id=job.world_id, variant_indices=tuple(v.index for v in job.variants),
+        world_id=job.world_id, future_indices=tuple(v.index for v in job.futures),
         trajectory=Trajectory(stamp_ns=job.state.stamp_ns, time_s=time_s, states=states),
         road_users=nobody(count, len(time_s)),
         metrics={}, accidents=(), left_out=("",) * count,
@@ -168,7 +168,7 @@ class Worker(Process):
         world = read_message(self.plan.worlds_dir / f"{message.world_id}.world", World)
         futures = straight_futures(message, world, self.process_id)
         if self.remark:
-            remarks = (self.remark,) * len(message.variants)
+            remarks = (self.remark,) * len(message.futures)
             outcome = msgspec.structs.replace(futures.outcome, remarks=remarks)
             futures = msgspec.structs.replace(futures, outcome=outcome)
         if self.diverges:

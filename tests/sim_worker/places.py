@@ -9,7 +9,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
-from foretwin.contracts.futures import FuturesJob, PathAhead, Variant
+from foretwin.contracts.futures import Future, Job, PathAhead
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import (
     Area,
@@ -109,25 +109,25 @@ def state_at(
 
 def happening(
     index: int, scenario_id: str, *, planner: str = "pure_pursuit_idm", **values: float
-) -> Variant:
+) -> Future:
     """A future in which a scenario of the catalogue happens; `values` with __ for the dots."""
     case = dict(draw_cases(catalogue()[scenario_id])[0])
     case.update({name.replace("__", "."): value for name, value in values.items()})
-    return Variant(
+    return Future(
         index=index, name=scenario_id, planner=planner, scenario_id=scenario_id, values=case
     )
 
 
 def job(
-    variants: tuple[Variant, ...], *, state: VehicleState | None = None,
+    futures: tuple[Future, ...], *, state: VehicleState | None = None,
     path: PathAhead | None = None, cruise: float = 8.0, horizon_s: float = 8.0,
     accidents: bool = False,
-) -> FuturesJob:  # fmt: skip
-    return FuturesJob(
+) -> Job:  # fmt: skip
+    return Job(
         round_id=1, job_index=0, world_id="crossroads",
         state=state_at(-50.0, -1.5) if state is None else state,
         path=straight_path() if path is None else path,
-        variants=variants, horizon_s=horizon_s, step_s=0.1, seed=0, cruise_speed_mps=cruise,
-        scenarios=tuple(catalogue()[i] for i in sorted({v.scenario_id for v in variants} - {""})),
+        futures=futures, horizon_s=horizon_s, step_s=0.1, seed=0, cruise_speed_mps=cruise,
+        scenarios=tuple(catalogue()[i] for i in sorted({v.scenario_id for v in futures} - {""})),
         accidents=accidents,
     )  # fmt: skip

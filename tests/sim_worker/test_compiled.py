@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.futures import Faults, Variant
+from foretwin.contracts.futures import Future
 from foretwin.geometry import compiled as compiled_geometry
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import Stage
@@ -85,15 +85,15 @@ def test_a_job_adds_no_signature_whatever_its_planners_answer(
         monkeypatch.setitem(registry._BUILT_IN, kind, lambda kind=kind: _Dressed(kind))
     load_planner.cache_clear()
     stage, before = Stage(crossroads(), CAR, nsim=8), signatures()
-    faulty = Faults(position_offset_m=0.1, friction_factor=0.8, brake_gain=0.9)
+    faulty = {"position_offset_m": 0.1, "friction_factor": 0.8, "brake_gain": 0.9}
     try:
-        for faults in (Faults(), faulty):
-            variants = tuple(
-                Variant(index=i, name=kind, planner=kind, faults=faults)
+        for numbers in ({}, faulty):
+            futures = tuple(
+                Future(index=i, name=kind, planner=kind, numbers=numbers)
                 for i, kind in enumerate(kinds)
             )
             # One planner alone is asked without its rows being cut out.
-            for who in (variants, *((variant,) for variant in variants)):
+            for who in (futures, *((future,) for future in futures)):
                 result = run_job(job(who, path=turning_path(), horizon_s=1.0), stage)
                 assert result.outcome.valid.all(), result.outcome.failures
                 if len(who) > 1:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foretwin.contracts.futures import Variant
+from foretwin.contracts.futures import Future
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
@@ -53,16 +53,16 @@ def offered(monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
 def test_a_planner_drives_the_futures_that_name_it(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
     offered(_Coasting)
     assert planner_names()[-1] == "theirs"
-    variants = (Variant(index=0, name="a"), Variant(index=1, name="b", planner="theirs"))
-    result = run_job(job(variants, cruise=12.0), stage)
+    futures = (Future(index=0, name="a"), Future(index=1, name="b", planner="theirs"))
+    result = run_job(job(futures, cruise=12.0), stage)
     assert result.outcome.progress_m[1] == pytest.approx(64.0, abs=0.1)
     assert result.outcome.progress_m[0] > 70.0
 
 
 def test_a_planner_of_the_wrong_shape_is_named(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
     offered(_Scalar)
-    variants = tuple(Variant(index=i, name="x", planner="theirs") for i in range(3))
-    outcome = run_job(job((*variants, Variant(index=3, name="ours"))), stage).outcome
+    futures = tuple(Future(index=i, name="x", planner="theirs") for i in range(3))
+    outcome = run_job(job((*futures, Future(index=3, name="ours"))), stage).outcome
     assert outcome.valid.tolist() == [False, False, False, True]
     assert "planner 'theirs' at 0 s: ValueError: answers of shapes (1,)" in outcome.failures[0]
     assert outcome.failures[3] == ""
@@ -77,9 +77,9 @@ class _Raises:
 
 def test_a_planner_that_raises_fails_its_futures_and_no_others(offered, stage: Stage) -> None:  # type: ignore[no-untyped-def]
     offered(_Raises)
-    variants = (Variant(index=0, name="ours"), Variant(index=1, name="x", planner="theirs"))
-    alone = run_job(job(variants[:1]), stage)
-    together = run_job(job(variants), stage)
+    futures = (Future(index=0, name="ours"), Future(index=1, name="x", planner="theirs"))
+    alone = run_job(job(futures[:1]), stage)
+    together = run_job(job(futures), stage)
     assert together.outcome.valid.tolist() == [True, False]
     assert together.outcome.failures == ("", "planner 'theirs' at 1 s: KeyError: 'no such lane'")
     assert together.trajectory.states[0] == pytest.approx(alone.trajectory.states[0], abs=1e-6)
@@ -87,9 +87,7 @@ def test_a_planner_that_raises_fails_its_futures_and_no_others(offered, stage: S
 
 
 def test_the_driver_reaches_and_keeps_the_cruise_speed(stage: Stage) -> None:
-    result = run_job(
-        job((Variant(index=0, name="n"),), state=state_at(-50, -1.5, speed=4.0)), stage
-    )
+    result = run_job(job((Future(index=0, name="n"),), state=state_at(-50, -1.5, speed=4.0)), stage)
     speed = result.trajectory.states[0, :, 3]
     assert speed[-1] == pytest.approx(8.0, abs=0.6)
     assert speed.max() < 8.1
@@ -97,7 +95,7 @@ def test_the_driver_reaches_and_keeps_the_cruise_speed(stage: Stage) -> None:
 
 def test_the_driver_slows_for_a_curve_and_stays_on_its_path(stage: Stage) -> None:
     result = run_job(
-        job((Variant(index=0, name="n"),), path=turning_path(), cruise=10.0,
+        job((Future(index=0, name="n"),), path=turning_path(), cruise=10.0,
             state=state_at(-30.0, -1.5, speed=10.0)),
         stage,
     )  # fmt: skip
@@ -114,12 +112,12 @@ def test_the_driver_stops_behind_a_standing_lead_and_the_careless_one_does_not(
     stage: Stage,
 ) -> None:
     lead = {"lead__speed_mps": 0.0, "lead__gap_m": 30.0}
-    variants = (
+    futures = (
         happening(0, "lead_stopping", **lead),
         happening(1, "lead_stopping", planner="constant_speed", **lead),
-        Variant(index=2, name="alone"),
+        Future(index=2, name="alone"),
     )
-    outcome = run_job(job(variants, horizon_s=16.0), stage).outcome
+    outcome = run_job(job(futures, horizon_s=16.0), stage).outcome
     assert outcome.collided.tolist() == [False, True, False]
     assert outcome.collision_with.tolist() == [0, 1, 0]
     assert outcome.collision_time_s[1] == pytest.approx(30.0 / 8.0, abs=0.1)
@@ -130,8 +128,8 @@ def test_the_driver_stops_behind_a_standing_lead_and_the_careless_one_does_not(
 
 @pytest.mark.parametrize("planner", ["pure_pursuit_idm", "constant_speed"])
 def test_a_car_with_nothing_to_do_stands_still(stage: Stage, planner: str) -> None:
-    variant = Variant(index=0, name="n", planner=planner)
-    result = run_job(job((variant,), state=state_at(-50, -1.5, speed=0.0), cruise=0.0), stage)
+    future = Future(index=0, name="n", planner=planner)
+    result = run_job(job((future,), state=state_at(-50, -1.5, speed=0.0), cruise=0.0), stage)
     states = result.trajectory.states[0]
     assert np.abs(states[:, :2] - states[0, :2]).max() < 1e-3
 
@@ -142,11 +140,11 @@ def test_a_car_across_its_path_with_wheels_turned_rejoins_it_without_a_loop(
 ) -> None:
     limit = stage.vehicle.max_tire_angle_rad.value
     planners = ("pure_pursuit_idm", "constant_speed")
-    variants = tuple(Variant(index=i, name="n", planner=name) for i, name in enumerate(planners))
+    futures = tuple(Future(index=i, name="n", planner=name) for i, name in enumerate(planners))
     for degrees in (-60, -30, 0, 30, 60):
         for tire in (-limit, limit):
             state = state_at(-50, -1.5, np.radians(degrees), speed, tire_angle=tire)
-            driven = run_job(job(variants, state=state, horizon_s=16.0), stage)
+            driven = run_job(job(futures, state=state, horizon_s=16.0), stage)
             assert (driven.outcome.progress_m > 60.0).all()
             for states in driven.trajectory.states:
                 assert np.degrees(np.ptp(np.unwrap(states[:, 2]))) < abs(degrees) + 50

@@ -23,8 +23,8 @@ from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
-from foretwin.sim_worker.futures.variants import plan_variants
 from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.worker import StageCache, serve_futures
@@ -78,7 +78,7 @@ def asked(bus: MemoryBus, channel: str, question: msgspec.Struct) -> Any:
 def test_a_worker_prepares_worlds_and_answers_jobs(served: MemoryBus) -> None:
     prepared = asked(served, "prepare", PrepareRequest(world_id="crossroads"))
     assert (prepared.world_id, prepared.worker_id) == ("crossroads", "w0")
-    question = job(plan_variants(count=4, seed=0, planners=["pure_pursuit_idm"]), horizon_s=2.0)
+    question = job(plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"]), horizon_s=2.0)
     result = asked(served, "job", question)
     assert result.worker_id == "w0"
     here = run_job(question, Stage(crossroads(), CAR, nsim=32))
@@ -92,7 +92,7 @@ def test_a_question_that_cannot_be_answered_is_refused_and_the_worker_goes_on(
         asked(served, "prepare", PrepareRequest(world_id="nowhere"))
     with pytest.raises(TimeoutError, match="names no file"):
         asked(served, "prepare", PrepareRequest(world_id="../crossroads"))
-    question = job(plan_variants(count=2, seed=0, planners=["magic"]))
+    question = job(plan_futures(count=2, seed=0, planners=["magic"]))
     with pytest.raises(TimeoutError, match="unknown planner 'magic'"):
         asked(served, "job", question)
     assert asked(served, "prepare", PrepareRequest(world_id="crossroads")).seconds < 10.0
@@ -101,8 +101,8 @@ def test_a_question_that_cannot_be_answered_is_refused_and_the_worker_goes_on(
 def test_a_worker_goes_on_with_other_parameters_and_says_with_which(served: MemoryBus) -> None:
     """As a worker started with them would, to the bit, in a World that it holds compiled."""
     heavy = altered(CAR, mass_kg=1500.0, wheelbase_m=2.9, steering_lag_s=0.1)
-    variants = plan_variants(count=4, seed=0, planners=["pure_pursuit_idm"])
-    before = job(variants, horizon_s=2.0)
+    futures = plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"])
+    before = job(futures, horizon_s=2.0)
     after = msgspec.structs.replace(before, vehicle_version=1)
     first = asked(served, "job", before)
     with pytest.raises(TimeoutError, match=r"job for version 1 .* at a worker with version 0"):
@@ -184,7 +184,7 @@ def test_a_worker_process_over_zenoh_answers_logs_and_leaves(folder: Path) -> No
             assert up.up
             with pytest.raises(TimeoutError, match=r"nowhere\.world"):
                 ask(bus, "prepare", PrepareRequest(world_id="nowhere"), timeout_s=DEADLINE_S, **IDS)
-            question = job(plan_variants(count=8, seed=0, planners=["pure_pursuit_idm"]))
+            question = job(plan_futures(count=8, seed=0, planners=["pure_pursuit_idm"]))
             result = ask(bus, "job", question, timeout_s=DEADLINE_S, **IDS)
             here = run_job(question, Stage(crossroads(), CAR, nsim=32))
             assert result_digest(result) == result_digest(here)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from foretwin.contracts.bus import Bus, Mailbox, ZenohBus
-from foretwin.contracts.futures import Variant
+from foretwin.contracts.futures import Future
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.sim_worker.batch.batch_simulation import Stage
@@ -74,9 +74,9 @@ def test_the_example_drives_and_after_its_death_the_fallback() -> None:
 
 
 def test_futures_of_a_job_are_driven_by_it_beside_others() -> None:
-    variants = (
-        Variant(index=0, name="ours"),
-        Variant(index=1, name="theirs", planner="remote"),
+    futures = (
+        Future(index=0, name="ours"),
+        Future(index=1, name="theirs", planner="remote"),
     )
     planner = load_planner("remote")
     assert isinstance(planner, RemotePlanner)
@@ -84,7 +84,7 @@ def test_futures_of_a_job_are_driven_by_it_beside_others() -> None:
         planner.connect(bus, run="r1", process="w0")
         shown = Mailbox(64)
         bus.subscribe("planned_motions", shown, run="r1", process="w0")
-        result = run_job(job(variants, horizon_s=4.0), Stage(crossroads(), VEHICLE, nsim=2))
+        result = run_job(job(futures, horizon_s=4.0), Stage(crossroads(), VEHICLE, nsim=2))
     load_planner.cache_clear()
     assert result.outcome.valid.all()
     assert result.outcome.progress_m[1] > 25.0

@@ -17,7 +17,7 @@ import pytest
 
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import crew_for, run_sweep
-from foretwin.orchestrator.sweep.rows import schema_of
+from foretwin.orchestrator.record.job_tables import JOB_TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, Alone, small_sweep
 from tests.starvation import kept_waiting
@@ -44,10 +44,10 @@ def test_a_row_tells_everything_about_its_cell(swept: tuple[Path, dict[str, Any]
     rows = _rows(folder / "out")
     assert len(rows) == summary["rows"] == 2 * 2 * (2 + 2 + 1)
     assert [row["cell"] for row in rows] == list(range(len(rows)))
-    assert list(rows[0]) == schema_of(load_spec(folder / "small.toml").spec).names
+    assert list(rows[0]) == JOB_TABLES["futures"].names
     crash = next(
         row for row in rows
-        if (row["scenario"], row["planner"], row["parameter_friction_factor"])
+        if (row["scenario"], row["planner"], row["friction_factor"])
         == ("scp", "constant_speed", 1.0)
     )  # fmt: skip
     assert crash["collided"]

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint
-from foretwin.contracts.futures import FuturesJob, FuturesResult, Outcome, PathAhead, Trajectory
+from foretwin.contracts.futures import FuturesResult, Job, Outcome, PathAhead, Trajectory
 from foretwin.orchestrator.rounds.dispatch import RoundDesk, RoundOrder
 from tests.orchestrator.futures_rounds import nobody
 
@@ -27,9 +27,9 @@ def order(round_id: int, jobs: int = 2) -> RoundOrder:
         receipt_mono_ns=1_000_000,
         started_mono_ns=2_000_000,
         jobs=tuple(
-            FuturesJob(
+            Job(
                 round_id=round_id, job_index=index, world_id="w", state=STATE,
-                path=PathAhead(xy_m=np.zeros((2, 2)), speed_limit_mps=np.ones(2)), variants=(),
+                path=PathAhead(xy_m=np.zeros((2, 2)), speed_limit_mps=np.ones(2)), futures=(),
                 horizon_s=8.0, step_s=0.1, seed=0, cruise_speed_mps=5.0,
             )
             for index in range(jobs)
@@ -37,11 +37,11 @@ def order(round_id: int, jobs: int = 2) -> RoundOrder:
     )  # fmt: skip
 
 
-def result(job: FuturesJob, worker_id: str) -> FuturesResult:
+def result(job: Job, worker_id: str) -> FuturesResult:
     none = np.zeros(0)
     return FuturesResult(
         round_id=job.round_id, job_index=job.job_index, worker_id=worker_id, world_id="w",
-        variant_indices=(),
+        future_indices=(),
         trajectory=Trajectory(
             stamp_ns=0, time_s=none, states=np.zeros((0, 0, 8), dtype=np.float32)
         ),
@@ -141,7 +141,7 @@ def test_no_order_of_deaths_loses_or_doubles_a_result(events: list[str]) -> None
     desk.worker_up("w0")
     desk.worker_up("w1")
     desk.open(order(0, jobs=4))
-    at_work: dict[str, FuturesJob] = {}
+    at_work: dict[str, Job] = {}
     finished = []
 
     def give() -> None:

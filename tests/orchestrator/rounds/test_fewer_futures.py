@@ -8,18 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.futures import Variant
+from foretwin.contracts.futures import Future
 from foretwin.orchestrator.rounds.fewer_futures import some_of
-from foretwin.sim_worker.futures.variants import plan_variants
+from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.scenarios.reading import catalogue
 
-ALL = plan_variants(
+ALL = plan_futures(
     count=64, seed=0, planners=["pure_pursuit_idm"], scenarios=tuple(catalogue().values())[:12]
 )
 
 
-def happening(variants: tuple[Variant, ...]) -> int:
-    return sum(bool(variant.scenario_id) for variant in variants)
+def happening(futures: tuple[Future, ...]) -> int:
+    return sum(bool(future.scenario_id) for future in futures)
 
 
 @given(count=st.integers(1, 64), turn=st.integers(0, 10_000))
@@ -28,7 +28,7 @@ def test_the_nominal_future_comes_first_and_none_twice(count: int, turn: int) ->
 
     assert some[0] is ALL[0]
     assert len(some) == count
-    indices = [variant.index for variant in some]
+    indices = [future.index for future in some]
     assert indices == sorted(set(indices))
 
 
@@ -44,10 +44,10 @@ def test_speeds_stay_spread_over_their_whole_range(count: int) -> None:
     for turn in range(8):
         for kind in (True, False):
             all_speeds = sorted(
-                v.target_speed_factor for v in ALL[1:] if bool(v.scenario_id) is kind
+                v.numbers["target_speed_factor"] for v in ALL[1:] if bool(v.scenario_id) is kind
             )
             speeds = sorted(
-                v.target_speed_factor
+                v.numbers["target_speed_factor"]
                 for v in some_of(ALL, count, turn=turn)[1:]
                 if bool(v.scenario_id) is kind
             )

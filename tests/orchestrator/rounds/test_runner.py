@@ -1,4 +1,4 @@
-"""A round is cut into jobs that together hold every variant once."""
+"""A round is cut into jobs that together hold every future once."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def test_every_variant_is_in_one_job(futures: int, size: int, tmp_path: Path) ->
         house.settle()
     house.tables.close()
 
-    indices = sorted(v.index for job in jobs for v in job.variants)
+    indices = sorted(v.index for job in jobs for v in job.futures)
     assert indices == list(range(futures))
-    assert max(len(job.variants) for job in jobs) <= size
+    assert max(len(job.futures) for job in jobs) <= size
     (first,) = (job for job in jobs if job.job_index == 0)
-    assert first.variants[0].name == "nominal"
+    assert first.futures[0].name == "nominal"
     assert len({(job.state.stamp_ns, job.cruise_speed_mps, job.seed) for job in jobs}) == 1
     assert house.conductor.rounds.futures.count == futures
 
@@ -48,7 +48,7 @@ def test_rounds_differ_by_their_state_and_not_by_their_variants(tmp_path: Path) 
     house.tables.close()
     early, late = (request.message() for request in seen)
 
-    assert early.variants == late.variants
+    assert early.futures == late.futures
     assert late.state.stamp_ns - early.state.stamp_ns == 2_000_000_000
     assert (early.round_id, late.round_id) == (0, 1)
     moved = late.path.xy_m[0] - early.path.xy_m[0]
@@ -83,7 +83,7 @@ def test_a_smaller_round_is_cut_into_jobs_of_one_size(
     asked = [r.message() for worker in house.workers for r in worker.take()]
     house.tables.close()
 
-    assert [len(job.variants) for job in asked] == [count // jobs] * jobs
+    assert [len(job.futures) for job in asked] == [count // jobs] * jobs
 
 
 def test_late_rounds_make_the_next_ones_smaller_and_say_so(

@@ -6,15 +6,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from foretwin.contracts.futures import RoadUserTracks, Variant
-from foretwin.orchestrator.record.result_rows import future_rows
+from foretwin.contracts.futures import RoadUserTracks
+from foretwin.orchestrator.record.result_rows import round_futures
 from foretwin.orchestrator.rounds.dispatch import RoundDone
 from foretwin.orchestrator.rounds.views import round_view
 from tests.orchestrator.futures_rounds import TIME_S, round_done, straight
 from tests.orchestrator.trip import town_world
 
 FRAME = town_world("n4").frame
-VARIANTS = tuple(Variant(index=i, name=str(i), scenario_id="scp") for i in range(3))
 
 
 def meeting(*users_xy: tuple[float, float]) -> RoundDone:
@@ -23,6 +22,7 @@ def meeting(*users_xy: tuple[float, float]) -> RoundDone:
     states = np.concatenate([straight((0.0, float(y))) for y in range(3)])
     done = round_done(
         states,
+        scenario_id="scp",
         outcome={
             "collided": np.array([False, False, True]),
             "collision_with": np.array([0, 0, 1]),
@@ -45,7 +45,7 @@ def meeting(*users_xy: tuple[float, float]) -> RoundDone:
 
 def test_the_nearest_road_user_of_critical_futures_is_shown_and_where_it_is_touched() -> None:
     done = meeting((40.0, 2.0), (30.0, 60.0))
-    view = round_view(done, future_rows(done, VARIANTS).futures, FRAME, FRAME, VARIANTS)
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
     # The first future keeps 20 m from everybody: nobody is shown for it.
     assert view.user_xy_m.shape == (2, 25, 2)
     assert view.user_xy_m[:, 0] == pytest.approx(np.array([[40.0, 2.0]] * 2), abs=1e-3)
@@ -55,6 +55,6 @@ def test_the_nearest_road_user_of_critical_futures_is_shown_and_where_it_is_touc
 
 def test_without_road_users_there_is_nobody_to_show() -> None:
     done = meeting()
-    view = round_view(done, future_rows(done, VARIANTS).futures, FRAME, FRAME, VARIANTS)
+    view = round_view(done, round_futures(done).futures, FRAME, FRAME)
     assert view.user_xy_m.shape == (0, 25, 2)
     assert view.touch_xy_m.shape == (0, 2)

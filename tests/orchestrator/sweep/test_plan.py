@@ -5,6 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
+from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.orchestrator.sweep.plan import (
     PlacedHere,
     WorldPlaces,
@@ -12,7 +13,6 @@ from foretwin.orchestrator.sweep.plan import (
     parameter_sets,
     plan_sweep,
     planners_for,
-    with_parameters,
 )
 from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, Loaded, SweepSpec, check_spec
 from foretwin.sim_worker.scenarios.reading import catalogue
@@ -26,6 +26,7 @@ def _places(loaded: Loaded, worlds: int = 2) -> tuple[WorldPlaces, ...]:
     return tuple(
         WorldPlaces(
             world_id=f"w{number}",
+            frame=LocalFrame(GeoPoint(52.5, 13.4)),
             placed=tuple(
                 PlacedHere(
                     scenario_id=scenario.id, junction_id=f"n{number}", place=f"c1/{scenario.id}",
@@ -78,21 +79,6 @@ def test_so_many_cases_are_drawn_as_are_wished_for(wished: int, seed: int) -> No
     assert len(chosen) == min(wished, len(everything))
     assert [number for number, _ in chosen] == sorted({number for number, _ in chosen})
     assert all(everything[number] == values for number, values in chosen)
-
-
-def test_parameters_come_on_top_of_what_a_case_has() -> None:
-    case = {
-        "faults.friction_factor": 0.5, "faults.perception_delay_s": 0.2, "ego.speed_mps": 8.0,
-    }  # fmt: skip
-    changed = with_parameters(
-        case,
-        {"friction_factor": 0.5, "perception_delay_s": 0.1, "target_speed_factor": 1.1},
-    )
-    assert changed == {
-        "faults.friction_factor": 0.25, "faults.perception_delay_s": 0.2 + 0.1,
-        "ego.speed_mps": 8.0,
-    }  # fmt: skip
-    assert case["faults.friction_factor"] == 0.5
 
 
 def test_without_parameters_there_is_one_set() -> None:

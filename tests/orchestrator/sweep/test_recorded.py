@@ -14,6 +14,7 @@ from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWork
 from foretwin.orchestrator.sweep.recorded import Recorded
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
 from tests.orchestrator.recorded_runs import write_run
+from tests.orchestrator.sweeps import rows_of
 from tests.sim_worker.scenarios.worlds import cross
 
 SPEED_MPS, START_X_M = 8.0, -70.0
@@ -66,13 +67,13 @@ def test_scenarios_are_timed_to_the_recorded_car(run: Path) -> None:
     assert [place.start for place in places.placed][:3] == [0, 1, 2]
     assert len(places.placed) < len(loaded.starts)
     plan = plan_sweep(loaded, [places])
-    rows = [row for job in plan.jobs for row in worker.answer(job)]  # type: ignore[union-attr]
+    rows = rows_of(worker, plan, loaded)
     assert [row["cell"] for row in rows] == list(range(plan.cells))
     assert not any(row["failure"] for row in rows)
     second = [row for row in rows if row["place"].startswith("round 4:")]
     assert len(second) == 2
     for row in second:
-        assert row["start_stamp_ns"] == pytest.approx(START_NS + 4_000_000_000, abs=1e6)
+        assert row["stamp_ns"] == pytest.approx(START_NS + 4_000_000_000, abs=1e6)
         assert row["left_out"] == ""
         assert row["collided"]
         # It is 38 m from the middle of the crossing, and drives 8 m/s.

@@ -18,13 +18,13 @@ from foretwin.orchestrator.sweep.plan import WorldPlaces, plan_sweep
 from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWorker
 from foretwin.orchestrator.sweep.recorded import Recorded
 from foretwin.orchestrator.sweep.road_users import others_at
-from foretwin.orchestrator.sweep.rows import Row
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
+from foretwin.sim_worker.futures.future_rows import Row
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
 from foretwin.telemetry.logs import open_road_users
 from tests.orchestrator.recorded_runs import write_run
-from tests.orchestrator.sweeps import Alone
+from tests.orchestrator.sweeps import Alone, rows_of
 from tests.sim_worker.scenarios.worlds import cross
 from tests.world_gen.drawn_maps import crossing, world_of
 
@@ -76,10 +76,9 @@ def _rows(loaded: Loaded, *, backwards: bool = False) -> list[Row]:
     (world,) = {start.world_id for start in loaded.starts}
     places = worker.answer(PlaceQuestion(world_id=world))
     assert isinstance(places, WorldPlaces)
-    jobs = plan_sweep(loaded, [places]).jobs
-    rows = [row for job in jobs[:: -1 if backwards else 1] for row in worker.answer(job)]  # type: ignore[union-attr]
+    rows = rows_of(worker, plan_sweep(loaded, [places]), loaded, step=-1 if backwards else 1)
     assert not any(row["failure"] for row in rows)
-    return sorted(rows, key=lambda row: row["start_stamp_ns"])
+    return sorted(rows, key=lambda row: row["stamp_ns"])
 
 
 def test_others_are_where_they_were(run: Path) -> None:
@@ -91,7 +90,7 @@ def test_others_are_where_they_were(run: Path) -> None:
         way_xy_m=first.path(cross().frame).xy_m,
     )  # fmt: skip
     far, stands = others.replayed
-    assert others.names == ("recorded far", "recorded 9")
+    assert [user.user_id for user in others.replayed] == ["far", "9"]
     # The first round is at 1 s, and its state up to 0.1 s before.
     began_s = (first.state.stamp_ns - START_NS) * 1e-9
     assert far.time_s[0] == pytest.approx(0.0, abs=0.1)
@@ -108,10 +107,12 @@ def test_who_comes_later_is_met_as_recorded_but_not_foreseen(run: Path) -> None:
     predicted = _rows(check_spec(_spec(run, road_users="predicted")))
     alone = _rows(check_spec(_spec(run, road_users="none")))
     assert [row["place"] for row in replayed[:3]] == ["round 1", "round 4", "round 7"]
-    assert {row["road_users"] for row in replayed} == {"replayed"}
-    assert [row["recorded_road_users"] for row in replayed[:3]] == [2, 2, 2]
-    assert [row["recorded_road_users"] for row in predicted[:3]] == [1, 2, 2]
-    assert [row["recorded_road_users"] for row in alone[:3]] == [0, 0, 0]
+    for rows, recorded, seen in (
+        (replayed, [2, 2, 2], [0, 0, 0]), (predicted, [0, 0, 0], [1, 2, 2]),
+        (alone, [0, 0, 0], [0, 0, 0]),
+    ):  # fmt: skip
+        assert [row["replayed_road_users"] for row in rows[:3]] == recorded
+        assert [row["seen_road_users"] for row in rows[:3]] == seen
     # From 1 s, nobody is seen yet who stands there from 3 s on.
     assert [row["collided"] for row in replayed[:3]] == [True, True, True]
     assert [row["collided"] for row in predicted[:3]] == [False, True, True]
@@ -194,7 +195,7 @@ def test_mcitys_car_among_those_the_roadside_saw(data_dir: Path, tmp_path: Path)
     rows = _rows(loaded)
     assert len(rows) == len(loaded.starts) > 1
     assert all(row["valid"] for row in rows)
-    assert max(row["recorded_road_users"] for row in rows) > 3
+    assert max(row["replayed_road_users"] for row in rows) > 3
     assert loaded.road_users is not None
     first = loaded.starts[0]
     others = others_at(

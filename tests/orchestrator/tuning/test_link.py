@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from foretwin.contracts.futures import FuturesJob
+from foretwin.contracts.futures import Job
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.mailbox import Mailbox, Reply, Request
 from foretwin.contracts.tuning import (
@@ -62,7 +62,7 @@ def answer(questions: Mailbox) -> Any:
     return message
 
 
-def jobs(house: House) -> list[FuturesJob]:
+def jobs(house: House) -> list[Job]:
     """What the workers are at."""
     return list(house.conductor.rounds.desk.busy.values())
 

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.futures import Variant
+from foretwin.contracts.futures import Future
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Building
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.batch.nearness import NearStatics
+from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
-from foretwin.sim_worker.futures.variants import plan_variants
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import box, crossroads, job, state_at
@@ -70,9 +70,9 @@ def test_looking_for_contacts_only_where_there_can_be_some_changes_no_bit(
     monkeypatch: pytest.MonkeyPatch, planner: str
 ) -> None:
     heading = (0.0, 0.25, -0.4)
-    variants = plan_variants(count=63, seed=5, planners=[planner], scenarios=HAPPENINGS)
+    futures = plan_futures(count=63, seed=5, planners=[planner], scenarios=HAPPENINGS)
     jobs = [
-        job((*variants, Variant(index=63, name="x", planner=planner)), cruise=cruise,
+        job((*futures, Future(index=63, name="x", planner=planner)), cruise=cruise,
             state=state_at(-45.0, -1.5, yaw, cruise))
         for yaw, cruise in zip(heading, (8.0, 14.0, 27.0), strict=True)
     ]  # fmt: skip

@@ -13,10 +13,11 @@ import pytest
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint
-from foretwin.contracts.futures import FuturesJob, FuturesResult, PathAhead, Variant
+from foretwin.contracts.futures import Future, FuturesResult, Job, PathAhead
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.ego_dry_run import staged_cases
+from foretwin.sim_worker.futures.future_rows import future_rows
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import draw_cases
@@ -42,7 +43,7 @@ class Played(NamedTuple):
 
     cases: list[Cast]
     result: FuturesResult
-    job: FuturesJob
+    job: Job
 
 
 @functools.cache
@@ -64,7 +65,7 @@ def play(world: World, scenario_id: str, planner: str = "constant_speed") -> Pla
         return None
     drawn = draw_cases(scenario)
     here = world.frame.origin
-    job = FuturesJob(
+    job = Job(
         round_id=0, job_index=0, world_id=world.id,
         state=VehicleState(
             vehicle_id="car", stamp_ns=0, position=GeoPoint(here.lat_deg, here.lon_deg),
@@ -73,8 +74,8 @@ def play(world: World, scenario_id: str, planner: str = "constant_speed") -> Pla
         path=PathAhead(
             xy_m=found[0].ego.xy_m, speed_limit_mps=found[0].ego.speed_limit_mps
         ),
-        variants=tuple(
-            Variant(
+        futures=tuple(
+            Future(
                 index=i, name=scenario_id, planner=planner, scenario_id=scenario_id,
                 values=values, place=found[0].name,
             )
@@ -143,7 +144,7 @@ def test_the_case_gives_the_start() -> None:
     assert played is not None
     for row, case in enumerate(played.cases):
         start = played.result.trajectory.states[row, 0]
-        assert start[3] == pytest.approx(played.job.variants[row].values["ego.speed_mps"])
+        assert start[3] == pytest.approx(played.job.futures[row].values["ego.speed_mps"])
         pose = case.place.ego.path.pose_at(np.array([case.ego_arc_m]))
         assert start[:2] == pytest.approx(pose.xy_m[0], abs=1e-3)
         assert start[2] == pytest.approx(pose.yaw_rad[0], abs=1e-3)
@@ -171,15 +172,24 @@ def test_a_car_backs_into_its_bay_unless_somebody_walks_behind_it() -> None:
     assert (np.hypot(*(states[:, -1, :2] - end).T) < 8.0).all()
 
 
-def test_a_place_that_a_world_lacks_leaves_its_row_out() -> None:
+def test_what_has_no_place_in_a_world_is_not_played_and_told() -> None:
     played = play(cross(), "scp")
     assert played is not None
     stage, maker = _stage(cross().id)
-    lost = msgspec.structs.replace(played.job.variants[0], place="nowhere")
-    job = msgspec.structs.replace(played.job, variants=(lost, *played.job.variants[1:]))
-    left_out = run_job(job, stage, scenes=maker).left_out
-    assert "no place 'nowhere'" in left_out[0]
-    assert not any(left_out[1:])
+    lost = msgspec.structs.replace(played.job.futures[0], place="nowhere")
+    job = msgspec.structs.replace(played.job, futures=(lost, *played.job.futures[1:]))
+    result = run_job(job, stage, scenes=maker)
+    ((index, reason),) = result.unplaced
+    assert index == lost.index
+    assert "no place 'nowhere'" in reason
+    # To the others it is as if it had never been asked for.
+    others = msgspec.structs.replace(job, futures=job.futures[1:])
+    assert result_digest(result) == result_digest(run_job(others, stage, scenes=maker))
+    nobody = run_job(msgspec.structs.replace(job, futures=(lost,)), stage, scenes=maker)
+    assert nobody.future_indices == ()
+    assert [i for i, _ in nobody.unplaced] == [lost.index]
+    (row,) = future_rows(msgspec.structs.replace(job, futures=(lost,)), nobody, job_sha256="a" * 64)
+    assert (row["left_out"], row.get("valid")) == (reason, None)
 
 
 def test_another_maker_of_scenes_gives_the_same_bits() -> None:

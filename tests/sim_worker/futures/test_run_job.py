@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.codec import content_bytes, write_message
-from foretwin.contracts.futures import Faults, FuturesJob, FuturesResult, Variant
+from foretwin.contracts.futures import Future, FuturesResult, Job
 from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
-from foretwin.sim_worker.futures.variants import plan_variants
 from foretwin.sim_worker.metrics.displacement import distinct_count
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -29,9 +29,9 @@ from tests.sim_worker.places import (
 
 CAR = load_vehicle()
 PLANNERS = ("pure_pursuit_idm",)
-NOMINAL = (Variant(index=0, name="nominal"),)
-ICE, LATE = Faults(friction_factor=0.3), Faults(extra_steering_delay_s=0.4)
-TOO_LATE = Faults(extra_steering_delay_s=1.0)
+NOMINAL = (Future(index=0, name="nominal"),)
+ICE, LATE = {"friction_factor": 0.3}, {"extra_steering_delay_s": 0.4}
+TOO_LATE = {"extra_steering_delay_s": 1.0}
 HAPPENINGS = tuple(catalogue()[name] for name in ("scp", "cccscp", "lead_stopping", "cbta"))
 
 
@@ -41,8 +41,8 @@ def stage() -> Stage:
 
 
 @pytest.fixture(scope="module")
-def round_of_64() -> tuple[Variant, ...]:
-    return plan_variants(count=64, seed=0, planners=PLANNERS, scenarios=HAPPENINGS)
+def round_of_64() -> tuple[Future, ...]:
+    return plan_futures(count=64, seed=0, planners=PLANNERS, scenarios=HAPPENINGS)
 
 
 def _ends(result: FuturesResult) -> np.ndarray:  # type: ignore[type-arg]
@@ -62,7 +62,7 @@ def _ends(result: FuturesResult) -> np.ndarray:  # type: ignore[type-arg]
 )
 def test_at_least_48_of_64_futures_end_apart(
     stage: Stage,
-    round_of_64: tuple[Variant, ...],
+    round_of_64: tuple[Future, ...],
     setting: dict,  # type: ignore[type-arg]
 ) -> None:
     result = run_job(job(round_of_64, **setting), stage)
@@ -72,15 +72,15 @@ def test_at_least_48_of_64_futures_end_apart(
 
 @pytest.mark.parametrize("seed", [1, 12345])
 def test_futures_differ_with_any_seed(stage: Stage, seed: int) -> None:
-    variants = plan_variants(
+    futures = plan_futures(
         count=64, seed=seed, planners=(*PLANNERS, "constant_speed"), scenarios=HAPPENINGS
     )
-    result = run_job(job(variants), stage)
+    result = run_job(job(futures), stage)
     assert distinct_count(_ends(result)) >= 48
 
 
 def test_the_same_job_gives_the_same_bytes_again_and_on_another_stage(
-    stage: Stage, round_of_64: tuple[Variant, ...]
+    stage: Stage, round_of_64: tuple[Future, ...]
 ) -> None:
     question = job(round_of_64[:32], path=turning_path(), horizon_s=4.0)
     first = run_job(question, stage)
@@ -92,7 +92,7 @@ def test_the_same_job_gives_the_same_bytes_again_and_on_another_stage(
 
 
 def test_another_process_computes_the_same_bytes(
-    stage: Stage, round_of_64: tuple[Variant, ...], tmp_path: Path
+    stage: Stage, round_of_64: tuple[Future, ...], tmp_path: Path
 ) -> None:
     question = job(round_of_64[:16], horizon_s=3.0)
     assert stage.world is not None
@@ -101,12 +101,12 @@ def test_another_process_computes_the_same_bytes(
     program = (
         "import sys; from pathlib import Path; from foretwin.contracts.codec import read_message;"
         "from foretwin.contracts.world import World;"
-        "from foretwin.contracts.futures import FuturesJob;"
+        "from foretwin.contracts.futures import Job;"
         "from foretwin.sim_worker.futures.run_job import run_job, result_digest;"
         "from foretwin.sim_worker.batch.batch_simulation import Stage;"
         "from foretwin.sim_worker.vehicle.parameters import load_vehicle; d = Path(sys.argv[1]);"
         "s = Stage(read_message(d / 'world', World), load_vehicle(), nsim=16);"
-        "print(result_digest(run_job(read_message(d / 'job', FuturesJob), s)))"
+        "print(result_digest(run_job(read_message(d / 'job', Job), s)))"
     )
     there = subprocess.run(
         [sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=True
@@ -115,7 +115,7 @@ def test_another_process_computes_the_same_bytes(
 
 
 def test_a_future_does_not_depend_on_its_companions(
-    stage: Stage, round_of_64: tuple[Variant, ...]
+    stage: Stage, round_of_64: tuple[Future, ...]
 ) -> None:
     together = run_job(job(round_of_64[:32], horizon_s=4.0), stage).trajectory.states
     for chosen in (5, 7):
@@ -124,8 +124,8 @@ def test_a_future_does_not_depend_on_its_companions(
 
 
 def test_a_future_keeps_the_cars_present_offset_from_the_path(stage: Stage) -> None:
-    variants = (*NOMINAL, Variant(index=1, name="shift", lateral_shift_m=0.5))
-    result = run_job(job(variants, state=state_at(-50.0, -0.8)), stage)
+    futures = (*NOMINAL, Future(index=1, name="shift", numbers={"lateral_shift_m": 0.5}))
+    result = run_job(job(futures, state=state_at(-50.0, -0.8)), stage)
     assert result.trajectory.states[0, :, 1] == pytest.approx(np.full(81, -0.8), abs=0.02)
     assert result.trajectory.states[1, -1, 1] == pytest.approx(-0.3, abs=0.05)
 
@@ -156,20 +156,20 @@ def test_only_drops_of_the_speed_limit_ahead_count(stage: Stage) -> None:
 
 
 def test_low_friction_makes_a_future_slide_and_delay_makes_it_late(stage: Stage) -> None:
-    variants = (
-        Variant(index=0, name="n", planner="constant_speed"),
-        Variant(index=1, name="ice", planner="constant_speed", faults=ICE),
-        Variant(index=2, name="late", planner="constant_speed", faults=LATE),
+    futures = (
+        Future(index=0, name="n", planner="constant_speed"),
+        Future(index=1, name="ice", planner="constant_speed", numbers=ICE),
+        Future(index=2, name="late", planner="constant_speed", numbers=LATE),
     )
     state = state_at(-20.0, -1.5, speed=9.0)
-    question = job(variants, state=state, path=turning_path(), cruise=9.0, horizon_s=4.0)
+    question = job(futures, state=state, path=turning_path(), cruise=9.0, horizon_s=4.0)
     ends = _ends(run_job(question, stage))
     assert np.hypot(*(ends[1] - ends[0])) > 1.0
     assert np.hypot(*(ends[2] - ends[0])) > 0.1
 
 
 def test_a_building_in_the_way_is_a_collision_with_a_building(
-    round_of_64: tuple[Variant, ...],
+    round_of_64: tuple[Future, ...],
 ) -> None:
     walled = Stage(crossroads(buildings=(box(0.0, 0.0, 4.0, 20.0),)), CAR, nsim=8)
     outcome = run_job(job(NOMINAL), walled).outcome
@@ -182,8 +182,8 @@ def test_a_building_in_the_way_is_a_collision_with_a_building(
 def test_after_a_collision_with_a_road_user_the_car_stands_where_it_happened(
     stage: Stage,
 ) -> None:
-    variants = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
-    result = run_job(job(variants), stage)
+    futures = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
+    result = run_job(job(futures), stage)
     assert result.outcome.collision_with.tolist() == [0, 1]
     states = result.trajectory.states
     after = result.trajectory.time_s > result.outcome.collision_time_s[1] + 0.1
@@ -194,8 +194,8 @@ def test_after_a_collision_with_a_road_user_the_car_stands_where_it_happened(
 
 
 def test_an_accident_is_run_on_when_asked_for(stage: Stage) -> None:
-    variants = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
-    result = run_job(job(variants, accidents=True), stage)
+    futures = (*NOMINAL, happening(1, "cccscp", planner="constant_speed"))
+    result = run_job(job(futures, accidents=True), stage)
     (accident,) = result.accidents
     assert (accident.future, accident.road_user) == (1, 0)
     assert accident.time_s == pytest.approx(float(result.outcome.collision_time_s[1]))
@@ -227,8 +227,8 @@ def test_a_diverged_future_is_marked_and_spoils_no_other(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     stage = Stage(crossroads(), CAR, nsim=2)
-    variants = tuple(Variant(index=i, name=str(i)) for i in range(2))
-    sound = run_job(job(variants, horizon_s=2.0), stage)
+    futures = tuple(Future(index=i, name=str(i)) for i in range(2))
+    sound = run_job(job(futures, horizon_s=2.0), stage)
     seed = stage.seed
 
     def seed_badly(states: np.ndarray, **others: np.ndarray) -> None:  # type: ignore[type-arg]
@@ -237,7 +237,7 @@ def test_a_diverged_future_is_marked_and_spoils_no_other(
         seed(states, **others)
 
     monkeypatch.setattr(stage, "seed", seed_badly)
-    result = run_job(job(variants, horizon_s=2.0), stage)
+    result = run_job(job(futures, horizon_s=2.0), stage)
     assert result.outcome.valid.tolist() == [True, False]
     assert np.isnan(result.outcome.progress_m[1])
     assert np.isnan(result.outcome.min_clearance_m[1])
@@ -248,7 +248,7 @@ def test_a_diverged_future_is_marked_and_spoils_no_other(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Variant, ...]) -> None:
+def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Future, ...]) -> None:
     from foretwin.contracts.codec import decode, encode
 
     result = run_job(job(round_of_64[:8]), stage)
@@ -258,22 +258,20 @@ def test_a_result_survives_the_codec(stage: Stage, round_of_64: tuple[Variant, .
     assert back.outcome.collided.dtype == np.bool_
 
 
-def _altered(question: FuturesJob, **changes: object) -> FuturesJob:
-    return msgspec.structs.replace(question, **changes)
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
         ({"world_id": "elsewhere"}, "world elsewhere on a stage that holds crossroads"),
         ({"step_s": 0.07}, "step_s 0.07 must be a multiple"),
         ({"horizon_s": 0.05}, "horizon_s 0.05 must be a multiple"),
-        ({"variants": NOMINAL * 65}, "65 states for a stage of 64"),
-        ({"variants": (Variant(index=0, name="x", planner="magic"),)}, "unknown planner 'magic'"),
-        (
-            {"variants": (Variant(index=0, name="x", faults=Faults(extra_steering_delay_s=1.0)),)},
-            "longer than",
-        ),
+        ({"futures": NOMINAL * 65}, "65 states for a stage of 64"),
+        ({"futures": (Future(index=0, name="x", planner="magic"),)}, "unknown planner 'magic'"),
+        ({"futures": (Future(index=0, name="x", numbers=TOO_LATE),)}, "longer than"),
+        ({"futures": (Future(index=0, name="x", numbers={"mood": 1.0}),)}, "'mood'; known"),
+        ({"schema_version": 0}, "schema version 0; this foretwin plays version 1"),
+        ({"anchor": "wall"}, "knows neither"),
+        ({"model": {"mass": 1.0}}, "knows neither"),
+        ({"control_hz": 50.0}, "50 control ticks a second on a stage of 20"),
         ({"state": state_at(0.0, 0.0, speed=float("nan"))}, "not finite"),
     ],
 )
@@ -283,7 +281,7 @@ def test_a_job_that_cannot_be_done_says_why(
     said: str,
 ) -> None:
     with pytest.raises(ValueError, match=said):
-        run_job(_altered(job(NOMINAL), **changes), stage)
+        run_job(msgspec.structs.replace(job(NOMINAL), **changes), stage)
 
 
 def test_result_digest_ignores_who_computed_it(stage: Stage) -> None:

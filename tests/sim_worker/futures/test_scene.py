@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.drive import SignalState
-from foretwin.contracts.futures import Faults, FuturesJob, PathAhead, SeenRoadUser, Variant
+from foretwin.contracts.futures import Future, Job, PathAhead, SeenRoadUser
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
@@ -26,13 +26,13 @@ def stage() -> Stage:
     return Stage(crossroads(), CAR, nsim=8)
 
 
-def faulty(index: int, **faults: float) -> Variant:
-    return Variant(index=index, name=str(index), faults=Faults(**faults))
+def faulty(index: int, **faults: float) -> Future:
+    return Future(index=index, name=str(index), numbers=faults)
 
 
 def test_who_believes_to_be_farther_left_drives_farther_right(stage: Stage) -> None:
-    variants = (faulty(0), faulty(1, position_offset_m=0.6))
-    states = run_job(job(variants), stage).trajectory.states
+    futures = (faulty(0), faulty(1, position_offset_m=0.6))
+    states = run_job(job(futures), stage).trajectory.states
     assert states[1, -1, 1] - states[0, -1, 1] == pytest.approx(-0.6, abs=0.05)
 
 
@@ -40,8 +40,8 @@ def test_a_steering_offset_draws_a_car_aside_and_half_the_steering_turns_less(
     stage: Stage,
 ) -> None:
     aside = state_at(-50.0, -0.5)
-    shift = Variant(index=0, name="shift", lateral_shift_m=2.0)
-    weak = msgspec.structs.replace(shift, index=1, faults=Faults(steering_gain=0.5))
+    shift = Future(index=0, name="shift", numbers={"lateral_shift_m": 2.0})
+    weak = msgspec.structs.replace(shift, index=1, numbers=shift.numbers | {"steering_gain": 0.5})
     crooked = faulty(2, steering_offset_rad=0.02)
     states = run_job(job((shift, weak, crooked), state=aside, horizon_s=2.0), stage)
     y = states.trajectory.states[:, 10, 1]
@@ -54,11 +54,8 @@ def test_weak_brakes_end_in_the_car_ahead(stage: Stage) -> None:
     ahead = {"lead__speed_mps": 0.0, "lead__gap_m": 45.0}
     sound = happening(0, "lead_stopping", **ahead)
     weak = msgspec.structs.replace(
-        happening(1, "lead_stopping", **ahead), faults=Faults(brake_gain=0.3)
+        happening(1, "lead_stopping", **ahead), numbers={"brake_gain": 0.3}
     )
-    # A scenario's own faults count where it draws some; this one draws sound brakes.
-    values = {k: v for k, v in weak.values.items() if not k.startswith("faults.")}
-    weak = msgspec.structs.replace(weak, values=values)
     state = state_at(-59.0, -1.5, speed=18.0)
     outcome = run_job(job((sound, weak), state=state, cruise=18.0), stage).outcome
     assert outcome.collision_with.tolist() == [0, 1]
@@ -85,13 +82,13 @@ def detected(**changes: object) -> SeenRoadUser:
     return msgspec.structs.replace(car, **changes)
 
 
-def with_users(question: FuturesJob, *users: SeenRoadUser) -> FuturesJob:
+def with_users(question: Job, *users: SeenRoadUser) -> Job:
     return msgspec.structs.replace(question, road_users=users)
 
 
 def test_detected_road_users_are_part_of_every_future(stage: Stage) -> None:
-    variants = (faulty(0), Variant(index=1, name="careless", planner="constant_speed"))
-    result = run_job(with_users(job(variants), detected()), stage)
+    futures = (faulty(0), Future(index=1, name="careless", planner="constant_speed"))
+    result = run_job(with_users(job(futures), detected()), stage)
     assert result.outcome.collision_with.tolist() == [0, 1]
     assert result.road_users.poses.shape[2] == 1
     stands = result.road_users.poses[:, :, 0, :2]
@@ -116,17 +113,17 @@ def lit(tmp_path_factory: pytest.TempPathFactory) -> World:
     return mapped_crossroads(tmp_path_factory.mktemp("map"), centre={"highway": "traffic_signals"})
 
 
-def approach(world: World) -> tuple[FuturesJob, SceneMaker, Stage]:
+def approach(world: World) -> tuple[Job, SceneMaker, Stage]:
     """A job that drives east towards the lights, which are 60 m away."""
     path = straight_on(world, (1.0, 0.0))
     arc = float(path.locate(np.zeros((1, 2))).arc_m[0]) - 60.0
     pose = path.pose_at(np.array([arc]))
     start = np.array([[*pose.xy_m[0], pose.yaw_rad[0], 9.0, 0.0, 0.0, 0.0, 0.0]])
     arcs = np.arange(0.0, path.length_m)
-    question = FuturesJob(
+    question = Job(
         round_id=0, job_index=0, world_id=world.id, state=state_at(0.0, 0.0),
         path=PathAhead(xy_m=path.point_at(arcs), speed_limit_mps=np.full(len(arcs), 13.9)),
-        variants=(Variant(index=0, name="a"),), horizon_s=12.0, step_s=0.1, seed=0,
+        futures=(Future(index=0, name="a"),), horizon_s=12.0, step_s=0.1, seed=0,
         cruise_speed_mps=9.0, starts=start,
     )  # fmt: skip
     return question, SceneMaker(world), Stage(world, CAR, nsim=1)
@@ -159,15 +156,15 @@ def test_a_plan_that_no_map_tells_stops_nobody_unless_asked_for(lit: World) -> N
 
 
 def test_an_unknown_scenario_names_those_that_the_job_defines(stage: Stage) -> None:
-    variant = Variant(index=0, name="x", scenario_id="flood")
-    question = msgspec.structs.replace(job((faulty(0),)), variants=(variant,))
+    future = Future(index=0, name="x", scenario_id="flood")
+    question = msgspec.structs.replace(job((faulty(0),)), futures=(future,))
     with pytest.raises(ValueError, match="scenario 'flood'; the job defines none"):
         run_job(question, stage)
 
 
 def test_metrics_that_a_job_names_come_back_for_every_future(stage: Stage) -> None:
-    variants = (faulty(0), happening(1, "lead_stopping", planner="constant_speed", **STANDING_LEAD))
-    question = msgspec.structs.replace(job(variants), metrics=("ttc", "max_jerk", "on_road"))
+    futures = (faulty(0), happening(1, "lead_stopping", planner="constant_speed", **STANDING_LEAD))
+    question = msgspec.structs.replace(job(futures), metrics=("ttc", "max_jerk", "on_road"))
     metrics = run_job(question, stage).metrics
     assert set(metrics) == {"ttc", "max_jerk", "on_road"}
     assert np.isinf(metrics["ttc"][0])

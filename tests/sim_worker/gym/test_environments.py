@@ -183,7 +183,7 @@ def test_options_choose_the_scenario_its_values_and_the_case() -> None:
     job = env.course.rows.episodes.job
     assert info["case"] == 2
     assert job.world_id == world.id
-    assert {variant.scenario_id for variant in job.variants} == {"scp"}
+    assert {future.scenario_id for future in job.futures} == {"scp"}
     assert seen[env.course.features.index("speed")] == pytest.approx(7.0 / 20.0)
     again, _ = env.reset(seed=1, options={"case": 2})
     assert again.tobytes() == seen.tobytes()

@@ -13,7 +13,7 @@ from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import local_from_geo
-from foretwin.contracts.futures import Faults, PathAhead, SeenRoadUser, Variant
+from foretwin.contracts.futures import Future, PathAhead, SeenRoadUser
 from foretwin.contracts.world import World
 from foretwin.sim_worker.gym import JunctionEnv, JunctionVectorEnv
 from foretwin.telemetry.estimator.estimator import StateEstimator
@@ -65,7 +65,7 @@ def test_a_job_is_read_from_its_file_with_all_that_was_seen(tmp_path: Path) -> N
         kind="car", x_m=-20.0, y_m=-1.5, yaw_rad=0.0, speed_mps=0.0, length_m=4.5, width_m=1.8
     )
     question = msgspec.structs.replace(
-        job((Variant(index=0, name="nominal"), happening(1, "scp"))), road_users=(parked,)
+        job((Future(index=0, name="nominal"), happening(1, "scp"))), road_users=(parked,)
     )
     (tmp_path / "job").write_bytes(encode(question))
     (tmp_path / "world").write_bytes(encode(crossroads()))
@@ -99,11 +99,11 @@ def test_a_building_in_the_way_ends_an_episode() -> None:
 
 
 def test_faults_of_a_future_act_in_its_row_alone() -> None:
-    variants = (
-        Variant(index=0, name="sound"),
-        Variant(index=1, name="weak brakes", faults=Faults(brake_gain=0.3)),
+    futures = (
+        Future(index=0, name="sound"),
+        Future(index=1, name="weak brakes", numbers={"brake_gain": 0.3}),
     )
-    envs = JunctionVectorEnv(2, crossroads(), job=job(variants), control="along_path")
+    envs = JunctionVectorEnv(2, crossroads(), job=job(futures), control="along_path")
     speeds = []
     for seed in range(8):
         _, infos = envs.reset(seed=seed)
@@ -123,7 +123,7 @@ def test_a_row_among_law_abiding_road_users_is_an_environment_alone() -> None:
         )
         for x, y, yaw in ((1.5, -40.0, np.pi / 2), (-1.5, 35.0, -np.pi / 2), (-25.0, -1.5, 0.0))
     )
-    late = Variant(index=0, name="late", faults=Faults(perception_delay_s=0.4))
+    late = Future(index=0, name="late", numbers={"perception_delay_s": 0.4})
     question = msgspec.structs.replace(job((late, happening(1, "scp"))), road_users=seen)
     settings: dict[str, Any] = {"job": question, "control": "along_path", "horizon_s": 3.0}
     envs = JunctionVectorEnv(3, crossroads(), autoreset_mode="SameStep", **settings)
@@ -152,7 +152,7 @@ def test_what_does_not_fit_says_so() -> None:
     with pytest.raises(UserError, match="the job is for World crossroads; given is elsewhere"):
         JunctionEnv(
             msgspec.structs.replace(crossroads(), id="elsewhere"),
-            job=job((Variant(index=0, name="nominal"),)),
+            job=job((Future(index=0, name="nominal"),)),
         )
     with pytest.raises(UserError, match="recorded states need the path that lay ahead"):
         JunctionEnv(crossroads(), states=STATES)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from foretwin.contracts.futures import Variant
+from foretwin.contracts.futures import Future
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.planner_interface import Planner, RemembersWithinJob
@@ -237,19 +237,19 @@ def test_checking_leaves_no_process() -> None:
 def test_in_a_job_only_its_own_futures_fail(stage: Stage, name: str) -> None:
     planner = theirs(name)
     assert planner.pid is not None
-    variants = (
-        Variant(index=0, name="ours"),
-        Variant(index=1, name="theirs", planner=name),
-        Variant(index=2, name="careless", planner="constant_speed"),
+    futures = (
+        Future(index=0, name="ours"),
+        Future(index=1, name="theirs", planner=name),
+        Future(index=2, name="careless", planner="constant_speed"),
     )
     begun = time.monotonic()
     with kept_waiting(planner.pid) as kept:
-        together = run_job(job(variants, horizon_s=2.0), stage)
+        together = run_job(job(futures, horizon_s=2.0), stage)
     assert time.monotonic() - begun - kept.seconds < 9.0
     assert together.outcome.valid.tolist() == [True, False, True]
     assert f"planner {name!r} at 0.5 s: " in together.outcome.failures[1]
     assert together.outcome.failures[0] == together.outcome.failures[2] == ""
-    alone = run_job(job((variants[0], variants[2]), horizon_s=2.0), stage)
+    alone = run_job(job((futures[0], futures[2]), horizon_s=2.0), stage)
     assert np.array_equal(together.trajectory.states[[0, 2]], alone.trajectory.states)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import decode, encode
-from foretwin.contracts.futures import FuturesJob, RecordedRoadUser, Variant
+from foretwin.contracts.futures import Future, Job, RecordedRoadUser
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.metrics.table import METRICS
@@ -44,9 +44,9 @@ def _moving(
     )  # fmt: skip
 
 
-def _job(*users: RecordedRoadUser, planners: tuple[str, ...] = ("constant_speed",)) -> FuturesJob:
-    variants = tuple(Variant(index=i, name=p, planner=p) for i, p in enumerate(planners))
-    return msgspec.structs.replace(job(variants), replayed=users)
+def _job(*users: RecordedRoadUser, planners: tuple[str, ...] = ("constant_speed",)) -> Job:
+    futures = tuple(Future(index=i, name=p, planner=p) for i, p in enumerate(planners))
+    return msgspec.structs.replace(job(futures), replayed=users)
 
 
 def test_a_standing_car_is_touched_when_the_way_is_driven(stage: Stage) -> None:
@@ -92,14 +92,14 @@ def test_planners_drive_and_all_metrics_are_told_among_those_who_come_and_go(sta
     assert np.nanmax(result.metrics["required_deceleration"]) < 20.0
     assert (result.metrics["min_clearance"] < 30.0).all()
     assert result_digest(result) == result_digest(run_job(question, stage))
-    again = decode(encode(question), FuturesJob).message
+    again = decode(encode(question), Job).message
     assert result_digest(run_job(again, stage)) == result_digest(result)
 
 
 def test_scenarios_and_seen_road_users_come_after_them(stage: Stage) -> None:
     lead = _moving("lead", np.arange(0.0, 9.0, 0.5), (60.0, 40.0), 0.0, 0.0)
     meets = happening(1, "scp", planner="constant_speed")
-    question = job((Variant(index=0, name="alone"), meets), accidents=True)
+    question = job((Future(index=0, name="alone"), meets), accidents=True)
     before = run_job(question, stage)
     after = run_job(msgspec.structs.replace(question, replayed=(lead,)), stage)
     assert after.road_users.poses[:, :, 1:] == pytest.approx(before.road_users.poses, nan_ok=True)

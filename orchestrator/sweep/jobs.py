@@ -1,0 +1,103 @@
+"""The jobs of a sweep, as a live round makes them, and what rows say of their cells."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.futures import Future, FuturesResult, Job
+from foretwin.contracts.job_identity import vehicle_digest
+from foretwin.orchestrator.sweep.plan import Cell, SweepJob, WorldPlaces
+from foretwin.orchestrator.sweep.road_users import NOBODY, others_at
+from foretwin.orchestrator.sweep.spec import AS_RECORDED, STEP_S, Loaded
+from foretwin.sim_worker.futures.future_rows import Row, future_rows
+
+
+class JobMaker:
+    """Makes jobs of what the plan names: a function of the spec and of where it takes place."""
+
+    def __init__(self, loaded: Loaded, worlds: tuple[WorldPlaces, ...]) -> None:
+        self._loaded = loaded
+        self._scenarios = {scenario.id: scenario for scenario in loaded.scenarios}
+        self._worlds = {world.world_id: world for world in worlds}
+        self._vehicles = {n: vehicle_digest(vehicle) for n, vehicle in loaded.vehicles.items()}
+
+    def job(self, planned: SweepJob) -> Job:
+        """Return the job whose futures are the cells, in their order."""
+        spec, cells = self._loaded.spec, planned.cells
+        names = sorted({cell.scenario_id for cell in cells} - {AS_RECORDED})
+        return Job(
+            round_id=0,
+            job_index=planned.number,
+            world_id=planned.world_id,
+            futures=tuple(_future(i, cell, planned.planner) for i, cell in enumerate(cells)),
+            horizon_s=planned.horizon_s,
+            step_s=STEP_S,
+            seed=spec.seed,
+            scenarios=tuple(self._scenarios[name] for name in names),
+            lights_by_plan=spec.lights_by_plan,
+            metrics=spec.metrics,
+            accidents=spec.accidents,
+            vehicle=self._vehicles[planned.vehicle],
+            control_hz=spec.control_hz,
+            **(self._staged(planned) if cells[0].start is None else self._recorded(planned)),
+        )
+
+    def _staged(self, planned: SweepJob) -> dict[str, Any]:
+        """Return how staged futures begin: each where its case says, nobody measured a car."""
+        world, first = self._worlds[planned.world_id], planned.cells[0]
+        return {
+            "state": VehicleState(
+                vehicle_id=planned.vehicle, stamp_ns=0, position=world.frame.origin,
+                yaw_rad=0.0, speed_mps=0.0, yaw_rate_radps=0.0, accel_mps2=0.0,
+            ),
+            "path": world.ways[first.ego],
+            "cruise_speed_mps": first.values["ego.speed_mps"],
+        }  # fmt: skip
+
+    def _recorded(self, planned: SweepJob) -> dict[str, Any]:
+        """Return how futures begin where a car was; those who meet it are timed to it."""
+        loaded, frame = self._loaded, self._worlds[planned.world_id].frame
+        start = loaded.starts[planned.cells[0].start or 0]
+        path, others = start.path(frame), NOBODY
+        if loaded.road_users is not None and loaded.spec.recorded is not None:
+            others = others_at(
+                loaded.road_users, loaded.spec.recorded.road_users, start.state, frame,
+                horizon_s=planned.horizon_s, way_xy_m=path.xy_m,
+            )  # fmt: skip
+        return {
+            "state": start.state, "path": path, "cruise_speed_mps": start.cruise_speed_mps,
+            "drive_time_s": start.drive_time_s, "road_users": others.predicted,
+            "replayed": others.replayed,
+        }  # fmt: skip
+
+
+def _future(index: int, cell: Cell, planner: str) -> Future:
+    drives_on = cell.scenario_id == AS_RECORDED
+    return Future(
+        index=index, name=f"{cell.scenario_id} {cell.case}", planner=planner,
+        numbers=cell.parameters, scenario_id="" if drives_on else cell.scenario_id,
+        values={} if drives_on else cell.values, place_rank=cell.rank,
+        place=cell.place if cell.start is None else "",
+    )  # fmt: skip
+
+
+def cell_rows(
+    planned: SweepJob,
+    job: Job,
+    sha256: str,
+    result: FuturesResult | None,
+    *,
+    failure: str = "",
+) -> list[Row]:
+    """Return the rows of a job's cells; without a result, all say why they failed."""
+    rows = future_rows(job, result, job_sha256=sha256)
+    for row, cell in zip(rows, planned.cells, strict=True):
+        row |= {
+            "cell": cell.number, "case": cell.case, "junction_id": cell.junction_id,
+            "scenario": cell.scenario_id, "place": cell.place, "vehicle": planned.vehicle,
+            "worker_id": None,
+        }  # fmt: skip
+        if failure:
+            row["failure"] = failure
+    return rows

@@ -1,0 +1,87 @@
+"""The table of a future's numbers: what it says holds in code, files and documentation."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from foretwin.contracts.futures import Future, numbers_of
+from foretwin.contracts.numbers import FUTURE_NUMBERS, SCENARIO_NUMBERS, out_of_range
+from foretwin.contracts.scenario import ActorPart, EgoPart, FaultPart, Number, Scenario
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results.md"
+
+
+def test_every_number_of_a_scenario_has_a_row() -> None:
+    fields = {
+        field.name
+        for part in (EgoPart, ActorPart)
+        for field in msgspec.structs.fields(part)
+        if field.type == Number
+    }
+    assert fields == set(SCENARIO_NUMBERS)
+    faults = {name for name, row in FUTURE_NUMBERS.items() if row.part == "fault"}
+    assert set(FaultPart.__struct_fields__) == faults
+    scenario = Scenario(id="a", title="a", shows="a", source="a")
+    assert hash(scenario) == hash(msgspec.structs.replace(scenario)), "scenarios are keys"
+
+
+def test_neutral_numbers_are_in_range_and_change_nothing() -> None:
+    for name, row in FUTURE_NUMBERS.items():
+        assert out_of_range(name, row.neutral, row.neutral) == ""
+        assert row.joined(0.25, row.neutral) == 0.25
+    nothing = numbers_of(Future(index=0, name="nominal"))
+    assert nothing == {name: row.neutral for name, row in FUTURE_NUMBERS.items()}
+
+
+def test_a_futures_own_numbers_join_those_of_its_scenario() -> None:
+    future = Future(
+        index=0, name="both", scenario_id="scp",
+        values={"faults.friction_factor": 0.5, "faults.perception_delay_s": 0.2},
+        numbers={"friction_factor": 0.5, "perception_delay_s": 0.1, "target_speed_factor": 1.1},
+    )  # fmt: skip
+    found = numbers_of(future)
+    assert (found["friction_factor"], found["perception_delay_s"]) == (0.25, 0.2 + 0.1)
+    assert (found["target_speed_factor"], found["brake_gain"]) == (1.1, 1.0)
+    alone = numbers_of(msgspec.structs.replace(future, scenario_id=""))
+    assert alone["friction_factor"] == 0.5, "values belong to a scenario"
+
+
+@pytest.mark.parametrize(
+    ("name", "least", "most", "said"),
+    [
+        ("friction_factor", 0.0, 1.0, "reaches 0; it must be above 0"),
+        ("brake_gain", 0.0, 1.0, ""),
+        ("brake_gain", -0.5, 1.0, "reaches -0.5; it must be 0 or more"),
+        ("extra_steering_delay_s", 0.0, 0.5, "reaches 0.5; it must be from 0 to 0.4"),
+        ("impact_share", -0.1, 1.0, "reaches -0.1; it must be from 0 to 1"),
+        ("lateral_shift_m", -9.0, math.inf, "must be finite"),
+    ],
+)
+def test_what_is_out_of_range_is_said(name: str, least: float, most: float, said: str) -> None:
+    assert out_of_range(name, least, most) == said
+
+
+def test_the_documentation_has_the_same_table() -> None:
+    told = [line for line in RESULTS.read_text(encoding="utf-8").splitlines() if "`" in line]
+    for name, row in FUTURE_NUMBERS.items():
+        line = next(line for line in told if line.startswith(f"| `{name}` |"))
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        assert cells[1:] == [row.unit, _range(name), _operation(name), row.meaning]
+
+
+def _range(name: str) -> str:
+    row = FUTURE_NUMBERS[name]
+    if math.isfinite(row.high):
+        return f"{row.low:g} to {row.high:g}"
+    if math.isfinite(row.low):
+        return f"above {row.low:g}" if row.above_low else f"{row.low:g} or more"
+    return "any"
+
+
+def _operation(name: str) -> str:
+    row = FUTURE_NUMBERS[name]
+    return f"{'times' if row.operation == 'multiply' else 'added to'} `{row.acts_on}`"

@@ -1,0 +1,110 @@
+"""A recorded future is played again to the same bits, or it is said why it cannot be."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.commands.sweep import run_sweep
+from foretwin.orchestrator.record.job_tables import JOB_TABLES
+from foretwin.orchestrator.sweep.spec import load_spec
+from tests.orchestrator.sweeps import SMALL, Alone, small_sweep
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("swept")
+    spec = small_sweep(folder, SMALL.replace("horizon_s = 5.0", "horizon_s = 2.0"))
+    loaded = load_spec(spec)
+    run_sweep(loaded, folder / "out", Alone(loaded))
+    return folder / "out"
+
+
+@pytest.fixture
+def copied(swept: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(swept, tmp_path / "copied"))
+
+
+def _rows(folder: Path) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = pq.read_table(folder / "rows").to_pylist()
+    return rows
+
+
+def _said(capsys: pytest.CaptureFixture[str]) -> str:
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    return line
+
+
+def test_every_future_of_a_sweep_comes_to_the_same(
+    swept: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = _rows(swept)
+    assert len({row["future_id"] for row in rows}) == len(rows)
+    for row in rows[:: len(rows) // 4]:
+        assert run(["repeat", str(swept), row["future_id"], "--json"]) == 0
+        assert json.loads(capsys.readouterr().out) == {
+            "future": row["future_id"], "recorded_sha256": row["trajectory_sha256"],
+            "sha256": row["trajectory_sha256"], "equal": True,
+        }  # fmt: skip
+
+
+def test_it_can_be_looked_at(swept: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    future = _rows(swept)[0]["future_id"]
+    assert run(["repeat", str(swept), future, "--view"]) == 0
+    picture = swept / "repeated" / f"{future}.png"
+    assert str(picture) in capsys.readouterr().out
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def _rewritten(folder: Path, table: str, metadata: dict[str, str], **columns: Any) -> None:
+    """Write all parts of a table of a sweep again, with other values and other metadata."""
+    for part in (folder / table).glob("*.parquet"):
+        old = pq.read_table(part)
+        rows = [row | columns for row in old.to_pylist()]
+        said = {k.decode(): v.decode() for k, v in old.schema.metadata.items()} | metadata
+        name = "futures" if table == "rows" else table
+        schema = JOB_TABLES[name].with_metadata(said)
+        pq.write_table(type(old).from_pylist(rows, schema=schema), part)
+
+
+def test_what_comes_to_something_else_is_3(copied: Path) -> None:
+    future = _rows(copied)[0]["future_id"]
+    _rewritten(copied, "rows", {}, trajectory_sha256="0" * 64)
+    assert run(["repeat", str(copied), future]) == 3
+
+
+@pytest.mark.parametrize(
+    ("table", "metadata", "columns", "said"),
+    [
+        ("rows", {"result_schema": "0"}, {}, "another foretwin (schema of results 0"),
+        ("jobs", {"versions": '{"python": "2.7"}'}, {}, "recorded with python 2.7, here is"),
+        ("rows", {"processor": "abacus"}, {}, "recorded on abacus, this is"),
+        ("rows", {}, {"planner": "remote"}, "driven by 'remote' in another process"),
+        ("rows", {}, {"trajectory_sha256": None, "left_out": "no room"}, "not played: no room"),
+        ("jobs", {}, {"job": b"other"}, "is damaged"),
+    ],
+)
+def test_what_cannot_be_repeated_is_told_in_one_line(
+    copied: Path, table: str, metadata: dict[str, str], columns: dict[str, Any], said: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    future = _rows(copied)[0]["future_id"]
+    _rewritten(copied, table, metadata, **columns)
+    assert run(["repeat", str(copied), future]) == 2
+    assert said in _said(capsys)
+
+
+def test_what_is_not_there_is_told(
+    swept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["repeat", str(swept), "nobody-1"]) == 2
+    assert "no future_id 'nobody-1'" in _said(capsys)
+    assert run(["repeat", str(tmp_path), "nobody-1"]) == 2
+    assert "neither of a run nor a sweep" in _said(capsys)
