@@ -17,7 +17,7 @@ from foretwin.contracts.frames import (
 )
 from foretwin.contracts.simulation import Comparison
 from foretwin.orchestrator.config import HORIZONS_S
-from foretwin.orchestrator.rounds.dispatch import RoundDone
+from foretwin.orchestrator.rounds.open_rounds import RoundDone
 from foretwin.sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 
 LEAD_NS = 1_000_000_000

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.codec import content_bytes, write_message
-from foretwin.contracts.futures import Future, FuturesResult, Job
+from foretwin.contracts.futures import Future, FuturesResult
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
