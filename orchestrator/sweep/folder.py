@@ -12,7 +12,7 @@ import msgspec
 from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.placement import WorldPlaces
-from foretwin.orchestrator.record.job_tables import RESULT_SCHEMA_VERSION, VEHICLES
+from foretwin.orchestrator.record.job_tables import REPEATED, RESULT_SCHEMA_VERSION, VEHICLES
 from foretwin.orchestrator.record.versions import versions
 from foretwin.orchestrator.sweep.road_users import digest_of
 from foretwin.orchestrator.sweep.rows import FOLDERS, METRICS_FILE
@@ -139,5 +139,5 @@ def _clear(path: Path) -> None:
         return
     for name in (SUMMARY, PLAN, LOG, METRICS_FILE):
         (path / name).unlink(missing_ok=True)
-    for name in (*FOLDERS.values(), VEHICLES, WORLDS):
+    for name in (*FOLDERS.values(), VEHICLES, WORLDS, REPEATED):
         shutil.rmtree(path / name, ignore_errors=True)
