@@ -17,6 +17,7 @@ from foretwin.contracts.setup import BusSetup, WorkerSetup
 from foretwin.orchestrator.drive.supervisor import (
     Death,
     FreshInterpreter,
+    Launcher,
     Supervisor,
     WhenDead,
     fold_stderr,
@@ -51,7 +52,13 @@ class WorkerProcesses:
     """
 
     def __init__(
-        self, count: int, setup: WorkerSetup, *, task_timeout_s: float, folder: Path
+        self,
+        count: int,
+        setup: WorkerSetup,
+        *,
+        task_timeout_s: float,
+        folder: Path,
+        launch: Launcher | None = None,
     ) -> None:
         self._count, self._timeout_s, self._folder = count, task_timeout_s, folder
         self._setup = msgspec.structs.replace(
@@ -59,7 +66,7 @@ class WorkerProcesses:
         )
         self._bus: ZenohBus | None = None
         self._mailbox = Mailbox(_MAILBOX_DEPTH)
-        self._supervisor = Supervisor(FreshInterpreter(folder))
+        self._supervisor = Supervisor(FreshInterpreter(folder) if launch is None else launch)
         self._answers: deque[Answer] = deque()
         self._up: set[str] = set()
         self._failed_starts: dict[str, int] = {}
