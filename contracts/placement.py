@@ -9,7 +9,6 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.scenario import Scenario
-from foretwin.contracts.vehicle import VehicleParameters
 
 AS_RECORDED = "as_recorded"
 """Id of the scenario that adds nobody to those who were around a recorded car."""
@@ -67,7 +66,7 @@ class RecordedStart(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PlaceRequest(msgspec.Struct, frozen=True, kw_only=True):
-    """Where do these scenarios take place in this World, for this vehicle?
+    """Where do these scenarios take place in this World, for the vehicle of this digest?
 
     At most `most` places of a scenario at one junction, or on one recorded way: with `starts`, by
     their numbers, only what can happen on these counts.
@@ -75,6 +74,6 @@ class PlaceRequest(msgspec.Struct, frozen=True, kw_only=True):
 
     world_id: str
     scenarios: tuple[Scenario, ...]
-    vehicle: VehicleParameters
+    vehicle: str
     most: int
     starts: dict[int, RecordedStart] = {}

@@ -99,7 +99,8 @@ class FuturesWorker:
         self._id = setup.process_id
         self._worlds_dir = Path(setup.worlds_dir)
         self._stages = self._cache(setup, setup.vehicle)
-        self._swept = {vehicle_digest(v): self._cache(setup, v) for v in setup.swept_vehicles}
+        self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
+        self._swept = {name: self._cache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
         self._answers: dict[str, Callable[[msgspec.Struct], msgspec.Struct]] = {
             "prepare": self._prepare,
@@ -162,7 +163,8 @@ class FuturesWorker:
 
     def _place(self, question: msgspec.Struct) -> WorldPlaces:
         assert isinstance(question, PlaceRequest)
-        return places_in(load_world(self._worlds_dir, question.world_id), question)
+        world = load_world(self._worlds_dir, question.world_id)
+        return places_in(world, question, self._vehicles[question.vehicle])
 
 
 def warm_up(stage: Stage) -> None:

@@ -13,6 +13,7 @@ from foretwin.contracts.placement import (
     PlaceRequest,
     WorldPlaces,
 )
+from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.scenarios.live import LiveScenarios
@@ -20,15 +21,15 @@ from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 
 
-def places_in(world: World, asked: PlaceRequest) -> WorldPlaces:
-    """Return where the scenarios asked for take place in a World."""
+def places_in(world: World, asked: PlaceRequest, vehicle: VehicleParameters) -> WorldPlaces:
+    """Return where the scenarios asked for take place in a World, for a vehicle."""
     network = RoadNetwork(world)
     if asked.starts:
-        return _places_recorded(network, asked)
+        return _places_recorded(network, asked, vehicle)
     placed, unplaced = [], []
     ways: dict[str, PathAhead] = {}
     for scenario in asked.scenarios:
-        found = places(scenario, world, network=network, vehicle=asked.vehicle, most=asked.most)
+        found = places(scenario, world, network=network, vehicle=vehicle, most=asked.most)
         for place in found.places:
             placed.append(
                 PlacedHere(
@@ -52,7 +53,9 @@ def places_in(world: World, asked: PlaceRequest) -> WorldPlaces:
     )  # fmt: skip
 
 
-def _places_recorded(network: RoadNetwork, asked: PlaceRequest) -> WorldPlaces:
+def _places_recorded(
+    network: RoadNetwork, asked: PlaceRequest, vehicle: VehicleParameters
+) -> WorldPlaces:
     """Return which scenarios can happen on the ways that a recorded car took from its starts."""
     world, known = network.world, LiveScenarios(network)
     placed, unplaced = [], []
@@ -62,7 +65,7 @@ def _places_recorded(network: RoadNetwork, asked: PlaceRequest) -> WorldPlaces:
             world.frame, start.state.position.lat_deg, start.state.position.lon_deg
         )
         arc = path.locate(np.asarray(here)[None])
-        passage = known.on(path, float(arc.arc_m[0]), asked.vehicle).passage
+        passage = known.on(path, float(arc.arc_m[0]), vehicle).passage
         for scenario in asked.scenarios:
             name = f"round {start.round_id}"
             if scenario.id == AS_RECORDED:
