@@ -78,6 +78,11 @@ class HorizonError(msgspec.Struct, frozen=True, kw_only=True):
     heading_rad: float
 
 
+HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
+"""How far ahead predictions, and a model run freely, are compared with the drive. Chosen: doubled
+from a moment to a whole manoeuvre."""
+
+
 class Comparison(msgspec.Struct, frozen=True, kw_only=True):
     """The nominal future of a round against what the car did, with two baselines."""
 

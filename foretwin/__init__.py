@@ -1,5 +1,81 @@
 """foretwin: a low-fidelity digital twin that drives ahead of a real car.
 
+What a notebook needs, each name loaded when it is first used:
+
+    import foretwin
+
+    town = foretwin.open_map("town.osm")
+    world = town.world(town.intersections[0].id)
+    way = foretwin.ways_through(world)[0]
+    futures = foretwin.run_futures(world, way, foretwin.state_on(world, way), count=32)
+    futures.table["min_clearance_m"]
+
+Metres, seconds, radians; x east, y north in a World's own frame, yaw counter-clockwise from east.
+A car's pose is that of its rear axle's centre on the ground. Mistakes in what is given are
+`UserError`, in one line.
+
 The rooms (`foretwin.contracts`, `foretwin.world_gen` and so on) stand at the top level of the
 repository; the links beside this file let an editable install find them under this name.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from foretwin.contracts.drive import VehicleState
+    from foretwin.contracts.errors import UserError
+    from foretwin.contracts.futures import Future
+    from foretwin.contracts.scenario import Scenario
+    from foretwin.contracts.vehicle import VehicleParameters
+    from foretwin.contracts.world import World
+    from foretwin.maps import Map, export_formats, export_world, open_map, read_world, save_world
+    from foretwin.recordings import Recording, open_run, open_sweep
+    from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView
+    from foretwin.sim_worker.planners.registry import planner_names
+    from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
+    from foretwin.sim_worker.scenarios.ways import Way
+    from foretwin.sim_worker.vehicle.parameters import load_vehicle
+    from foretwin.simulation import Futures, run_futures, state_on, ways_through
+
+_FROM = {
+    "foretwin.contracts.drive": ("VehicleState",),
+    "foretwin.contracts.errors": ("UserError",),
+    "foretwin.contracts.futures": ("Future",),
+    "foretwin.contracts.scenario": ("Scenario",),
+    "foretwin.contracts.vehicle": ("VehicleParameters",),
+    "foretwin.contracts.world": ("World",),
+    "foretwin.maps": (
+        "Map", "export_formats", "export_world", "open_map", "read_world", "save_world",
+    ),
+    "foretwin.recordings": ("Recording", "open_run", "open_sweep"),
+    "foretwin.sim_worker.planner_interface": ("Planner", "PlannerOutput", "PlannerView"),
+    "foretwin.sim_worker.planners.registry": ("planner_names",),
+    "foretwin.sim_worker.scenarios.reading": ("catalogue", "find_scenario", "read_scenario"),
+    "foretwin.sim_worker.scenarios.ways": ("Way",),
+    "foretwin.sim_worker.vehicle.parameters": ("load_vehicle",),
+    "foretwin.simulation": ("Futures", "run_futures", "state_on", "ways_through"),
+}  # fmt: skip
+_MODULE_OF = {name: module for module, names in _FROM.items() for name in names}
+
+__all__ = [
+    "Future", "Futures", "Map", "Planner", "PlannerOutput", "PlannerView", "Recording", "Scenario",
+    "UserError", "VehicleParameters", "VehicleState", "Way", "World", "catalogue",
+    "export_formats", "export_world", "find_scenario", "load_vehicle", "open_map", "open_run",
+    "open_sweep", "planner_names", "read_scenario", "read_world", "run_futures", "save_world",
+    "state_on", "ways_through",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Load a name of the face on first use: importing one room must not load the others."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'foretwin' has no attribute {name!r}")
+    value = getattr(import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

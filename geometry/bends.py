@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import left_of
 from foretwin.geometry.polyline_batch import Polylines
 
 MIN_STEP_M = 0.25
@@ -138,7 +139,7 @@ def rounded_through(lines: Polylines, radius_m: Array, before: Array, after: Arr
     turned[cut] = angle[at[cut]] / 2.0
     from_centre[cut] *= np.cos(chord_rad[cut] / 2.0)
     ahead = into[at]
-    inward = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) * np.sign(bend)[at][:, None]
+    inward = left_of(ahead) * np.sign(bend)[at][:, None]
     points = xy[at] - ahead * np.where(arc, tangent, 0.0)[at][:, None]
     points += ahead * (from_centre * np.sin(turned))[:, None]
     points += inward * (radius - from_centre * np.cos(turned))[:, None]

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry import compiled
+from foretwin.geometry.polyline import apart, arc_lengths
 
 SPACING_M = 1.0
 """Between nodes. As it is one metre, an arc length less that of the first node is a place."""
@@ -62,12 +63,11 @@ class FrenetPath:
         points = np.asarray(xy_m, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise ValueError(f"a path needs finite points (N, 2), not shape {points.shape}")
-        steps = np.hypot(*np.diff(points, axis=0).T)
-        keep = np.concatenate([[True], steps > 1e-6])
+        keep = apart(points, tolerance_m=1e-6)
         points = points[keep]
         if len(points) < 2:
             raise ValueError("a path needs at least two distinct points")
-        arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        arc = arc_lengths(points)
         self.length_m = float(arc[-1])
 
         before, after = int(before_m / SPACING_M), int((self.length_m + _AFTER_M) / SPACING_M)

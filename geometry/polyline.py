@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 
-_MITRE_LIMIT = 2.0
+Flags = npt.NDArray[np.bool_]
+MITRE_LIMIT = 2.0
+"""At bends a parallel is at most so many times its distance away."""
 
 
 def arc_lengths(xy_m: Array) -> Array:
@@ -26,9 +30,13 @@ def without_repeats(xy_m: Array, *, tolerance_m: float = 0.01) -> Array:
     """Return the polyline without points closer than `tolerance_m` to the one before."""
     if len(xy_m) < 2:
         return xy_m
-    keep = np.concatenate([[True], np.hypot(*np.diff(xy_m, axis=0).T) > tolerance_m])
-    kept: Array = xy_m[keep]
+    kept: Array = xy_m[apart(xy_m, tolerance_m=tolerance_m)]
     return kept
+
+
+def apart(xy_m: Array, *, tolerance_m: float) -> Flags:
+    """Return (N,) whether points are farther than `tolerance_m` from the one before."""
+    return np.concatenate([[True], np.hypot(*np.diff(xy_m, axis=0).T) > tolerance_m])
 
 
 def points_at(xy_m: Array, at_m: Array | float) -> Array:
@@ -74,6 +82,28 @@ def left_of(direction: Array) -> Array:
     return np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
 
 
+class Mitres(NamedTuple):
+    """Rays across a polyline that its parallels share: unit vectors (N - 1, 2) along its segments,
+    (N, 2) to the left at its points, and (N,) how much farther a parallel is there."""
+
+    directions: Array
+    normal: Array
+    stretch: Array
+
+
+def mitres(xy_m: Array, *, before: Array | None = None, after: Array | None = None) -> Mitres:
+    """Return the rays at the points (N, 2) of a polyline, as `offset` continues its ends."""
+    d = np.diff(xy_m, axis=0)
+    d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
+    incoming = np.concatenate([d[:1] if before is None else before[None], d])
+    outgoing = np.concatenate([d, d[-1:] if after is None else after[None]])
+    normal = left_of(incoming) + left_of(outgoing)
+    norm = np.hypot(normal[:, 0], normal[:, 1])
+    normal = np.where(norm[:, None] > 0.2, normal / np.maximum(norm, 0.2)[:, None], left_of(d[[0]]))
+    stretch = 1.0 / np.maximum((normal * left_of(outgoing)).sum(axis=1), 1.0 / MITRE_LIMIT)
+    return Mitres(d, normal, stretch)
+
+
 def offset(
     xy_m: Array,
     left_m: float,
@@ -88,18 +118,9 @@ def offset(
     """
     if abs(left_m) < 1e-9:
         return xy_m.copy()
-    d = np.diff(xy_m, axis=0)
-    d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
-    first = d[:1] if before is None else before[None]
-    last = d[-1:] if after is None else after[None]
-    incoming = np.concatenate([first, d])
-    outgoing = np.concatenate([d, last])
-    normal = left_of(incoming) + left_of(outgoing)
-    norm = np.hypot(normal[:, 0], normal[:, 1])
-    normal = np.where(norm[:, None] > 0.2, normal / np.maximum(norm, 0.2)[:, None], left_of(d[[0]]))
-    stretch = 1.0 / np.maximum((normal * left_of(outgoing)).sum(axis=1), 1.0 / _MITRE_LIMIT)
-    shifted = xy_m + normal * (left_m * stretch)[:, None]
-    return _without_backward_runs(shifted, d)
+    ray = mitres(xy_m, before=before, after=after)
+    shifted = xy_m + ray.normal * (left_m * ray.stretch)[:, None]
+    return _without_backward_runs(shifted, ray.directions)
 
 
 def _without_backward_runs(shifted: Array, directions: Array) -> Array:

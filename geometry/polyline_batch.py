@@ -15,9 +15,8 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import MITRE_LIMIT, left_of
 
-_MITRE_LIMIT = 2.0
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 
 
@@ -165,7 +164,7 @@ def offset(
     normal = left_of(into + out)
     norm = np.hypot(normal[:, 0], normal[:, 1])[:, None]
     normal = np.where(norm > 0.2, normal / np.maximum(norm, 0.2), at_start[lines.line])
-    stretch = 1.0 / np.maximum((normal * left_of(out)).sum(axis=1), 1.0 / _MITRE_LIMIT)
+    stretch = 1.0 / np.maximum((normal * left_of(out)).sum(axis=1), 1.0 / MITRE_LIMIT)
     shift = left_m[lines.line]
     shifted = np.where(
         (np.abs(shift) < 1e-9)[:, None],

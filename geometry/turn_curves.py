@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import left_of
 from foretwin.geometry.polyline_batch import Polylines
 
 LEAST_RADIUS_M = 4.0
@@ -96,7 +97,7 @@ def _one_arc(gap: Array, u: Array, v: Array, turn: Array, side: float) -> _Paths
     by_start, by_end = side * _cross(gap, v) / share, side * _cross(u, gap) / share
     radius = np.where(turn <= math.pi, np.minimum(by_start, by_end), np.maximum(by_start, by_end))
     sin, cos = np.sin(turn), 1.0 - np.cos(turn)
-    left = np.stack([-u[:, 1], u[:, 0]], axis=-1) * side
+    left = left_of(u) * side
     rest = gap - radius[:, None] * (sin[:, None] * u + cos[:, None] * left)
     before, behind = _dot(rest, u), _dot(rest, v)
     ahead = (np.abs(_cross(rest, u)) <= np.abs(_cross(rest, v)) + 1e-6) & (before > 0.0)
@@ -109,8 +110,8 @@ def _one_arc(gap: Array, u: Array, v: Array, turn: Array, side: float) -> _Paths
 
 def _two_arcs(gap: Array, u: Array, v: Array, side: float) -> _Paths:
     """Return two arcs of one radius, the first to `side`, the second back, that just touch."""
-    left_u = np.stack([-u[:, 1], u[:, 0]], axis=-1) * side
-    left_v = np.stack([-v[:, 1], v[:, 0]], axis=-1) * side
+    left_u = left_of(u) * side
+    left_v = left_of(v) * side
     # |gap - R (left_u + left_v)| = 2 R, solved for R.
     both = _dot(gap, left_u + left_v)
     quarter = np.maximum(2.0 - 2.0 * _dot(u, v), 0.0)

@@ -17,9 +17,6 @@ View = Literal["auto", "native", "web", "none"]
 MapAiding = Literal["auto", "off"]
 Source = Literal["auto", "log", "standin", "live"]
 
-HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
-"""The horizons at which the nominal future is compared with the drive."""
-
 
 class ConfigError(UserError):
     """A setting that cannot be used; the message names it and what would be right."""

@@ -9,7 +9,7 @@ import rerun as rr
 from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.contracts.side_by_side import Disagreement
-from foretwin.contracts.simulation import Comparison, PlanComparison, RoundView
+from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison, RoundView
 from foretwin.viewer.log_drive import PLAN
 from foretwin.viewer.log_roles import TWIN
 from foretwin.viewer.meshes import Colour
@@ -24,7 +24,6 @@ BASELINES: dict[str, tuple[Colour, str]] = {
     "constant_turn_rate": ((190, 190, 120), "constant turn rate"),
 }
 """Colour and name of each prediction that is compared with the real drive."""
-HORIZONS_S = (1, 2, 4, 8)
 
 FUTURE_POINTS = 33
 """Points drawn of each future; more only makes the file larger."""
@@ -35,7 +34,7 @@ def static_rows() -> list[Row]:
     """Return names and colours of the comparison's curves."""
     rows = [
         static(
-            f"comparison/ade_m/{horizon_s}/{name}",
+            f"comparison/ade_m/{horizon_s:g}/{name}",
             rr.SeriesLines(colors=colour, names=label, widths=2.0 if name == "nominal" else 1.2),
         )
         for horizon_s in HORIZONS_S

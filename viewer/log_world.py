@@ -11,6 +11,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local, target_from_source
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import World
+from foretwin.geometry.polyline import left_of
 from foretwin.viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
 from foretwin.viewer.rows import Row, path_part
 
@@ -57,17 +58,21 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
     junction = [place.area for place in world.junctions[:1] if place.area is not None]
     if surface:
         rows.append(
-            row("roads/surface", _archetype(
-                flat_mesh(move.polygons(surface), height_m=ROAD_HEIGHT_M, colour=ROAD)
-            ))
-        )  # fmt: skip
+            row(
+                "roads/surface",
+                _archetype(flat_mesh(move.polygons(surface), height_m=ROAD_HEIGHT_M, colour=ROAD)),
+            )
+        )
     if junction:
         inside = [Polygon(area.outline, area.holes) for area in junction]
         rows.append(
-            row("roads/junction", _archetype(
-                flat_mesh(move.polygons(inside), height_m=JUNCTION_HEIGHT_M, colour=JUNCTION)
-            ))
-        )  # fmt: skip
+            row(
+                "roads/junction",
+                _archetype(
+                    flat_mesh(move.polygons(inside), height_m=JUNCTION_HEIGHT_M, colour=JUNCTION)
+                ),
+            )
+        )
     edges = [
         offset_left(lane.centerline, side * lane.width_m.value / 2.0)
         for lane in world.lanes
@@ -134,7 +139,7 @@ def offset_left(line: Array, distance_m: float) -> Array:
     line = np.asarray(line, dtype=np.float64)
     along: Array = np.diff(line, axis=0)
     along /= np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
-    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    left = left_of(along)
     before, after = np.vstack([left[:1], left]), np.vstack([left, left[-1:]])
     # The mitre is (before + after) / (1 + cos of the bend).
     scale = np.maximum(1.0 + np.sum(before * after, axis=1), 0.5)

@@ -23,7 +23,7 @@ from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
 from foretwin.sim_worker.analysis.gap.verdict import Judge, without_manual_commands
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs.log import Log, Sample
 from foretwin.telemetry.logs.opening import open_log
 
@@ -68,12 +68,7 @@ def _measured(
     name: str,
     advance: Callable[[str], None],
 ) -> GapReport:
-    estimator = StateEstimator(
-        log.info,
-        wheelbase_m=vehicle.wheelbase_m.value,
-        steering_ratio=vehicle.steering_ratio.value,
-        steering_offset_rad=vehicle.steering_offset_rad.value,
-    )
+    estimator = estimator_of(log.info, vehicle)
     judge = Judge(log.info, vehicle, frame=frame)
     recorder = MotionRecorder(frame=frame, keep_s=1e6, depth=len(messages) + 1)
     states: list[VehicleState] = []

@@ -19,9 +19,10 @@ from foretwin.contracts.drive import (
     VehicleStatus,
 )
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.steering import column_of
 from foretwin.orchestrator.drive.telemetry_watch import TelemetryWatch, record
 from foretwin.orchestrator.record.bookkeeping import TelemetryCount
-from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import StateEstimator, estimator_of
 from foretwin.telemetry.estimator.map_aid import RoadLine
 
 
@@ -32,7 +33,7 @@ class LatestState(NamedTuple):
     receipt_mono_ns: int
 
 
-class Surroundings(NamedTuple):
+class LatestReports(NamedTuple):
     """The newest of what a car says besides its own motion; each with its own stamp."""
 
     plan: PlannedTrajectory | None
@@ -68,12 +69,7 @@ class Intake:
     def take_info(self, info: VehicleInfo) -> None:
         """Begin to estimate: what the vehicle says of itself is known."""
         self.info = info
-        self._estimator = StateEstimator(
-            info,
-            wheelbase_m=self._vehicle.wheelbase_m.value,
-            steering_ratio=self._vehicle.steering_ratio.value,
-            steering_offset_rad=self._vehicle.steering_offset_rad.value,
-        )
+        self._estimator = estimator_of(info, self._vehicle)
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Turn steering wheels into tyres with these parameters from now on."""
@@ -128,9 +124,11 @@ class Intake:
         wheel = state.steering_wheel_rad
         if self._vehicle is self._vehicle_at_start or wheel is None:
             return state
-        if state.tire_angle_rad != _tire_angle_rad(wheel, self._vehicle_at_start):
+        if state.tire_angle_rad != column_of(self._vehicle_at_start).tire_rad(wheel):
             return state  # measured, or from the motion
-        return msgspec.structs.replace(state, tire_angle_rad=_tire_angle_rad(wheel, self._vehicle))
+        return msgspec.structs.replace(
+            state, tire_angle_rad=column_of(self._vehicle).tire_rad(wheel)
+        )
 
     def _drive_ns(self, mono_ns: int) -> int | None:
         """Return our monotonic clock at the vehicle's pace, None in lock step."""
@@ -160,9 +158,9 @@ class Intake:
         return {**self.counts.record(self.skipped_invalid), **found, **_position_record(state)}
 
     @property
-    def surroundings(self) -> Surroundings:
+    def surroundings(self) -> LatestReports:
         """What the car last said of its plan, of other road users and of lights."""
-        return Surroundings(self.plan, self.road_users, tuple(self.signals.values()))
+        return LatestReports(self.plan, self.road_users, tuple(self.signals.values()))
 
     @property
     def start_stamp_ns(self) -> int:
@@ -190,10 +188,6 @@ def _position_record(state: VehicleState | None) -> dict[str, Any]:
         "position_from": ["gnss"] if state.map_shift_m is None else ["gnss", "map"],
         "position_std_m": None if std_m is None else round(std_m, 3),
     }
-
-
-def _tire_angle_rad(wheel_rad: float, vehicle: VehicleParameters) -> float:
-    return wheel_rad / vehicle.steering_ratio.value + vehicle.steering_offset_rad.value
 
 
 def unannounced(vehicle_id: str, first_stamp_ns: int) -> VehicleInfo:

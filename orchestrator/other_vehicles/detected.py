@@ -8,7 +8,7 @@ from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, wrap_angle
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 
 class DetectedBeside:

@@ -6,9 +6,8 @@ from typing import Protocol
 
 import msgspec
 
-from foretwin.contracts.drive import ControlCommand, VehicleInfo, VehicleState
+from foretwin.contracts.drive import ControlCommand, VehicleState
 from foretwin.contracts.roles import OtherVehicle
-from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.estimator import StateEstimator
 
 PERIOD_NS = 18_000_000
@@ -16,7 +15,7 @@ PERIOD_NS = 18_000_000
 FRESH_NS = 500_000_000
 
 
-class Source(Protocol):
+class OtherVehicleSource(Protocol):
     """Where a vehicle's states come from."""
 
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
@@ -26,17 +25,7 @@ class Source(Protocol):
         """Let go of files and threads; idempotent."""
 
 
-def estimator_of(info: VehicleInfo, vehicle: VehicleParameters) -> StateEstimator:
-    """Return the estimator of a vehicle's state."""
-    return StateEstimator(
-        info,
-        wheelbase_m=vehicle.wheelbase_m.value,
-        steering_ratio=vehicle.steering_ratio.value,
-        steering_offset_rad=vehicle.steering_offset_rad.value,
-    )
-
-
-class Measured:
+class OtherVehicleStates:
     """Samples of one vehicle to states, as far apart as is worth passing on."""
 
     def __init__(self, vehicle_id: str, estimator: StateEstimator) -> None:

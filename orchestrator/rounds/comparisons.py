@@ -15,8 +15,7 @@ from foretwin.contracts.frames import (
     local_from_geo_yaw,
     target_from_source,
 )
-from foretwin.contracts.simulation import Comparison
-from foretwin.orchestrator.config import HORIZONS_S
+from foretwin.contracts.simulation import HORIZONS_S, Comparison
 from foretwin.orchestrator.rounds.open_rounds import RoundDone
 from foretwin.sim_worker.metrics.comparison import ActualTrack, NominalTrack, compare_nominal
 

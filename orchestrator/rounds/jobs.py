@@ -17,7 +17,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.orchestrator.instructions import RoundIntent
 from foretwin.orchestrator.rounds.fewer_futures import some_of
 from foretwin.orchestrator.rounds.seen_users import near_car
@@ -85,7 +85,7 @@ class RoundPlanner:
         round_id: int,
         intent: RoundIntent,
         state: VehicleState,
-        said: Surroundings,
+        said: LatestReports,
         world: World,
         *,
         start_stamp_ns: int,

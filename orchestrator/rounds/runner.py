@@ -16,7 +16,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import WindowDesk
-from foretwin.orchestrator.drive.intake import LatestState, Surroundings
+from foretwin.orchestrator.drive.intake import LatestReports, LatestState
 from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import RoundIntent, Tell
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
@@ -109,7 +109,7 @@ class RoundRunner:
         self,
         intent: RoundIntent,
         latest: LatestState,
-        said: Surroundings,
+        said: LatestReports,
         *,
         started_mono_ns: int,
     ) -> None:

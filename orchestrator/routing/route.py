@@ -11,6 +11,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import wrap_angle
+from foretwin.geometry.polyline import points_at
 from foretwin.orchestrator.routing.road_index import key_of, legality
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 
@@ -60,11 +61,6 @@ class Route:
         parts += [self.edges[index].xy_m[1:] for index in range(first + 1, last + 1)]
         return np.concatenate(parts)
 
-    def xy_at(self, s_m: float) -> Array:
-        """Return the point (2,) at `s_m`, clamped to the route."""
-        index = self.index_at(s_m)
-        return point_along(self.edges[index].xy_m, s_m - float(self.start_m[index]))
-
     def validate(self) -> Route:
         """Return self, or raise RouteError where it is empty or an edge does not join the next."""
         if not self.edges:
@@ -78,18 +74,10 @@ class Route:
         return self
 
 
-def point_along(line_m: Array, s_m: float) -> Array:
-    """Return the point (2,) at `s_m` along a polyline (N, 2), clamped to its ends."""
-    cumulative = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line_m, axis=0).T))])
-    return np.array(
-        [np.interp(s_m, cumulative, line_m[:, 0]), np.interp(s_m, cumulative, line_m[:, 1])]
-    )
-
-
 def leaving_heading(directed: DirectedEdge) -> float:
     """Return the heading in radians over the first metres of an edge."""
     line = directed.xy_m
-    delta = point_along(line, HEADING_OVER_M) - line[0]
+    delta = points_at(line, HEADING_OVER_M) - line[0]
     return math.atan2(delta[1], delta[0])
 
 
@@ -107,7 +95,7 @@ def arriving_heading(edges: tuple[DirectedEdge, ...]) -> float:
         if length_m >= HEADING_OVER_M:
             break
     backwards = np.concatenate(parts)
-    delta = backwards[0] - point_along(backwards, HEADING_OVER_M)
+    delta = backwards[0] - points_at(backwards, HEADING_OVER_M)
     return math.atan2(delta[1], delta[0])
 
 

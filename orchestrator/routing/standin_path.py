@@ -10,6 +10,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import geo_from_local
+from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.speed_profile import accelerated, braked, speed_in_bends_mps
 from foretwin.orchestrator.routing.driving_path import driving_path
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.osm.osm_map import OsmMap
@@ -58,7 +60,7 @@ def stop_signs(osm: OsmMap, route: Route) -> list[float]:
     found = []
     for place, directed in enumerate(route.edges):
         xy = directed.xy_m
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+        along = arc_lengths(xy)
         nodes = directed.edge.node_ids[::-1] if directed.reverse else directed.edge.node_ids
         for node, s_m in zip(nodes[1:], along[1:], strict=True):
             tags = osm.node_tags.get(node, {})
@@ -71,7 +73,7 @@ def stop_signs(osm: OsmMap, route: Route) -> list[float]:
 def speed_profile(xy_m: Array, limit_mps: Array, *, stop_indices: Sequence[int] = ()) -> Array:
     """Return speeds (N,) within limits (N,), lateral acceleration, and what drive and brakes give.
 
-    v² ≤ a_lat/|κ|, then v² ≤ v₀² + 2·a·Δs forwards and backwards (the usual two-pass profile).
+    Bends first, then what drive and brakes give, forwards and backwards.
     """
     step = np.hypot(*np.diff(xy_m, axis=0).T)
     heading = np.unwrap(np.arctan2(*np.diff(xy_m, axis=0).T[::-1]))
@@ -79,15 +81,7 @@ def speed_profile(xy_m: Array, limit_mps: Array, *, stop_indices: Sequence[int] 
     if len(xy_m) > 2:
         curvature[1:-1] = np.diff(heading) / np.maximum(0.5 * (step[1:] + step[:-1]), 1e-3)
     smooth = np.convolve(np.pad(np.abs(curvature), 3, mode="edge"), np.ones(7) / 7, mode="valid")
-    speed = np.minimum(limit_mps, np.sqrt(LATERAL_MPS2 / np.maximum(smooth, 1e-4)))
+    speed = np.minimum(limit_mps, speed_in_bends_mps(smooth, LATERAL_MPS2))
     speed[-1] = 0.0
     speed[list(stop_indices)] = 0.0
-    for index in range(1, len(speed)):
-        speed[index] = min(
-            speed[index], np.sqrt(speed[index - 1] ** 2 + 2 * ACCEL_MPS2 * step[index - 1])
-        )
-    for index in range(len(speed) - 2, -1, -1):
-        speed[index] = min(
-            speed[index], np.sqrt(speed[index + 1] ** 2 + 2 * BRAKE_MPS2 * step[index])
-        )
-    return speed
+    return braked(accelerated(speed, xy_m, ACCEL_MPS2), xy_m, BRAKE_MPS2)

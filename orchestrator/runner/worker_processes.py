@@ -88,7 +88,8 @@ class WorkerProcesses:
         self._supervisor.stop(grace_s=0.0, term_s=_END_S)
         assert self._bus is not None
         self._bus.close()
-        fold_stderr(self._folder, Path(self._setup.log_file))
+        if self._supervisor.started:
+            fold_stderr(self._folder, Path(self._setup.log_file))
 
     @property
     def capacity(self) -> int:

@@ -23,7 +23,7 @@ from foretwin.contracts.frames import (
 from foretwin.contracts.futures import RecordedRoadUser, SeenRoadUser
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.rounds.seen_users import WITHIN_M, near_car
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.telemetry.logs import open_road_users
 from foretwin.telemetry.logs.road_users import RoadUserLog, RoadUserTrack

@@ -16,7 +16,9 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.polyline import left_of
 from foretwin.geometry.rectangles import Rectangles, separations
 from foretwin.sim_worker.batch.accident_bodies import (
     Bodies,
@@ -26,7 +28,7 @@ from foretwin.sim_worker.batch.accident_bodies import (
 )
 from foretwin.sim_worker.batch.accident_model import AccidentBatch, Crush, Impact
 from foretwin.sim_worker.batch.collision_detection import Indices, Touches
-from foretwin.sim_worker.vehicle.planar import base_from_cog, cog_from_base
+from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
 _STIFF, _STIFF_LOOK_S = Crush(400.0, 0.0005), 0.01
 _SOFT, _SOFT_LOOK_S = Crush(100.0, 0.0025), 0.025
@@ -217,16 +219,14 @@ def _results(
     turned = touches.user_poses[:, 2] - touches.ego_states[:, 2]
     centre = cog_from_base(vehicle, touches.ego_states)[0][:, :2]
     arms = touches.point_m - np.stack([centre, touches.user_poses[:, :2]])
-    at_point = velocities[..., :2] + velocities[..., 2:] * np.stack(
-        [-arms[..., 1], arms[..., 0]], axis=-1
-    )
+    at_point = velocities[..., :2] + velocities[..., 2:] * left_of(arms)
     closing = ((at_point[0] - at_point[1]) * touches.normal).sum(axis=-1)
     return Accidents(
         future=touches.future,
         user=touches.user,
         time_s=touches.time_s,
         point_m=touches.point_m,
-        angle_rad=np.asarray((turned + np.pi) % (2.0 * np.pi) - np.pi),
+        angle_rad=wrap_angle(turned),
         closing_mps=np.where(touches.from_start, np.nan, closing),
         ego_delta_v_mps=delta_v[0],
         user_delta_v_mps=delta_v[1],

@@ -16,7 +16,7 @@ from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.collision_detection import Touches
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
 _TYRE_FRICTION = 0.75

@@ -18,13 +18,8 @@ from foretwin.sim_worker.vehicle import compiled
 from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
 from foretwin.sim_worker.vehicle.clock import silence_step_clock
 from foretwin.sim_worker.vehicle.mujoco_log import log_mujoco_warnings
-from foretwin.sim_worker.vehicle.planar import (
-    JOINTS,
-    TIMESTEP_S,
-    box_centre_from_base_m,
-    check_steering_delay,
-    cog_from_base,
-)
+from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S, check_steering_delay
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m, cog_from_base
 
 _MAX_SPEED_MPS, _MAX_SLIDE_MPS, _MAX_YAW_RATE_RADPS = 25.0, 5.0, 3.0
 """Within these, a car cannot come from beyond the reach of `NearStatics` in a tick."""

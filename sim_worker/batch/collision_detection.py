@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.rectangles import (
     Rectangles,
@@ -21,14 +22,13 @@ from foretwin.geometry.rectangles import (
     overlapping,
     separations,
 )
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 Indices = npt.NDArray[np.intp]
 
 _SEARCH_STEP_S = 0.01
 _PRECISION_S = 1e-5
-_MAX_CLOSING_MPS = 100.0
-"""Faster than any two road users approach each other."""
 _FUTURES_AT_ONCE = 8
 _TOUCHING_M = 0.02
 """Corners this near to the other's outline count as touching it."""
@@ -143,10 +143,10 @@ class _Motion:
         after = np.minimum(tick + 1, states.shape[1] - 1)
         self.state = states[future, tick]
         self.state_change = states[future, after] - self.state
-        self.state_change[:, 2] = _wrapped(self.state_change[:, 2])
+        self.state_change[:, 2] = wrap_angle(self.state_change[:, 2])
         self.pose = users[future, tick, user]
         change = users[future, after, user] - self.pose
-        change[:, 2] = _wrapped(change[:, 2])
+        change[:, 2] = wrap_angle(change[:, 2])
         # Who is absent at the next tick stays where it was last seen.
         self.pose_change = np.where(np.isfinite(change), change, 0.0)
         self.size_m = user_size_m[future, user]
@@ -199,7 +199,7 @@ def _near(
     """Return future, tick and user of all pairs whose circles may meet before the next tick."""
     radius = np.hypot(user_size_m[..., 0], user_size_m[..., 1]) / 2.0
     reach = radius + math.hypot(vehicle.length_m.value, vehicle.width_m.value) / 2.0
-    reach += _MAX_CLOSING_MPS * tick_s / 2.0
+    reach += MAX_CLOSING_MPS * tick_s / 2.0
     reach_square = np.square(reach)
     centre = ego_rectangles(vehicle, states).centre_m
     near = []
@@ -268,7 +268,3 @@ def _normal(ego: Rectangles, user: Rectangles) -> Array:
     between = user.centre_m - ego.centre_m
     sign = np.where((normal * between).sum(axis=-1) < 0.0, -1.0, 1.0)
     return np.asarray(normal * sign[..., None])
-
-
-def _wrapped(angle: Array) -> Array:
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)

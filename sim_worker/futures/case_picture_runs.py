@@ -19,7 +19,7 @@ from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.impact import Moving, ego_box, ego_rectangles, rectangles
 from foretwin.sim_worker.scenarios.roles import Cast
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 STEP_S = 0.1
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import apart, arc_lengths
 from foretwin.sim_worker.scenarios.roles import Cast
 from foretwin.sim_worker.scenarios.ways import Way
 
@@ -35,9 +36,8 @@ def driven_lines(cases: Iterable[Cast], states: Array, *, tick_s: float) -> Iter
         driven = np.where(np.isfinite(driven).all(axis=1)[:, None], driven, driven[0])
         before = np.arange(0.0, max(case.ego_arc_m - 0.5, 0.0), 1.0)
         xy = np.concatenate([path.point_at(before, case.ego_lateral_m), driven[:, :2]])
-        steps = np.hypot(*np.diff(xy, axis=0).T)
-        arc = np.concatenate([[0.0], np.cumsum(steps)])
-        moved = np.concatenate([[True], steps > 1e-6])
+        arc = arc_lengths(xy)
+        moved = apart(xy, tolerance_m=1e-6)
         limit = path.at_nodes(np.minimum(path.speed_limit_mps, 1e3), arc)
         # The lines of egos beside their paths are moved back: casting moves them aside again.
         line = FrenetPath(xy[moved], limit[moved])

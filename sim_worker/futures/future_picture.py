@@ -14,7 +14,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.rectangles import Rectangles
 from foretwin.sim_worker.futures.case_picture import IMPACT, OTHERS, PLANNED, draw_box, draw_lanes
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.export.picture_ground import draw_ground
 from foretwin.world_gen.export.picture_marks import scale_bar
 from foretwin.world_gen.export.picture_style import view_around

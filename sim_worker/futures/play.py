@@ -12,7 +12,7 @@ from foretwin.sim_worker.futures.scene import Scene
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.road_users.crowd import EgoBoxes
 from foretwin.sim_worker.road_users.perception import Lead
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 Rows = npt.NDArray[np.intp]
 

@@ -12,10 +12,11 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
+from foretwin.sim_worker.driver_model import COMFORT_DECEL_MPS2, LATERAL_ACCEL_MPS2
 from foretwin.sim_worker.gym.rows import Sighting
 from foretwin.sim_worker.planner_interface import PlannerView
 from foretwin.sim_worker.planners.tracking import front_from_base_m
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 Observation = npt.NDArray[np.float32]
 
@@ -25,7 +26,6 @@ LENGTH_M, WIDTH_M = 12.0, 3.0
 """What a 1 stands for; where nothing is ahead, distances are a 1."""
 CURVATURE_AT_M = (0.0, 5.0, 10.0, 20.0, 30.0, 45.0)
 GROUND_PIECES = 2
-_LATERAL_ACCEL_MPS2, _DECEL_MPS2 = 2.5, 2.0
 
 _EGO = ("speed", "slide", "yaw_rate", "tire_angle", "accel", "offset", "heading")
 _WAY = ("target_speed", "bend_speed", "to_end", "lead_gap", "lead_speed", "stop_line", "wait_line")
@@ -79,7 +79,7 @@ def _curves(view: PlannerView) -> Array:
 def _way(seen: Sighting) -> Array:
     view = seen.view
     profile = view.path.speed_profile(
-        lateral_accel_mps2=_LATERAL_ACCEL_MPS2, decel_mps2=_DECEL_MPS2
+        lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
     )
     front = view.arc_m + front_from_base_m(view.vehicle)
     stop = np.full(len(front), np.inf) if view.stop_arc_m is None else view.stop_arc_m - front

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.driver_model import ALONG_COS, STANDING_MPS
 from foretwin.sim_worker.metrics import compiled_pairs
 from foretwin.sim_worker.metrics.rollout import Measure
 from foretwin.sim_worker.metrics.scene import Scene
@@ -20,10 +21,6 @@ Indices = npt.NDArray[np.intp]
 _SLOW_MPS = 1.0
 """Below this speed a yaw rate says nothing about the course, which is then taken as straight."""
 _MAX_CURVATURE_PM = 0.25
-_ALONG_COS = 0.5
-"""Whose heading is within 60° of the course drives along it."""
-_STANDS_MPS = 0.5
-"""Who is slower may stand at any angle."""
 _MOVES_MPS = 0.1
 """An ego slower than this has no headway in time."""
 
@@ -113,7 +110,7 @@ def leaders(scene: Scene) -> Leaders:
     found = np.empty((5, len(pairs)))
     count = compiled_pairs.find_leaders(
         (*seen[:4], seen.speed_mps), *scene.user_half_m, curvature,
-        (scene.centre_ahead_m, scene.half_length_m, scene.half_width_m, _ALONG_COS, _STANDS_MPS),
+        (scene.centre_ahead_m, scene.half_length_m, scene.half_width_m, ALONG_COS, STANDING_MPS),
         pairs, found,
     )  # fmt: skip
     pair = pairs[:count]

@@ -9,12 +9,11 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.rectangles import Rectangles, clearance
+from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
 from foretwin.sim_worker.metrics.rollout import Flags, Measure
 from foretwin.sim_worker.metrics.scene import Scene
 from foretwin.sim_worker.metrics.time_to_collision import Pairs, meeting
 
-_MAX_CLOSING_MPS = 100.0
-"""Faster than any two road users approach each other."""
 _STANDS_MPS = 0.05
 """An ego slower than this stands: nuPlan, no_ego_at_fault_collisions."""
 Indices = npt.NDArray[np.intp]
@@ -125,7 +124,7 @@ def impacts(scene: Scene) -> Impacts:
     seen = scene.relative
     _, instants, users = seen.ahead_m.shape
     reach = np.hypot(*scene.user_half_m) + np.hypot(scene.half_length_m, scene.half_width_m)
-    step_m = _MAX_CLOSING_MPS * float(np.diff(scene.time_s).max())
+    step_m = MAX_CLOSING_MPS * float(np.diff(scene.time_s).max())
     pair = np.flatnonzero(scene.centre_distance_m < reach + step_m)
     row, user = np.divmod(pair, max(users, 1))
     instant = row % instants

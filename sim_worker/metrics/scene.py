@@ -17,7 +17,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Flags, Measure, Rollout
 from foretwin.sim_worker.metrics.route_rules import RouteRules
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.rules.signal_state import LiveColour
 
 _Kept = TypeVar("_Kept")

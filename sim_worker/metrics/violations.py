@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import SignalColour
+from foretwin.sim_worker.driver_model import ALONG_COS
 from foretwin.sim_worker.metrics.rollout import Flags, Measure
 from foretwin.sim_worker.metrics.route_rules import PriorityConflict, RouteRules
 from foretwin.sim_worker.metrics.scene import Scene
@@ -17,7 +18,6 @@ HARD_BRAKING_MPS2 = 2.0
 NARROW_S = 1.0
 """Nor was who reaches the shared ground sooner than this after the ego has left it."""
 _AT_POINT_M = 2.5
-_ALONG_COS = 0.5
 _ON_WAY_M = 2.0
 _STOPS = ("red", "red_amber")
 Indices = npt.NDArray[np.intp]
@@ -121,7 +121,7 @@ def _own_passage(scene: Scene, conflict: PriorityConflict) -> tuple[Array, Array
     along = offset @ way
     cos, sin = scene.heading
     on_way: Flags = (np.abs(offset[..., 1] * way[0] - offset[..., 0] * way[1]) < _AT_POINT_M) & (
-        cos * way[0] + sin * way[1] > _ALONG_COS
+        cos * way[0] + sin * way[1] > ALONG_COS
     )
     enters = _first_above(along + scene.half_length_m, conflict.own_from_m, scene.time_s, on_way)
     leaves = _first_above(along - scene.half_length_m, conflict.own_until_m, scene.time_s, on_way)
@@ -151,7 +151,7 @@ def _forced(
     )
     direction = conflict.way.pose_at(place.arc_m).yaw_rad
     along = np.cos(yaw[rows, instant].ravel() - direction)
-    on_way = (np.abs(place.offset_m) < _ON_WAY_M) & (along > _ALONG_COS)
+    on_way = (np.abs(place.offset_m) < _ON_WAY_M) & (along > ALONG_COS)
     half_length = scene.user_half_m[0][rows, 0].ravel()
     distance = conflict.way_from_m - place.arc_m - half_length
     candidate = np.flatnonzero(on_way & (distance > 0.0) & scene.there[rows, instant].ravel())

@@ -16,7 +16,7 @@ from foretwin.geometry.rectangles import Rectangles, overlapping
 from foretwin.sim_worker.mirror.member import STEP_NS, CastMember, Member
 from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.mirror.track import Measured
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 Touches = frozenset[tuple[str, str]]
 """Sorted pairs of vehicle ids; `world` stands for what does not move."""

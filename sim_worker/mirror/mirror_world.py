@@ -16,7 +16,8 @@ from foretwin.sim_worker.mirror.twin_body import TwinBody
 from foretwin.sim_worker.vehicle.clock import silence_step_clock
 from foretwin.sim_worker.vehicle.lag import without_lags
 from foretwin.sim_worker.vehicle.mujoco_log import log_mujoco_warnings
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m, vehicle_spec
+from foretwin.sim_worker.vehicle.planar import vehicle_spec
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.export.mjcf import ROAD_USER, VEHICLE
 
 TWIN, SHADOW, GHOST = "twin_", "shadow", "ghost"

@@ -8,13 +8,8 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
-from foretwin.sim_worker.vehicle.planar import (
-    JOINTS,
-    TIMESTEP_S,
-    base_from_cog,
-    check_steering_delay,
-    cog_from_base,
-)
+from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S, check_steering_delay
+from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
 _REFRESH_STEPS = 2
 """Physics steps between two updates of tyre forces."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from foretwin.sim_worker.driver_model import HASTE
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.tracking import (
     MAX_LATERAL_ACCEL_MPS2,
@@ -27,7 +28,7 @@ class ConstantSpeed:
         angle = pure_pursuit(view)
         turning = turning_speed(view, angle, lateral_accel_mps2=MAX_LATERAL_ACCEL_MPS2)
         accel = (np.minimum(view.target_speed_mps, turning) - speed) / _TIME_CONSTANT_S
-        most = _LIMIT_MPS2 * np.minimum(np.maximum(view.speed_factor, 0.3), 2.0)
+        most = _LIMIT_MPS2 * np.minimum(np.maximum(view.speed_factor, HASTE[0]), HASTE[1])
         accel = np.maximum(np.minimum(accel, most), -_LIMIT_MPS2)
         stands = (np.abs(speed) < 0.05) & (view.target_speed_mps < 0.05)
         command = accel + resistance_mps2(view.vehicle, speed)

@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.driver_model import HOLD_MPS2, HOLD_SPEED_MPS, MAX_DECEL_MPS2
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView, SeenUsers, rows_of
 from foretwin.sim_worker.planners.lattice_choice import Planned, choose
 from foretwin.sim_worker.planners.lattice_rating import (
-    MAX_ACCEL_MPS2,
-    MAX_DECEL_MPS2,
+    CANDIDATE_ACCEL_MPS2,
     still_free,
 )
 from foretwin.sim_worker.planners.polynomials import Motions
@@ -33,7 +33,6 @@ _TURNS_RADPS, _GAINS_MPS = 0.15, 1.0
 """Who turns or drives otherwise by more than when a motion was chosen is looked at again."""
 _LOOKAHEAD_S, _PREVIEW_S = 0.6, 0.1
 _SPEED_GAIN, _PLACE_GAIN = 1.2, 0.3
-_HOLD_MPS, _HOLD_MPS2 = 0.3, -2.0
 
 
 class FrenetLattice:
@@ -97,10 +96,10 @@ class LatticeDriver:
         angle = pure_pursuit(view._replace(desired_offset_m=offset))
         present = view.states[:, 3]
         command = accel + _SPEED_GAIN * (speed - present) + _PLACE_GAIN * (place - view.arc_m)
-        command = np.minimum(np.maximum(command, -MAX_DECEL_MPS2), MAX_ACCEL_MPS2)
-        hold = (present < _HOLD_MPS) & (speed < _HOLD_MPS) & (accel < _HOLD_MPS)
+        command = np.minimum(np.maximum(command, -MAX_DECEL_MPS2), CANDIDATE_ACCEL_MPS2)
+        hold = (present < HOLD_SPEED_MPS) & (speed < HOLD_SPEED_MPS) & (accel < HOLD_SPEED_MPS)
         command = command + resistance_mps2(view.vehicle, present)
-        return PlannerOutput(np.where(hold, _HOLD_MPS2, command), angle)
+        return PlannerOutput(np.where(hold, HOLD_MPS2, command), angle)
 
     def _due(
         self,

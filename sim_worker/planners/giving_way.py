@@ -17,6 +17,15 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
+from foretwin.sim_worker.driver_model import (
+    COMFORT_DECEL_MPS2,
+    LAG_S,
+    LATERAL_ACCEL_MPS2,
+    LEAD_S,
+    MAX_ACCEL_MPS2,
+    SIGHT_M,
+    STANDING_MPS,
+)
 from foretwin.sim_worker.planner_interface import PlannerView, SeenUsers, SharedGround, rows_of
 from foretwin.sim_worker.planners.tracking import front_from_base_m
 
@@ -25,15 +34,8 @@ Indices = npt.NDArray[np.intp]
 
 CRITICAL_GAP_S = 4.1
 FOLLOW_UP_S = 2.9
-LAG_S, LEAD_S = 1.0, 0.5
-"""Others reach the ground so long after the car has left it, or have left before it enters."""
-ACCEL_MPS2 = 1.5
-_LATERAL_ACCEL_MPS2 = 2.5
-_COMFORT_DECEL_MPS2 = 2.0
 _LOOKS_M = 15.0
 """Beyond its way to a stop a car looks so far for ground where it has to wait."""
-_SIGHT_M = 60.0
-_STANDING_MPS = 0.5
 _AIMS_BESIDE_M = 2.0
 _AIMS_WITHIN_RAD = 0.6
 _BEARS_WITHIN_RAD = 1.2
@@ -86,7 +88,7 @@ def wait_arcs(view: PlannerView) -> Array:
     front = view.arc_m + front_from_base_m(view.vehicle)
     ahead = lines.stop_arc_m - front[:, None]
     speed = np.maximum(view.states[:, 3], 0.0)
-    reach = np.square(speed) / (2.0 * _COMFORT_DECEL_MPS2) + _LOOKS_M
+    reach = np.square(speed) / (2.0 * COMFORT_DECEL_MPS2) + _LOOKS_M
     concerns = (ahead > 0.0) & (ahead < reach[:, None])
     rows = np.flatnonzero(concerns.any(axis=1))
     if not len(rows):
@@ -120,7 +122,7 @@ def _taken(view: PlannerView, ground: SharedGround, front_arc_m: Array) -> Flags
     enter_s = _time_to(ground.enter_arc_m[pieces] - front_arc_m[:, None], speed, pace)
     left_m = ground.leave_arc_m[pieces] + view.vehicle.length_m.value - front_arc_m[:, None]
     needed_s = _time_to(left_m, speed, pace) + LAG_S
-    stands = (speed < _STANDING_MPS)[:, None]
+    stands = (speed < STANDING_MPS)[:, None]
     follows = ((view.lead_gap_m < 12.0) & (view.lead_speed_mps > 1.0))[:, None]
     least_s = np.where(stands, np.where(follows, FOLLOW_UP_S, CRITICAL_GAP_S), 0.0)
     needed_s = np.maximum(needed_s, least_s)
@@ -136,7 +138,7 @@ def _near(users: SeenUsers, front_arc_m: Array, points_m: Array) -> Flags:
     """(S, R) bool: who could matter, being near the ground, on wheels and not in the own lane."""
     if not len(points_m):
         return np.zeros(users.speed_mps.shape, dtype=bool)
-    low, high = points_m.min(axis=0) - _SIGHT_M, points_m.max(axis=0) + _SIGHT_M
+    low, high = points_m.min(axis=0) - SIGHT_M, points_m.max(axis=0) + SIGHT_M
     x, y = users.poses[..., 0], users.poses[..., 1]
     near = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & ~users.walks
     near &= (
@@ -151,7 +153,7 @@ def _pace(view: PlannerView, ground: SharedGround, pieces: Indices) -> Array:
     """Return (S, W) the speed at which pieces of the ground are crossed, as bends allow."""
     middle = 0.5 * (ground.enter_arc_m + ground.leave_arc_m)[pieces]
     profile = view.path.speed_profile(
-        lateral_accel_mps2=_LATERAL_ACCEL_MPS2, decel_mps2=_COMFORT_DECEL_MPS2
+        lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
     )
     bend = view.path.at_nodes(profile, middle)
     pace = np.minimum(view.target_speed_mps[:, None], view.speed_factor[:, None] * bend)
@@ -163,9 +165,9 @@ def _time_to(distance_m: Array, speed_mps: Array, pace_mps: Array) -> Array:
     speed = speed_mps[:, None]
     pace = np.maximum(pace_mps, speed)
     distance = np.maximum(distance_m, 0.0)
-    gaining = (np.square(pace) - np.square(speed)) / (2.0 * ACCEL_MPS2)
-    short = (np.sqrt(np.square(speed) + 2.0 * ACCEL_MPS2 * distance) - speed) / ACCEL_MPS2
-    long = (pace - speed) / ACCEL_MPS2 + (distance - gaining) / pace
+    gaining = (np.square(pace) - np.square(speed)) / (2.0 * MAX_ACCEL_MPS2)
+    short = (np.sqrt(np.square(speed) + 2.0 * MAX_ACCEL_MPS2 * distance) - speed) / MAX_ACCEL_MPS2
+    long = (pace - speed) / MAX_ACCEL_MPS2 + (distance - gaining) / pace
     return np.where(distance < gaining, short, long)
 
 
@@ -201,8 +203,8 @@ def _courses(
         arrives = wrap_angle(2.0 * bearing - yaw - ground.their_yaw_rad[pieces])
         heads = np.abs(arrives) < _AIMS_WITHIN_RAD
         heads &= np.abs(wrap_angle(bearing - yaw)) < _BEARS_WITHIN_RAD
-    moves = speed > _STANDING_MPS
-    pace = np.maximum(speed, _STANDING_MPS)
+    moves = speed > STANDING_MPS
+    pace = np.maximum(speed, STANDING_MPS)
     within = far < reach
     arrive_s = np.where(within, 0.0, (far - reach) / pace)
     gone_s = np.where(moves, (ahead + reach) / pace, np.inf)

@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.frenet_path import SPACING_M
+from foretwin.sim_worker.driver_model import HASTE, LATERAL_ACCEL_MPS2, MAX_DECEL_MPS2
 from foretwin.sim_worker.planner_interface import PlannerView
 from foretwin.sim_worker.planners.polynomials import Floats, Motions
 from foretwin.sim_worker.planners.prediction import Changes, courses
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 HORIZON_S, _INSTANTS = 4.0, 12
 _INSTANTS_S: Array = np.linspace(HORIZON_S / _INSTANTS, HORIZON_S, _INSTANTS)
@@ -21,8 +22,8 @@ _ROUGH_INSTANTS_S = _INSTANTS_S.astype(np.float32)[:, None, None]
 _NEAREST, _BITS = 6, 4
 """So few others are looked at that their number, twice if all turn, fits into so many bits."""
 _DIGITS = np.exp2(_BITS * np.arange(_INSTANTS - 1, -1, -1.0))[:, None, None, None]
-MAX_ACCEL_MPS2, MAX_DECEL_MPS2 = 2.5, 8.0
-LATERAL_ACCEL_MPS2, _MAX_LATERAL_MPS2 = 2.5, 4.0
+CANDIDATE_ACCEL_MPS2, _MAX_LATERAL_MPS2 = 2.5, 4.0
+"""Candidates with more are not driven. Chosen: jerk and comfort, which cost, keep them lower."""
 _ALONG_MARGIN_M, _ACROSS_MARGIN_M = 0.8, 0.4
 _SLOPE = 0.3
 """Of the own speed, how fast a car may move across its path."""
@@ -44,7 +45,7 @@ def rate_along(view: PlannerView, along: Motions, stop: Array) -> tuple[Floats, 
         + _WEIGHT_ACCEL * np.square(accel)
         + _WEIGHT_JERK * np.square(np.minimum(np.abs(jerk), np.float32(20.0)))
     ).sum(axis=0) / _INSTANTS
-    most = MAX_ACCEL_MPS2 * np.clip(view.speed_factor, 0.3, 2.0)[:, None]
+    most = CANDIDATE_ACCEL_MPS2 * np.clip(view.speed_factor, *HASTE)[:, None]
     wrong = (accel.max(axis=0) > most) | (accel.min(axis=0) < -MAX_DECEL_MPS2 - 0.5)
     wrong |= speed.min(axis=0) < -0.1
     bends = np.abs(view.path.curvature_pm).astype(np.float32)

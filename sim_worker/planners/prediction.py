@@ -10,11 +10,11 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.driver_model import SIGHT_M
 from foretwin.sim_worker.planner_interface import PlannerView, SeenUsers
 
 _KEEPS_LANE = 0.34
 """The sine of the angle to the road within which one drives along it, either way."""
-_SIGHT_M = 60.0
 _WAY_M, _BEYOND_M, _GAINS_MPS = 7.0, 15.0, 3.0
 """Who stays farther beside the way, or beyond what a car can reach of it, is no matter."""
 _TURNS_ON_S, _TURNS_OFF_RADPS = 1.5, 0.12
@@ -83,7 +83,7 @@ def courses(
     along_lane = (np.abs(np.sin(turned)) < _KEEPS_LANE) & ~users.walks
     behind = along_lane & (np.cos(turned) > 0.0) & (users.arc_m < view.arc_m[:, None])
     behind &= np.abs(users.offset_m - view.offset_m[:, None]) < 2.0
-    counts = (away < _SIGHT_M**2) & ~behind & _may_meet(view, users, float(instants_s[-1]))
+    counts = (away < SIGHT_M**2) & ~behind & _may_meet(view, users, float(instants_s[-1]))
     if not counts.any():
         return None
     away = np.where(counts, away, np.inf)

@@ -8,27 +8,29 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.driver_model import (
+    ACCEL_EXPONENT,
+    CALM_TIME_GAP_S,
+    COMFORT_DECEL_MPS2,
+    HASTE,
+    HOLD_MPS2,
+    HOLD_SPEED_MPS,
+    LATERAL_ACCEL_MPS2,
+    LINE_DECEL_MPS2,
+    LINE_GAP_M,
+    MAX_ACCEL_MPS2,
+    MAX_DECEL_MPS2,
+    STANDSTILL_GAP_M,
+    dynamic_gap_m,
+)
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import compiled, tracking
 from foretwin.sim_worker.planners.tracking import front_from_base_m
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
-MAX_ACCEL_MPS2 = 1.5
-COMFORT_DECEL_MPS2 = 2.0
-MAX_DECEL_MPS2 = 8.0
-TIME_GAP_S = 1.5
-STANDSTILL_GAP_M = 2.0
-LATERAL_ACCEL_MPS2 = 2.5
 TURNING_ACCEL_MPS2 = 4.0
 """Of the wheels' own curvature: more than that of the path, which alone governs on it."""
-EXPONENT = 4.0
-LINE_GAP_M = 1.0
-"""Between the front and the line at which it has stopped."""
-LINE_DECEL_MPS2 = 4.0
-"""Who would have to brake harder for a line goes on, as behind a light that has just changed."""
 _CURVE_TIME_S = 0.5
-_HOLD_SPEED_MPS = 0.3
-_HOLD_MPS2 = -2.0
 
 
 _TRACKING = (
@@ -105,9 +107,9 @@ class PurePursuitIdm:
             accel -= self._interaction(view, speed)
         np.maximum(accel, -MAX_DECEL_MPS2, out=accel)
         command = accel + resistance_mps2(view.vehicle, speed)
-        slow = speed < _HOLD_SPEED_MPS
+        slow = speed < HOLD_SPEED_MPS
         if np.count_nonzero(slow):
-            command = np.where(slow & (accel <= 0.0), _HOLD_MPS2, command)
+            command = np.where(slow & (accel <= 0.0), HOLD_MPS2, command)
         return PlannerOutput(command, angle)
 
     def _wishes(self, view: PlannerView) -> _Wishes:
@@ -118,14 +120,16 @@ class PurePursuitIdm:
             or known.target_speed_mps is not target
             or known.speed_factor is not factor
         ):
-            start = MAX_ACCEL_MPS2 * np.minimum(np.maximum(factor, 0.3, dtype=np.float64), 2.0)
+            start = MAX_ACCEL_MPS2 * np.minimum(
+                np.maximum(factor, HASTE[0], dtype=np.float64), HASTE[1]
+            )
             stand = target < 0.05
             known = self._wished = _Wishes(
                 target,
                 factor,
                 speed_mps=np.maximum(target, 0.1, dtype=np.float64),
                 accel_mps2=start,
-                exponent=-start * EXPONENT / COMFORT_DECEL_MPS2,
+                exponent=-start * ACCEL_EXPONENT / COMFORT_DECEL_MPS2,
                 stand=stand if stand.any() else None,
             )
         return known
@@ -133,10 +137,12 @@ class PurePursuitIdm:
     def _interaction(self, view: PlannerView, speed: Array) -> Array:
         """IDM deceleration for what is ahead: a (s* / s)², s* = s0 + v T + v Δv / (2 √(a b))."""
         gap = np.maximum(view.lead_gap_m, 0.1)
-        approach = speed * (speed - view.lead_speed_mps)
-        wanted = STANDSTILL_GAP_M + np.maximum(
-            speed * TIME_GAP_S + approach / (2.0 * np.sqrt(MAX_ACCEL_MPS2 * COMFORT_DECEL_MPS2)),
-            0.0,
+        wanted = STANDSTILL_GAP_M + dynamic_gap_m(
+            speed,
+            view.lead_speed_mps,
+            time_gap_s=CALM_TIME_GAP_S,
+            accel_mps2=MAX_ACCEL_MPS2,
+            decel_mps2=COMFORT_DECEL_MPS2,
         )
         following = np.asarray(MAX_ACCEL_MPS2 * np.square(wanted / gap))
         if view.stop_arc_m is None:
@@ -147,7 +153,7 @@ class PurePursuitIdm:
         """IDM deceleration for a line, as for somebody who stands a little behind it."""
         ahead = np.maximum(stop_arc_m - view.arc_m - front_from_base_m(view.vehicle), 0.1)
         wanted = STANDSTILL_GAP_M + speed * (
-            TIME_GAP_S + speed / (2.0 * np.sqrt(MAX_ACCEL_MPS2 * COMFORT_DECEL_MPS2))
+            CALM_TIME_GAP_S + speed / (2.0 * np.sqrt(MAX_ACCEL_MPS2 * COMFORT_DECEL_MPS2))
         )
         braking = MAX_ACCEL_MPS2 * np.square(wanted / (ahead + STANDSTILL_GAP_M - LINE_GAP_M))
         stops = np.square(speed) < 2.0 * LINE_DECEL_MPS2 * ahead

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.driver_model import HOLD_MPS2
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.tracking import front_from_base_m, steer_towards
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
@@ -14,7 +15,7 @@ _ACCEL_MPS2, _DECEL_MPS2, _MAX_DECEL_MPS2 = 1.0, 1.0, 6.0
 _GAP_M = 0.6
 """From the rear to whoever is behind, or crosses behind, where it stops for them."""
 _TIME_CONSTANT_S = 0.5
-_HOLD_MPS, _HOLD_MPS2 = 0.2, -2.0
+_HOLD_MPS = 0.2
 
 
 class ReversePursuit:
@@ -39,7 +40,7 @@ class ReversePursuit:
         hold = (speed < _HOLD_MPS) & (accel <= _HOLD_MPS)
         hold &= (wanted < _HOLD_MPS) | (room <= 0.0)
         command = accel + resistance_mps2(view.vehicle, speed)
-        return PlannerOutput(np.where(hold, _HOLD_MPS2, command), steer_towards(view, goal))
+        return PlannerOutput(np.where(hold, HOLD_MPS2, command), steer_towards(view, goal))
 
     def _free_m(self, view: PlannerView) -> Array:
         """Return (S,) how far the rear may go: gaps are given for a front that leads."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.driver_model import HOLD_MPS2, HOLD_SPEED_MPS, MAX_DECEL_MPS2
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.tracking import lookahead_m, steer_towards
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
@@ -15,8 +16,8 @@ _NEAR_S = 3.0
 """A car is looked for on its trajectory within this time of where it should be."""
 _POSITION_GAIN, _SPEED_GAIN = 0.6, 1.5
 """1/s², 1/s: critically damped."""
-_MAX_ACCEL_MPS2, _MAX_DECEL_MPS2 = 4.0, 8.0
-_HOLD_MPS, _HOLD_MPS2 = 0.3, -2.0
+_MAX_ACCEL_MPS2 = 4.0
+"""Chosen: more than cars have, so that whose trajectory it is decides."""
 
 
 class Trajectories(NamedTuple):
@@ -59,9 +60,11 @@ def track(view: PlannerView, trajectories: Trajectories, *, time_s: Array | floa
     late_m = late_m - own_arc
     present = view.states[:, 3]
     wanted = accel + _POSITION_GAIN * late_m + _SPEED_GAIN * (speed - present)
-    wanted = np.minimum(np.maximum(wanted, -_MAX_DECEL_MPS2), _MAX_ACCEL_MPS2)
-    hold = (np.abs(present) < _HOLD_MPS) & (speed < _HOLD_MPS) & (wanted <= _HOLD_MPS)
-    command = np.where(hold, _HOLD_MPS2, wanted + resistance_mps2(view.vehicle, present))
+    wanted = np.minimum(np.maximum(wanted, -MAX_DECEL_MPS2), _MAX_ACCEL_MPS2)
+    hold = (
+        (np.abs(present) < HOLD_SPEED_MPS) & (speed < HOLD_SPEED_MPS) & (wanted <= HOLD_SPEED_MPS)
+    )
+    command = np.where(hold, HOLD_MPS2, wanted + resistance_mps2(view.vehicle, present))
     goal = line.point_at(own_arc + lookahead_m(present, aside), view)
     return PlannerOutput(command, steer_towards(view, goal))
 

@@ -13,7 +13,7 @@ from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.planner_interface import SeenUsers
 from foretwin.sim_worker.road_users.path_table import PathProjection, Place
 from foretwin.sim_worker.road_users.traffic import Traffic
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 Flags = npt.NDArray[np.bool_]
 

@@ -13,7 +13,7 @@ from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.world import Connection, World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.geometry.polyline import direction_at
+from foretwin.geometry.polyline import arc_lengths, direction_at
 from foretwin.sim_worker.planner_interface import SharedGround
 from foretwin.sim_worker.road_users.path_table import Indices
 
@@ -149,8 +149,7 @@ def _signals(
 def _probe(line: Array) -> Array:
     """Return (3, 3) x, y, heading at the start, the middle and the end of a polyline."""
     steps = np.diff(line, axis=0)
-    length = np.hypot(steps[:, 0], steps[:, 1])
-    arc = np.concatenate([[0.0], np.cumsum(length)])
+    arc = arc_lengths(line)
     at = np.array([0.0, 0.5, 1.0]) * arc[-1]
     step = np.minimum(np.searchsorted(arc, at, side="right") - 1, len(steps) - 1)
     xy = [np.interp(at, arc, line[:, k]) for k in (0, 1)]

@@ -9,6 +9,7 @@ import numpy as np
 
 from foretwin.contracts.scenario import EGO, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.driver_model import LEAST_START_MPS
 from foretwin.sim_worker.scenarios.alongside import (
     Touched,
     along,
@@ -27,8 +28,6 @@ from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor, Meeting,
 
 __all__ = ["Cast", "CastActor", "cast", "cast_all"]
 
-_LEAST_SPEED_MPS = 2.0
-"""A car that stands is taken to set off with this speed."""
 _LATERAL_ACCEL_MPS2 = 4.0
 """Cars begin with no more of it: half of what holds them on a dry road."""
 _VERGE_M = 4.0
@@ -84,7 +83,7 @@ def _cast(
 ) -> Cast | Unplaced:
     wished_mps = values[f"{EGO}.speed_mps"]
     speed = wished_mps if ego_speed_mps is None else ego_speed_mps
-    speed = max(speed, min(_LEAST_SPEED_MPS, wished_mps) or _LEAST_SPEED_MPS)
+    speed = max(speed, min(LEAST_START_MPS, wished_mps) or LEAST_START_MPS)
     ego = Moving(place.ego.path, speed, values[f"{EGO}.lateral_shift_m"])
     staging = Staging(scenario, values, place, ego, ego_box(vehicle, reverse=place.reverse))
     meetings: dict[str, Meeting] = {}

@@ -17,6 +17,7 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.rectangles import Rectangles, overlapping
 from foretwin.sim_worker.vehicle.road_user_kinds import KindTraits
 
@@ -214,19 +215,18 @@ def _meetings(front: Array, x: Array, y: Array) -> tuple[npt.NDArray[np.intp], A
     )
     which = meet[of]
     at = shapely.points(points)
-    front_step = np.hypot(*np.diff(front, axis=0).T)
-    on_front = _places(shapely.line_locate_point(trace, at), front_step)
+    on_front = _places(shapely.line_locate_point(trace, at), front)
     on_curve = np.empty(len(at))
     for curve in np.unique(which):
         mine = which == curve
-        step = np.hypot(np.diff(x[:, curve]), np.diff(y[:, curve]))
-        on_curve[mine] = _places(shapely.line_locate_point(curves[curve], at[mine]), step)
+        along = np.stack([x[:, curve], y[:, curve]], axis=-1)
+        on_curve[mine] = _places(shapely.line_locate_point(curves[curve], at[mine]), along)
     return which, on_front, on_curve
 
 
-def _places(distance_m: Array, steps_m: Array) -> Array:
+def _places(distance_m: Array, xy_m: Array) -> Array:
     """Return places counted in points of a polyline for distances along it."""
-    walked = np.concatenate([[0.0], np.cumsum(steps_m)])
+    walked = arc_lengths(xy_m)
     return np.asarray(np.interp(distance_m, walked, np.arange(len(walked))))
 
 

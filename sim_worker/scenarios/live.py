@@ -16,6 +16,7 @@ import numpy as np
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker.driver_model import LEAST_START_MPS
 from foretwin.sim_worker.road_users.cast import Player
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S
@@ -26,8 +27,6 @@ from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor
 from foretwin.sim_worker.scenarios.staged import player_on
 from foretwin.sim_worker.scenarios.ways import Way
 
-_LEAST_SPEED_MPS = 2.0
-"""A car that stands is taken to set off with this speed."""
 _LATE = ".arrives_after_s"
 
 
@@ -42,7 +41,7 @@ class LiveScenarios:
     def on(self, path: FrenetPath, from_arc_m: float, vehicle: VehicleParameters) -> PathScenarios:
         """Return the scenarios on a path, for a car at `from_arc_m` of it."""
         found = passage_on_path(self._network, path, from_arc_m)
-        return PathScenarios(self, path, vehicle, None if found is None else found[0])
+        return PathScenarios(self, path, vehicle, found)
 
     def places(self, scenario: Scenario, passage: Passage) -> tuple[Place, ...]:
         """Return where a scenario can take place on a passage, none where it does not apply."""
@@ -98,7 +97,7 @@ class PathScenarios(NamedTuple):
         played = self.known.cast(scenario, values, place, self.vehicle)
         if isinstance(played, Unplaced):
             return played
-        speed = max(ego_speed_mps, _LEAST_SPEED_MPS)
+        speed = max(ego_speed_mps, LEAST_START_MPS)
         later_s = 0.0
         if math.isfinite(played.impact_time_s):
             met = played.ego_arc_m + played.ego_speed_mps * played.impact_time_s

@@ -12,6 +12,7 @@ from lxml import etree
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.scenario import EGO
 from foretwin.geometry.frenet_path import FrenetPath, PathPose
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.scenarios.openscenario_entities import reference_behind_centre_m
 from foretwin.sim_worker.scenarios.roles import Cast, CastActor
 from foretwin.world_gen.export.opendrive_elements import number
@@ -54,8 +55,7 @@ def ego_motion(played: Cast, *, horizon_s: float) -> Motion:
     path, speed = FrenetPath(played.ego_xy_m), played.ego_speed_mps
     along = _spaced(speed * horizon_s)
     pose = path.pose_at(played.ego_arc_m + along, played.ego_lateral_m)
-    steps = np.hypot(*np.diff(pose.xy_m, axis=0).T)
-    drift_m = np.abs(np.cumsum(steps) - along[1:])
+    drift_m = np.abs(arc_lengths(pose.xy_m) - along)[1:]
     if not played.reverse and float(drift_m.max()) <= _MOST_DRIFT_M:
         name = f"{EGO}_speed_mps"
         return Motion(EGO, pose, along / speed, False, f"${name}", {name: speed})

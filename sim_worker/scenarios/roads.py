@@ -12,7 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import TrafficTurn
 from foretwin.contracts.world import Connection, DrivingSide, Lane, World
-from foretwin.geometry.polyline import arc_lengths, length
+from foretwin.geometry.polyline import apart, arc_lengths, length
 from foretwin.sim_worker.scenarios.walls import Walls
 from foretwin.sim_worker.scenarios.ways import (
     APPROACH_M,
@@ -55,7 +55,6 @@ class RoadNetwork:
         self.driving_side: DrivingSide = world.intersection.driving_side
         self.lanes = {lane.id: lane for lane in world.lanes}
         self.connections = {c.id: c for c in world.connections}
-        self.road_of_lane = {lane.id: lane.road_id for lane in world.lanes}
         self.roads = {road.id: road for road in world.roads}
         self._into: dict[str, list[str]] = {}
         self._out_of: dict[str, list[str]] = {}
@@ -241,7 +240,7 @@ class RoadNetwork:
         parts = [self._line(i) for i in (*before, *middle, *after)]
         limits = [np.full(len(self._line(i)), self._limit(i)) for i in (*before, *middle, *after)]
         xy, limit = np.concatenate(parts), np.concatenate(limits)
-        keep = np.concatenate([[True], np.hypot(*np.diff(xy, axis=0).T) > 0.02])
+        keep = apart(xy, tolerance_m=0.02)
         count = sum(len(part) for part in parts[: len(before)])
         inside = sum(len(part) for part in parts[len(before) : len(before) + len(middle)])
         arc_all = arc_lengths(xy)

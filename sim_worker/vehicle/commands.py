@@ -10,12 +10,13 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ControlCommand
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.steering import column_of
+from foretwin.sim_worker.driver_model import HOLD_MPS2
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 STEP_BACK_NS = 1_000_000_000
 """A stamp that lies this far behind the last one is of a clock that has stepped back."""
 _STANDS_MPS = 0.05
-_HOLD_MPS2 = -2.0
 
 
 class TwinCommand(NamedTuple):
@@ -52,22 +53,16 @@ class CommandMemory:
         if latest is not None and command.stamp_ns <= latest.stamp_ns:
             return
         self.estimated = self.estimated or command.estimated
-        vehicle = self._vehicle
+        column = column_of(self._vehicle)
         if command.tire_angle_rad is not None:
-            angle = command.tire_angle_rad
+            angle = command.tire_angle_rad + column.offset_rad
         elif command.steering_wheel_rad is not None:
-            angle = command.steering_wheel_rad / vehicle.steering_ratio.value
+            angle = column.tire_rad(command.steering_wheel_rad)
         else:
-            angle = 0.0 if latest is None else latest.tire_angle_rad - self._offset
-        if not (np.isfinite(angle) and np.isfinite(command.accel_mps2)):
-            return
-        self._commands.append(
-            TwinCommand(command.stamp_ns, command.accel_mps2, angle + self._offset)
-        )
-
-    @property
-    def _offset(self) -> float:
-        return self._vehicle.steering_offset_rad.value
+            before = 0.0 if latest is None else latest.tire_angle_rad - column.offset_rad
+            angle = before + column.offset_rad
+        if np.isfinite(angle) and np.isfinite(command.accel_mps2):
+            self._commands.append(TwinCommand(command.stamp_ns, command.accel_mps2, angle))
 
     def forget_before(self, stamp_ns: int) -> None:
         """Drop what lies further back than is kept, the one that still holds excepted."""
@@ -103,7 +98,7 @@ def estimated_command(
     """
     speed, slip, rate, angle = 0.5 * (before[3:7] + after[3:7])
     if abs(before[3]) < _STANDS_MPS and abs(after[3]) < _STANDS_MPS:
-        return TwinCommand(stamp_ns, _HOLD_MPS2, float(after[6]))
+        return TwinCommand(stamp_ns, HOLD_MPS2, float(after[6]))
     rear = vehicle.cog_from_rear_axle_m.value
     front_force = rear / vehicle.wheelbase_m.value * speed * rate / np.cos(angle)
     wanted = float(after[3] - before[3]) / duration_s

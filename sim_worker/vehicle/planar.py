@@ -1,7 +1,7 @@
 """The planar vehicle as a MuJoCo spec: a chassis on x, y, yaw whose tyres are saturating actuators.
 
-The body origin is the centre of gravity, so that the mass matrix is diagonal; `base_from_cog` and
-`cog_from_base` convert to base_link, the rear-axle centre. A lateral tyre force is a velocity
+The body origin is the centre of gravity, so that the mass matrix is diagonal; `reference_points`
+converts to base_link, the rear-axle centre. A lateral tyre force is a velocity
 actuator at the axle, F = -(C / max(|u|, 1)) v_lat within ±limit, which implicit integration keeps
 stable at 10 ms down to standstill; `vehicle.actuation` refreshes C and the limits.
 """
@@ -16,6 +16,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE
 
 TIMESTEP_S = 0.01
@@ -49,11 +50,6 @@ def check_steering_delay(delay_s: Array | float) -> None:
             f"steering delay {delays.max():g} s is longer than the buffer of "
             f"{MAX_STEERING_DELAY_S:g} s"
         )
-
-
-def box_centre_from_base_m(vehicle: VehicleParameters) -> float:
-    """Return how far the centre of the vehicle's box lies ahead of base_link."""
-    return vehicle.length_m.value / 2.0 - vehicle.rear_overhang_m.value
 
 
 def vehicle_spec(
@@ -151,35 +147,3 @@ def _add_actuators(spec: mujoco.MjSpec, vehicle: VehicleParameters, *, timestep_
     steer.ctrlrange = [-limit, limit]
     steer.nsample = history_samples(timestep_s)
     steer.delay = vehicle.steering_delay_s.value
-
-
-def cog_from_base(vehicle: VehicleParameters, states: Array) -> tuple[Array, Array]:
-    """Return joint positions (S, 4) and velocities (S, 4) of base_link `states` (S, 8).
-
-    x, y, yaw of the centre of gravity and the tyre angle; velocities in the world frame.
-    """
-    rear = vehicle.cog_from_rear_axle_m.value
-    cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
-    u, r = states[:, 3], states[:, 5]
-    v = states[:, 4] + rear * r
-    positions = np.stack(
-        [states[:, 0] + rear * cos, states[:, 1] + rear * sin, states[:, 2], states[:, 6]], axis=1
-    )
-    velocities = np.stack([cos * u - sin * v, sin * u + cos * v, r, np.zeros_like(r)], axis=1)
-    return positions, velocities
-
-
-def base_from_cog(
-    vehicle: VehicleParameters, positions: Array, velocities: Array, out: Array
-) -> Array:
-    """Fill columns 0 to 6 of base_link states `out` (S, 8) from joints (S, 4); returns `out`."""
-    rear = vehicle.cog_from_rear_axle_m.value
-    columns, place, motion = out.T, positions.T, velocities.T
-    ahead = np.array([np.cos(place[2]), np.sin(place[2])])
-    columns[:2] = place[:2] - rear * ahead
-    columns[2:7:4] = place[2:]
-    columns[3] = np.add(*(ahead * motion[:2]))
-    across = ahead[::-1] * motion[:2]
-    columns[4] = across[1] - across[0] - rear * motion[2]
-    columns[5] = motion[2]
-    return out

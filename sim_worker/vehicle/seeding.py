@@ -10,6 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.steering import column_of
 from foretwin.sim_worker.vehicle.parameters import understeer_gradient
 
 _MIN_SPEED_MPS = 1.0
@@ -47,10 +48,7 @@ def tire_angle(state: VehicleState, vehicle: VehicleParameters) -> float:
     if state.tire_angle_rad is not None:
         return state.tire_angle_rad
     if state.steering_wheel_rad is not None:
-        return (
-            state.steering_wheel_rad / vehicle.steering_ratio.value
-            + vehicle.steering_offset_rad.value
-        )
+        return column_of(vehicle).tire_rad(state.steering_wheel_rad)
     return kinematic_tire_angle(vehicle, state.speed_mps, state.yaw_rate_radps)
 
 

@@ -20,6 +20,7 @@ from foretwin.contracts.drive import (
     VehicleInfo,
     VehicleState,
 )
+from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.clock_steps import ClockStep, ClockSteps
 from foretwin.telemetry.estimator.map_aid import RoadLine
@@ -226,3 +227,13 @@ class StateEstimator:
         self._state_ns = state.stamp_ns
         stale = self._staleness.overdue(now_ns)
         return msgspec.structs.replace(state, stale=stale) if stale else state
+
+
+def estimator_of(info: VehicleInfo, vehicle: VehicleParameters) -> StateEstimator:
+    """Return the estimator of the state of a vehicle with these parameters."""
+    return StateEstimator(
+        info,
+        wheelbase_m=vehicle.wheelbase_m.value,
+        steering_ratio=vehicle.steering_ratio.value,
+        steering_offset_rad=vehicle.steering_offset_rad.value,
+    )

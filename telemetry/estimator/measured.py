@@ -7,6 +7,7 @@ from collections import Counter
 from typing import Any
 
 from foretwin.contracts.drive import SpeedSample, SteeringSample
+from foretwin.geometry.steering import SteeringColumn
 
 FRESH_NS = 1_000_000_000
 """A quantity counts as measured while its last sample is younger than this."""
@@ -32,14 +33,13 @@ _LIMITS = {
 """Beyond these a number is no motion of a road vehicle."""
 
 
-class Measured:
+class MotionSamples:
     """Remembers samples beside positions; `skipped` counts what it refused, by reason."""
 
     def __init__(
         self, *, steering_ratio: float, steering_offset_rad: float, skipped: Counter[str]
     ) -> None:
-        self._steering_ratio = steering_ratio
-        self._steering_offset_rad = steering_offset_rad
+        self._column = SteeringColumn(steering_ratio, steering_offset_rad)
         self._skipped = skipped
         self._sample_ns: dict[str, int] = {}
         self._field_ns: dict[str, int] = {}
@@ -48,9 +48,9 @@ class Measured:
         self.speed_mps = 0.0
         """The last measured speed; 0 before there is one."""
 
-    def copy(self, *, skipped: Counter[str]) -> Measured:
+    def copy(self, *, skipped: Counter[str]) -> MotionSamples:
         """Return another memory of the same samples that counts into `skipped`."""
-        other = object.__new__(Measured)
+        other = object.__new__(MotionSamples)
         other.__dict__.update(self.__dict__)
         other._skipped = skipped
         other._sample_ns, other._field_ns = self._sample_ns.copy(), self._field_ns.copy()
@@ -118,7 +118,7 @@ class Measured:
         if self._steering.tire_angle_rad is not None:
             return self._steering.tire_angle_rad
         wheel = self._steering.steering_wheel_rad
-        return None if wheel is None else wheel / self._steering_ratio + self._steering_offset_rad
+        return None if wheel is None else self._column.tire_rad(wheel)
 
 
 class Doubt:

@@ -22,7 +22,7 @@ from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
 from foretwin.telemetry.logs.write_mcap import create
-from foretwin.telemetry.processes.recording import SOURCE, Recording
+from foretwin.telemetry.processes.recording import SOURCE, DriveRecording
 from foretwin.telemetry.ros_messages.parts import typestore
 
 DEPTH = 20_000
@@ -41,14 +41,14 @@ log = logging.getLogger("foretwin.telemetry.processes.recorder")
 
 
 class RecorderProcess:
-    """Carries messages from the bus to a Recording; `step` works a moment, `run` until the end.
+    """Carries messages from the bus to a DriveRecording: `step` a moment, `run` until the end.
 
     `life` tells when that is.
     """
 
     def __init__(
         self,
-        recording: Recording,
+        recording: DriveRecording,
         *,
         bus: Bus,
         life: ProcessLife,
@@ -185,7 +185,7 @@ def serve(setup: RecorderSetup, bus: Bus, life: ProcessLife) -> None:
     typestore()  # Costs a third of a second: before the first message, not at it.
     path = Path(setup.file)
     process = RecorderProcess(
-        Recording(lambda: create(path), name=path.name),
+        DriveRecording(lambda: create(path), name=path.name),
         bus=bus,
         life=life,
         run_id=setup.run_id,

@@ -17,7 +17,7 @@ from foretwin.contracts.setup import ReplaySetup
 from foretwin.telemetry.processes.vehicle_process import serve_vehicle
 
 
-class RecordedDrive(Protocol):
+class ReplayableLog(Protocol):
     """What replay needs of a log; `foretwin.telemetry.logs.open_log` gives it."""
 
     @property
@@ -41,7 +41,7 @@ class ReplaySource:
 
     def __init__(
         self,
-        drive: RecordedDrive,
+        drive: ReplayableLog,
         *,
         vehicle_id: str,
         start_s: float = 0.0,

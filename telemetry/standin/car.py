@@ -15,6 +15,7 @@ from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.steering import SteeringColumn
 from foretwin.telemetry.standin.parameters import CarParameters
 
 STEP_S = 0.005
@@ -95,6 +96,7 @@ class MultiBodyCar:
         if not self._gives:
             self._steered_rad = self._state[_ANGLE]
         self._parameters = parameters
+        self._column = SteeringColumn(parameters.steering_ratio, parameters.steering_offset_rad)
         self._gives = parameters.steering_compliance_rad_per_mps2 != 0.0
         self._model.tire.p_ky1 = self._own_stiffness * parameters.tyre_stiffness
 
@@ -130,7 +132,7 @@ class MultiBodyCar:
         demanded, self._drive_queue[slot] = self._drive_queue[slot], accel_mps2
         self._tick += 1
         given, state = self._parameters, self._state
-        target = wheel / given.steering_ratio + given.steering_offset_rad
+        target = self._column.tire_rad(wheel)
         target = min(max(target, -_MAX_TIRE_ANGLE_RAD), _MAX_TIRE_ANGLE_RAD)
         steered = self._steered_rad if self._gives else state[_ANGLE]
         rate = given.steering_gain_ps * (target - steered)

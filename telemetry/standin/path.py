@@ -12,6 +12,8 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.speed_profile import braked, speed_in_bends_mps
 from foretwin.telemetry.standin.parameters import DriverParameters
 
 _SPACING_M = 0.5
@@ -62,7 +64,7 @@ class DrivenPath:
             raise UserError("path holds a negative speed; the stand-in drives forwards")
         self.frame = LocalFrame(GeoPoint(float(lat_deg[0]), float(lon_deg[0])))
         xy = local_from_geo(self.frame, lat_deg, lon_deg)
-        given_s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+        given_s = arc_lengths(xy)
         if given_s[-1] < 5.0:
             raise UserError(f"path is {given_s[-1]:.1f} m long; at least 5 m are needed")
         fresh = np.concatenate([[True], np.diff(given_s) > 1e-6])
@@ -71,8 +73,7 @@ class DrivenPath:
         dense = np.stack([np.interp(even_s, given_s[fresh], xy[fresh, k]) for k in (0, 1)], axis=1)
         for sigma_m in _SMOOTHING_M:
             self.xy_m = _smoothed(dense, sigma_m / (even_s[1] - even_s[0]))
-            step = np.hypot(*np.diff(self.xy_m, axis=0).T)
-            self.s_m: Array = np.concatenate([[0.0], np.cumsum(step)])
+            self.s_m: Array = arc_lengths(self.xy_m)
             tangent = np.gradient(self.xy_m, self.s_m, axis=0)
             self.yaw_rad: Array = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
             self.curvature_pm: Array = np.gradient(self.yaw_rad, self.s_m)
@@ -90,10 +91,9 @@ class DrivenPath:
         # The smoothing shortens the path a little: stretch the given distances to it.
         along = given_s * self.length_m / given_s[-1]
         wished = np.interp(self.s_m, along[moving], speed_mps[moving])
-        bend = np.sqrt(driver.lateral_accel_mps2 / np.maximum(np.abs(self.curvature_pm), 1e-4))
-        self.speed_mps = _braked(
-            np.maximum(np.minimum(wished, bend), _CREEP_MPS), step, driver.comfort_decel_mps2
-        )
+        bend = speed_in_bends_mps(self.curvature_pm, driver.lateral_accel_mps2)
+        lowest = np.maximum(np.minimum(wished, bend), _CREEP_MPS)
+        self.speed_mps = braked(lowest, self.xy_m, driver.comfort_decel_mps2)
         standing = speed_mps == 0.0
         begins = standing & ~np.concatenate([[False], standing[:-1]])
         between = along[begins & (along > 5.0) & (along < self.length_m - 5.0)]
@@ -137,14 +137,6 @@ def _smoothed(xy_m: Array, sigma: float) -> Array:
     kernel /= kernel.sum()
     padded = np.pad(xy_m, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
     return np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in (0, 1)], axis=1)
-
-
-def _braked(speed_mps: Array, step_m: Array, decel_mps2: float) -> Array:
-    """Lower speeds (N,) so that none asks for more than `decel_mps2` to reach the next."""
-    result = speed_mps.copy()
-    for i in range(len(result) - 2, -1, -1):
-        result[i] = min(result[i], math.sqrt(result[i + 1] ** 2 + 2.0 * decel_mps2 * step_m[i]))
-    return result
 
 
 def read_path(file: Path, *, driver: DriverParameters) -> DrivenPath:

@@ -17,6 +17,7 @@ from foretwin.contracts.drive import (
     VehicleStatus,
 )
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.geometry.steering import SteeringColumn
 from foretwin.telemetry.standin.car import CarMotion
 from foretwin.telemetry.standin.driver import PlanPoint
 from foretwin.telemetry.standin.parameters import CarParameters, SensorParameters
@@ -107,10 +108,9 @@ class Sensors:
     def steering(self, stamp_ns: int, motion: CarMotion) -> SteeringSample:
         """Return the angle at the steering wheel, as the car's bus would."""
         noise = float(self._steering.normal(0.0, self._parameters.steering_wheel_std_rad))
-        angle = motion.steered_rad - self._car.steering_offset_rad
-        return SteeringSample(
-            stamp_ns=stamp_ns, steering_wheel_rad=angle * self._car.steering_ratio + noise
-        )
+        column = SteeringColumn(self._car.steering_ratio, self._car.steering_offset_rad)
+        wheel = column.wheel_rad(motion.steered_rad)
+        return SteeringSample(stamp_ns=stamp_ns, steering_wheel_rad=wheel + noise)
 
 
 def status(stamp_ns: int) -> VehicleStatus:

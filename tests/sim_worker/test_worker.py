@@ -18,7 +18,6 @@ from foretwin.contracts.drive import ControlCommand
 from foretwin.contracts.futures import Job
 from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.runner import Wanted, job_task
@@ -33,6 +32,7 @@ from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.worker import StageCache, serve_futures
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
 from tests.sim_worker.places import FRAME, crossroads, job, state_at
 from tests.starvation import unhindered_wait_s

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from foretwin.contracts.frames import geo_from_local, local_from_geo
+from foretwin.geometry.polyline import points_at
 from foretwin.orchestrator.embedded import MAP_FILE, ROUTE_FILE
-from foretwin.orchestrator.routing.route import point_along
 from foretwin.telemetry.logs import read_line
 from foretwin.world_gen.osm.read_osm import read_map
 from tests.system.foretwin_command import foretwin
@@ -28,7 +28,7 @@ def dirty_gpx(path: Path) -> Path:
     points = []
     for number in range(DRIVE_S * RATE_HZ):
         time_s = number / RATE_HZ
-        xy = point_along(route, 20.0 + SPEED_MPS * time_s)
+        xy = points_at(route, 20.0 + SPEED_MPS * time_s)
         if AWAY_S[0] <= time_s < AWAY_S[1]:
             xy = xy + np.array([0.0, 1500.0])
         if number in JUMPS:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import mitres
 
-_MITRE_LIMIT = 2.0
 _SHORTEST_M = 0.002
 """Shorter steps vanish when coordinates are rounded to millimetres."""
 _LOOP_POINTS = 100
@@ -23,14 +22,7 @@ def parallel(
     that parallels of consecutive lines meet. Points of one index lie on one ray across the line,
     but on the inside of bends too tight for the distance, where loops are cut off.
     """
-    d = np.diff(xy_m, axis=0)
-    d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
-    incoming = np.concatenate([d[:1] if before is None else before[None], d])
-    outgoing = np.concatenate([d, d[-1:] if after is None else after[None]])
-    normal = left_of(incoming) + left_of(outgoing)
-    norm = np.hypot(normal[:, 0], normal[:, 1])
-    normal = np.where(norm[:, None] > 0.2, normal / np.maximum(norm, 0.2)[:, None], left_of(d[[0]]))
-    stretch = 1.0 / np.maximum((normal * left_of(outgoing)).sum(axis=1), 1.0 / _MITRE_LIMIT)
+    d, normal, stretch = mitres(xy_m, before=before, after=after)
     rays = normal * stretch[:, None]
     lines: Array = xy_m + left_m[:, None, None] * rays
     forward = (np.diff(lines, axis=1) * d).sum(axis=2) > _SHORTEST_M

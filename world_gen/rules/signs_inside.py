@@ -10,7 +10,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import DrivingSide, YieldRule
-from foretwin.geometry.polyline import locate, points_at
+from foretwin.geometry.polyline import arc_lengths, locate, points_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
@@ -121,7 +121,7 @@ def _met(
         for part in run:
             xy_m = part.xy_m
             nodes = part.edge.node_ids[::-1] if part.reverse else part.edge.node_ids
-            along_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy_m, axis=0).T))])
+            along_m = arc_lengths(xy_m)
             for node, place_m, at_m in zip(nodes, xy_m, (gone_m + along_m).tolist(), strict=True):
                 if node not in node_tags or not sign_of(node_tags[node]):
                     continue

@@ -11,6 +11,8 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.polyline import arc_lengths
+from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Flags, Rollout
 from foretwin.sim_worker.metrics.route_rules import LineAhead, RouteRules
@@ -21,7 +23,6 @@ from foretwin.sim_worker.metrics.violations import line_crossings
 CRITERIA = ("clearance", "drivable_area", "red_light", "stop_line", "comfort")
 LEAST_CLEARANCE_M = 0.2
 """Nearer to another road user is a failure; boxes as detected are no more exact than that."""
-_STANDING_MPS = 0.5
 _STOP_WITHIN_M = 6.0
 """Whoever stands within so much before a stop line has stopped for it."""
 _HEARD_FOR_NS = 2_000_000_000
@@ -149,12 +150,11 @@ class Court:
         time_s = self._window.time_s
         future, crossed_s = line_crossings(front, line.ends_m, time_s)
         for row, at_s in zip(future, crossed_s, strict=True):
-            steps = np.hypot(*np.diff(front[row], axis=0).T)
-            gone_m = np.concatenate([[0.0], np.cumsum(steps)])
+            gone_m = arc_lengths(front[row])
             line_m = float(np.interp(at_s, time_s, gone_m))
             before = (time_s <= at_s) & (gone_m >= line_m - _STOP_WITHIN_M)
             if line_m >= _STOP_WITHIN_M:
-                unstopped[row] |= bool(np.abs(speed_mps[row, before]).min() > _STANDING_MPS)
+                unstopped[row] |= bool(np.abs(speed_mps[row, before]).min() > STANDING_MPS)
 
 
 class Verdicts(NamedTuple):

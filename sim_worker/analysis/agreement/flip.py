@@ -9,6 +9,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.analysis.agreement.criteria import CRITERIA, Court, Users
 from foretwin.sim_worker.metrics.rollout import Flags
 
@@ -53,7 +54,7 @@ def gap_between(simulated: Array, driven: Array) -> Gap:
     it; a car that stands has but its axes.
     """
     yaw = np.unwrap(simulated[:, 2])
-    arc = _arc_m(simulated)
+    arc = arc_lengths(simulated[:, :2])
     speed = driven[:, 3] - simulated[:, 3]
     if arc[-1] < _LEAST_WAY_M:
         dx, dy = driven[:, 0] - simulated[:, 0], driven[:, 1] - simulated[:, 1]
@@ -75,7 +76,7 @@ def grown(simulated: Array, gap: Gap, factors: Array, direction: str) -> Array:
     factor = factors[:, None]
     found = np.repeat(simulated[None], len(factors), axis=0)
     if direction != "across":
-        arc = _arc_m(simulated)
+        arc = arc_lengths(simulated[:, :2])
         yaw = np.unwrap(simulated[:, 2])
         far = 2.0 * MOST_M + float(np.abs(gap.along_m).max() * np.abs(factors).max(initial=0.0))
         ends = np.array([np.cos(yaw[[0, -1]]), np.sin(yaw[[0, -1]])]) * far
@@ -132,8 +133,3 @@ def flips(
         else Flip(name, None, None)
         for name in DIRECTIONS
     )
-
-
-def _arc_m(states: Array) -> Array:
-    steps = np.hypot(*np.diff(states[:, :2], axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(steps)])

@@ -10,6 +10,7 @@ import numpy as np
 
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.gap import GapSample, Manoeuvre
+from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.sim_worker.analysis.gap.free_run import (
     FreeRunner,
     accel_commands_from_motion,
@@ -21,7 +22,6 @@ from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.vehicle.lag import without_lags
 
-HORIZONS_S = (1.0, 2.0, 4.0, 8.0)
 QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")
 """Of a sample; a row has `position_m` too, how far apart both are."""
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.steering import column_of
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
@@ -28,15 +29,15 @@ class SteeringSignals(NamedTuple):
 
 def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> SteeringSignals:
     """Return the tyre angles that the record's steering means to the model."""
-    ratio, offset = vehicle.steering_ratio.value, vehicle.steering_offset_rad.value
+    column = column_of(vehicle)
 
     def read(tire: Array, wheel: Array) -> Array:
-        return np.where(np.isfinite(tire), tire, wheel / ratio + offset)
+        return np.where(np.isfinite(tire), tire, column.tire_rad(wheel))
 
     commanded = np.where(
         np.isfinite(record.command_tire_rad),
-        record.command_tire_rad + offset,
-        record.command_wheel_rad / ratio + offset,
+        record.command_tire_rad + column.offset_rad,
+        column.tire_rad(record.command_wheel_rad),
     )
     return SteeringSignals(commanded, read(record.tire_rad, record.wheel_rad))
 

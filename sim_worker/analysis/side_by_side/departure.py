@@ -12,6 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.side_by_side import DisagreementKind
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.geometry.polyline import arc_lengths
 
 _LEAST_WAY_M = 3.0
 """Ways are compared as far as both went, and not at all where that is less."""
@@ -109,7 +110,7 @@ def _between_ways(planned: Array, driven: Array) -> tuple[float, float]:
         return 0.0, 0.0
     way = FrenetPath(moved[:, :2], before_m=0.0)
     place = way.locate(planned[:, :2])
-    gone_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(planned[:, :2], axis=0).T))])
+    gone_m = arc_lengths(planned[:, :2])
     common = (place.arc_m < way.length_m) & (gone_m <= way.length_m)
     if not common.any() or min(way.length_m, float(gone_m[-1])) < _LEAST_WAY_M:
         return 0.0, 0.0

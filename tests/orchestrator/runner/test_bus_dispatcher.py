@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import pytest
 
 from foretwin.contracts.bus import Mailbox, Reply, Request
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.runner import Answer, Task
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.orchestrator.runner import bus_dispatcher
 from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
+from tests.contracts.memory_bus import MemoryBus
 
 A = Task("a", "prepare", "w", PrepareRequest(world_id="a"))
 

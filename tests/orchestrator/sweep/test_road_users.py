@@ -20,7 +20,7 @@ from foretwin.orchestrator.sweep.road_users import others_at
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec
 from foretwin.sim_worker.futures.future_rows import Row
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.telemetry.logs import open_road_users
 from tests.orchestrator.recorded_runs import write_run
 from tests.orchestrator.sweeps import alone, places_of, rows_of

@@ -15,7 +15,7 @@ from foretwin.sim_worker.batch.accident_bodies import accident_bodies
 from foretwin.sim_worker.batch.accident_model import Impact
 from foretwin.sim_worker.batch.collision_detection import Touches, ego_rectangles, first_touches
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import cog_from_base
+from foretwin.sim_worker.vehicle.reference_points import cog_from_base
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from tests.sim_worker.rigid_impact import Body, impact
 

@@ -16,7 +16,7 @@ from foretwin.sim_worker.batch.collision_detection import (
     touched,
 )
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 CAR = load_vehicle()
 TICK_S = 0.05

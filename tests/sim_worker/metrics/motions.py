@@ -10,7 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.metrics.rollout import Rollout
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 STEP_S = 0.1
 VEHICLE = load_vehicle()

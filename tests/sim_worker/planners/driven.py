@@ -21,7 +21,7 @@ from foretwin.sim_worker.planner_interface import (
     SeenUsers,
 )
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 TICK_S = 0.05
 

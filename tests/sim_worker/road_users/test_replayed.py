@@ -15,7 +15,7 @@ from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.metrics.table import METRICS
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.vehicle.planar import box_centre_from_base_m
+from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from tests.sim_worker.places import crossroads, happening, job, state_at
 
 CAR = load_vehicle()

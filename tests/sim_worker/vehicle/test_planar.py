@@ -5,7 +5,7 @@ import pytest
 
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.vehicle.parameters import load_vehicle, understeer_gradient
-from foretwin.sim_worker.vehicle.planar import base_from_cog, cog_from_base
+from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 from tests.sim_worker.driving import altered, drive, seed, states
 
 CAR = load_vehicle()

@@ -13,12 +13,12 @@ from foretwin.contracts.drive import (
     VehicleInfo,
 )
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
 from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.processes.replay import ReplaySource
 from foretwin.telemetry.processes.vehicle_process import VehicleProcess
+from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.processes.test_replay import SECOND_NS, START_NS, RecordedMinute
 
 ORCHESTRATOR = alive_key(run="r", process="orchestrator")

@@ -1,0 +1,96 @@
+"""Maps, their intersections, and Worlds made of them: what the face reads and writes."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+from foretwin.contracts.codec import SchemaMismatch, read_message, write_message
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.world import IntersectionSummary, World
+from foretwin.orchestrator.worlds.choice import junction_by_id, nearest_junction
+from foretwin.orchestrator.worlds.opening import OpenMap
+from foretwin.orchestrator.worlds.opening import open_map as read_whole
+from foretwin.world_gen.build import DEFAULT_RADIUS_M, build_world
+from foretwin.world_gen.export.formats import FORMATS, ExportOptions
+from foretwin.world_gen.junctions.map_index import MapIndex, index_map
+
+
+class Map:
+    """A map that was read: its intersections, and Worlds of them."""
+
+    def __init__(self, opened: OpenMap) -> None:
+        self._opened = opened
+
+    @property
+    def attribution(self) -> str:
+        """Whose data it is: stands in everything that is made of it."""
+        return self._opened.osm.attribution
+
+    @property
+    def intersections(self) -> tuple[IntersectionSummary, ...]:
+        """Every intersection, as a driver sees it."""
+        return tuple(junction.summary for junction in self._opened.junctions)
+
+    def nearest(self, lat_deg: float, lon_deg: float) -> IntersectionSummary:
+        """Return the intersection nearest to a place; UserError where there is none near."""
+        return nearest_junction(self._opened, lat_deg, lon_deg).summary
+
+    def world(self, intersection_id: str, *, radius_m: float = DEFAULT_RADIUS_M) -> World:
+        """Return the World within `radius_m` of an intersection, in a frame of its own.
+
+        Raises UserError for an unknown intersection and ValueError for a radius that is not
+        between 10 and 2000 m.
+        """
+        junction = junction_by_id(self._opened, intersection_id)
+        opened, index = self._opened, self._index
+        return build_world(opened.osm, opened.graph, junction, radius_m=radius_m, index=index)
+
+    @functools.cached_property
+    def _index(self) -> MapIndex:
+        return index_map(self._opened.osm, self._opened.graph, self._opened.junctions)
+
+
+def open_map(file: Path | str, *, service_roads: bool = False) -> Map:
+    """Read a map: `.osm`, `.osm.gz`, `.osm.bz2` or `.osm.pbf`.
+
+    With `service_roads`, driveways and parking aisles are roads like any other. Raises MapError, a
+    UserError, where the file is no map or has no roads.
+    """
+    return Map(read_whole(Path(file), service_roads=service_roads))
+
+
+def export_formats() -> dict[str, str]:
+    """Return how the files of each format end that `export_world` writes."""
+    return {name: format_.suffix for name, format_ in FORMATS.items()}
+
+
+def export_world(world: World, file: Path | str, *, format_name: str | None = None) -> Path:
+    """Write a World for another program; the file's suffix says as what where no format is named.
+
+    Raises UserError where neither says.
+    """
+    file = Path(file)
+    named = [name for name, known in FORMATS.items() if known.suffix == file.suffix.lower()]
+    if format_name is None and len(named) != 1:
+        wish = f"one of {', '.join(named)}" if named else f"one of {', '.join(FORMATS)}"
+        raise UserError(f"{file}: its suffix names no one format; give format_name, {wish}")
+    name = named[0] if format_name is None else format_name
+    if name not in FORMATS:
+        raise UserError(f"format {name!r} is unknown; known: {', '.join(FORMATS)}")
+    FORMATS[name].write(world, file, ExportOptions())
+    return file
+
+
+def save_world(world: World, file: Path | str) -> Path:
+    """Write a World as foretwin keeps it; `read_world` reads it again."""
+    write_message(world, Path(file))
+    return Path(file)
+
+
+def read_world(file: Path | str) -> World:
+    """Return a World that foretwin wrote; UserError where the file holds none."""
+    try:
+        return read_message(Path(file), World)
+    except (OSError, SchemaMismatch) as error:
+        raise UserError(f"{file}: {error}") from error

@@ -1,0 +1,48 @@
+"""What a run or a sweep left, as tables: the part of the face that looks back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from foretwin.contracts.errors import UserError
+from foretwin.orchestrator.record.recorded_jobs import table_at
+
+_RUN, _SWEEP = "run.json", "sweep.json"
+
+
+class Recording:
+    """A run's or a sweep's folder: its record, and its tables by name."""
+
+    def __init__(self, folder: Path, record_file: str) -> None:
+        self.folder = folder
+        try:
+            text = (folder / record_file).read_text(encoding="utf-8")
+            self.record: dict[str, Any] = json.loads(text)
+        except (OSError, ValueError) as error:
+            raise UserError(f"{folder}: no {record_file} to be read: {error}") from error
+
+    def table(self, name: str) -> pa.Table:
+        """Return a table, such as `futures`, `jobs`, or a run's `comparisons`.
+
+        Raises UserError where there is none.
+        """
+        file = self.folder / "results" / f"{name}.parquet"
+        try:
+            return pq.read_table(file if file.is_file() else table_at(self.folder, name))
+        except (OSError, KeyError, pa.ArrowException) as error:
+            raise UserError(f"{self.folder}: no table {name!r} to be read: {error}") from error
+
+
+def open_run(folder: Path | str) -> Recording:
+    """Open what `foretwin drive` left; UserError where the folder holds no run."""
+    return Recording(Path(folder), _RUN)
+
+
+def open_sweep(folder: Path | str) -> Recording:
+    """Open what `foretwin sweep` left; UserError where the folder holds no sweep."""
+    return Recording(Path(folder), _SWEEP)

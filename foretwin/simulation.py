@@ -1,0 +1,150 @@
+"""Futures of a car from a state, played here and now: the part of the face that simulates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from foretwin.contracts.arrays import Array, Array32
+from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.frames import (
+    GeoPoint,
+    geo_from_local,
+    geo_from_local_yaw,
+    local_from_geo,
+)
+from foretwin.contracts.futures import Future, FuturesResult, Job, PathAhead
+from foretwin.contracts.job_identity import job_bytes, vehicle_digest
+from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.contracts.world import World
+from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.futures.future_mix import plan_futures
+from foretwin.sim_worker.futures.future_rows import future_rows
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.metrics.table import ROW_METRICS
+from foretwin.sim_worker.planners.registry import check_planner
+from foretwin.sim_worker.scenarios.reading import find_scenario
+from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.vehicle.parameters import load_vehicle
+
+STEP_S = 0.1
+DEFAULT_SPEED_MPS = 8.3
+"""Where no speed limit is known."""
+_PATH_BEHIND_M = 10.0
+_NEAR_WAY_M = 10.0
+
+
+class Futures(NamedTuple):
+    """What S futures came to.
+
+    `time_s` (N,) from the state; `states` (S, N, 8) of base_link in the World's frame, columns as
+    `foretwin.contracts.futures.STATE_COLUMNS`. `rows` say of each future what was asked for, its
+    outcome and its metrics, by the columns of docs/results.md.
+    """
+
+    job: Job
+    result: FuturesResult
+    rows: list[dict[str, Any]]
+
+    @property
+    def time_s(self) -> Array:
+        """(N,) seconds from the state that they begin with."""
+        return self.result.trajectory.time_s
+
+    @property
+    def states(self) -> Array32:
+        """(S, N, 8) x_m, y_m, yaw_rad, vx_mps, vy_mps, yaw_rate_radps, tire_angle_rad, accel."""
+        return self.result.trajectory.states
+
+    @property
+    def table(self) -> pa.Table:
+        """The rows as a table."""
+        return pa.Table.from_pylist(self.rows)
+
+
+def ways_through(world: World) -> tuple[Way, ...]:
+    """Return the ways that a car can take through the World's intersection."""
+    network = RoadNetwork(world)
+    return tuple(network.way(p) for p in network.passages(world.intersection.id))
+
+
+def state_on(
+    world: World, way: Way, *, before_m: float = 40.0, speed_mps: float | None = None
+) -> VehicleState:
+    """Return a car in its lane, `before_m` metres before the intersection.
+
+    It drives at the speed limit there where no speed is given. Raises UserError where the way does
+    not reach back so far.
+    """
+    arc_m = way.entry_m - before_m
+    if not _PATH_BEHIND_M <= arc_m < way.path.length_m:
+        most = way.entry_m - _PATH_BEHIND_M
+        raise UserError(f"{before_m:g} m before the intersection: way {way.name} has {most:.0f} m")
+    pose = way.path.pose_at(np.array([arc_m]))
+    xy = way.path.point_at(np.array([arc_m]))[0]
+    limit = float(way.path.at_nodes(way.path.speed_limit_mps, np.array([arc_m]))[0])
+    if speed_mps is None:
+        speed_mps = limit if np.isfinite(limit) else DEFAULT_SPEED_MPS
+    lat, lon = geo_from_local(world.frame, xy)
+    return VehicleState(
+        vehicle_id="ego", stamp_ns=0, position=GeoPoint(float(lat), float(lon)),
+        yaw_rad=float(geo_from_local_yaw(world.frame, float(pose.yaw_rad[0]), xy)),
+        speed_mps=speed_mps, yaw_rate_radps=0.0, accel_mps2=0.0,
+    )  # fmt: skip
+
+
+def run_futures(
+    world: World,
+    way: Way,
+    state: VehicleState,
+    *,
+    count: int = 64,
+    futures: Sequence[Future] = (),
+    scenarios: Sequence[Scenario | str] = (),
+    planner: str = "pure_pursuit_idm",
+    vehicle: VehicleParameters | None = None,
+    horizon_s: float = 8.0,
+    seed: int = 0,
+) -> Futures:
+    """Play futures of a car that drives along `way` from `state`, side by side.
+
+    `futures` as given, or a mix of `count`: the nominal one first, then others that differ in
+    speed, friction, steering delay and place in the lane, and in which `scenarios` (ids, files or
+    definitions) happen. Raises UserError for an unknown planner or scenario, or a state that is
+    not on the way.
+    """
+    try:
+        check_planner(planner)
+    except ValueError as error:
+        raise UserError(str(error)) from error
+    known = tuple(find_scenario(s) if isinstance(s, str) else s for s in scenarios)
+    car = load_vehicle() if vehicle is None else vehicle
+    mix = tuple(futures) or plan_futures(
+        count=count, seed=seed, planners=(planner,), scenarios=known
+    )
+    job = Job(
+        round_id=0, job_index=0, world_id=world.id, state=state, path=_path(world, way, state),
+        futures=mix, horizon_s=horizon_s, step_s=STEP_S, seed=seed,
+        cruise_speed_mps=state.speed_mps, scenarios=known, lights_by_plan=True,
+        metrics=ROW_METRICS, accidents=True, vehicle=vehicle_digest(car),
+    )  # fmt: skip
+    result = run_job(job, Stage(world, car, nsim=len(mix)))
+    rows = future_rows(job, result, job_sha256=job_bytes(job).sha256)
+    return Futures(job, result, rows)
+
+
+def _path(world: World, way: Way, state: VehicleState) -> PathAhead:
+    """Return the way from a few metres behind the car on, a point each metre."""
+    here = local_from_geo(world.frame, state.position.lat_deg, state.position.lon_deg)
+    place = way.path.locate(np.asarray(here)[None])
+    if not abs(place.offset_m[0]) <= _NEAR_WAY_M:
+        raise UserError(f"the state is {abs(place.offset_m[0]):.0f} m away from way {way.name}")
+    arcs = np.arange(max(place.arc_m[0] - _PATH_BEHIND_M, 0.0), way.path.length_m, 1.0)
+    limits = way.path.at_nodes(way.path.speed_limit_mps, arcs)
+    return PathAhead(xy_m=way.path.point_at(arcs), speed_limit_mps=np.asarray(limits))

@@ -1,0 +1,36 @@
+"""Between the steering wheel and the tyres: a ratio, and an offset that is added at the tyres."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeVar
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.vehicle import VehicleParameters
+
+MAX_CURVATURE_PM = 0.25
+"""1/m, of base_link's path: a turning circle of 8 m across, tighter than any passenger car's (10 m
+and more from kerb to kerb)."""
+
+_Angle = TypeVar("_Angle", float, Array)
+
+
+class SteeringColumn(NamedTuple):
+    """How tyre angles follow from steering-wheel angles, both in radians, positive to the left."""
+
+    ratio: float
+    """Steering wheel over tyre."""
+    offset_rad: float
+    """Of the tyres where the wheel is straight."""
+
+    def tire_rad(self, wheel_rad: _Angle) -> _Angle:
+        """Return the tyre angle that a steering-wheel angle means."""
+        return wheel_rad / self.ratio + self.offset_rad
+
+    def wheel_rad(self, tire_rad: _Angle) -> _Angle:
+        """Return the steering-wheel angle that belongs to a tyre angle."""
+        return (tire_rad - self.offset_rad) * self.ratio
+
+
+def column_of(vehicle: VehicleParameters) -> SteeringColumn:
+    """Return the steering column of a vehicle."""
+    return SteeringColumn(vehicle.steering_ratio.value, vehicle.steering_offset_rad.value)

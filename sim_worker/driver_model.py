@@ -1,0 +1,71 @@
+"""How drivers drive, in numbers: what planners, road users and their judges share.
+
+IDM is the intelligent driver model: Treiber, Hennecke, Helbing (2000), Congested traffic states in
+empirical observations and microscopic simulations, Phys. Rev. E 62, equations 2 and 3, table I.
+What is chosen says so, and next to which published number it lies.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from foretwin.contracts.arrays import Array
+
+LATERAL_ACCEL_MPS2 = 2.5
+"""In bends. Chosen: half of the 4.89 m/s² up to which nuPlan calls human driving comfortable."""
+COMFORT_DECEL_MPS2 = 2.0
+"""IDM's b. Chosen: the paper has 1.67 m/s²; AASHTO's stopping sight distances suppose 3.4 m/s²."""
+MAX_DECEL_MPS2 = 8.0
+"""In emergencies. Chosen: what tyres give on dry asphalt, less a margin; friction limits it too."""
+MAX_ACCEL_MPS2 = 1.5
+"""IDM's a, in town. Chosen: the paper has 0.73 m/s² for motorways; ISO 15622 lets adaptive cruise
+control take 2.0 m/s²."""
+ACCEL_EXPONENT = 4.0
+"""IDM's δ, as in the paper."""
+STANDSTILL_GAP_M = 2.0
+"""IDM's s0, as in the paper, from bumper to bumper."""
+CALM_TIME_GAP_S = 1.5
+"""IDM's T of the car under test. Chosen: near the paper's 1.6 s."""
+BRISK_TIME_GAP_S = 1.2
+"""IDM's T of other road users, and of a lattice's candidates that follow. Chosen: dense town
+traffic keeps less than the paper's 1.6 s."""
+HASTE = (0.3, 2.0)
+"""Least and most by which a driver's haste multiplies accelerations from a standstill. Chosen."""
+LINE_GAP_M = 1.0
+"""Between a front and the line, or the ground of others, before which it stops. Chosen."""
+LINE_DECEL_MPS2 = 4.0
+"""Who would have to brake harder for a line goes on, as behind a light that has just changed.
+Chosen: above the 3.5 m/s² that amber times suppose (RiLSA 2010)."""
+SIGHT_M = 60.0
+"""How far drivers look for others. Chosen: 4 s at 50 km/h."""
+LAG_S, LEAD_S = 1.0, 0.5
+"""Nobody enters ground that somebody else reaches less than the lag after it is left, or leaves
+less than the lead before it is entered. Chosen."""
+STANDING_MPS = 0.5
+"""Who is slower stands, in the eyes of others. Chosen: half of a slow walk."""
+HOLD_SPEED_MPS, HOLD_MPS2 = 0.3, -2.0
+"""Who is slower and means to stop holds the brake like this. Chosen: enough on any road's grade."""
+ALONG_COS = 0.5
+"""Whose heading is within 60° of a way drives along it. Chosen."""
+MAX_CLOSING_MPS = 100.0
+"""Faster than any two road users approach each other. Chosen: two cars at 180 km/h each."""
+LEAST_START_MPS = 2.0
+"""With this speed a car that stands is taken to set off. Chosen."""
+
+
+def dynamic_gap_m(
+    speed_mps: Array,
+    lead_mps: Array,
+    *,
+    time_gap_s: float,
+    accel_mps2: Array | float,
+    decel_mps2: Array | float,
+) -> Array:
+    """Return what IDM wants ahead beyond the gap at a standstill: v T + v Δv / (2 √(a b)), or 0.
+
+    All of one shape; speeds of who follows and of who leads.
+    """
+    approach = speed_mps * (speed_mps - lead_mps)
+    return np.maximum(
+        speed_mps * time_gap_s + approach / (2.0 * np.sqrt(accel_mps2 * decel_mps2)), 0.0
+    )

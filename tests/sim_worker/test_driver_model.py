@@ -1,0 +1,44 @@
+"""The intelligent driver model: what it wants ahead."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foretwin.sim_worker.driver_model import (
+    ALONG_COS,
+    COMFORT_DECEL_MPS2,
+    LATERAL_ACCEL_MPS2,
+    LINE_DECEL_MPS2,
+    MAX_DECEL_MPS2,
+    dynamic_gap_m,
+)
+from foretwin.sim_worker.metrics.comfort import BOUNDS
+
+
+def wanted_m(speed_mps: float, lead_mps: float, *, time_gap_s: float = 1.5) -> float:
+    return float(
+        dynamic_gap_m(
+            np.array([speed_mps]), np.array([lead_mps]),
+            time_gap_s=time_gap_s, accel_mps2=1.0, decel_mps2=4.0,
+        )[0]
+    )  # fmt: skip
+
+
+@given(speed=st.floats(0.0, 40.0), time_gap=st.floats(0.5, 2.0))
+def test_behind_an_equally_fast_leader_the_time_gap_alone_counts(speed, time_gap):
+    assert wanted_m(speed, speed, time_gap_s=time_gap) == pytest.approx(speed * time_gap)
+
+
+def test_closing_in_wants_more_and_falling_back_no_less_than_nothing() -> None:
+    assert wanted_m(10.0, 6.0) == pytest.approx(15.0 + 10.0 * 4.0 / (2.0 * 2.0))
+    assert wanted_m(10.0, 40.0) == 0.0
+
+
+def test_drivers_are_comfortable_by_the_bounds_that_they_are_judged_by() -> None:
+    assert BOUNDS["lat_accel_mps2"][1] > LATERAL_ACCEL_MPS2
+    assert -BOUNDS["lon_accel_mps2"][0] > COMFORT_DECEL_MPS2
+    assert COMFORT_DECEL_MPS2 < LINE_DECEL_MPS2 < MAX_DECEL_MPS2
+    assert pytest.approx(np.cos(np.radians(60.0))) == ALONG_COS
