@@ -12,10 +12,11 @@ import msgspec
 
 from foretwin.contracts import (
     drive,
-    futures,
     gap,
+    placement,
     planner_link,
     roles,
+    runner,
     side_by_side,
     simulation,
     towards_vehicle,
@@ -92,8 +93,10 @@ CHANNELS: dict[str, Channel] = {
         _row("advance", "vehicle/{vehicle}/advance", drive.AdvanceRequest, None, REQUEST,
              "lock step: go on until", drive.AdvanceReply),
         # Work.
-        _row("job", f"{_RUN}/worker/{{process}}/job", futures.Job, 2, REQUEST,
-             "simulate futures", futures.FuturesResult),
+        _row("job", f"{_RUN}/worker/{{process}}/job", runner.JobRequest, 2, REQUEST,
+             "simulate futures", runner.JobAnswer),
+        _row("place", f"{_RUN}/worker/{{process}}/place", placement.PlaceRequest, None, REQUEST,
+             "find places for scenarios", placement.WorldPlaces),
         _row("prepare", f"{_RUN}/worker/{{process}}/prepare", simulation.PrepareRequest, None,
              REQUEST, "load a World", simulation.PrepareReply),
         _row("use_world", f"{_RUN}/worker/{{process}}/use_world", simulation.ActiveWorld, None,

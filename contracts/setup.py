@@ -76,12 +76,18 @@ class Ros2Setup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 class WorkerSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A worker of one role; `drive_frame` is the frame of MirrorSample."""
+    """A worker of one role; `drive_frame` is the frame of MirrorSample, None where none is made."""
 
     role: str
     worlds_dir: str
     vehicle: VehicleParameters
-    drive_frame: LocalFrame
+    swept_vehicles: tuple[VehicleParameters, ...] = ()
+    """Those that jobs of a sweep name by their digests; a drive's are played with `vehicle`."""
+    simulations: int = 32
+    """The most futures of a job: two workers share a round of 64."""
+    kept_worlds: int = 8
+    """So many Worlds stay compiled for each vehicle."""
+    drive_frame: LocalFrame | None = None
     control_hz: float = 20.0
     mirror_window_s: float = 8.0
     mirror_rate_hz: float = 10.0

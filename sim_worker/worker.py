@@ -16,22 +16,23 @@ import scipy.spatial  # noqa: F401  A search for many points needs it: not withi
 from foretwin.contracts.bus import Bus, Mailbox, Request
 from foretwin.contracts.errors import one_line
 from foretwin.contracts.frames import local_from_geo
-from foretwin.contracts.futures import FuturesResult, Job
+from foretwin.contracts.job_identity import vehicle_digest
+from foretwin.contracts.placement import PlaceRequest, WorldPlaces
 from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.runner import JobAnswer, JobRequest
 from foretwin.contracts.setup import WorkerSetup
 from foretwin.contracts.simulation import PrepareReply, PrepareRequest
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.futures.future_rows import future_rows, rows_as_bytes
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.planners.registry import load_planner
 from foretwin.sim_worker.planners.remote import RemotePlanner
+from foretwin.sim_worker.scenarios.world_places import places_in
 from foretwin.sim_worker.world_file import load_world
 
-NSIM = 32
-"""Simulations of a stage: two workers share a round of 64."""
-KEPT_WORLDS = 8
 _IDLE_S = 0.2
 
 log = logging.getLogger("sim_worker")
@@ -52,8 +53,8 @@ class StageCache:
         *,
         control_hz: float = 20.0,
         threads: int = 1,
-        nsim: int = NSIM,
-        kept: int = KEPT_WORLDS,
+        nsim: int,
+        kept: int,
     ) -> None:
         self._worlds_dir = worlds_dir
         self._vehicle = vehicle
@@ -92,33 +93,42 @@ class StageCache:
 
 
 class FuturesWorker:
-    """Answers `prepare`, `use_vehicle`, `job`; what cannot be answered is refused in one line."""
+    """Answers `prepare`, `use_vehicle`, `job`, `place`: in a process of its own, or in any."""
 
     def __init__(self, setup: WorkerSetup) -> None:
         self._id = setup.process_id
-        self._stages = StageCache(
-            Path(setup.worlds_dir),
-            setup.vehicle,
-            control_hz=setup.control_hz,
-            threads=setup.threads,
-        )
+        self._worlds_dir = Path(setup.worlds_dir)
+        self._stages = self._cache(setup, setup.vehicle)
+        self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
+        self._swept = {name: self._cache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
         self._answers: dict[str, Callable[[msgspec.Struct], msgspec.Struct]] = {
             "prepare": self._prepare,
             "use_vehicle": self._use_vehicle,
             "job": self._job,
+            "place": self._place,
         }
 
+    def _cache(self, setup: WorkerSetup, vehicle: VehicleParameters) -> StageCache:
+        return StageCache(
+            self._worlds_dir, vehicle, control_hz=setup.control_hz, threads=setup.threads,
+            nsim=setup.simulations, kept=setup.kept_worlds,
+        )  # fmt: skip
+
     def handle(self, request: Request) -> None:
-        """Answer one question; never raises."""
+        """Answer one question; never raises: what cannot be answered is refused in one line."""
         try:
-            answer = self._answers[request.channel](request.message())
+            answer = self.answer(request.channel, request.message())
         except Exception as error:
-            # The drive goes on without this answer; the traceback is for the log's reader.
+            # The run goes on without this answer; the traceback is for the log's reader.
             log.exception("%s refused", request.channel)
             request.refuse(one_line(error))
             return
         request.reply(answer)
+
+    def answer(self, channel: str, question: msgspec.Struct) -> msgspec.Struct:
+        """Return the answer to a question; raises whatever keeps it from being answered."""
+        return self._answers[channel](question)
 
     def _prepare(self, question: msgspec.Struct) -> PrepareReply:
         assert isinstance(question, PrepareRequest)
@@ -136,20 +146,25 @@ class FuturesWorker:
         self._version = question.version
         return question
 
-    def _job(self, question: msgspec.Struct) -> FuturesResult:
-        assert isinstance(question, Job)
-        if question.vehicle_version != self._version:
+    def _job(self, question: msgspec.Struct) -> JobAnswer:
+        assert isinstance(question, JobRequest)
+        job = question.job
+        if job.vehicle_version != self._version:
             raise ValueError(
-                f"job for version {question.vehicle_version} of the vehicle's parameters at a "
+                f"job for version {job.vehicle_version} of the vehicle's parameters at a "
                 f"worker with version {self._version}"
             )
-        prepared = self._stages.get(question.world_id)
-        return run_job(
-            question,
-            prepared.stage,
-            worker_id=self._id,
-            scenes=prepared.scenes,
-        )
+        prepared = self._swept.get(job.vehicle, self._stages).get(job.world_id)
+        result = run_job(job, prepared.stage, worker_id=self._id, scenes=prepared.scenes)
+        if question.wanted == "result":
+            return JobAnswer(result=result)
+        rows = future_rows(job, result, job_sha256=question.sha256)
+        return JobAnswer(rows=rows_as_bytes(rows))
+
+    def _place(self, question: msgspec.Struct) -> WorldPlaces:
+        assert isinstance(question, PlaceRequest)
+        world = load_world(self._worlds_dir, question.world_id)
+        return places_in(world, question, self._vehicles[question.vehicle])
 
 
 def warm_up(stage: Stage) -> None:
@@ -166,12 +181,12 @@ def serve_futures(setup: WorkerSetup, bus: Bus, life: ProcessLife) -> None:
     worker = FuturesWorker(setup)
     mailbox = Mailbox(64)
     ids = {"run": setup.run_id, "process": setup.process_id}
-    bus.serve("prepare", mailbox, **ids)
-    bus.serve("use_vehicle", mailbox, **ids)
-    bus.serve("job", mailbox, **ids)
-    remote = load_planner("remote")
-    assert isinstance(remote, RemotePlanner)
-    remote.connect(bus, run=setup.run_id, process=setup.process_id)
+    for channel in ("prepare", "use_vehicle", "job", "place"):
+        bus.serve(channel, mailbox, **ids)
+    if "remote" in setup.planners:
+        remote = load_planner("remote")
+        assert isinstance(remote, RemotePlanner)
+        remote.connect(bus, run=setup.run_id, process=setup.process_id)
     for name in setup.planners:
         try:
             load_planner(name)

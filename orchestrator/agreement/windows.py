@@ -19,7 +19,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.drive.intake import LatestReports
-from foretwin.orchestrator.rounds.dispatch import RoundDone
+from foretwin.orchestrator.rounds.open_rounds import RoundDone
 from foretwin.sim_worker.analysis.agreement.criteria import Court, Heard, Users, Window
 from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
 from foretwin.sim_worker.metrics.ground import DrivableGround

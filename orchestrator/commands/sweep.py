@@ -2,34 +2,36 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import FuturesResult
 from foretwin.contracts.job_identity import job_bytes
+from foretwin.contracts.placement import WorldPlaces
+from foretwin.contracts.runner import Runner, answers, job_task, place_task
 from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.record.job_tables import keep_vehicles
+from foretwin.orchestrator.runner.worker_processes import WorkerProcesses
 from foretwin.orchestrator.sweep.folder import (
     FoundPlaces,
     SweepFolder,
-    built_worlds,
     fingerprint_of,
     keep_worlds,
     planner_origins,
 )
-from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows
-from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
-from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, start_worker
-from foretwin.orchestrator.sweep.pool import Crew, Lost, Task
+from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows, place_request
+from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, plan_sweep
 from foretwin.orchestrator.sweep.rows import Parts, RowsHash
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec, worlds_folder
 from foretwin.orchestrator.sweep.summary import Summary, print_summary
+from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.orchestrator.sweep.worlds import source_digest, sweep_worlds
 
 SOME_FAILED = 3
@@ -54,8 +56,8 @@ def sweep(request: SweepRequest) -> int:
         raise UserError(f"--workers {request.workers}: at least 1")
     loaded = load_spec(request.spec)
     out = request.out or Path("sweeps") / request.spec.stem
-    with crew_for(loaded, out, request.workers) as crew:
-        summary = run_sweep(loaded, out, crew, fresh=request.fresh)
+    with workers_for(loaded, out, request.workers) as runner:
+        summary = run_sweep(loaded, out, runner, fresh=request.fresh)
     if request.as_json:
         sys.stdout.write(msgspec.json.format(msgspec.json.encode(summary)).decode() + "\n")
     else:
@@ -63,19 +65,27 @@ def sweep(request: SweepRequest) -> int:
     return SOME_FAILED if summary["failed"] or summary["failures"] else 0
 
 
-def crew_for(loaded: Loaded, out: Path, workers: int) -> Crew:
-    """Return the processes that play a sweep in the folder `out`."""
-    worlds = worlds_folder(loaded.spec) or built_worlds(out)
-    setup = PlaySetup(loaded=loaded, worlds_dir=str(worlds))
-    return Crew(workers, start_worker, setup, timeout_s=loaded.spec.job_timeout_s)
+@contextlib.contextmanager
+def workers_for(loaded: Loaded, out: Path, workers: int) -> Iterator[WorkerProcesses]:
+    """Give the processes that play a sweep into the folder `out`, and end them."""
+    with (
+        tempfile.TemporaryDirectory(prefix="foretwin-sweep-") as folder,
+        WorkerProcesses(
+            workers,
+            worker_setup(loaded, out),
+            task_timeout_s=loaded.spec.job_timeout_s,
+            folder=Path(folder),
+        ) as runner,
+    ):
+        yield runner
 
 
-def run_sweep(loaded: Loaded, out: Path, crew: Crew, *, fresh: bool = False) -> dict[str, Any]:
+def run_sweep(loaded: Loaded, out: Path, runner: Runner, *, fresh: bool = False) -> dict[str, Any]:
     """Play what is not yet played of a sweep, and return its summary as `sweep.json` has it."""
     fingerprint = fingerprint_of(loaded, source_digest(loaded.spec))
     with SweepFolder(out, fingerprint, fresh=fresh) as folder:
         folder.begin(loaded)
-        places = folder.places() or _find_places(loaded, folder, crew)
+        places = folder.places() or _find_places(loaded, folder, runner)
         plan = plan_sweep(loaded, places.worlds)
         parts = Parts(folder.path)
         keep_vehicles(folder.path, loaded.vehicles.values())
@@ -83,7 +93,7 @@ def run_sweep(loaded: Loaded, out: Path, crew: Crew, *, fresh: bool = False) -> 
         there = parts.done(plan.jobs)
         started_s = time.monotonic()
         left = [job for job in plan.jobs if job.number not in there]
-        _play(left, JobMaker(loaded, plan.worlds), parts, crew)
+        _play(left, JobMaker(loaded, plan.worlds), parts, runner)
         return folder.summarise(
             _summary(loaded, plan, places, parts)
             | {"jobs_played": len(plan.jobs) - len(there),
@@ -91,24 +101,22 @@ def run_sweep(loaded: Loaded, out: Path, crew: Crew, *, fresh: bool = False) -> 
         )  # fmt: skip
 
 
-def _find_places(loaded: Loaded, folder: SweepFolder, crew: Crew) -> FoundPlaces:
+def _find_places(loaded: Loaded, folder: SweepFolder, runner: Runner) -> FoundPlaces:
     """Build or read the Worlds, and find where the scenarios take place in each."""
     with _counting("Worlds") as advance:
         worlds = sweep_worlds(loaded.spec, folder.worlds_dir, advance)
     found: dict[int, WorldPlaces] = {}
     failures = dict(worlds.failures)
-    tasks = [Task(i, id_, PlaceQuestion(world_id=id_)) for i, id_ in enumerate(worlds.ids)]
+    tasks = [place_task(place_request(loaded, world_id)) for world_id in worlds.ids]
     with progress_bar(len(tasks), "Worlds placed on") as (advance_one, say):
-
-        def done(task: Task, answer: WorldPlaces | Lost) -> None:
-            if isinstance(answer, Lost):
-                failures[task.place] = answer.reason
-                say(f"failed: world {task.place}: {answer.reason}")
+        for answer in answers(runner, tasks):
+            world_id = answer.task.world_id
+            if answer.message is None:
+                failures[world_id] = answer.failure
+                say(f"failed: world {world_id}: {answer.failure}")
             else:
-                found[task.number] = answer
-            advance_one(task.place)
-
-        crew.run(tasks, done)
+                found[worlds.ids.index(world_id)] = answer.message
+            advance_one(world_id)
     return folder.save_places(tuple(found[number] for number in sorted(found)), failures)
 
 
@@ -134,24 +142,19 @@ class _counting:  # noqa: N801
             self._bar.__exit__(*what)
 
 
-def _play(left: Sequence[SweepJob], maker: JobMaker, parts: Parts, crew: Crew) -> None:
+def _play(left: Sequence[SweepJob], maker: JobMaker, parts: Parts, runner: Runner) -> None:
     """Play jobs and write their rows as they come."""
-    planned = {one.number: one for one in left}
+    jobs = [(one, job := maker.job(one), job_bytes(job)) for one in left]
+    by_name = {named.sha256: (one, job, named) for one, job, named in jobs}
+    tasks = [job_task(job, named, wanted="rows") for _, job, named in jobs]
     with progress_bar(sum(len(one.cells) for one in left), "futures") as (advance, say):
-
-        def done(task: Task, answer: FuturesResult | Lost) -> None:
-            one, job = planned[task.number], task.question
-            recorded = job_bytes(job)
-            if isinstance(answer, Lost):
-                say(f"failed: job {one.number}: {answer.reason}")
-                rows = cell_rows(one, job, recorded.sha256, None, failure=answer.reason)
-            else:
-                rows = cell_rows(one, job, recorded.sha256, answer)
-            parts.write(rows, job, recorded)
+        for answer in answers(runner, tasks):
+            one, job, named = by_name[answer.task.key]
+            if answer.message is None:
+                say(f"failed: job {one.number}: {answer.failure}")
+            parts.write(cell_rows(one, job, answer), job, named)
             for _ in one.cells:
                 advance(f"{one.cells[0].junction_id} {one.planner}")
-
-        crew.run([Task(one.number, one.world_id, maker.job(one)) for one in left], done)
 
 
 def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts) -> dict[str, Any]:

@@ -148,12 +148,12 @@ class Conductor:
                 self._alive(item)
 
     def _build_reply(self, item: Reply) -> None:
-        workers, builder_up = self.rounds.desk.workers, BUILDER in self.alive
+        workers, builder_up = self.rounds.dispatcher.workers, BUILDER in self.alive
         self.worlds.build_reply(item, workers=workers, builder_up=builder_up)
 
     def _tuning_reply(self, item: Reply) -> None:
         process_id = self.tuning.reply(item)
-        if process_id in self.alive and process_id not in self.rounds.desk.workers:
+        if process_id in self.alive and process_id not in self.rounds.dispatcher.workers:
             self._worker_up(process_id)
 
     def take_telemetry(self, item: Received) -> None:
@@ -217,7 +217,7 @@ class Conductor:
         for instruction in instructions:
             match instruction:
                 case BuildWorld(junction_id, load):
-                    self.worlds.want(junction_id, load=load, workers=self.rounds.desk.workers)
+                    self.worlds.want(junction_id, load=load, workers=self.rounds.dispatcher.workers)
                 case UseWorld(world_id):
                     self._active_world = world_id
                     self._world_untold = True
@@ -249,7 +249,7 @@ class Conductor:
 
     def make_changes(self) -> None:
         """Make what `foretwin set` asked for; between rounds, and from the next state on."""
-        if self.rounds.desk.open_rounds:
+        if self.rounds.open:
             return
         stamp_ns, start_ns = self.intake.now_stamp_ns + 1, self.intake.start_stamp_ns
         for change in self.changes.make(stamp_ns=stamp_ns, start_stamp_ns=start_ns):
@@ -283,10 +283,10 @@ class Conductor:
         """Give a worker that has the parameters in force its Worlds, and jobs."""
         if not process_id.startswith("w"):
             return
-        self.rounds.desk.worker_up(process_id)
+        self.rounds.worker_up(process_id)
         for world_id in self.mission.worlds_ahead():
             self.worlds.prepare(process_id, world_id)
-        self.rounds.give_out()
+        self.rounds.dispatcher.give_out()
 
     def _process_down(self, process_id: str) -> None:
         if process_id not in self.alive:
@@ -295,6 +295,5 @@ class Conductor:
         self.tuning.process_down(process_id)
         log.info("lost %s", process_id)
         if process_id.startswith("w"):
-            self.rounds.desk.worker_down(process_id)
             self.worlds.worker_down(process_id)
-            self.rounds.give_out()
+            self.rounds.worker_down(process_id)

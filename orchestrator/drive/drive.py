@@ -148,6 +148,7 @@ class _Drive:
         def housekeeping(now_s: float) -> None:
             self._look_after(conductor, now_s)
             self._supervisor.let_give_way(conductor.alive, now_s)
+            conductor.rounds.dispatcher.give_out()
             line.update(now_s)
 
         loop: LockStepLoop | LiveLoop

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from foretwin.contracts.bus import Received
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.orchestrator.rounds.runner import ROUND_DEADLINE_S
 
 HOUSEKEEPING_S = 0.1
 SILENCE_S = 0.05
 """So long may nothing come before it is asked whether something should have."""
 LAST_ROUND_GRACE_S = 1.0
-GIVE_UP_ROUND_S = 10.0
 STALE_AFTER_S = 1.0
 """No round starts from a state older than this, in seconds of the drive's clock."""
 
@@ -90,9 +90,9 @@ class LiveLoop:
             return False
         if (now_s - latest.receipt_mono_ns / 1e9) * self._speed > STALE_AFTER_S:
             return False
-        if conductor.rounds.desk.open_rounds:
+        if conductor.rounds.open:
             conductor.missed_rounds += 1
-            if now_s - self._started_s > GIVE_UP_ROUND_S:
+            if now_s - self._started_s > ROUND_DEADLINE_S:
                 conductor.rounds.drop()
             return True
         # Where the machine is too slow, one round follows the other without a turn between.
@@ -109,7 +109,7 @@ class LiveLoop:
         """Give the last round its time and take what the mirror still has to say."""
         conductor = self._conductor
         deadline = time.monotonic() + LAST_ROUND_GRACE_S
-        while time.monotonic() < deadline and conductor.rounds.desk.open_rounds:
+        while time.monotonic() < deadline and conductor.rounds.open:
             item = conductor.mailbox.take(0.05)
             if item is not None:
                 conductor.handle(item)

@@ -70,7 +70,7 @@ class LockStepLoop:
             # Weighed while the round and the next step go on; counts from the step after.
             conductor.tuning.weigh(advanced.published)
             if not advanced.ended and conductor.start_round():
-                self._wait("the round", lambda: not conductor.rounds.desk.open_rounds)
+                self._wait("the round", lambda: not conductor.rounds.open)
             if self._stop():
                 return False
             if advanced.ended:

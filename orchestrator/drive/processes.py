@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from foretwin.contracts.roles import CastVehicle, MirrorCast
 from foretwin.contracts.setup import (
@@ -18,6 +18,7 @@ from foretwin.contracts.setup import (
     WorkerSetup,
 )
 from foretwin.orchestrator.drive.plan import Beside, DrivePlan
+from foretwin.orchestrator.drive.supervisor import WhenDead
 from foretwin.orchestrator.rounds.jobs import planners_of
 
 ORCHESTRATOR = "orchestrator"
@@ -26,8 +27,6 @@ MIRROR = "mirror"
 TUNING = "tuning"
 VEHICLE = "vehicle"
 ROS2_BESIDE = "ros2-beside"
-
-WhenDead = Literal["restart", "report", "end_drive"]
 
 
 class ProcessRow(NamedTuple):

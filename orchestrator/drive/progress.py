@@ -89,10 +89,10 @@ class ProgressLine:
         )
 
     def _workers(self, stamp_ns: int) -> list[WorkerStatus]:
-        desk = self._conductor.rounds.desk
-        busy = desk.busy
+        dispatch = self._conductor.rounds.dispatcher.dispatch
+        busy = dispatch.busy
         count = self._conductor.plan.config.workers
-        up = set(desk.workers)
+        up = set(dispatch.workers)
         statuses = []
         for worker_id in (f"w{index}" for index in range(count)):
             state: Literal["idle", "busy", "dead"] = "dead"
@@ -117,7 +117,7 @@ class ProgressLine:
         return (
             f"{progress.drive_time_s:7.1f} s  {progress.mission_state}  {ahead}  {short}"
             f"{progress.futures_per_s:.0f} futures/s  "
-            f"workers {len(conductor.rounds.desk.workers)}/{conductor.plan.config.workers}  "
+            f"workers {len(conductor.rounds.dispatcher.workers)}/{conductor.plan.config.workers}  "
             f"missed {conductor.missed_rounds}  "
             f"dropped {progress.dropped}"
         )

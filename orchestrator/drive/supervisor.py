@@ -19,11 +19,10 @@ from collections import defaultdict, deque
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol
 
 from foretwin.contracts.setup import ProcessSetup, write_setup
 from foretwin.orchestrator.drive.priorities import gives_way
-from foretwin.orchestrator.drive.processes import ProcessRow
 
 log = logging.getLogger("orchestrator")
 
@@ -36,6 +35,25 @@ file is slow, not stuck."""
 _REAP_S = 30.0
 MAX_RESTARTS = 5
 """More deaths than this within RESTARTS_WITHIN_S and a process is given up."""
+
+
+WhenDead = Literal["restart", "report", "end_drive"]
+
+
+class SupervisedRow(Protocol):
+    """What a supervisor must know of a kind of process."""
+
+    @property
+    def module(self) -> str:
+        """Its module below `foretwin`."""
+
+    @property
+    def when_dead(self) -> WhenDead:
+        """What follows from its death."""
+
+    @property
+    def nice(self) -> int:
+        """Added to its scheduling niceness once it can take work."""
 
 
 class Child(Protocol):
@@ -99,14 +117,14 @@ class Death:
     """A process that ended although nobody asked it to."""
 
     process_id: str
-    row: ProcessRow
+    row: SupervisedRow
     exit_code: int
     restarted: bool
 
 
 @dataclass(slots=True)
 class _Managed:
-    row: ProcessRow
+    row: SupervisedRow
     setup: ProcessSetup
     child: Child
     gone: bool = False
@@ -123,7 +141,7 @@ class Supervisor:
     _deaths: dict[str, deque[float]] = field(default_factory=lambda: defaultdict(deque))
     _to_give_way: dict[str, float] = field(default_factory=dict)
 
-    def start(self, row: ProcessRow, setup: ProcessSetup) -> None:
+    def start(self, row: SupervisedRow, setup: ProcessSetup) -> None:
         """Start one process."""
         child = self.launch(module=row.module, setup=setup)
         if row.nice:
@@ -182,7 +200,16 @@ class Supervisor:
         if managed is not None and not managed.gone:
             _signal(managed.child, signal.SIGKILL)
 
-    def row(self, process_id: str) -> ProcessRow:
+    def end(self, process_id: str, *, grace_s: float) -> None:
+        """Wait for the end of a process that is no use any more, and kill it after `grace_s`."""
+        child = self._managed[process_id].child
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            child.wait(timeout=grace_s)
+        self.kill(process_id)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            child.wait(timeout=_REAP_S)
+
+    def row(self, process_id: str) -> SupervisedRow:
         """Return the table's row of a process."""
         return self._managed[process_id].row
 

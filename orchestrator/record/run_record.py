@@ -65,14 +65,14 @@ def run_record(
         "workers": {
             "started": plan.config.workers,
             "restarted": supervisor.restarted,
-            "requeued_jobs": conductor.rounds.desk.requeued_jobs,
-            "late_results": conductor.rounds.desk.late_results,
+            "requeued_jobs": conductor.rounds.dispatcher.dispatch.requeued,
+            "late_results": conductor.rounds.dispatcher.dispatch.late,
         },
         "dropped": {
             "orchestrator_mailbox": conductor.mailbox.dropped,
             "result_rows": conductor.tables.dropped,
             "failed_jobs": conductor.rounds.failed_jobs,
-            "given_up_rounds": conductor.rounds.desk.given_up_rounds,
+            "given_up_rounds": conductor.rounds.open.given_up,
         },
         "troubles": [conductor.tables.failed] if conductor.tables.failed else [],
         "off_road": [

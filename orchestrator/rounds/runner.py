@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 import math
+import time
 from collections.abc import Callable
 from typing import NamedTuple
 
 from foretwin.contracts.bus import Bus, Mailbox, Reply
 from foretwin.contracts.drive import PlannedTrajectory, VehicleState
+from foretwin.contracts.runner import Answer
 from foretwin.contracts.simulation import Comparison
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -26,13 +29,19 @@ from foretwin.orchestrator.record.result_rows import (
 )
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.comparisons import ComparisonDesk
-from foretwin.orchestrator.rounds.dispatch import RoundDesk, RoundDone, RoundOrder
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
+from foretwin.orchestrator.rounds.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
 from foretwin.orchestrator.rounds.views import round_view
+from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
 from foretwin.sim_worker.metrics.comparison import compare_plan
 
-JOB_TIMEOUT_S = 20.0
+log = logging.getLogger("orchestrator")
+
+ROUND_DEADLINE_S = 10.0
+"""A live round that is not complete after so long is given up, and its jobs with it."""
+_REFUSALS = 3
+"""A job that workers refuse so often would be refused for ever."""
 
 
 class _Seed(NamedTuple):
@@ -58,7 +67,8 @@ class RoundRunner:
         on_round: Callable[[str, int], None],
         tell: Callable[[Tell], None],
     ) -> None:
-        self.desk = RoundDesk()
+        self.open = OpenRounds()
+        self.dispatcher = BusDispatcher(bus, mailbox, run_id=plan.run_id, refusals=_REFUSALS)
         self.futures = FuturesCount()
         self.comparisons = ComparisonCount()
         self.plans = PlanCount()
@@ -67,7 +77,6 @@ class RoundRunner:
         self.start_stamp_ns = 0
         self._plan = plan
         self._bus = bus
-        self._mailbox = mailbox
         self._tables = tables
         self._world_of = world_of
         self._on_round = on_round
@@ -117,18 +126,22 @@ class RoundRunner:
             count=pace.futures,
         )
         self._seeds[round_id] = _Seed(latest.state, said.plan, intent, pace)
-        self.desk.open(
-            RoundOrder(
-                round_id=round_id,
-                stamp_ns=latest.state.stamp_ns,
-                junction_id=intent.junction_id,
-                world_id=intent.world_id,
-                receipt_mono_ns=latest.receipt_mono_ns,
-                started_mono_ns=started_mono_ns,
-                jobs=jobs,
-            )
+        order = RoundOrder(
+            round_id=round_id,
+            stamp_ns=latest.state.stamp_ns,
+            junction_id=intent.junction_id,
+            world_id=intent.world_id,
+            receipt_mono_ns=latest.receipt_mono_ns,
+            started_mono_ns=started_mono_ns,
+            jobs=jobs,
         )
-        self.give_out()
+        self.open.open(order)
+        for task in order.tasks:
+            # In lock step nothing hurries; a drive that stands still ends by itself.
+            self.dispatcher.submit(
+                task, within_s=None if self._plan.config.lock_step else ROUND_DEADLINE_S
+            )
+        self.dispatcher.give_out()
 
     def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
         """Plan rounds for these parameters from now on, which workers have as `version`."""
@@ -137,39 +150,48 @@ class RoundRunner:
 
     def drop(self) -> None:
         """Give up the open rounds: they take too long."""
-        for round_id in self.desk.open_rounds:
-            self._take_time(self._seeds.pop(round_id).pace, math.inf)
-        self.desk.drop()
+        for order in self.open.drop():
+            self._forget(order, late=True)
 
-    def give_out(self) -> None:
-        """Send waiting jobs to idle workers."""
-        for worker_id, job in self.desk.assignments():
-            self._bus.request(
-                "job",
-                job,
-                self._mailbox,
-                tag=(worker_id, job),
-                timeout_s=JOB_TIMEOUT_S,
-                run=self._plan.run_id,
-                process=worker_id,
-            )
+    def worker_up(self, worker_id: str) -> None:
+        """A worker can take jobs, as soon as these are given out."""
+        self._take(self.dispatcher.worker_up(worker_id))
+
+    def worker_down(self, worker_id: str) -> None:
+        """A worker is gone: its job goes to another."""
+        self._take(self.dispatcher.worker_down(worker_id))
+        self.dispatcher.give_out()
 
     def reply(self, reply: Reply) -> None:
         """Take a worker's answer."""
-        worker_id, job = reply.tag
-        refused = reply.message is None and reply.error != "no answer"
+        worker_id, _ = reply.tag
         if reply.message is None:
             self.failed_jobs += 1
-            if refused:
+            if reply.error != NO_ANSWER:
                 self._tell(Tell("error", f"{worker_id}: {reply.error}"))
-        elif reply.message.cpu_seconds > 0.0:
-            self.rtf[worker_id] = reply.message.sim_seconds / reply.message.cpu_seconds
-        done = self.desk.result(
-            worker_id, job, reply.message, reply.received_mono_ns, refused=refused
-        )
-        if done is not None:
-            self._take_apart(done)
-        self.give_out()
+        elif (result := reply.message.result).cpu_seconds > 0.0:
+            self.rtf[worker_id] = result.sim_seconds / result.cpu_seconds
+        answer = self.dispatcher.reply(reply)
+        self._take([] if answer is None else [answer])
+        self.dispatcher.give_out()
+
+    def _take(self, answers: list[Answer]) -> None:
+        for answer in answers:
+            match self.open.take(answer):
+                case RoundDone() as done:
+                    self._take_apart(done)
+                case RoundGivenUp(order):
+                    log.warning("round %d is given up: %s", order.round_id, answer.failure)
+                    took_s = (time.monotonic_ns() - order.started_mono_ns) * 1e-9
+                    self._forget(order, late=took_s >= ROUND_DEADLINE_S)
+
+    def _forget(self, order: RoundOrder, *, late: bool) -> None:
+        """Cancel the jobs of a round that is given up; was it late, the next are smaller."""
+        for named in order.recorded:
+            self.dispatcher.cancel(named.sha256)
+        pace = self._seeds.pop(order.round_id).pace
+        if late:
+            self._take_time(pace, math.inf)
 
     def take_state(self, state: VehicleState) -> None:
         """Add where the car is: comparisons fall due."""

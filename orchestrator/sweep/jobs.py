@@ -5,12 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.futures import Future, FuturesResult, Job
+from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.job_identity import vehicle_digest
-from foretwin.orchestrator.sweep.plan import Cell, SweepJob, WorldPlaces
+from foretwin.contracts.placement import AS_RECORDED, PlaceRequest, WorldPlaces
+from foretwin.contracts.runner import Answer
+from foretwin.orchestrator.sweep.plan import Cell, SweepJob
 from foretwin.orchestrator.sweep.road_users import NOBODY, others_at
-from foretwin.orchestrator.sweep.spec import AS_RECORDED, STEP_S, Loaded
-from foretwin.sim_worker.futures.future_rows import Row, future_rows
+from foretwin.orchestrator.sweep.spec import STEP_S, Loaded
+from foretwin.sim_worker.futures.future_rows import Row, future_rows, rows_from_bytes
+
+
+def place_request(loaded: Loaded, world_id: str) -> PlaceRequest:
+    """Return the question where the scenarios of a sweep take place, for its first vehicle."""
+    vehicle = next(iter(loaded.vehicles.values()))
+    starts = {n: start for n, start in enumerate(loaded.starts) if start.world_id == world_id}
+    return PlaceRequest(
+        world_id=world_id, scenarios=loaded.scenarios, vehicle=vehicle_digest(vehicle),
+        most=loaded.spec.places, starts=starts,
+    )  # fmt: skip
 
 
 class JobMaker:
@@ -85,19 +97,19 @@ def _future(index: int, cell: Cell, planner: str) -> Future:
 def cell_rows(
     planned: SweepJob,
     job: Job,
-    sha256: str,
-    result: FuturesResult | None,
-    *,
-    failure: str = "",
+    answer: Answer,
 ) -> list[Row]:
-    """Return the rows of a job's cells; without a result, all say why they failed."""
-    rows = future_rows(job, result, job_sha256=sha256)
+    """Return the rows of a job's cells; where it was given up, all say why."""
+    if answer.message is None:
+        rows = future_rows(job, None, job_sha256=answer.task.key)
+    else:
+        rows = rows_from_bytes(answer.message.rows, job)
     for row, cell in zip(rows, planned.cells, strict=True):
         row |= {
             "cell": cell.number, "case": cell.case, "junction_id": cell.junction_id,
             "scenario": cell.scenario_id, "place": cell.place, "vehicle": planned.vehicle,
             "worker_id": None,
         }  # fmt: skip
-        if failure:
-            row["failure"] = failure
+        if answer.failure:
+            row["failure"] = answer.failure
     return rows

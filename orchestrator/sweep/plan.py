@@ -14,55 +14,15 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.frames import LocalFrame
-from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.placement import AS_RECORDED, PlacedHere, WorldPlaces
 from foretwin.contracts.scenario import FAULTS, Scenario
-from foretwin.orchestrator.sweep.spec import (
-    AS_RECORDED,
-    FUTURES_PER_JOB,
-    STEP_S,
-    Loaded,
-    SweepSpec,
-)
+from foretwin.orchestrator.sweep.spec import FUTURES_PER_JOB, STEP_S, Loaded, SweepSpec
 from foretwin.sim_worker.planners.registry import drives_backwards
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 
 MOST_CELLS = 5_000_000
 BACKWARDS_PLANNER = "reverse_pursuit"
 """Drives where the ego goes backwards, unless the spec names another that does."""
-
-
-class PlacedHere(msgspec.Struct, frozen=True, kw_only=True):
-    """A place that a scenario has in a World; `ego` names the way that the ego takes."""
-
-    scenario_id: str
-    junction_id: str
-    place: str
-    ego: str
-    start: int | None = None
-    """Of the recorded starts, which; None where the case says where the ego starts."""
-    rank: int = 0
-    """Which of the places that fit the way of a recorded car."""
-
-
-class NotPlaced(msgspec.Struct, frozen=True, kw_only=True):
-    """A junction without a place for a scenario that applies to it, or for a whole one."""
-
-    scenario_id: str
-    junction_id: str
-    reason: str
-    applies: bool
-
-
-class WorldPlaces(msgspec.Struct, frozen=True, kw_only=True):
-    """Where scenarios take place in one World."""
-
-    world_id: str
-    frame: LocalFrame
-    placed: tuple[PlacedHere, ...]
-    unplaced: tuple[NotPlaced, ...]
-    ways: dict[str, PathAhead] = {}
-    """Those that staged egos take, by name."""
 
 
 class Cell(msgspec.Struct, frozen=True, kw_only=True):

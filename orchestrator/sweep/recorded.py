@@ -15,7 +15,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalFrame, local_from_geo
-from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.placement import RecordedStart
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.sweep.road_users import RoadUserMode, among, named_log
 from foretwin.telemetry.estimator.estimator import StateEstimator
@@ -47,24 +47,6 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """Ids of road users who are not to be there: the car itself, in a log of somebody else's."""
     longest_gap_s: float = LONGEST_GAP_S
     """Who is not seen for longer is away until seen again."""
-
-
-class RecordedStart(msgspec.Struct, frozen=True, kw_only=True):
-    """Where the car was as a round began, and the way that it then drove, in degrees."""
-
-    round_id: int
-    drive_time_s: float
-    world_id: str
-    junction_id: str
-    cruise_speed_mps: float
-    state: VehicleState
-    lat_deg: tuple[float, ...]
-    lon_deg: tuple[float, ...]
-
-    def path(self, frame: LocalFrame) -> PathAhead:
-        """Return the way that the car drove in a World's frame; of limits nothing is known."""
-        xy = np.asarray(local_from_geo(frame, np.array(self.lat_deg), np.array(self.lon_deg)))
-        return PathAhead(xy_m=xy, speed_limit_mps=np.full(len(xy), np.inf))
 
 
 class RecordedStarts(NamedTuple):

@@ -9,10 +9,11 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.numbers import FUTURE_NUMBERS, out_of_range
+from foretwin.contracts.placement import AS_RECORDED, RecordedStart
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.world import MAX_RADIUS_M, MIN_RADIUS_M
-from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, RecordedStart, read_drive
+from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, read_drive
 from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
 from foretwin.sim_worker.planners.registry import REMOTE, check_planner
@@ -27,7 +28,6 @@ DEFAULT_METRICS = (
     "red_light_violations", "right_of_way_violations", "driving_score",
 )  # fmt: skip
 STEP_S = 0.1
-AS_RECORDED = "as_recorded"
 JUST_RECORDED = Scenario(
     id=AS_RECORDED, title="As recorded", source="the drive",
     shows="The ego drives on from where the car was, among those who were there.",

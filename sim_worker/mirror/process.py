@@ -45,6 +45,7 @@ class MirrorWorker:
         self._commanded_ns: int | None = None
         self._waits_for_others = setup.bus.lossless and bool(setup.mirror_cast.others)
         self._others: deque[OtherVehicles] = deque()
+        assert setup.drive_frame is not None
         self._mirror = Mirror(
             setup.vehicle,
             drive_frame=setup.drive_frame,

@@ -17,8 +17,10 @@ import zenoh
 from foretwin.contracts.bus import Bus, Mailbox, Reply, ZenohBus, ask, zenoh_config
 from foretwin.contracts.codec import encode
 from foretwin.contracts.futures import Job
+from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
+from foretwin.contracts.runner import job_task
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import PrepareRequest
 from foretwin.sim_worker.futures.future_mix import plan_futures
@@ -81,7 +83,8 @@ def _round_ms(folder: Path, jobs: list[Job]) -> tuple[float, int]:
         for _ in range(ROUNDS):
             start = time.perf_counter()
             for worker, job in zip(WORKERS, jobs, strict=True):
-                bus.request("job", job, replies, timeout_s=60.0, run=RUN, process=worker)
+                asked = job_task(job, job_bytes(job)).question
+                bus.request("job", asked, replies, timeout_s=60.0, run=RUN, process=worker)
             results = [_result(take(replies)) for _ in WORKERS]
             taken_ms.append(1000.0 * (time.perf_counter() - start))
     return statistics.median(taken_ms), len(encode(results[0]))
@@ -106,7 +109,6 @@ def _worker(folder: Path, bus: BusSetup, process_id: str) -> Iterator[None]:
         role="futures",
         worlds_dir=str(folder / "worlds"),
         vehicle=load_vehicle(),
-        drive_frame=scenes.street(buildings=0).frame,
     )
     write_setup(setup, file)
     with subprocess.Popen(

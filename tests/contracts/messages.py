@@ -35,7 +35,13 @@ def messages(kind: Any) -> st.SearchStrategy[Any]:
         return st.tuples(*(messages(argument) for argument in arguments))
     if origin is dict:
         return st.dictionaries(messages(arguments[0]), messages(arguments[1]), max_size=2)
-    plain = {int: INTS, float: FLOATS, str: st.text(max_size=8), bool: st.booleans()}
+    plain = {
+        int: INTS,
+        float: FLOATS,
+        str: st.text(max_size=8),
+        bool: st.booleans(),
+        bytes: st.binary(max_size=8),
+    }
     return st.none() if kind is type(None) else plain[kind]
 
 

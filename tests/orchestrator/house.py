@@ -15,6 +15,7 @@ from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw
 from foretwin.contracts.futures import FuturesResult, Job, Outcome, Trajectory
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.mailbox import Mailbox, Request
+from foretwin.contracts.runner import JobAnswer
 from foretwin.contracts.simulation import BuildReply, BuildRequest, PrepareReply, PrepareRequest
 from foretwin.contracts.world import World
 from foretwin.orchestrator.drive.conductor import Conductor
@@ -165,16 +166,17 @@ class Worker(Process):
             )
             return
         self.jobs += 1
-        world = read_message(self.plan.worlds_dir / f"{message.world_id}.world", World)
-        futures = straight_futures(message, world, self.process_id)
+        job = message.job
+        world = read_message(self.plan.worlds_dir / f"{job.world_id}.world", World)
+        futures = straight_futures(job, world, self.process_id)
         if self.remark:
-            remarks = (self.remark,) * len(message.futures)
+            remarks = (self.remark,) * len(job.futures)
             outcome = msgspec.structs.replace(futures.outcome, remarks=remarks)
             futures = msgspec.structs.replace(futures, outcome=outcome)
         if self.diverges:
             futures.trajectory.states[:, 1:] = np.nan
             futures.outcome.valid[:] = False
-        request.reply(futures)
+        request.reply(JobAnswer(result=futures))
 
 
 class House:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from foretwin.contracts.futures import FuturesResult
 from foretwin.contracts.job_identity import job_bytes
-from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows
+from foretwin.contracts.placement import WorldPlaces
+from foretwin.contracts.runner import Runner, answers, job_task, place_task
+from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows, place_request
 from foretwin.orchestrator.sweep.plan import SweepPlan
-from foretwin.orchestrator.sweep.play import PlaySetup, SweepWorker
-from foretwin.orchestrator.sweep.pool import Task
-from foretwin.orchestrator.sweep.spec import Loaded, worlds_folder
+from foretwin.orchestrator.sweep.spec import Loaded
+from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.sim_worker.futures.future_rows import Row
+from foretwin.sim_worker.in_process_runner import InProcessRunner
 from foretwin.world_gen.world_store import WorldStore
 from tests.sim_worker.scenarios.worlds import cross
 
@@ -37,24 +37,23 @@ def small_sweep(folder: Path, text: str = SMALL) -> Path:
     return spec
 
 
-class Alone:
-    """A crew of this process alone: what it answers is what any worker would."""
-
-    def __init__(self, loaded: Loaded) -> None:
-        worlds = worlds_folder(loaded.spec)
-        self._worker = SweepWorker(PlaySetup(loaded=loaded, worlds_dir=str(worlds)))
-
-    def run(self, tasks: Sequence[Task], done: Callable[[Task, object], None]) -> None:
-        for task in tasks:
-            done(task, self._worker.answer(task.question))
+def alone(loaded: Loaded) -> InProcessRunner:
+    """A runner of this process alone: what it answers is what any worker would."""
+    return InProcessRunner(worker_setup(loaded, Path("nowhere")))
 
 
-def rows_of(worker: SweepWorker, plan: SweepPlan, loaded: Loaded, *, step: int = 1) -> list[Row]:
+def places_of(runner: Runner, loaded: Loaded, world_id: str) -> WorldPlaces:
+    """Ask where the scenarios of a sweep take place."""
+    (answer,) = answers(runner, [place_task(place_request(loaded, world_id))])
+    assert isinstance(answer.message, WorldPlaces), answer.failure
+    return answer.message
+
+
+def rows_of(runner: Runner, plan: SweepPlan, loaded: Loaded, *, step: int = 1) -> list[Row]:
     """Play the jobs of a plan one by one, in their order or, with -1, from the last."""
     maker, rows = JobMaker(loaded, plan.worlds), []
     for planned in plan.jobs[::step]:
         job = maker.job(planned)
-        result = worker.answer(job)
-        assert isinstance(result, FuturesResult)
-        rows += cell_rows(planned, job, job_bytes(job).sha256, result)
+        (answer,) = answers(runner, [job_task(job, job_bytes(job), wanted="rows")])
+        rows += cell_rows(planned, job, answer)
     return rows

@@ -15,14 +15,18 @@ import pytest
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus, ask
 from foretwin.contracts.codec import write_message
 from foretwin.contracts.drive import ControlCommand
+from foretwin.contracts.futures import Job
+from foretwin.contracts.job_identity import job_bytes
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife
+from foretwin.contracts.runner import Wanted, job_task
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
 from foretwin.contracts.simulation import ActiveWorld, MirrorSample, PrepareRequest, RunEnd
 from foretwin.contracts.tuning import UseVehicle
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.future_mix import plan_futures
+from foretwin.sim_worker.futures.future_rows import future_rows, rows_from_bytes
 from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -71,6 +75,10 @@ def served(folder: Path) -> Iterator[MemoryBus]:
     assert not thread.is_alive()
 
 
+def request(question: Job, wanted: Wanted = "result") -> msgspec.Struct:
+    return job_task(question, job_bytes(question), wanted=wanted).question
+
+
 def asked(bus: MemoryBus, channel: str, question: msgspec.Struct) -> Any:
     return ask(bus, channel, question, timeout_s=DEADLINE_S, **IDS)
 
@@ -79,10 +87,19 @@ def test_a_worker_prepares_worlds_and_answers_jobs(served: MemoryBus) -> None:
     prepared = asked(served, "prepare", PrepareRequest(world_id="crossroads"))
     assert (prepared.world_id, prepared.worker_id) == ("crossroads", "w0")
     question = job(plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"]), horizon_s=2.0)
-    result = asked(served, "job", question)
+    result = asked(served, "job", request(question)).result
     assert result.worker_id == "w0"
     here = run_job(question, Stage(crossroads(), CAR, nsim=32))
     assert result_digest(result) == result_digest(here)
+
+
+def test_rows_are_what_the_result_comes_to_and_the_job_is_the_same(served: MemoryBus) -> None:
+    question = job(plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"]), horizon_s=2.0)
+    answer = asked(served, "job", request(question, "rows"))
+    assert answer.result is None
+    result = asked(served, "job", request(question)).result
+    rows = future_rows(question, result, job_sha256=job_bytes(question).sha256)
+    assert rows_from_bytes(answer.rows, question) == rows
 
 
 def test_a_question_that_cannot_be_answered_is_refused_and_the_worker_goes_on(
@@ -94,7 +111,7 @@ def test_a_question_that_cannot_be_answered_is_refused_and_the_worker_goes_on(
         asked(served, "prepare", PrepareRequest(world_id="../crossroads"))
     question = job(plan_futures(count=2, seed=0, planners=["magic"]))
     with pytest.raises(TimeoutError, match="unknown planner 'magic'"):
-        asked(served, "job", question)
+        asked(served, "job", request(question))
     assert asked(served, "prepare", PrepareRequest(world_id="crossroads")).seconds < 10.0
 
 
@@ -104,12 +121,12 @@ def test_a_worker_goes_on_with_other_parameters_and_says_with_which(served: Memo
     futures = plan_futures(count=4, seed=0, planners=["pure_pursuit_idm"])
     before = job(futures, horizon_s=2.0)
     after = msgspec.structs.replace(before, vehicle_version=1)
-    first = asked(served, "job", before)
+    first = asked(served, "job", request(before)).result
     with pytest.raises(TimeoutError, match=r"job for version 1 .* at a worker with version 0"):
-        asked(served, "job", after)
+        asked(served, "job", request(after))
     use = UseVehicle(stamp_ns=0, vehicle=heavy, version=1)
     assert asked(served, "use_vehicle", use) == use
-    second = asked(served, "job", after)
+    second = asked(served, "job", request(after)).result
     assert (first.vehicle_version, second.vehicle_version) == (0, 1)
     anew = run_job(after, Stage(crossroads(), heavy, nsim=32))
     assert result_digest(second) == result_digest(anew) != result_digest(first)
@@ -185,7 +202,7 @@ def test_a_worker_process_over_zenoh_answers_logs_and_leaves(folder: Path) -> No
             with pytest.raises(TimeoutError, match=r"nowhere\.world"):
                 ask(bus, "prepare", PrepareRequest(world_id="nowhere"), timeout_s=DEADLINE_S, **IDS)
             question = job(plan_futures(count=8, seed=0, planners=["pure_pursuit_idm"]))
-            result = ask(bus, "job", question, timeout_s=DEADLINE_S, **IDS)
+            result = ask(bus, "job", request(question), timeout_s=DEADLINE_S, **IDS).result
             here = run_job(question, Stage(crossroads(), CAR, nsim=32))
             assert result_digest(result) == result_digest(here)
             bus.publish("run_end", RunEnd(stamp_ns=0), **RUN)

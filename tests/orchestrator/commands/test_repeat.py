@@ -14,7 +14,7 @@ from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.record.job_tables import JOB_TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
-from tests.orchestrator.sweeps import SMALL, Alone, small_sweep
+from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("swept")
     spec = small_sweep(folder, SMALL.replace("horizon_s = 5.0", "horizon_s = 2.0"))
     loaded = load_spec(spec)
-    run_sweep(loaded, folder / "out", Alone(loaded))
+    run_sweep(loaded, folder / "out", alone(loaded))
     return folder / "out"
 
 

@@ -16,10 +16,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from foretwin.orchestrator.commands.cli import run
-from foretwin.orchestrator.commands.sweep import crew_for, run_sweep
+from foretwin.orchestrator.commands.sweep import run_sweep, workers_for
 from foretwin.orchestrator.record.job_tables import JOB_TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
-from tests.orchestrator.sweeps import SMALL, Alone, small_sweep
+from tests.orchestrator.sweeps import SMALL, alone, small_sweep
 from tests.sim_worker.planners.installed import install
 from tests.starvation import kept_waiting
 
@@ -32,7 +32,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
     """A small sweep's folder, played in this process, and what it came to."""
     folder = tmp_path_factory.mktemp("swept")
     loaded = load_spec(small_sweep(folder))
-    return folder, run_sweep(loaded, folder / "out", Alone(loaded))
+    return folder, run_sweep(loaded, folder / "out", alone(loaded))
 
 
 def _rows(out: Path) -> list[dict[str, Any]]:
@@ -82,9 +82,9 @@ def test_two_workers_give_the_same_rows_again_and_again(
 ) -> None:
     folder, summary = swept
     loaded = load_spec(folder / "small.toml")
-    with crew_for(loaded, tmp_path, 2) as crew:
+    with workers_for(loaded, tmp_path, 2) as runner:
         for _ in range(2):
-            again = run_sweep(loaded, tmp_path, crew, fresh=True)
+            again = run_sweep(loaded, tmp_path, runner, fresh=True)
             assert again["jobs_played"] == summary["jobs"]
             assert again["rows_sha256"] == summary["rows_sha256"]
 
@@ -188,8 +188,8 @@ def test_ctrl_c_ends_soon_and_keeps_what_is_done(tmp_path: Path) -> None:
     kept = list((out / "rows").glob("*.parquet"))
     assert kept
     assert not json.loads((out / "sweep.json").read_text())["complete"]
-    again = run_sweep(loaded, out, Alone(loaded))
-    whole = run_sweep(loaded, tmp_path / "whole", Alone(loaded))
+    again = run_sweep(loaded, out, alone(loaded))
+    whole = run_sweep(loaded, tmp_path / "whole", alone(loaded))
     assert again["jobs_played"] <= whole["jobs"] - len(kept)
     assert again["rows_sha256"] == whole["rows_sha256"]
 
@@ -203,9 +203,9 @@ def test_100_of_100_runs_give_the_same_hash(
     folder, summary = swept
     loaded = load_spec(folder / "small.toml")
     hashes = []
-    with crew_for(loaded, tmp_path, workers) as crew:
+    with workers_for(loaded, tmp_path, workers) as runner:
         for number in range(100):
-            if number % 25 == 10 and crew.pids:
-                os.kill(crew.pids[0], signal.SIGKILL)
-            hashes.append(run_sweep(loaded, tmp_path, crew, fresh=True)["rows_sha256"])
+            if number % 25 == 10 and runner.pids:
+                os.kill(runner.pids[0], signal.SIGKILL)
+            hashes.append(run_sweep(loaded, tmp_path, runner, fresh=True)["rows_sha256"])
     assert hashes == 100 * [summary["rows_sha256"]]

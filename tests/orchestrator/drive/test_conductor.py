@@ -61,7 +61,7 @@ def test_a_worker_that_dies_while_loading_is_waited_for_no_more(house: House) ->
     house.settle()
 
     assert ready(house.conductor)
-    assert house.conductor.rounds.desk.workers == ("w0",)
+    assert house.conductor.rounds.dispatcher.workers == ("w0",)
 
 
 def test_a_worker_that_hangs_while_loading_is_waited_for_until_it_is_gone(house: House) -> None:
@@ -191,10 +191,10 @@ def test_a_worker_that_dies_at_work_costs_no_future_and_counts_none_twice(house:
     house.workers[1].answer()
     house.settle()
 
-    assert house.conductor.rounds.desk.open_rounds == ()
+    assert not house.conductor.rounds.open
     assert house.conductor.rounds.futures.count == 6
     assert house.conductor.rounds.futures.rounds == 1
-    assert house.conductor.rounds.desk.requeued_jobs >= 1
+    assert house.conductor.rounds.dispatcher.dispatch.requeued >= 1
     assert house.workers[1].jobs == 2
 
 
@@ -209,8 +209,8 @@ def test_a_job_that_every_worker_refuses_ends_its_round_and_not_the_drive(house:
             request.refuse("path has no length")
         house.settle()
 
-    assert house.conductor.rounds.desk.open_rounds == ()
-    assert house.conductor.rounds.desk.given_up_rounds == 1
+    assert not house.conductor.rounds.open
+    assert house.conductor.rounds.open.given_up == 1
     assert {e.text.split(": ", 1)[1] for e in house.watched("event") if e.level == "error"} == {
         "path has no length"
     }

@@ -70,7 +70,7 @@ class Conductor:
         self._settled_s = settled_s
         self.tuning = SimpleNamespace(parameters=self)
         pace = SimpleNamespace(now=Pace(64, one_of))
-        self.rounds = SimpleNamespace(desk=self, drop=self.drop, pace=pace)
+        self.rounds, self.pace = self, pace
         self.missed_rounds = self.spared_rounds = 0
         self.started_s: list[float] = []
         self.dropped_s: list[float] = []
@@ -78,9 +78,8 @@ class Conductor:
         self.changes_made_s: list[float] = []
 
     @property
-    def open_rounds(self) -> tuple[int, ...]:
-        still = self._open_until_s is not None and self._clock.now_s < self._open_until_s
-        return (len(self.started_s),) if still else ()
+    def open(self) -> bool:
+        return self._open_until_s is not None and self._clock.now_s < self._open_until_s
 
     @property
     def settled(self) -> bool:

@@ -9,12 +9,11 @@ import pytest
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import geo_from_local, local_from_geo
-from foretwin.orchestrator.sweep.plan import WorldPlaces, plan_sweep
-from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWorker
+from foretwin.orchestrator.sweep.plan import plan_sweep
 from foretwin.orchestrator.sweep.recorded import Recorded
 from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
 from tests.orchestrator.recorded_runs import write_run
-from tests.orchestrator.sweeps import rows_of
+from tests.orchestrator.sweeps import alone, places_of, rows_of
 from tests.sim_worker.scenarios.worlds import cross
 
 SPEED_MPS, START_X_M = 8.0, -70.0
@@ -59,15 +58,14 @@ def test_scenarios_are_timed_to_the_recorded_car(run: Path) -> None:
     loaded = _loaded(run, every_s=3.0)
     folder = worlds_folder(loaded.spec)
     assert folder == run / "worlds"
-    worker = SweepWorker(PlaySetup(loaded=loaded, worlds_dir=str(folder)))
-    places = worker.answer(PlaceQuestion(world_id=cross().id))
-    assert isinstance(places, WorldPlaces)
+    runner = alone(loaded)
+    places = places_of(runner, loaded, cross().id)
     # It goes straight on: a turn across happens to nobody, and once over, nothing happens to it.
     assert {place.scenario_id for place in places.placed} == {"scp"}
     assert [place.start for place in places.placed][:3] == [0, 1, 2]
     assert len(places.placed) < len(loaded.starts)
     plan = plan_sweep(loaded, [places])
-    rows = rows_of(worker, plan, loaded)
+    rows = rows_of(runner, plan, loaded)
     assert [row["cell"] for row in rows] == list(range(plan.cells))
     assert not any(row["failure"] for row in rows)
     second = [row for row in rows if row["place"].startswith("round 4:")]

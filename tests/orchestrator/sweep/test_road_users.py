@@ -14,17 +14,16 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.orchestrator.commands.sweep import run_sweep
 from foretwin.orchestrator.sweep.folder import fingerprint_of
-from foretwin.orchestrator.sweep.plan import WorldPlaces, plan_sweep
-from foretwin.orchestrator.sweep.play import PlaceQuestion, PlaySetup, SweepWorker
+from foretwin.orchestrator.sweep.plan import plan_sweep
 from foretwin.orchestrator.sweep.recorded import Recorded
 from foretwin.orchestrator.sweep.road_users import others_at
-from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec, worlds_folder
+from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec, check_spec
 from foretwin.sim_worker.futures.future_rows import Row
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.telemetry.logs import open_road_users
 from tests.orchestrator.recorded_runs import write_run
-from tests.orchestrator.sweeps import Alone, rows_of
+from tests.orchestrator.sweeps import alone, places_of, rows_of
 from tests.sim_worker.scenarios.worlds import cross
 from tests.world_gen.drawn_maps import crossing, world_of
 
@@ -72,11 +71,10 @@ def _spec(run: Path, *, every_s: float = 3.0, horizon_s: float = 8.0, **said: An
 
 
 def _rows(loaded: Loaded, *, backwards: bool = False) -> list[Row]:
-    worker = SweepWorker(PlaySetup(loaded=loaded, worlds_dir=str(worlds_folder(loaded.spec))))
+    runner = alone(loaded)
     (world,) = {start.world_id for start in loaded.starts}
-    places = worker.answer(PlaceQuestion(world_id=world))
-    assert isinstance(places, WorldPlaces)
-    rows = rows_of(worker, plan_sweep(loaded, [places]), loaded, step=-1 if backwards else 1)
+    places = places_of(runner, loaded, world)
+    rows = rows_of(runner, plan_sweep(loaded, [places]), loaded, step=-1 if backwards else 1)
     assert not any(row["failure"] for row in rows)
     return sorted(rows, key=lambda row: row["stamp_ns"])
 
@@ -129,10 +127,10 @@ def test_rows_do_not_depend_on_who_plays_them_in_which_order(run: Path, tmp_path
     loaded = check_spec(spec)
     assert _rows(loaded) == _rows(check_spec(spec), backwards=True)
     # And a sweep goes on where it stopped.
-    crew = Alone(loaded)
-    whole = run_sweep(loaded, tmp_path / "out", crew)  # type: ignore[arg-type]
+    runner = alone(loaded)
+    whole = run_sweep(loaded, tmp_path / "out", runner)
     (tmp_path / "out" / "rows" / "job-000001.parquet").unlink()
-    again = run_sweep(loaded, tmp_path / "out", crew)  # type: ignore[arg-type]
+    again = run_sweep(loaded, tmp_path / "out", runner)
     assert again["jobs_played"] == 1
     assert again["rows_sha256"] == whole["rows_sha256"]
     others = check_spec(_spec(run, every_s=6.0, horizon_s=2.0, leave_out=("9",)))

@@ -12,6 +12,7 @@ import pytest
 from foretwin.contracts.futures import Job
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.mailbox import Mailbox, Reply, Request
+from foretwin.contracts.runner import JobRequest
 from foretwin.contracts.tuning import (
     Identification,
     ParameterEstimate,
@@ -64,7 +65,10 @@ def answer(questions: Mailbox) -> Any:
 
 def jobs(house: House) -> list[Job]:
     """What the workers are at."""
-    return list(house.conductor.rounds.desk.busy.values())
+    busy = house.conductor.rounds.dispatcher.dispatch.busy
+    return [
+        request.job for task in busy.values() if isinstance(request := task.question, JobRequest)
+    ]
 
 
 def test_no_round_starts_before_every_worker_has_what_was_set(house: House) -> None:
@@ -110,10 +114,10 @@ def test_a_worker_that_comes_up_gets_no_job_before_it_has_what_counts(house: Hou
     late = asked(house, "w9")
     worker = Worker(house.plan, house.bus, "w9")
     house.settle()
-    assert "w9" not in house.conductor.rounds.desk.workers
+    assert "w9" not in house.conductor.rounds.dispatcher.workers
     assert answer(late).version == 1
     house.settle()
-    assert "w9" in house.conductor.rounds.desk.workers
+    assert "w9" in house.conductor.rounds.dispatcher.workers
     worker.die()
 
 

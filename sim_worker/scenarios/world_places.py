@@ -1,4 +1,4 @@
-"""Where the scenarios of a sweep take place: in Worlds, or around a car that was recorded there."""
+"""Where scenarios take place: in a World, or around a car that was recorded there."""
 
 from __future__ import annotations
 
@@ -6,26 +6,30 @@ import numpy as np
 
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.placement import (
+    AS_RECORDED,
+    NotPlaced,
+    PlacedHere,
+    PlaceRequest,
+    WorldPlaces,
+)
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.orchestrator.sweep.plan import NotPlaced, PlacedHere, WorldPlaces
-from foretwin.orchestrator.sweep.spec import AS_RECORDED, Loaded
 from foretwin.sim_worker.scenarios.live import LiveScenarios
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 
 
-def places_in(world: World, loaded: Loaded) -> WorldPlaces:
-    """Return where the scenarios of a sweep take place in a World, for its first vehicle."""
+def places_in(world: World, asked: PlaceRequest, vehicle: VehicleParameters) -> WorldPlaces:
+    """Return where the scenarios asked for take place in a World, for a vehicle."""
     network = RoadNetwork(world)
-    vehicle = next(iter(loaded.vehicles.values()))
-    if loaded.starts:
-        return _places_recorded(network, loaded, vehicle)
+    if asked.starts:
+        return _places_recorded(network, asked, vehicle)
     placed, unplaced = [], []
     ways: dict[str, PathAhead] = {}
-    for scenario in loaded.scenarios:
-        found = places(scenario, world, network=network, vehicle=vehicle, most=loaded.spec.places)
+    for scenario in asked.scenarios:
+        found = places(scenario, world, network=network, vehicle=vehicle, most=asked.most)
         for place in found.places:
             placed.append(
                 PlacedHere(
@@ -50,21 +54,19 @@ def places_in(world: World, loaded: Loaded) -> WorldPlaces:
 
 
 def _places_recorded(
-    network: RoadNetwork, loaded: Loaded, vehicle: VehicleParameters
+    network: RoadNetwork, asked: PlaceRequest, vehicle: VehicleParameters
 ) -> WorldPlaces:
     """Return which scenarios can happen on the ways that a recorded car took from its starts."""
     world, known = network.world, LiveScenarios(network)
     placed, unplaced = [], []
-    for number, start in enumerate(loaded.starts):
-        if start.world_id != world.id:
-            continue
+    for number, start in asked.starts.items():
         path = FrenetPath(start.path(world.frame).xy_m)
         here = local_from_geo(
             world.frame, start.state.position.lat_deg, start.state.position.lon_deg
         )
         arc = path.locate(np.asarray(here)[None])
         passage = known.on(path, float(arc.arc_m[0]), vehicle).passage
-        for scenario in loaded.scenarios:
+        for scenario in asked.scenarios:
             name = f"round {start.round_id}"
             if scenario.id == AS_RECORDED:
                 placed.append(
@@ -80,7 +82,7 @@ def _places_recorded(
                     scenario_id=scenario.id, junction_id=start.junction_id,
                     place=f"{name}: {place.name}", ego=name, start=number, rank=rank,
                 )
-                for rank, place in enumerate(found[: loaded.spec.places])
+                for rank, place in enumerate(found[: asked.most])
             ]  # fmt: skip
             if not found:
                 reason = "does not apply on the recorded way"

@@ -1,0 +1,95 @@
+"""Who plays jobs: what a runner takes and gives, whether its workers are processes or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal, NamedTuple, Protocol
+
+import msgspec
+
+from foretwin.contracts.futures import FuturesResult, Job
+from foretwin.contracts.job_identity import JobBytes
+from foretwin.contracts.placement import PlaceRequest
+
+Wanted = Literal["result", "rows"]
+
+
+class JobRequest(msgspec.Struct, frozen=True, kw_only=True):
+    """A job, its name, and in which form it is answered, which changes nothing about the job."""
+
+    job: Job
+    sha256: str
+    wanted: Wanted = "result"
+
+
+class JobAnswer(msgspec.Struct, frozen=True, kw_only=True):
+    """The result of a job, or the rows of its futures alone, as msgpack."""
+
+    result: FuturesResult | None = None
+    rows: bytes = b""
+
+
+class Task(NamedTuple):
+    """One question for one worker; its answer counts once by `key`, a job's hash.
+
+    Tasks of one World go to the worker that has it compiled, where that helps.
+    """
+
+    key: str
+    channel: str
+    world_id: str
+    question: msgspec.Struct
+
+
+class Answer(NamedTuple):
+    """What became of a task: a message, or None and in `failure` why there is none."""
+
+    task: Task
+    message: Any
+    failure: str = ""
+    worker_id: str = ""
+    received_mono_ns: int = 0
+
+
+class Runner(Protocol):
+    """Answers every task that is submitted and not cancelled exactly once, in any order."""
+
+    @property
+    def capacity(self) -> int:
+        """How many tasks can be in work at once; further ones wait."""
+
+    @property
+    def workers(self) -> tuple[str, ...]:
+        """Ids of the workers that can take work now."""
+
+    def submit(self, task: Task) -> None:
+        """Take a task; never waits."""
+
+    def cancel(self, key: str) -> None:
+        """Forget a task: it is not begun any more, and an answer to it does not count."""
+
+    def take(self, timeout_s: float | None = 0.0) -> Answer | None:
+        """Return one answer, or None where there is none in time (None waits for ever)."""
+
+
+def job_task(job: Job, named: JobBytes, *, wanted: Wanted = "result") -> Task:
+    """Return the task of playing a job."""
+    request = JobRequest(job=job, sha256=named.sha256, wanted=wanted)
+    return Task(named.sha256, "job", job.world_id, request)
+
+
+def place_task(request: PlaceRequest) -> Task:
+    """Return the task of finding places in a World."""
+    return Task(f"places in {request.world_id}", "place", request.world_id, request)
+
+
+def answers(runner: Runner, tasks: Iterable[Task]) -> Iterator[Answer]:
+    """Have tasks answered by a runner that has no others, and yield the answers as they come."""
+    left = 0
+    for task in tasks:
+        runner.submit(task)
+        left += 1
+    for _ in range(left):
+        answer = runner.take(None)
+        assert answer is not None
+        yield answer

@@ -1,0 +1,111 @@
+"""Rounds that are open: cut into tasks, and put together again from what becomes of these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from foretwin.contracts.futures import Future, FuturesResult, Job
+from foretwin.contracts.job_identity import JobBytes, job_bytes
+from foretwin.contracts.runner import Answer, Task, job_task
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoundOrder:
+    """A round to run: its jobs, and when the sample that seeds it was received."""
+
+    round_id: int
+    stamp_ns: int
+    junction_id: str
+    world_id: str
+    receipt_mono_ns: int
+    started_mono_ns: int
+    jobs: tuple[Job, ...]
+    recorded: tuple[JobBytes, ...] = field(init=False)
+    """The jobs as they are recorded."""
+
+    def __post_init__(self) -> None:
+        """Put the jobs into bytes: what is known of them is known by their hash."""
+        object.__setattr__(self, "recorded", tuple(job_bytes(job) for job in self.jobs))
+
+    @property
+    def futures(self) -> tuple[Future, ...]:
+        """All futures of the round, in the order of its jobs."""
+        return tuple(future for job in self.jobs for future in job.futures)
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """The tasks of playing the jobs, in their order."""
+        return tuple(
+            job_task(job, named) for job, named in zip(self.jobs, self.recorded, strict=True)
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoundDone:
+    """A complete round: results in the order of its jobs, and how long it took.
+
+    `latency_ms` from the receipt of the state to the last result, `seconds` from the round's start.
+    """
+
+    order: RoundOrder
+    results: tuple[FuturesResult, ...]
+    latency_ms: float
+    seconds: float
+
+
+class RoundGivenUp(NamedTuple):
+    """A round one of whose jobs is given up."""
+
+    order: RoundOrder
+
+
+@dataclass(slots=True)
+class OpenRounds:
+    """Holds the open rounds; live there is one at most."""
+
+    given_up: int = 0
+    _orders: dict[int, RoundOrder] = field(default_factory=dict)
+    _results: dict[int, dict[str, FuturesResult]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self._orders)
+
+    def open(self, order: RoundOrder) -> None:
+        """Begin a round."""
+        self._orders[order.round_id] = order
+        self._results[order.round_id] = {}
+
+    def drop(self) -> tuple[RoundOrder, ...]:
+        """Give up every open round and return them; what their workers still send is late."""
+        dropped = tuple(self._orders.values())
+        self._orders.clear()
+        self._results.clear()
+        return dropped
+
+    def take(self, answer: Answer) -> RoundDone | RoundGivenUp | None:
+        """Take what became of a task; returns the round where this completes or ends it."""
+        key = answer.task.key
+        order = next(
+            (o for o in self._orders.values() if key in {r.sha256 for r in o.recorded}), None
+        )
+        if order is None:
+            return None
+        if answer.message is None:
+            self._close(order)
+            self.given_up += 1
+            return RoundGivenUp(order)
+        results = self._results[order.round_id]
+        results[key] = answer.message.result
+        if len(results) < len(order.jobs):
+            return None
+        self._close(order)
+        return RoundDone(
+            order=order,
+            results=tuple(results[named.sha256] for named in order.recorded),
+            latency_ms=(answer.received_mono_ns - order.receipt_mono_ns) / 1e6,
+            seconds=(answer.received_mono_ns - order.started_mono_ns) / 1e9,
+        )
+
+    def _close(self, order: RoundOrder) -> None:
+        del self._orders[order.round_id], self._results[order.round_id]

@@ -1,0 +1,106 @@
+"""Carries tasks to workers over the bus; whoever owns the mailbox hands in what comes back."""
+
+from __future__ import annotations
+
+import time
+
+from foretwin.contracts.bus import Bus, Mailbox, Reply
+from foretwin.contracts.runner import Answer, Task
+from foretwin.orchestrator.runner.dispatch import Dispatch, GivenUp
+
+NO_ANSWER = "no answer"
+"""What the bus says of a question that nobody answered."""
+_FOR_EVER_S = 30 * 86_400.0
+_SILENT_S = 0.5
+"""So long a worker that left a question unanswered is given nothing: if it has died, it is known
+by then, and where its connection was lost and came back, it may answer nothing in between."""
+
+
+class BusDispatcher:
+    """The tasks of a run and its workers; see Dispatch."""
+
+    def __init__(
+        self, bus: Bus, mailbox: Mailbox, *, run_id: str, in_flight: int = 1, refusals: int = 1
+    ) -> None:
+        self.dispatch = Dispatch(in_flight=in_flight, refusals=refusals)
+        self._bus, self._mailbox, self._run_id = bus, mailbox, run_id
+        self._allowed: dict[str, tuple[float, float]] = {}
+        """Of tasks with a deadline: when it is, and how long that was from their start."""
+        self._silent_since_s: dict[str, float] = {}
+
+    @property
+    def workers(self) -> tuple[str, ...]:
+        """Ids of the workers that are up."""
+        return self.dispatch.workers
+
+    def submit(self, task: Task, *, within_s: float | None = None) -> None:
+        """Take a task; one that is not answered `within_s` from now is given up."""
+        self.dispatch.submit(task)
+        if within_s is not None:
+            self._allowed[task.key] = (time.monotonic() + within_s, within_s)
+
+    def cancel(self, key: str) -> None:
+        """Forget a task."""
+        self._allowed.pop(key, None)
+        self.dispatch.cancel(key)
+
+    def worker_up(self, worker_id: str) -> list[Answer]:
+        """A worker is there; returns what is given up since its earlier life has died of it."""
+        self._silent_since_s.pop(worker_id, None)
+        return self._answers(self.dispatch.worker_up(worker_id))
+
+    def worker_down(self, worker_id: str, *, how: str = "") -> list[Answer]:
+        """A worker is gone; returns what is given up since it has died of it."""
+        self._silent_since_s.pop(worker_id, None)
+        return self._answers(self.dispatch.worker_down(worker_id, how=how))
+
+    def give_up(self, key: str, reason: str) -> list[Answer]:
+        """Try a task no more; returns what that comes to."""
+        given_up = self.dispatch.give_up(key, reason)
+        return self._answers([] if given_up is None else [given_up])
+
+    def give_out(self) -> None:
+        """Send waiting tasks to free workers; call it often."""
+        now_s = time.monotonic()
+        for worker_id, since_s in list(self._silent_since_s.items()):
+            if now_s - since_s > _SILENT_S:
+                del self._silent_since_s[worker_id]
+                self.dispatch.trust(worker_id)
+        for worker_id, task in self.dispatch.assignments():
+            until_s, _ = self._allowed.get(task.key, (now_s + _FOR_EVER_S, 0.0))
+            self._bus.request(
+                task.channel,
+                task.question,
+                self._mailbox,
+                tag=(worker_id, task),
+                timeout_s=max(until_s - now_s, 0.0) + 0.01,
+                run=self._run_id,
+                process=worker_id,
+            )
+
+    def reply(self, reply: Reply) -> Answer | None:
+        """Take what the bus says of a task; returns what became of the task, None if not yet."""
+        worker_id, task = reply.tag
+        if reply.message is not None:
+            if not self.dispatch.answered(worker_id, task.key):
+                return None
+            self._allowed.pop(task.key, None)
+            return Answer(task, reply.message, "", worker_id, reply.received_mono_ns)
+        until_s, within_s = self._allowed.get(task.key, (_FOR_EVER_S + time.monotonic(), 0.0))
+        if time.monotonic() >= until_s:
+            self.dispatch.unanswered(worker_id, task.key)
+            self.dispatch.trust(worker_id)  # It may be slow alone.
+            given_up = self.dispatch.give_up(task.key, f"no answer in {within_s:g} s")
+        elif reply.error == NO_ANSWER:
+            self.dispatch.unanswered(worker_id, task.key)
+            self._silent_since_s.setdefault(worker_id, time.monotonic())
+            return None
+        else:
+            given_up = self.dispatch.refused(worker_id, task.key, reply.error or "")
+        found = self._answers([] if given_up is None else [given_up])
+        return found[0] if found else None
+
+    def _answers(self, given_up: list[GivenUp]) -> list[Answer]:
+        for task, _ in given_up:
+            self._allowed.pop(task.key, None)
+        return [Answer(task, None, reason) for task, reason in given_up]

@@ -1,0 +1,95 @@
+"""Tasks on a bus in memory: answers, refusals, deadlines, and workers that say nothing."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from foretwin.contracts.bus import Mailbox, Reply, Request
+from foretwin.contracts.runner import Answer, Task
+from foretwin.contracts.simulation import PrepareReply, PrepareRequest
+from foretwin.orchestrator.runner import bus_dispatcher
+from foretwin.orchestrator.runner.bus_dispatcher import NO_ANSWER, BusDispatcher
+from tests.contracts.memory_bus import MemoryBus
+
+A = Task("a", "prepare", "w", PrepareRequest(world_id="a"))
+
+
+class Bench:
+    """A dispatcher with one worker `w0` that a test lets answer, and a clock that it moves."""
+
+    def __init__(self, **settings: int) -> None:
+        self.now_s = 100.0
+        self.bus, self.mailbox, self.asked = MemoryBus(), Mailbox(16), Mailbox(16)
+        self.bus.serve("prepare", self.asked, run="r1", process="w0")
+        self.dispatcher = BusDispatcher(self.bus, self.mailbox, run_id="r1", **settings)
+        self.dispatcher.worker_up("w0")
+
+    def question(self) -> Request:
+        self.dispatcher.give_out()
+        found = self.asked.take()
+        assert isinstance(found, Request)
+        return found
+
+    def reply(self) -> Answer | None:
+        found = self.mailbox.take()
+        assert isinstance(found, Reply)
+        return self.dispatcher.reply(found)
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    made = Bench(refusals=2)
+    monkeypatch.setattr(bus_dispatcher, "time", SimpleNamespace(monotonic=lambda: made.now_s))
+    return made
+
+
+def test_an_answer_comes_with_its_task_and_who_gave_it(bench: Bench) -> None:
+    bench.dispatcher.submit(A)
+    message = PrepareReply(world_id="a", worker_id="w0", seconds=1.0)
+    bench.question().reply(message)
+    answer = bench.reply()
+    assert answer is not None
+    assert (answer.task, answer.message, answer.failure) == (A, message, "")
+    assert (answer.worker_id, answer.received_mono_ns > 0) == ("w0", True)
+
+
+def test_a_refusal_is_the_reason_once_it_was_refused_often_enough(bench: Bench) -> None:
+    bench.dispatcher.submit(A)
+    bench.question().refuse("no path")
+    assert bench.reply() is None
+    bench.question().refuse("no path")
+    assert bench.reply() == Answer(A, None, "no path")
+
+
+def test_a_task_that_is_not_answered_by_its_deadline_is_given_up(bench: Bench) -> None:
+    bench.dispatcher.submit(A, within_s=10.0)
+    question = bench.question()
+    bench.now_s += 10.0
+    question.refuse("Timeout")
+    assert bench.reply() == Answer(A, None, "no answer in 10 s")
+    # The worker is slow and not dead: it takes what comes next.
+    bench.dispatcher.submit(A)
+    assert bench.question().message().world_id == "a"
+
+
+def test_who_says_nothing_is_asked_again_when_it_can_be_known_to_live(bench: Bench) -> None:
+    bench.dispatcher.submit(A)
+    bench.question().refuse(NO_ANSWER)
+    assert bench.reply() is None
+    bench.dispatcher.give_out()
+    assert bench.asked.take() is None
+    bench.now_s += 1.0
+    assert bench.question().message().world_id == "a"
+
+
+def test_what_a_task_that_killed_its_workers_comes_to_is_an_answer(bench: Bench) -> None:
+    bench.dispatcher.submit(A)
+    for _ in range(2):
+        bench.question()
+        assert bench.dispatcher.worker_down("w0", how="signal 9") == []
+        bench.dispatcher.worker_up("w0")
+    bench.question()
+    (lost,) = bench.dispatcher.worker_down("w0", how="signal 9")
+    assert lost == Answer(A, None, "3 workers died of it, the last by signal 9")
