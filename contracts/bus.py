@@ -1,7 +1,6 @@
 """The bus: publish, subscribe, ask, serve and watch over Zenoh.
 
-What arrives lands in a `mailbox.Mailbox`; `memory_bus` is the same without a
-network.
+What arrives lands in a `foretwin.contracts.mailbox.Mailbox`.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ class Future(msgspec.Struct, frozen=True, kw_only=True):
     """One alternative future: what differs from the nominal one (index 0).
 
     `numbers` are those of `contracts.numbers` that are not neutral. With `scenario_id`, one of the
-    job's scenarios happens in it: `values` are its numbers, named as in `ConcreteScenario`, and
+    job's scenarios happens in it: `values` are its numbers, named as `Scenario` tells, and
     `place_rank` says which of the places that fit the car's path, modulo their number. With
     `place`, a place's name, it is staged there as the case says, away from any drive: the job's
     path is that place's, and the car starts where the case begins.

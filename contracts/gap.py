@@ -8,6 +8,15 @@ import msgspec
 
 Manoeuvre = Literal["standstill", "straight", "curve", "braking", "accelerating"]
 Culprit = Literal["vehicle", "model", "both", "none", "undecided"]
+ALARM_LIMITS_PER_S = {
+    "along_m": 0.8,
+    "across_m": 0.5,
+    "yaw_rad": 0.07,
+    "speed_mps": 0.6,
+}
+"""What may be lost for each second that the model was left to itself, by quantity of GapSample."""
+ALARM_HORIZON_S = 2.0
+"""Alarms are about the gap after so long."""
 
 
 class GapSample(msgspec.Struct, frozen=True, kw_only=True):

@@ -1,7 +1,8 @@
 """How every process of a run lives: reads its setup, joins the bus, says it is alive, and leaves.
 
 A process leaves when the run ends (`run_end`), when it is told to (SIGTERM), or when the
-orchestrator is gone. Ctrl-C is the orchestrator's business: children ignore SIGINT.
+orchestrator is gone: at once where that has started it, after a grace where the link may come back.
+Ctrl-C is the orchestrator's business: children ignore SIGINT.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+import msgspec
+
 from foretwin.contracts.bus import Alive, Bus, Mailbox, ZenohBus
+from foretwin.contracts.errors import UserError
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.setup import ProcessSetup, read_setup
 
@@ -61,14 +65,18 @@ def log_to_file(setup: ProcessSetup) -> None:
 
 
 class ProcessLife:
-    """Tells a process when its run is over; `over` is cheap to ask."""
+    """Tells a process when its run begins and when it is over; both are cheap to ask."""
 
-    def __init__(self, setup: ProcessSetup, bus: Bus) -> None:
+    def __init__(
+        self, setup: ProcessSetup, bus: Bus, *, mono_s: Callable[[], float] = time.monotonic
+    ) -> None:
         self._setup = setup
         self._bus = bus
+        self._mono_s = mono_s
+        self._parent = os.getppid()
         self._mailbox = Mailbox(16)
         self._orchestrator_seen = False
-        self._orchestrator_gone_since: float | None = None
+        self._gone_since_s: float | None = None
         self.run_ended = False
         """Whether the orchestrator has said that the run is over, and waits for files."""
         self.terminated = threading.Event()
@@ -80,11 +88,19 @@ class ProcessLife:
         self._bus.declare_alive(alive_key(run=self._setup.run_id, process=self._setup.process_id))
 
     @property
+    def begun(self) -> bool:
+        """Whether the orchestrator has been there."""
+        self._look()
+        return self._orchestrator_seen
+
+    @property
     def over(self) -> bool:
         """Whether the process should finish what it holds and leave."""
         self._look()
-        gone = self._orchestrator_gone_since
-        if gone is not None and time.monotonic() - gone > ORCHESTRATOR_GRACE_S:
+        since_s = self._gone_since_s
+        if since_s is not None and self._mono_s() - since_s > ORCHESTRATOR_GRACE_S:
+            self.terminated.set()
+        if os.getppid() != self._parent:
             self.terminated.set()
         return self.terminated.is_set()
 
@@ -95,9 +111,9 @@ class ProcessLife:
                 self.terminated.set()
             elif item.up:
                 self._orchestrator_seen = True
-                self._orchestrator_gone_since = None
+                self._gone_since_s = None
             elif self._orchestrator_seen:
-                self._orchestrator_gone_since = time.monotonic()
+                self._gone_since_s = self._mono_s()
 
 
 def run_process(
@@ -107,19 +123,28 @@ def run_process(
 ) -> None:
     """Run `serve` as this process's work, with `--setup FILE` from the command line.
 
-    Leaves through os._exit: a library's exit handler must not hold up the end of a drive.
+    Leaves through os._exit: a library's exit handler must not hold up the end of a drive. Exit
+    codes: 0 done, 2 something wrong with setup or input, in one line, 1 any other error.
     """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parser = argparse.ArgumentParser()
     parser.add_argument("--setup", type=Path, required=True, help="JSON file written by foretwin")
-    setup = read_setup(parser.parse_args(argv).setup, kind)
+    file = parser.parse_args(argv).setup
+    try:
+        setup = read_setup(file, kind)
+    except (msgspec.DecodeError, OSError) as problem:
+        parser.exit(2, f"{file}: {problem}\n")
     log_to_file(setup)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     code = 0
     try:
         with ZenohBus(setup.bus) as bus:
             life = ProcessLife(setup, bus)
             signal.signal(signal.SIGTERM, lambda *_: life.terminated.set())
             serve(setup, bus, life)
+    except (UserError, OSError) as problem:
+        logging.getLogger(setup.process_id).exception("%s", problem)
+        print(f"{setup.process_id}: {problem}", file=sys.stderr)
+        code = 2
     except Exception:
         logging.getLogger(setup.process_id).exception("ended by an error")
         code = 1

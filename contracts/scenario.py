@@ -2,7 +2,8 @@
 
 A `Scenario` is abstract: relations instead of places, spans instead of numbers. Sides are named
 by the traffic: `near` is where one drives (right where traffic keeps right), `across` the other.
-A `ConcreteScenario` is one of its cases, at one place of one World, with every number drawn.
+Every number of one of its cases has a name: `ego.speed_mps`, `<actor>.gap_m`,
+`faults.friction_factor` and so on.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ EGO = "ego"
 FAULTS = "faults"
 
 
-class Span(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Distribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What a number may be: one of `values`, or uniform from `min` to `max`, or, with `mean` and
     `std`, normal and cut to `min` and `max` where these are given."""
 
@@ -48,7 +49,7 @@ class Span(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     std: float | None = None
 
 
-Number = float | Span
+Number = float | Distribution
 """A number that is always the same, or one that differs from case to case."""
 
 
@@ -131,16 +132,3 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     seed: int = 0
     samples: int = 1
     """How many cases to draw for each combination of listed values."""
-
-
-class ConcreteScenario(msgspec.Struct, frozen=True, kw_only=True):
-    """One case of a scenario at one place; `values` holds every number that was drawn, named
-    `ego.speed_mps`, `<actor>.speed_mps`, `faults.friction_factor` and so on."""
-
-    scenario_id: str
-    world_id: str
-    junction_id: str
-    place: str
-    """The connection that the ego takes and, after a `/`, that of the first other road user."""
-    values: dict[str, float]
-    seed: int

@@ -27,7 +27,7 @@ ACCEL_MPS2, DECEL_MPS2, LATERAL_MPS2 = 1.5, 2.5, 2.0
 JOIN_S = 30.0
 
 
-class Road(NamedTuple):
+class PathProfile(NamedTuple):
     """Of the path's points, 1 m apart: arc length, heading, and the speed that bends allow."""
 
     arc_m: Array
@@ -42,7 +42,7 @@ def plan(scene: PlannerScene) -> PlannedMotions:
     heading = np.unwrap(np.arctan2(*np.gradient(scene.path_xy_m, axis=0).T[::-1]))
     bend = np.abs(np.gradient(heading, path_arc)) + 1e-6
     ahead = np.lib.stride_tricks.sliding_window_view(np.pad(bend, (0, 14), mode="edge"), 15)
-    road = Road(path_arc, heading, np.sqrt(LATERAL_MPS2 / ahead.max(axis=1)))
+    road = PathProfile(path_arc, heading, np.sqrt(LATERAL_MPS2 / ahead.max(axis=1)))
     rows = range(len(scene.futures))
     xy, yaw, speed = zip(*(_drive(scene, row, road) for row in rows), strict=True)
     return PlannedMotions(
@@ -51,7 +51,7 @@ def plan(scene: PlannerScene) -> PlannedMotions:
     )  # fmt: skip
 
 
-def _drive(scene: PlannerScene, row: int, road: Road) -> tuple[Array, Array, Array]:
+def _drive(scene: PlannerScene, row: int, road: PathProfile) -> tuple[Array, Array, Array]:
     """Return positions (N, 2), yaws (N,) and speeds (N,) of one car."""
     path_arc, heading, bends_mps = road
     arc, present = float(scene.arc_m[row]), max(float(scene.states[row, 3]), 0.0)

@@ -122,10 +122,7 @@ def drive_blueprint(
         rrb.Horizontal(
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/status", name="Status", titlebar=False),
-                rrb.Tabs(
-                    intersection, chase, overview,
-                    active_tab=main,
-                ),
+                rrb.Tabs(intersection, chase, overview, active_tab=main),
                 rrb.Tabs(
                     rrb.StateTimelineView(origin="/workers/state", name="Workers"),
                     rrb.TextLogView(origin="/events", name="Events"),
@@ -158,7 +155,7 @@ def drive_blueprint(
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
         auto_layout=False,
         auto_views=False,
-    )  # fmt: skip
+    )
 
 
 def _plot(

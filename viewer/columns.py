@@ -12,7 +12,7 @@ import rerun as rr
 from foretwin.viewer.rows import TIMELINE, Row
 
 
-class _Cells(NamedTuple):
+class _ComponentCells(NamedTuple):
     """One component of several rows on end."""
 
     arrays: list[pa.Array]
@@ -37,10 +37,10 @@ def send_rows(stream: rr.RecordingStream, path: str, rows: Sequence[Row]) -> Non
 
 def _tables(
     rows: Sequence[Row],
-) -> Iterator[tuple[list[int], dict[rr.ComponentDescriptor, _Cells]]]:
+) -> Iterator[tuple[list[int], dict[rr.ComponentDescriptor, _ComponentCells]]]:
     """Yield stretches of rows that say the same components: instants, and a column of each."""
     times_ns: list[int] = []
-    columns: dict[rr.ComponentDescriptor, _Cells] = {}
+    columns: dict[rr.ComponentDescriptor, _ComponentCells] = {}
     for row in rows:
         assert row.drive_ns is not None
         said = {
@@ -52,6 +52,6 @@ def _tables(
             times_ns, columns = [], {}
         times_ns.append(row.drive_ns)
         for descriptor, array in said.items():
-            columns.setdefault(descriptor, _Cells([])).arrays.append(array)
+            columns.setdefault(descriptor, _ComponentCells([])).arrays.append(array)
     if times_ns:
         yield times_ns, columns

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import math
 
 import numpy as np
 import rerun as rr
@@ -10,6 +11,7 @@ import rerun as rr
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, PlannedTrajectory, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw, wrap_angle
+from foretwin.contracts.gap import ALARM_LIMITS_PER_S
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.viewer.log_roles import GHOST, SHADOW, TWIN, RolesLog, box_of, pose_of
 from foretwin.viewer.meshes import Colour
@@ -19,15 +21,20 @@ TRAIL: Colour = (126, 132, 144)
 PLAN: Colour = (88, 150, 255)
 LIMIT: Colour = (229, 72, 66)
 
-GAP_LIMITS = {"pos_m": 1.5, "yaw_deg": 5.0, "speed_mps": 1.0}
-"""The lines drawn in the gap plots: beyond them a gap is worth a look."""
+GAP_LIMITS_PER_S = {
+    "pos_m": math.hypot(ALARM_LIMITS_PER_S["along_m"], ALARM_LIMITS_PER_S["across_m"]),
+    "yaw_deg": math.degrees(ALARM_LIMITS_PER_S["yaw_rad"]),
+    "speed_mps": ALARM_LIMITS_PER_S["speed_mps"],
+}
+"""The lines of the gap plots, for each second since the free twin started anew. Who is farther away
+than `pos_m` is beyond the limit along or across."""
 
 TRAIL_S = 10.0
 PERIOD_NS = 95_000_000
 """Cars and gaps are logged at most at about 10 Hz of drive time."""
 TRAIL_PERIOD_NS = 195_000_000
 LIMIT_PERIOD_NS = 995_000_000
-"""Lines that stay where they are need few points."""
+"""Straight lines need few points."""
 FOCUS_REACH_M = 32.0
 MARK_HEIGHT_M = 60.0
 FOCUS_TIME_CONSTANT_S = 1.5
@@ -52,7 +59,7 @@ def static_rows() -> list[Row]:
         static("world/ego/trail/real", rr.LineStrips3D.from_fields(radii=0.12, colors=[TRAIL])),
         static("world/plan", rr.LineStrips3D.from_fields(radii=0.22, colors=[PLAN])),
     ]
-    for quantity in GAP_LIMITS:
+    for quantity in GAP_LIMITS_PER_S:
         for name, colour, width in (("twin", TWIN, 2.0), ("shadow", SHADOW, 1.5)):
             rows.append(
                 static(
@@ -82,6 +89,8 @@ class DriveLog:
         self._last_ns: dict[str, int] = {}
         self._trail: collections.deque[tuple[int, Array, tuple[float, float]]] = collections.deque()
         self._roles = RolesLog()
+        self._limit_point = (0.0, 0)
+        """Since when the free twin ran at the last sample, and that sample's drive time."""
         self._yaw_rad = 0.0
         self._junction: Array | None = None
         self._focus: Array | None = None
@@ -180,16 +189,34 @@ class DriveLog:
         real, shadow = sample.real, sample.shadow
         rows = self._roles.rows(sample, drive_ns)
         twin_gap = (sample.gap_m, np.degrees(sample.gap_yaw_rad), sample.gap_speed_mps)
-        for quantity, twin, other in zip(GAP_LIMITS, twin_gap, _gap(shadow, real), strict=True):
+        gaps = zip(GAP_LIMITS_PER_S, twin_gap, _gap(shadow, real), strict=True)
+        for quantity, twin, other in gaps:
             rows += [
                 Row(f"gap/{quantity}/twin", drive_ns, rr.Scalars(float(twin))),
                 Row(f"gap/{quantity}/shadow", drive_ns, rr.Scalars(float(other))),
             ]
-        if self._due("limit", drive_ns, LIMIT_PERIOD_NS):
-            for quantity, limit in GAP_LIMITS.items():
-                limits = [limit] if quantity == "pos_m" else [limit, -limit]
-                rows.append(Row(f"gap/{quantity}/limit", drive_ns, rr.Scalars(limits)))
-        return rows
+        return rows + self._limits(sample.since_reset_s, drive_ns)
+
+    def _limits(self, since_reset_s: float, drive_ns: int) -> list[Row]:
+        """Return points of the limits' lines: once a second, and both ends of each fall."""
+        before, self._limit_point = self._limit_point, (since_reset_s, drive_ns)
+        points = [self._limit_point]
+        if since_reset_s < before[0] and drive_ns > before[1]:
+            points = [before, self._limit_point]
+            self._last_ns["limit"] = drive_ns
+        elif not self._due("limit", drive_ns, LIMIT_PERIOD_NS):
+            return []
+        return [
+            Row(
+                f"gap/{quantity}/limit",
+                at_ns,
+                rr.Scalars(
+                    [per_s * at_s] if quantity == "pos_m" else [per_s * at_s, -per_s * at_s]
+                ),
+            )
+            for at_s, at_ns in points
+            for quantity, per_s in GAP_LIMITS_PER_S.items()
+        ]
 
 
 def _gap(car: PlaneState, real: PlaneState) -> tuple[float, float, float]:

@@ -93,8 +93,10 @@ class RolesLog:
         self._used = self._used or sample.role != "all"
         rows = []
         for name, car in (
-            ("twin", sample.twin), ("shadow", sample.shadow), ("ghost", sample.ghost),
-        ):  # fmt: skip
+            ("twin", sample.twin),
+            ("shadow", sample.shadow),
+            ("ghost", sample.ghost),
+        ):
             scale = None
             if self._used:
                 scale = 1.0 if sample.role in ("all", name) else _GONE

@@ -7,15 +7,19 @@ from typing import get_args
 
 import rerun as rr
 
-from foretwin.contracts.gap import GapSample, Manoeuvre, Verdict
+from foretwin.contracts.gap import (
+    ALARM_HORIZON_S,
+    ALARM_LIMITS_PER_S,
+    GapSample,
+    Manoeuvre,
+    Verdict,
+)
 from foretwin.contracts.tuning import Identification, ParameterChange, ParameterEstimate
 from foretwin.viewer.log_drive import LIMIT, PLAN
 from foretwin.viewer.log_roles import REAL, TWIN
 from foretwin.viewer.meshes import Colour
 from foretwin.viewer.rows import Row, plain_text, static, table_cell
 
-HORIZON_S = 2.0
-"""The horizon whose gap is drawn; the run's tables hold all."""
 GAPS = {"across_m": 1.0, "along_m": 1.0, "yaw_deg": math.degrees(1.0)}
 _FIELDS = {"across_m": "across_m", "along_m": "along_m", "yaw_deg": "yaw_rad"}
 MANOEUVRE_COLOURS: dict[Manoeuvre, Colour] = {
@@ -46,6 +50,8 @@ def static_rows() -> list[Row]:
         for gap in GAPS
         for name in get_args(Manoeuvre)
     ]
+    lines = rr.SeriesLines(colors=[LIMIT] * 2, names=["limit", "-limit"], widths=[1.5] * 2)
+    rows += [static(f"reality/{gap}/limit", lines) for gap in GAPS]
     for name in PLOTTED:
         for curve, (colour, label, width) in _CURVES.items():
             lines = rr.SeriesLines(colors=colour, names=label, widths=width)
@@ -72,17 +78,21 @@ class TuningLog:
         ]
 
     def gap(self, sample: GapSample, drive_ns: int) -> list[Row]:
-        """Return the gap after 2 s, by manoeuvre."""
-        if abs(sample.horizon_s - HORIZON_S) > 1e-9:
+        """Return the gap after 2 s by manoeuvre, and the limits beyond which it is an alarm.
+
+        The run's tables hold all horizons.
+        """
+        if abs(sample.horizon_s - ALARM_HORIZON_S) > 1e-9:
             return []
-        return [
-            Row(
-                f"reality/{gap}/{sample.manoeuvre}",
-                drive_ns,
-                rr.Scalars(scale * getattr(sample, _FIELDS[gap])),
-            )
-            for gap, scale in GAPS.items()
-        ]
+        rows = []
+        for gap, scale in GAPS.items():
+            value = scale * getattr(sample, _FIELDS[gap])
+            limit = scale * ALARM_LIMITS_PER_S[_FIELDS[gap]] * ALARM_HORIZON_S
+            rows += [
+                Row(f"reality/{gap}/{sample.manoeuvre}", drive_ns, rr.Scalars(value)),
+                Row(f"reality/{gap}/limit", drive_ns, rr.Scalars([limit, -limit])),
+            ]
+        return rows
 
     def verdict(self, verdict: Verdict, drive_ns: int) -> list[Row]:
         """Return all verdicts so far, the newest first, as one text."""
@@ -108,8 +118,11 @@ class TuningLog:
             if found.name not in PLOTTED:
                 continue
             values = {
-                "in_use": found.prior, "value": found.value, "low": found.low, "high": found.high,
-            }  # fmt: skip
+                "in_use": found.prior,
+                "value": found.value,
+                "low": found.low,
+                "high": found.high,
+            }
             rows += [
                 Row(f"parameters/{found.name}/{curve}", drive_ns, rr.Scalars(value))
                 for curve, value in values.items()
@@ -132,9 +145,7 @@ class TuningLog:
         lines = ["| parameter | in use | driving says | 95 % | |", "|---|---|---|---|---|"]
         for found in self._estimates.values():
             interval = "" if found.low is None else f"{_number(found.low)} to {_number(found.high)}"
-            cells = (
-                found.name, _number(found.prior), _number(found.value), interval, found.reason,
-            )  # fmt: skip
+            cells = (found.name, _number(found.prior), _number(found.value), interval, found.reason)
             lines.append("| " + " | ".join(table_cell(cell) for cell in cells) + " |")
         return "\n".join(lines)
 

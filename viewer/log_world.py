@@ -58,17 +58,21 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
     junction = [place.area for place in world.junctions[:1] if place.area is not None]
     if surface:
         rows.append(
-            row("roads/surface", _archetype(
-                flat_mesh(move.polygons(surface), height_m=ROAD_HEIGHT_M, colour=ROAD)
-            ))
-        )  # fmt: skip
+            row(
+                "roads/surface",
+                _archetype(flat_mesh(move.polygons(surface), height_m=ROAD_HEIGHT_M, colour=ROAD)),
+            )
+        )
     if junction:
         inside = [Polygon(area.outline, area.holes) for area in junction]
         rows.append(
-            row("roads/junction", _archetype(
-                flat_mesh(move.polygons(inside), height_m=JUNCTION_HEIGHT_M, colour=JUNCTION)
-            ))
-        )  # fmt: skip
+            row(
+                "roads/junction",
+                _archetype(
+                    flat_mesh(move.polygons(inside), height_m=JUNCTION_HEIGHT_M, colour=JUNCTION)
+                ),
+            )
+        )
     edges = [
         offset_left(lane.centerline, side * lane.width_m.value / 2.0)
         for lane in world.lanes

@@ -28,9 +28,21 @@ from foretwin.viewer.rows import Row
 
 VEHICLE_CHANNELS = ("state", "gnss", "plan", "end")
 RUN_CHANNELS = (
-    "round", "comparison", "plan_comparison", "disagreement", "mirror", "active_world", "world",
-    "worker_status", "progress", "event", "gap", "verdict", "identification", "parameter",
-)  # fmt: skip
+    "round",
+    "comparison",
+    "plan_comparison",
+    "disagreement",
+    "mirror",
+    "active_world",
+    "world",
+    "worker_status",
+    "progress",
+    "event",
+    "gap",
+    "verdict",
+    "identification",
+    "parameter",
+)
 
 _log = logging.getLogger(__name__)
 

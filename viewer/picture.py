@@ -70,9 +70,12 @@ def take_picture(
         copy_with_blueprint(recording, copy, drive_blueprint(main=main, detail=detail))
         port = free_port()
         program = start_program(
-            "--headless", "--hide-welcome-screen", "--window-size", f"{size[0]}x{size[1]}",
+            "--headless",
+            "--hide-welcome-screen",
+            "--window-size",
+            f"{size[0]}x{size[1]}",
             port=port,
-        )  # fmt: skip
+        )
         try:
             wait_until_it_answers(program, port)
             client = ViewerClient.connect(address(port))
@@ -154,9 +157,13 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         width, height = (int(part) for part in given.size.split("x"))
         render_recording(
-            given.recording, given.out, at_s=given.at, main=given.main, detail=given.detail,
+            given.recording,
+            given.out,
+            at_s=given.at,
+            main=given.main,
+            detail=given.detail,
             size=(width, height),
-        )  # fmt: skip
+        )
     except (OSError, ValueError) as problem:
         print(f"foretwin.viewer.picture: {problem}", file=sys.stderr)
         return 2

@@ -92,8 +92,11 @@ class Rectangle(msgspec.Struct, frozen=True):
         s = arc_lengths(xy_m)
         found: list[float] = []
         for axis, level in (
-            (0, self.west_m), (0, self.east_m), (1, self.south_m), (1, self.north_m),
-        ):  # fmt: skip
+            (0, self.west_m),
+            (0, self.east_m),
+            (1, self.south_m),
+            (1, self.north_m),
+        ):
             gap = xy_m[:, axis] - level
             for i in np.nonzero(gap[:-1] * gap[1:] < 0.0)[0]:
                 share = gap[i] / (gap[i] - gap[i + 1])

@@ -18,7 +18,7 @@ from foretwin.contracts.futures import PathAhead
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.orchestrator.rounds.dispatch import RoundDone
 from foretwin.sim_worker.analysis.agreement.criteria import Court, Heard, Users, Window
 from foretwin.sim_worker.analysis.agreement.tally import Judged, judged, tally
@@ -63,7 +63,7 @@ class WindowDesk:
         self._last_ns: int | None = None
         self.judged: list[Judged] = []
 
-    def take(self, said: Surroundings, state: VehicleState) -> None:
+    def take(self, said: LatestReports, state: VehicleState) -> None:
         """Take where the car is, and what it newly saw and heard."""
         if self._states and state.stamp_ns < self._states[-1].stamp_ns - _SPARE_NS:
             for gone in (self._states, self._seen, self._waiting):

@@ -139,11 +139,13 @@ def world(
     everything: Annotated[bool, typer.Option("--all", help="each junction of the map")] = False,
     service_roads: ServiceRoadsOption = False,
     file_format: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--format", help="mjcf, sdf, opendrive, lanelet2, commonroad, geojson, svg or png"
+            "--format",
+            help="mjcf, sdf, opendrive, lanelet2, commonroad, geojson, svg or png "
+            "[default: as the suffix of --out says; mjcf for .xml and in a folder]",
         ),
-    ] = "mjcf",
+    ] = None,
     radius: Annotated[float, typer.Option(help="metres around the junction")] = 150.0,
     opendrive_version: Annotated[str, typer.Option(help="1.8, or 1.4 for CARLA")] = "1.8",
     simulator: Annotated[

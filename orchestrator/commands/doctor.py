@@ -19,7 +19,7 @@ _BUS_S = 20.0
 """How long a busy machine may take for one question over the bus."""
 
 
-class Finding(NamedTuple):
+class CheckResult(NamedTuple):
     """One line of the examination."""
 
     what: str
@@ -36,27 +36,27 @@ def examine() -> int:
     return 3 if any(f.verdict == "missing" for f in findings) else 0
 
 
-def _python() -> Finding:
+def _python() -> CheckResult:
     good = sys.version_info >= (3, 11)
-    return Finding(
+    return CheckResult(
         "Python", "ok" if good else "missing", f"{platform.python_version()}, 3.11 or newer"
     )
 
 
-def _cores() -> Finding:
+def _cores() -> CheckResult:
     count = os.cpu_count() or 1
     text = f"{count} cores; a live drive at 64 futures twice a second was measured on 2"
-    return Finding("processor", "ok" if count >= 2 else "note", text)
+    return CheckResult("processor", "ok" if count >= 2 else "note", text)
 
 
-def _tuning() -> Finding:
+def _tuning() -> CheckResult:
     from foretwin.orchestrator.config import DriveConfig
 
     choice = DriveConfig().tuning_choice
-    return Finding("tuning", "note" if choice.mode == "off" else "ok", choice.text)
+    return CheckResult("tuning", "note" if choice.mode == "off" else "ok", choice.text)
 
 
-def _packages() -> Finding:
+def _packages() -> CheckResult:
     names = ("mujoco", "eclipse-zenoh", "rerun-sdk", "osmium", "shapely", "pyproj", "pyarrow")
     versions, absent = [], []
     for name in names:
@@ -65,11 +65,13 @@ def _packages() -> Finding:
         except importlib.metadata.PackageNotFoundError:
             absent.append(name)
     if absent:
-        return Finding("packages", "missing", f"not installed: {', '.join(absent)}; run make setup")
-    return Finding("packages", "ok", ", ".join(versions))
+        return CheckResult(
+            "packages", "missing", f"not installed: {', '.join(absent)}; run make setup"
+        )
+    return CheckResult("packages", "ok", ", ".join(versions))
 
 
-def _bus() -> Finding:
+def _bus() -> CheckResult:
     import contextlib
     import threading
 
@@ -99,44 +101,48 @@ def _bus() -> Finding:
             except TimeoutError:
                 continue
             taken_ms = 1e3 * (time.perf_counter() - started)
-            return Finding("Zenoh over loopback", "ok", f"question and answer in {taken_ms:.1f} ms")
+            return CheckResult(
+                "Zenoh over loopback", "ok", f"question and answer in {taken_ms:.1f} ms"
+            )
     text = f"no answer in {_BUS_S:.0f} s; is loopback filtered?"
-    return Finding("Zenoh over loopback", "missing", text)
+    return CheckResult("Zenoh over loopback", "missing", text)
 
 
-def _clock() -> Finding:
+def _clock() -> CheckResult:
     from foretwin.sim_worker.vehicle.clock import silence_step_clock
 
     if silence_step_clock():
-        return Finding("MuJoCo's step clock", "ok", "switched off")
-    return Finding("MuJoCo's step clock", "note", "cannot be switched off here; steps are slower")
+        return CheckResult("MuJoCo's step clock", "ok", "switched off")
+    return CheckResult(
+        "MuJoCo's step clock", "note", "cannot be switched off here; steps are slower"
+    )
 
 
-def _vulkan() -> Finding:
+def _vulkan() -> CheckResult:
     folders = [Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d")]
     drivers = sorted(p.stem for f in folders if f.is_dir() for p in f.glob("*.json"))
     if drivers:
-        return Finding("Vulkan drivers", "ok", ", ".join(drivers))
+        return CheckResult("Vulkan drivers", "ok", ", ".join(drivers))
     text = "none: no pictures and no native viewer (Debian: mesa-vulkan-drivers)"
-    return Finding("Vulkan drivers", "note", text)
+    return CheckResult("Vulkan drivers", "note", text)
 
 
-def _display() -> Finding:
+def _display() -> CheckResult:
     if has_display():
-        return Finding("display", "ok", "--view auto opens the native viewer")
-    return Finding("display", "note", "none: --view auto writes monitor.rrd alone")
+        return CheckResult("display", "ok", "--view auto opens the native viewer")
+    return CheckResult("display", "note", "none: --view auto writes monitor.rrd alone")
 
 
-def _disk() -> Finding:
+def _disk() -> CheckResult:
     free_gb = shutil.disk_usage(tempfile.gettempdir()).free / 1e9
-    return Finding("disk", "ok" if free_gb > 2 else "note", f"{free_gb:.1f} GB free")
+    return CheckResult("disk", "ok" if free_gb > 2 else "note", f"{free_gb:.1f} GB free")
 
 
-def _data() -> Finding:
+def _data() -> CheckResult:
     folder = os.environ.get("FORETWIN_DATA")
     if folder and Path(folder).is_dir():
-        return Finding("FORETWIN_DATA", "ok", "set: real-data tests run")
-    return Finding("FORETWIN_DATA", "note", "not set: real-data tests skip (drives need none)")
+        return CheckResult("FORETWIN_DATA", "ok", "set: real-data tests run")
+    return CheckResult("FORETWIN_DATA", "note", "not set: real-data tests skip (drives need none)")
 
 
 def has_display() -> bool:
@@ -146,6 +152,6 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-CHECKS: tuple[Callable[[], Finding], ...] = (
+CHECKS: tuple[Callable[[], CheckResult], ...] = (
     _python, _cores, _tuning, _packages, _bus, _clock, _vulkan, _display, _disk, _data,
 )  # fmt: skip

@@ -9,6 +9,7 @@ import msgspec
 
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import FuturesResult, Job
+from foretwin.orchestrator.record.job_tables import REPEATED
 from foretwin.orchestrator.record.recorded_jobs import RecordedFuture, recorded_future
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.future_rows import future_rows
@@ -43,7 +44,7 @@ def repeat(folder: Path, future_id: str, *, as_json: bool, view: bool) -> int:
     if view:
         from foretwin.sim_worker.futures.future_picture import write_future_picture
 
-        picture = folder / "repeated" / f"{future_id}.png"
+        picture = folder / REPEATED / f"{future_id}.png"
         index = result.future_indices.index(recorded.row["index"])
         write_future_picture(picture, recorded.job, result, index, recorded.world, recorded.vehicle)
         print(picture)

@@ -21,6 +21,7 @@ from foretwin.orchestrator.sweep.folder import (
     built_worlds,
     fingerprint_of,
     keep_worlds,
+    planner_origins,
 )
 from foretwin.orchestrator.sweep.jobs import JobMaker, cell_rows
 from foretwin.orchestrator.sweep.plan import SweepJob, SweepPlan, WorldPlaces, plan_sweep
@@ -71,22 +72,23 @@ def crew_for(loaded: Loaded, out: Path, workers: int) -> Crew:
 
 def run_sweep(loaded: Loaded, out: Path, crew: Crew, *, fresh: bool = False) -> dict[str, Any]:
     """Play what is not yet played of a sweep, and return its summary as `sweep.json` has it."""
-    folder = SweepFolder(out, fingerprint_of(loaded, source_digest(loaded.spec)), fresh=fresh)
-    folder.begin(loaded)
-    places = folder.places() or _find_places(loaded, folder, crew)
-    plan = plan_sweep(loaded, places.worlds)
-    parts = Parts(folder.path)
-    keep_vehicles(folder.path, loaded.vehicles.values())
-    keep_worlds(worlds_folder(loaded.spec), folder.worlds_dir, places.worlds)
-    there = parts.done(plan.jobs)
-    started_s = time.monotonic()
-    left = [job for job in plan.jobs if job.number not in there]
-    _play(left, JobMaker(loaded, plan.worlds), parts, crew)
-    return folder.summarise(
-        _summary(loaded, plan, places, parts)
-        | {"jobs_played": len(plan.jobs) - len(there),
-           "playing_s": round(time.monotonic() - started_s, 3)}
-    )  # fmt: skip
+    fingerprint = fingerprint_of(loaded, source_digest(loaded.spec))
+    with SweepFolder(out, fingerprint, fresh=fresh) as folder:
+        folder.begin(loaded)
+        places = folder.places() or _find_places(loaded, folder, crew)
+        plan = plan_sweep(loaded, places.worlds)
+        parts = Parts(folder.path)
+        keep_vehicles(folder.path, loaded.vehicles.values())
+        keep_worlds(worlds_folder(loaded.spec), folder.worlds_dir, places.worlds)
+        there = parts.done(plan.jobs)
+        started_s = time.monotonic()
+        left = [job for job in plan.jobs if job.number not in there]
+        _play(left, JobMaker(loaded, plan.worlds), parts, crew)
+        return folder.summarise(
+            _summary(loaded, plan, places, parts)
+            | {"jobs_played": len(plan.jobs) - len(there),
+               "playing_s": round(time.monotonic() - started_s, 3)}
+        )  # fmt: skip
 
 
 def _find_places(loaded: Loaded, folder: SweepFolder, crew: Crew) -> FoundPlaces:
@@ -161,6 +163,7 @@ def _summary(loaded: Loaded, plan: SweepPlan, places: FoundPlaces, parts: Parts)
     return {
         "complete": True,
         "spec": loaded.spec,
+        "planners": planner_origins(loaded.spec),
         "worlds": len(places.worlds),
         "jobs": len(plan.jobs),
         **counted.totals(),

@@ -31,7 +31,13 @@ from foretwin.world_gen.export.choices import (
     VEHICLE_KINDS,
     VehicleKind,
 )
-from foretwin.world_gen.export.formats import FORMATS, ExportOptions, Format
+from foretwin.world_gen.export.formats import (
+    DEFAULT_FORMAT,
+    FORMATS,
+    ExportOptions,
+    Format,
+    formats_by_suffix,
+)
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex, index_map
 from foretwin.world_gen.osm.osm_map import LatLonBounds
@@ -52,7 +58,8 @@ class WorldRequest:
     route: Path | None = None
     everything: bool = False
     service_roads: bool = False
-    file_format: str = "mjcf"
+    file_format: str | None = None
+    """None goes by the suffix of `out`."""
     radius_m: float = 150.0
     opendrive_version: str = "1.8"
     simulator: str = "classic"
@@ -66,10 +73,11 @@ def write_worlds(request: WorldRequest) -> int:
 
     Raises UserError, in one line, for anything that cannot be meant.
     """
-    format_ = _format(request)
-    options = _options(request)
+    _check_place(request)
     many = request.everything or request.route is not None
-    _check_out(request.out, format_, many=many)
+    _check_out(request.out, many=many)
+    format_ = _format(request.file_format, None if many else request.out)
+    options = _options(request, format_)
     if request.bbox is not None:
         return _region(request, parse_bbox("--bbox", request.bbox), format_, options)
     if request.at is not None:
@@ -158,7 +166,7 @@ def _index(opened: OpenMap) -> MapIndex:
     return index_map(opened.osm, opened.graph, opened.junctions)
 
 
-def _format(request: WorldRequest) -> Format:
+def _check_place(request: WorldRequest) -> None:
     chosen = [
         name
         for name, given in (
@@ -173,20 +181,33 @@ def _format(request: WorldRequest) -> Format:
             "name the place by exactly one of --at LAT,LON, --id ID, --bbox W,S,E,N, "
             f"--route FILE or --all; got {' and '.join(chosen) or 'none'}"
         )
-    if request.file_format not in FORMATS:
-        raise UserError(f"--format {request.file_format}: one of {', '.join(FORMATS)}")
     if not MIN_RADIUS_M <= request.radius_m <= MAX_RADIUS_M:
         raise UserError(
             f"--radius {request.radius_m}: {MIN_RADIUS_M:.0f} to {MAX_RADIUS_M:.0f} metres"
         )
-    return FORMATS[request.file_format]
 
 
-def _options(request: WorldRequest) -> ExportOptions:
+def _format(name: str | None, file: Path | None) -> Format:
+    """Return the format that was named or that the file's suffix says; in a folder, the default."""
+    if name is not None and name not in FORMATS:
+        raise UserError(f"--format {name}: one of {', '.join(FORMATS)}")
+    if file is None or (name is None and not file.suffix):
+        return FORMATS[name or DEFAULT_FORMAT]
+    said = formats_by_suffix(file.suffix)
+    if name is None and not said:
+        known = ", ".join(dict.fromkeys(format_.suffix for format_ in FORMATS.values()))
+        raise UserError(f"--out {file}: ends in none of {known}; --format says what to write")
+    format_ = FORMATS[name or said[0]]
+    if (said or format_.told_by_suffix) and format_.name not in said:
+        raise UserError(f"--out {file}: a file of --format {name} ends in {format_.suffix}")
+    return format_
+
+
+def _options(request: WorldRequest, format_: Format) -> ExportOptions:
     version = _one_of("--opendrive-version", request.opendrive_version, OPENDRIVE_VERSIONS)
     simulator = _one_of("--simulator", request.simulator, SIMULATORS)
     vehicles = _vehicles(request.vehicles)
-    if request.file_format != "sdf" or not vehicles:
+    if format_.name != "sdf" or not vehicles:
         return ExportOptions(opendrive_version=version, simulator=simulator)
     from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
@@ -221,7 +242,7 @@ def _vehicles(text: str) -> tuple[tuple[str, VehicleKind], ...]:
     return tuple(pairs)
 
 
-def _check_out(out: Path, format_: Format, *, many: bool) -> None:
+def _check_out(out: Path, *, many: bool) -> None:
     if many:
         if out.exists() and not out.is_dir():
             raise UserError(f"--out {out}: is a file; --all and --route write into a folder")
@@ -231,8 +252,6 @@ def _check_out(out: Path, format_: Format, *, many: bool) -> None:
         raise UserError(f"--out {out}: is a folder; name the file to write")
     if not out.parent.is_dir():
         raise UserError(f"--out {out}: folder {out.parent} does not exist")
-    if format_.told_by_suffix and out.suffix.lower() != format_.suffix:
-        raise UserError(f"--out {out}: a file of --format {format_.name} ends in {format_.suffix}")
     _check_writable(out, out.parent)
 
 

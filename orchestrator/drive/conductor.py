@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 
 from foretwin.contracts import keys
 from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, Request
@@ -33,6 +34,10 @@ from foretwin.orchestrator.worlds.handler import WorldDesk
 log = logging.getLogger(ORCHESTRATOR)
 
 MAILBOX_DEPTH = 16384
+
+
+def _nothing(_: object) -> None:
+    """Take what nothing here listens to."""
 
 
 class Conductor:
@@ -86,8 +91,23 @@ class Conductor:
         self.route = RouteDesk(plan, use=mission.give_route, tell=self.tell)
         self._active_world: str | None = None
         self._world_untold = False
-
-    # Joining.
+        self._on_message: dict[str, Callable[[Received], object]] = {
+            **dict.fromkeys(keys.TELEMETRY_CHANNELS, self.take_telemetry),
+            **dict.fromkeys(FINDINGS, self.tuning.heard),
+            "route": self.route.take,
+            "mirror": lambda item: self.mirror.take(item.message()),
+            "event": lambda item: self.events.heard(item.message()),
+        }
+        """What takes the messages of each channel that `join` subscribes to."""
+        self._on_reply: dict[str, Callable[[Reply], object]] = {
+            **dict.fromkeys(("use_world", "use_roles"), lambda _: self.questions.answered()),
+            **dict.fromkeys(("use_vehicle", "tune"), self._tuning_reply),
+            "job": self.rounds.reply,
+            "build": self._build_reply,
+            "prepare": self.worlds.prepare_reply,
+            "info": lambda item: self.beside.take_info(item.tag, item.message),
+        }
+        """What takes the answers to each question that is asked through the mailbox."""
 
     def join(self) -> None:
         """Subscribe to everything a drive listens to."""
@@ -110,49 +130,31 @@ class Conductor:
         self.rounds.start_stamp_ns = info.start_stamp_ns
         self.mission.start_stamp_ns = info.start_stamp_ns
         if info.body_from_antenna_m is None:
-            text = (
-                f"the source does not say where on the car its reference point "
-                f"({info.reference_point}) sits; taken as base_link"
-            )
-            self.tell(Tell("warning", text))
+            where = f"where on the car its reference point ({info.reference_point}) sits"
+            self.tell(Tell("warning", f"the source does not say {where}; taken as base_link"))
 
     # Messages.
 
     def handle(self, item: object) -> None:
         """Take one item of the mailbox."""
         match item:
-            case Received(channel="mirror"):
-                self.mirror.take(item.message())
-            case Received(channel="event"):
-                self.events.heard(item.message())
-            case Received(channel="route"):
-                self.route.take(item)
-            case Received(channel=channel) if channel in FINDINGS:
-                self.tuning.heard(item)
             case Received():
-                self.take_telemetry(item)
-            case Reply(channel="job"):
-                self.rounds.reply(item)
-            case Reply(channel="build"):
-                self.worlds.build_reply(
-                    item, workers=self.rounds.desk.workers, builder_up=BUILDER in self.alive
-                )
-            case Reply(channel="prepare"):
-                self.worlds.prepare_reply(item)
-            case Reply(channel="info"):
-                self.beside.take_info(item.tag, item.message)
-            case Reply(channel="use_world" | "use_roles"):
-                self.questions.answered()
-            case Reply(channel="use_vehicle" | "tune"):
-                process_id = self.tuning.reply(item)
-                if process_id in self.alive and process_id not in self.rounds.desk.workers:
-                    self._worker_up(process_id)
+                self._on_message.get(item.channel, _nothing)(item)
+            case Reply():
+                self._on_reply.get(item.channel, _nothing)(item)
             case Request(channel="set"):
                 self.changes.take(item, stamp_ns=self.intake.now_stamp_ns)
             case Alive():
                 self._alive(item)
-            case _:
-                pass
+
+    def _build_reply(self, item: Reply) -> None:
+        workers, builder_up = self.rounds.desk.workers, BUILDER in self.alive
+        self.worlds.build_reply(item, workers=workers, builder_up=builder_up)
+
+    def _tuning_reply(self, item: Reply) -> None:
+        process_id = self.tuning.reply(item)
+        if process_id in self.alive and process_id not in self.rounds.desk.workers:
+            self._worker_up(process_id)
 
     def take_telemetry(self, item: Received) -> None:
         """Take one sample, and let the mission go on where it gives a new state."""

@@ -108,7 +108,6 @@ class _Drive:
         """Run to the end, whatever ends it; the run's files are complete afterwards."""
         plan = self._plan
         started_s = time.monotonic()
-        reserve_record(plan, plan.folder / "run.json")
         log.info("run %s in %s, versions %s", plan.run_id, plan.folder, versions())
         with ZenohBus(plan.bus, router=True) as bus:
             tables = ResultTables(
@@ -137,6 +136,8 @@ class _Drive:
 
     def _go(self, bus: ZenohBus, conductor: Conductor, line: ProgressLine) -> tuple[str, int]:
         conductor.join()
+        # A run that is listed can be spoken to: questions wait in the mailbox from here on.
+        reserve_record(self._plan, self._plan.folder / "run.json")
         self._start_processes()
         conductor.rounds.draw_cases()  # while they come up
         if not self._join_processes(bus, conductor):

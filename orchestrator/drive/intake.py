@@ -33,7 +33,7 @@ class LatestState(NamedTuple):
     receipt_mono_ns: int
 
 
-class Surroundings(NamedTuple):
+class LatestReports(NamedTuple):
     """The newest of what a car says besides its own motion; each with its own stamp."""
 
     plan: PlannedTrajectory | None
@@ -158,9 +158,9 @@ class Intake:
         return {**self.counts.record(self.skipped_invalid), **found, **_position_record(state)}
 
     @property
-    def surroundings(self) -> Surroundings:
+    def surroundings(self) -> LatestReports:
         """What the car last said of its plan, of other road users and of lights."""
-        return Surroundings(self.plan, self.road_users, tuple(self.signals.values()))
+        return LatestReports(self.plan, self.road_users, tuple(self.signals.values()))
 
     @property
     def start_stamp_ns(self) -> int:

@@ -10,7 +10,7 @@ from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.other_vehicles.measured import Measured
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates
 from foretwin.telemetry.estimator.estimator import estimator_of
 
 APART_NS = 1_000_000_000
@@ -34,7 +34,7 @@ class LiveBeside:
     ) -> None:
         self._id, self._vehicle = vehicle_id, vehicle
         self._ask_info, self._tell = ask_info, tell
-        self._measured: Measured | None = None
+        self._measured: OtherVehicleStates | None = None
         self._heard: list[OtherVehicle] = []
         self._told_apart = False
 
@@ -48,7 +48,7 @@ class LiveBeside:
             info = VehicleInfo(
                 vehicle_id=self._id, time_base="utc", start_stamp_ns=message.stamp_ns
             )
-            self._measured = Measured(self._id, estimator_of(info, self._vehicle))
+            self._measured = OtherVehicleStates(self._id, estimator_of(info, self._vehicle))
             self._tell(Tell("info", f"{self._id} is heard"))
             self._ask_info(self._id)
         heard = self._measured.take(item.channel, message, received_ns=item.received_mono_ns)

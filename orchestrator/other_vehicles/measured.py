@@ -15,7 +15,7 @@ PERIOD_NS = 18_000_000
 FRESH_NS = 500_000_000
 
 
-class Source(Protocol):
+class OtherVehicleSource(Protocol):
     """Where a vehicle's states come from."""
 
     def states_until(self, own: VehicleState) -> list[OtherVehicle]:
@@ -25,7 +25,7 @@ class Source(Protocol):
         """Let go of files and threads; idempotent."""
 
 
-class Measured:
+class OtherVehicleStates:
     """Samples of one vehicle to states, as far apart as is worth passing on."""
 
     def __init__(self, vehicle_id: str, estimator: StateEstimator) -> None:

@@ -13,7 +13,7 @@ from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.roles import OtherVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.instructions import Tell
-from foretwin.orchestrator.other_vehicles.measured import Measured
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleStates
 from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs import open_log
 from foretwin.telemetry.processes.replay import ReplaySource
@@ -120,7 +120,7 @@ class LogBeside:
         try:
             source = ReplaySource(open_log(self._file), vehicle_id=self._id)
             later_ns = self._later_ns(source.info)
-            measured = Measured(self._id, estimator_of(source.info, self._vehicle))
+            measured = OtherVehicleStates(self._id, estimator_of(source.info, self._vehicle))
             for channel, message in source.advance(_FOREVER_NS):
                 if self._stop.is_set():
                     return

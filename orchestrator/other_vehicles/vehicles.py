@@ -15,12 +15,12 @@ from foretwin.contracts.drive import InfoRequest, RoadUser, RoadUsers, VehicleIn
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
-from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.orchestrator.drive.plan import Beside, DrivePlan
 from foretwin.orchestrator.instructions import Tell
 from foretwin.orchestrator.other_vehicles.detected import DetectedBeside, moved_ahead
 from foretwin.orchestrator.other_vehicles.live import LiveBeside
-from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, Source
+from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, OtherVehicleSource
 from foretwin.orchestrator.other_vehicles.recorded import LogBeside
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
@@ -57,7 +57,7 @@ class VehiclesBeside:
         """What a vehicle answers that was asked what it is lands in `mailbox`, for `take_info`."""
         self._bus, self._mailbox, self._run_id = bus, mailbox, plan.run_id
         self._crew = crew = plan.beside
-        self._sources: dict[str, Source] = {}
+        self._sources: dict[str, OtherVehicleSource] = {}
         self._waits = plan.config.lock_step
         self._tell = tell
         self._vehicles = {one.config.id: one.vehicle for one in crew}
@@ -75,7 +75,7 @@ class VehiclesBeside:
         for source in self._sources.values():
             source.close()
 
-    def _source(self, beside: Beside, own: VehicleInfo) -> Source:
+    def _source(self, beside: Beside, own: VehicleInfo) -> OtherVehicleSource:
         config, vehicle = beside.config, beside.vehicle
         if config.log is not None:
             return LogBeside(
@@ -117,8 +117,8 @@ class VehiclesBeside:
         self._bus.publish("other_vehicles", message, run=self._run_id)
 
     def among(
-        self, said: Surroundings, own: VehicleState, roles: Mapping[str, Role]
-    ) -> Surroundings:
+        self, said: LatestReports, own: VehicleState, roles: Mapping[str, Role]
+    ) -> LatestReports:
         """Return what surrounds the car with these vehicles in it, ghosts excepted."""
         if not self._sources:
             return said

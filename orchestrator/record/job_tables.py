@@ -25,7 +25,8 @@ _TYPES = {
 
 RESULT_SCHEMA_VERSION = 1
 """Of these tables: raised where a column means something else."""
-VEHICLES = "vehicles"
+VEHICLES, REPEATED = "vehicles", "repeated"
+"""Folders of a run or sweep: parameters that jobs name, and pictures of futures played again."""
 
 
 def _schema(**columns: type) -> pa.Schema:

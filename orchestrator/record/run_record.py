@@ -90,9 +90,14 @@ def run_record(
 
 
 def reserve_record(plan: DrivePlan, file: Path) -> None:
-    """Write a run.json that says that the run goes on, and keeps room on the disk for the last."""
+    """Write a run.json that says that the run goes on, and keeps room on the disk for the last.
+
+    Whoever lists runs meanwhile sees the whole of it or nothing.
+    """
     begun = json.dumps({"run_id": plan.run_id, "exit": "running", "endpoint": plan.bus.endpoint})
-    file.write_text(begun.ljust(RESERVED_BYTES) + "\n", encoding="utf-8")
+    partial = file.with_name(f"{file.name}.writing")
+    partial.write_text(begun.ljust(RESERVED_BYTES) + "\n", encoding="utf-8")
+    partial.replace(file)
 
 
 def write_record(record: dict[str, Any], file: Path) -> None:

@@ -17,12 +17,13 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.config import DriveConfig
-from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.orchestrator.instructions import RoundIntent
 from foretwin.orchestrator.rounds.fewer_futures import some_of
 from foretwin.orchestrator.rounds.seen_users import near_car
 from foretwin.orchestrator.routing.route_ahead import PATH_BEHIND_M
 from foretwin.sim_worker.futures.future_mix import cases_of, plan_futures
+from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.scenarios.live import LiveScenarios
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
@@ -84,7 +85,7 @@ class RoundPlanner:
         round_id: int,
         intent: RoundIntent,
         state: VehicleState,
-        said: Surroundings,
+        said: LatestReports,
         world: World,
         *,
         start_stamp_ns: int,
@@ -117,6 +118,9 @@ class RoundPlanner:
                     signals=signals,
                     drive_time_s=(state.stamp_ns - start_stamp_ns) / 1e9,
                     car_plan=car_plan,
+                    metrics=ROW_METRICS,
+                    accidents=True,
+                    accident_motion=False,
                     vehicle=self._vehicle_digest,
                     vehicle_version=self._vehicle_version,
                 )

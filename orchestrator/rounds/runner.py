@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -14,7 +13,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
 from foretwin.orchestrator.agreement.windows import WindowDesk
-from foretwin.orchestrator.drive.intake import LatestState, Surroundings
+from foretwin.orchestrator.drive.intake import LatestReports, LatestState
 from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import RoundIntent, Tell
 from foretwin.orchestrator.record.bookkeeping import ComparisonCount, FuturesCount, PlanCount
@@ -32,8 +31,6 @@ from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
 from foretwin.orchestrator.rounds.views import round_view
 from foretwin.sim_worker.metrics.comparison import compare_plan
-
-log = logging.getLogger("orchestrator")
 
 JOB_TIMEOUT_S = 20.0
 
@@ -103,7 +100,7 @@ class RoundRunner:
         self,
         intent: RoundIntent,
         latest: LatestState,
-        said: Surroundings,
+        said: LatestReports,
         *,
         started_mono_ns: int,
     ) -> None:

@@ -40,7 +40,7 @@ _SURE = 3.0
 """Standard deviations by which the car must be away from any other road that runs alike."""
 
 
-class _Side(NamedTuple):
+class _LateralPosition(NamedTuple):
     """Where one direction drives on a road: left of its line, and the standard deviation."""
 
     left_m: float
@@ -52,7 +52,7 @@ class RoadLines:
 
     def __init__(self, graph: RoadGraph) -> None:
         self._graph = graph
-        self._sides: dict[EdgeKey, _Side] = {}
+        self._sides: dict[EdgeKey, _LateralPosition] = {}
         self._offered_xy: Array | None = None
 
     def near(
@@ -102,7 +102,7 @@ class RoadLines:
         doubt = 2.0 * (state.yaw_std_rad or 0.0)
         return abs(match.heading_off_rad) > min(_MOST_OFF_RAD + doubt, _MOST_OFF_EVER_RAD)
 
-    def _side(self, directed: DirectedEdge) -> _Side:
+    def _side(self, directed: DirectedEdge) -> _LateralPosition:
         key = key_of(directed)
         if key not in self._sides:
             self._sides[key] = _side_of(self._graph, directed)
@@ -139,7 +139,7 @@ def _straight(route: Route, place: int, s_m: float) -> float | None:
     return None if bend.size == 0 or bend.max() > _MOST_BEND_RAD else at
 
 
-def _side_of(graph: RoadGraph, directed: DirectedEdge) -> _Side:
+def _side_of(graph: RoadGraph, directed: DirectedEdge) -> _LateralPosition:
     """Return the middle of the lanes driven this way, any of which the car may be in."""
     section = cross_section(directed.edge, graph.driving_side)
     lanes = section.abreast(reverse=directed.reverse)
@@ -148,4 +148,4 @@ def _side_of(graph: RoadGraph, directed: DirectedEdge) -> _Side:
         lefts = -lefts
     unknown_m = 0.0 if directed.lanes.source == "tagged" else UNTAGGED_STD_M
     spread_m = math.sqrt(MAP_STD_M**2 + IN_LANE_STD_M**2 + unknown_m**2 + float(lefts.var()))
-    return _Side(float(lefts.mean()), spread_m)
+    return _LateralPosition(float(lefts.mean()), spread_m)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import shapely
 from scipy.ndimage import gaussian_filter1d
 
 from foretwin.contracts.arrays import Array
@@ -103,28 +104,10 @@ def smoothed(points: Array, deviation_m: float) -> Array:
 
 def simplified(line: Array) -> list[int]:
     """Return the indices that Douglas and Peucker (1973) keep within `SIMPLIFY_M`."""
-    keep = np.zeros(len(line), dtype=bool)
-    keep[[0, -1]] = True
-    stack = [(0, len(line) - 1)]
-    while stack:
-        low, high = stack.pop()
-        if high - low < 2:
-            continue
-        chord = line[high] - line[low]
-        inner = line[low + 1 : high] - line[low]
-        length = float(np.hypot(chord[0], chord[1]))
-        if length < 1e-6:
-            away = np.hypot(inner[:, 0], inner[:, 1])
-        else:
-            share = np.clip((inner @ chord) / length**2, 0.0, 1.0)
-            off = inner - share[:, None] * chord
-            away = np.hypot(off[:, 0], off[:, 1])
-        worst = int(away.argmax())
-        if away[worst] > SIMPLIFY_M:
-            middle = low + 1 + worst
-            keep[middle] = True
-            stack += [(low, middle), (middle, high)]
-    return [int(index) for index in np.flatnonzero(keep)]
+    numbered = shapely.linestrings(np.column_stack([line, np.arange(len(line))]))
+    kept = shapely.simplify(numbered, SIMPLIFY_M, preserve_topology=False)
+    indices: list[int] = shapely.get_coordinates(kept, include_z=True)[:, 2].astype(int).tolist()
+    return indices
 
 
 def curvature_pm(points: Array) -> Array:

@@ -61,11 +61,6 @@ class Route:
         parts += [self.edges[index].xy_m[1:] for index in range(first + 1, last + 1)]
         return np.concatenate(parts)
 
-    def xy_at(self, s_m: float) -> Array:
-        """Return the point (2,) at `s_m`, clamped to the route."""
-        index = self.index_at(s_m)
-        return points_at(self.edges[index].xy_m, s_m - float(self.start_m[index]))
-
     def validate(self) -> Route:
         """Return self, or raise RouteError where it is empty or an edge does not join the next."""
         if not self.edges:

@@ -22,7 +22,7 @@ from foretwin.orchestrator.routing.map_matching import MapMatcher, Match, OffRoa
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.road_line import RoadLines
 from foretwin.orchestrator.routing.route import Route
-from foretwin.orchestrator.routing.route_follower import Progress, RouteFollower
+from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.roads.road_graph import RoadGraph
@@ -63,7 +63,7 @@ class WayAhead:
         self._cruise = CruiseSpeed()
         self._given = bool(routes)
         self._match: Match | None = None
-        self._progress: Progress | None = None
+        self._progress: RouteProgress | None = None
         self.junctions: tuple[JunctionAhead, ...] = ()
 
     def give(self, route: Route) -> None:

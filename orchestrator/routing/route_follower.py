@@ -25,7 +25,7 @@ BEHIND_M = 150.0
 SourceOfRoute = Literal["given", "predicted"]
 
 
-class Progress(NamedTuple):
+class RouteProgress(NamedTuple):
     """Where the car is on its route.
 
     `route_version` grows whenever what lies ahead has changed; `off_route` says that a route is
@@ -84,7 +84,7 @@ class RouteFollower:
             raise LookupError("no route before the first match")
         return self._route
 
-    def update(self, match: Match | None) -> Progress | None:
+    def update(self, match: Match | None) -> RouteProgress | None:
         """Take the car's match; None (off the map) ends the route until the car is back."""
         if match is None:
             self._route = None
@@ -103,7 +103,7 @@ class RouteFollower:
             self._leave(match)
         self._direction_known = match.direction_known
         self._extend()
-        return Progress(
+        return RouteProgress(
             self._s_m,
             self._version,
             bool(self._given) and not self._on_given,

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import msgspec
 
 from foretwin.contracts.codec import SchemaMismatch, encode, read_message
 from foretwin.contracts.errors import UserError
-from foretwin.orchestrator.record.job_tables import RESULT_SCHEMA_VERSION, VEHICLES
+from foretwin.orchestrator.record.job_tables import REPEATED, RESULT_SCHEMA_VERSION, VEHICLES
 from foretwin.orchestrator.record.versions import versions
-from foretwin.orchestrator.sweep.plan import WorldPlaces
+from foretwin.orchestrator.sweep.lock import LOCK, folder_lock
+from foretwin.orchestrator.sweep.plan import BACKWARDS_PLANNER, WorldPlaces
 from foretwin.orchestrator.sweep.road_users import digest_of
-from foretwin.orchestrator.sweep.rows import FOLDERS
-from foretwin.orchestrator.sweep.spec import Loaded
+from foretwin.orchestrator.sweep.rows import FOLDERS, METRICS_FILE
+from foretwin.orchestrator.sweep.spec import Loaded, SweepSpec
+from foretwin.sim_worker.planners.registry import planner_origin
 from foretwin.world_gen.build import GENERATOR_VERSION
 
 SUMMARY, PLAN, WORLDS = "sweep.json", "places.msgpack", "worlds"
@@ -32,27 +35,46 @@ class FoundPlaces(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SweepFolder:
-    """One folder for one sweep; raises UserError where it holds something else."""
+    """One folder for one sweep, locked while it is entered.
+
+    Entering raises UserError where it holds something else or another process sweeps there.
+    """
 
     def __init__(self, path: Path, fingerprint: str, *, fresh: bool) -> None:
         self.path, self.fingerprint = path, fingerprint
-        if path.exists() and not path.is_dir():
-            raise UserError(f"--out {path}: is a file; a sweep writes into a folder")
-        if fresh:
-            _clear(path)
-        self._check()
-        self.worlds_dir.mkdir(parents=True, exist_ok=True)
+        self._fresh = fresh
+        self._held = ExitStack()
+
+    def __enter__(self) -> Self:
+        self._refuse_strangers()
+        self.path.mkdir(parents=True, exist_ok=True)
+        with ExitStack() as held:
+            held.enter_context(folder_lock(self.path))
+            if self._fresh:
+                _clear(self.path)
+            self._check()
+            self.worlds_dir.mkdir(exist_ok=True)
+            self._held = held.pop_all()
+        return self
+
+    def __exit__(self, *what: object) -> None:
+        self._held.close()
 
     @property
     def worlds_dir(self) -> Path:
         """Return where Worlds are built."""
         return built_worlds(self.path)
 
+    def _refuse_strangers(self) -> None:
+        if self.path.exists() and not self.path.is_dir():
+            raise UserError(f"--out {self.path}: is a file; a sweep writes into a folder")
+        there = {entry.name for entry in self.path.iterdir()} if self.path.is_dir() else set()
+        if there and not {SUMMARY, LOCK} & there:
+            raise UserError(f"--out {self.path}: holds other files and no sweep")
+
     def _check(self) -> None:
         summary = self.path / SUMMARY
         if not summary.is_file():
-            if self.path.is_dir() and any(self.path.iterdir()):
-                raise UserError(f"--out {self.path}: holds other files and no sweep")
             return
         try:
             known = msgspec.json.decode(summary.read_bytes()).get("fingerprint")
@@ -60,14 +82,16 @@ class SweepFolder:
             raise UserError(f"{summary}: is no summary of a sweep: {error}") from error
         if known != self.fingerprint:
             raise UserError(
-                f"--out {self.path}: holds a sweep of another spec, map or version; --fresh starts "
-                "anew, another --out keeps both"
+                f"--out {self.path}: holds a sweep of another spec, map, planner or version; "
+                "--fresh starts anew, another --out keeps both"
             )
 
     def begin(self, loaded: Loaded) -> None:
         """Note what the folder is for, where nothing is there yet."""
         if not (self.path / SUMMARY).is_file():
-            self.summarise({"complete": False, "spec": loaded.spec})
+            self.summarise(
+                {"complete": False, "spec": loaded.spec, "planners": planner_origins(loaded.spec)}
+            )
 
     def summarise(self, what: dict[str, Any]) -> dict[str, Any]:
         """Write the summary; returns the whole of it."""
@@ -115,6 +139,13 @@ def keep_worlds(source: Path | None, folder: Path, used: tuple[WorldPlaces, ...]
             shutil.copyfile(source / name, folder / name)
 
 
+def planner_origins(spec: SweepSpec) -> dict[str, dict[str, str]]:
+    """Return what each planner of a sweep is made of, by name."""
+    # Egos that go backwards may be driven by one that the spec does not name.
+    names = sorted({*spec.planners, BACKWARDS_PLANNER})
+    return {name: planner_origin(name)._asdict() for name in names}
+
+
 def fingerprint_of(loaded: Loaded, source: str) -> str:
     """Return a hash of everything that decides the rows of a sweep."""
     # How long one waits for a job does not.
@@ -129,6 +160,7 @@ def fingerprint_of(loaded: Loaded, source: str) -> str:
         GENERATOR_VERSION,
         versions(),
         RESULT_SCHEMA_VERSION,
+        planner_origins(loaded.spec),
     )
     return hashlib.sha256(msgspec.json.encode(parts)).hexdigest()
 
@@ -137,7 +169,7 @@ def _clear(path: Path) -> None:
     """Remove what an earlier sweep left in its folder, and nothing else."""
     if not (path / SUMMARY).is_file():
         return
-    for name in (SUMMARY, PLAN):
+    for name in (SUMMARY, PLAN, METRICS_FILE):
         (path / name).unlink(missing_ok=True)
-    for name in (*FOLDERS.values(), VEHICLES, WORLDS):
+    for name in (*FOLDERS.values(), VEHICLES, WORLDS, REPEATED):
         shutil.rmtree(path / name, ignore_errors=True)

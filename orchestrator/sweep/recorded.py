@@ -67,14 +67,14 @@ class RecordedStart(msgspec.Struct, frozen=True, kw_only=True):
         return PathAhead(xy_m=xy, speed_limit_mps=np.full(len(xy), np.inf))
 
 
-class RecordedDrive(NamedTuple):
+class RecordedStarts(NamedTuple):
     """Where a sweep starts, and who was around then; None where nobody is to be."""
 
     starts: tuple[RecordedStart, ...]
     road_users: RoadUserLog | None
 
 
-def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedDrive:
+def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedStarts:
     """Return starts from a run's folder, one round of every `every_s` seconds, and road users.
 
     Rounds after which the car hardly moved on are left out. Raises FileNotFoundError for a folder
@@ -88,13 +88,13 @@ def read_drive(recorded: Recorded, vehicle: VehicleParameters) -> RecordedDrive:
     states, said = _states(run / _DRIVE, vehicle, longest_gap_s=recorded.longest_gap_s)
     starts = _starts(run, states, every_s=recorded.every_s)
     if recorded.road_users == "none":
-        return RecordedDrive(starts, None)
+        return RecordedStarts(starts, None)
     if recorded.road_user_log is not None:
         path = Path(recorded.road_user_log)
         said = named_log(path, states, vehicle, recorded.leave_out, recorded.longest_gap_s)
     else:
         said = among(said, recorded.leave_out, "the car's detections")
-    return RecordedDrive(starts, said if said.tracks else None)
+    return RecordedStarts(starts, said if said.tracks else None)
 
 
 def _starts(run: Path, states: list[VehicleState], *, every_s: float) -> tuple[RecordedStart, ...]:

@@ -26,6 +26,9 @@ FOLDERS = {"road_users": "road_users", "jobs": "jobs", "futures": "rows"}
 """Where the parts of a table lie; whose rows are there is done, so these are written last."""
 
 
+METRICS_FILE = "metrics.parquet"
+
+
 class Parts:
     """The tables of a sweep in its folder: Parquet files for each job that is done, each of which
     is whole or not there."""
@@ -36,7 +39,7 @@ class Parts:
             (folder / name).mkdir(parents=True, exist_ok=True)
             for left in (folder / name).glob("*.writing"):
                 left.unlink()
-        self._write("metrics", folder / "metrics.parquet", metric_rows())
+        self._write("metrics", folder / METRICS_FILE, metric_rows())
 
     def path_of(self, job: int) -> Path:
         """Return where the rows of a job's futures are, or would be."""

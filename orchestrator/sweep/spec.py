@@ -15,7 +15,7 @@ from foretwin.orchestrator.commands.world import MAX_RADIUS_M, MIN_RADIUS_M
 from foretwin.orchestrator.sweep.recorded import WORLDS, Recorded, RecordedStart, read_drive
 from foretwin.orchestrator.worlds.choice import node_of_id, parse_bbox
 from foretwin.sim_worker.metrics.table import METRICS, ROW_METRICS
-from foretwin.sim_worker.planners.registry import check_planner
+from foretwin.sim_worker.planners.registry import REMOTE, check_planner
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.planar import TIMESTEP_S
@@ -159,6 +159,8 @@ def _checks(spec: SweepSpec) -> tuple[tuple[bool, str], ...]:
         (spec.samples is None or spec.samples >= 1, f"samples {spec.samples}: at least 1"),
         (len(spec.planners) > 0, "planners: at least one name"),
         (len(set(spec.planners)) == len(spec.planners), "planners: each only once"),
+        (REMOTE not in spec.planners,
+         f"planners: {REMOTE} asks a stack over the bus of a drive; a sweep has none to join yet"),
         (len(spec.vehicles) > 0, "vehicles: at least one name"),
         (len(set(spec.vehicles)) == len(spec.vehicles), "vehicles: each only once"),
         (horizon is None or (1.0 <= horizon <= 60.0

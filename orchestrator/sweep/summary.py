@@ -14,7 +14,7 @@ _SCORE = "metric_driving_score"
 _PLAIN_WIDTH = 120
 
 
-class _Group:
+class _CaseCount:
     def __init__(self) -> None:
         self.cases = self.placed = self.collided = self.failed = 0
         self.clearance_m: list[float] = []
@@ -41,7 +41,7 @@ class Summary:
 
     def __init__(self, spec: SweepSpec) -> None:
         self._scored = _SCORE.removeprefix("metric_") in spec.metrics
-        self._groups: dict[tuple[str, str], _Group] = collections.defaultdict(_Group)
+        self._groups: dict[tuple[str, str], _CaseCount] = collections.defaultdict(_CaseCount)
 
     def add(self, row: Row) -> None:
         """Count one more row."""

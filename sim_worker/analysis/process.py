@@ -14,7 +14,7 @@ from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import TuningSetup
 from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
-from foretwin.sim_worker.analysis.tuning import VehicleWatch
+from foretwin.sim_worker.analysis.tuning import SAMPLES, VehicleWatch
 
 _DEPTH = 16384
 _IDLE_S = 0.2
@@ -26,7 +26,7 @@ _ASK_EVERY = 2000
 """Samples between two questions to a vehicle that has not said what it is."""
 _UNANNOUNCED_AFTER = 4000
 """Samples after which a vehicle that does not answer is taken as it is."""
-_CHANNELS = ("gnss", "imu", "speed", "heading", "steering", "control", "status", "state")
+_CHANNELS = (*SAMPLES, "state")
 """In the order in which messages with one stamp are taken."""
 _FINDINGS: dict[type, str] = {
     Identification: "identification", GapSample: "gap", GapAlarm: "gap_alarm", Verdict: "verdict",

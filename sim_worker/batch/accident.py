@@ -37,6 +37,8 @@ _STIFF_FOR_S = 0.05
 """The first impact is over by then; what follows is slower and may be less stiff."""
 _APART_STEP_S = 0.01
 """For those who cannot touch before the next look."""
+ACCIDENT_S = 1.0
+"""How long both are followed after the touch."""
 DELTA_V_WITHIN_S = 0.25
 """Delta-v is that within 250 ms of the touch, as event data recorders have it (49 CFR 563.7)."""
 
@@ -78,7 +80,7 @@ def run_accidents(
     user_decel_mps2: Array | float = 0.0,
     impact: Impact | None = None,
     ground: bool = True,
-    duration_s: float = 1.0,
+    duration_s: float = ACCIDENT_S,
     step_s: float = 0.05,
     threads: int = 1,
 ) -> Accidents:

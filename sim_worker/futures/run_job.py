@@ -9,6 +9,7 @@ islands are contacts of the physics.
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from collections.abc import Mapping
 
@@ -26,7 +27,12 @@ from foretwin.contracts.futures import (
     RoadUserTracks,
     Trajectory,
 )
-from foretwin.sim_worker.batch.accident import Accidents, run_accidents
+from foretwin.sim_worker.batch.accident import (
+    ACCIDENT_S,
+    DELTA_V_WITHIN_S,
+    Accidents,
+    run_accidents,
+)
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.batch.collision_detection import Touches
 from foretwin.sim_worker.futures.closed_loop import DriveRecord, drive
@@ -219,11 +225,14 @@ def _accidents(job: Job, scene: Scene, stage: Stage, touches: Touches) -> Accide
         if scene.casts is None
         else [KIND_NAMES[kind] for kind in scene.casts.kinds[touches.future, touches.user]]
     )
+    # Without the motion after it, an accident is over once its delta-v is.
+    enough_s = math.ceil(DELTA_V_WITHIN_S / job.step_s - 1e-9) * job.step_s
     return run_accidents(
         stage.vehicle,
         touches,
         kinds=kinds,
         friction_factor=scene.numbers.applied("ground.friction_factor", 1.0)[touches.future],
+        duration_s=ACCIDENT_S if job.accident_motion else enough_s,
         step_s=job.step_s,
     )
 

@@ -28,7 +28,6 @@ from foretwin.sim_worker.gym.reward import Reward, default_reward
 from foretwin.sim_worker.gym.rows import EpisodeRows, Flags, StepFacts
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
-KINDS = ("scenario", "job", "states")
 CASE = "case"
 
 

@@ -31,7 +31,6 @@ BEYOND_JUNCTION_M = 20.0
 """An episode at a place ends so far behind the junction."""
 _LATE = ".arrives_after_s"
 _PLANNER = "pure_pursuit_idm"
-_PATH_BEFORE_M = 30.0
 _DEFAULT_SPEED_MPS = 8.3
 
 
@@ -65,7 +64,7 @@ def episodes_of_scenario(
 ) -> Episodes:
     """Return cases of a scenario, an id of the catalogue or a file, at one of its places.
 
-    `values` fix what the scenario leaves open, named as in `ConcreteScenario`; `cases` are drawn
+    `values` fix what the scenario leaves open, named as `Scenario` tells; `cases` are drawn
     with `cases_seed`, and others come up to `early_or_late_s` before or after they would meet a
     car that keeps its speed. `place` is a name or a number. Raises UserError where the scenario,
     the place or a value is unknown, or no case can be played.

@@ -16,11 +16,7 @@ from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.baselines import constant_turn_rate, constant_velocity
 from foretwin.sim_worker.metrics.displacement import horizon_error
-from foretwin.sim_worker.metrics.rollout import Measure, Rollout
-from foretwin.sim_worker.metrics.scene import Context
-from foretwin.sim_worker.metrics.table import evaluate
 
-PLAN_NAMES = ("ade", "fde", "lateral", "longitudinal", "heading", "frechet", "dtw")
 _MAX_GAP_S = 1.5
 """Across a longer hole in the track nothing is interpolated: no truth is known there."""
 _MIN_PLAN_S = 0.5
@@ -113,25 +109,6 @@ def compare_plan(
         difference=horizon_error(planned, nominal),
         path_offset_m=float(offsets.mean()),
     )
-
-
-def compare_plans(
-    plan: PlannedTrajectory, rollout: Rollout, *, stamp_ns: int, world_frame: LocalFrame
-) -> dict[str, Measure]:
-    """Compare each simulated plan with the car's own at the same instants.
-
-    `rollout` holds S simulated plans, its time 0 at `stamp_ns`. Returns the metrics of `PLAN_NAMES`
-    (S,) by name, seen from the car's plan: positive lateral where a simulated plan ends to its
-    left, positive longitudinal where it is ahead. All are invalid where the two have no more than
-    half a second in common.
-    """
-    reference = planned_reference(
-        plan, stamp_ns=stamp_ns, time_s=rollout.time_s, world_frame=world_frame
-    )
-    common = np.isfinite(reference[:, 0]) & (rollout.time_s > 1e-6)
-    if not common.any() or np.ptp(rollout.time_s[common]) < _MIN_PLAN_S:
-        reference = np.full_like(reference, np.nan)
-    return evaluate(rollout, PLAN_NAMES, context=Context(reference=reference))
 
 
 def planned_reference(

@@ -11,26 +11,14 @@ from foretwin.sim_worker.metrics.rollout import Measure
 from foretwin.sim_worker.metrics.scene import Scene
 
 
-def frechet_distance(curves: Array, reference: Array) -> Array:
-    """Return (S,) discrete Fréchet distances in metres of curves (S, N, 2) from one (M, 2).
+def cheapest_walks(curves: Array, reference: Array) -> Array:
+    """Return (2, S) metres: of curves (S, N, 2) from one (M, 2), the discrete Fréchet distances
+    (Eiter and Mannila 1994, Computing Discrete Fréchet Distance, table 1) and the least sums.
 
-    Eiter and Mannila (1994), Computing Discrete Fréchet Distance, table 1.
+    Both are of the walks along the pairs of points that never go back and have the least of it.
+    The sums are dynamic time warping: Sakoe and Chiba (1978), Dynamic Programming Algorithm
+    Optimization for Spoken Word Recognition, equation 11, weight 1 for every pair and no window.
     """
-    return np.asarray(_cheapest_walks(curves, reference)[0])
-
-
-def warping_distance(curves: Array, reference: Array) -> Array:
-    """Return (S,) least sums of distances in metres over all monotonous pairings of the points.
-
-    Dynamic time warping: Sakoe and Chiba (1978), Dynamic Programming Algorithm Optimization for
-    Spoken Word Recognition, equation 11, with weight 1 for every pair and no window.
-    """
-    return np.asarray(_cheapest_walks(curves, reference)[1])
-
-
-def _cheapest_walks(curves: Array, reference: Array) -> Array:
-    """Return (2, S): the greatest distance, and the sum, of the walks along the pairs of points
-    that never go back and have the least of it."""
     x, y = (np.ascontiguousarray(curves[..., k], dtype=np.float64) for k in range(2))
     to_x, to_y = (np.ascontiguousarray(reference[:, k], dtype=np.float64) for k in range(2))
     found = np.empty((2, len(x)))
@@ -54,4 +42,4 @@ def _from_reference(scene: Scene) -> Array | None:
     predicted, reference = known(scene)
     if not len(reference):
         return None
-    return _cheapest_walks(predicted[..., :2], reference[:, :2])
+    return cheapest_walks(predicted[..., :2], reference[:, :2])

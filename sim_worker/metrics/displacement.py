@@ -44,15 +44,6 @@ def displacements(predicted: Array, reference: Array) -> Displacements:
     )
 
 
-def absolute_pose_error(predicted: Array, reference: Array) -> Array:
-    """Return (S,) root mean square distances of (S, N, 3) from (N, 3), without alignment.
-
-    Absolute trajectory error: Sturm et al. (2012), A Benchmark for the Evaluation of RGB-D SLAM
-    Systems, equation 3, with the identity for S. What evo calls the APE's translation part.
-    """
-    return np.asarray(np.sqrt(np.square(displacements(predicted, reference).distance_m).mean(-1)))
-
-
 def relative_pose_error(predicted: Array, reference: Array) -> Array:
     """Return (S,) root mean square errors in metres of the way from each instant to the next.
 
@@ -132,7 +123,11 @@ def heading(scene: Scene) -> Measure:
 
 
 def ape(scene: Scene) -> Measure:
-    """Absolute pose error (S,) over all known instants but the seeding one."""
+    """Absolute pose error (S,) over all known instants but the seeding one, without alignment.
+
+    Absolute trajectory error: Sturm et al. (2012), A Benchmark for the Evaluation of RGB-D SLAM
+    Systems, equation 3, with the identity for S. What evo calls the APE's translation part.
+    """
     return _of(scene, lambda found: np.sqrt(np.square(found.distance_m).mean(axis=1)))
 
 

@@ -8,7 +8,9 @@ without arguments that follows `foretwin.sim_worker.planner_interface.Planner`, 
 from __future__ import annotations
 
 import functools
-from importlib.metadata import entry_points
+import importlib.metadata
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 
 from foretwin.sim_worker.planner_interface import Planner
 from foretwin.sim_worker.planners.as_planned import AsPlanned
@@ -16,11 +18,14 @@ from foretwin.sim_worker.planners.constant_speed import ConstantSpeed
 from foretwin.sim_worker.planners.frenet_lattice import FrenetLattice
 from foretwin.sim_worker.planners.gap_acceptance import GapAcceptance
 from foretwin.sim_worker.planners.hosted import HostedPlanner
+from foretwin.sim_worker.planners.origin import PlannerOrigin, files_digest, origin_of
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.remote import RemotePlanner
 from foretwin.sim_worker.planners.reverse_pursuit import ReversePursuit
 
 GROUP = "foretwin.planners"
+REMOTE = "remote"
+"""Of a worker on a bus alone: a driving stack in another process."""
 
 _BUILT_IN: dict[str, type[Planner]] = {
     "pure_pursuit_idm": PurePursuitIdm,
@@ -29,7 +34,7 @@ _BUILT_IN: dict[str, type[Planner]] = {
     "frenet_lattice": FrenetLattice,
     "as_planned": AsPlanned,
     "reverse_pursuit": ReversePursuit,
-    "remote": RemotePlanner,
+    REMOTE: RemotePlanner,
 }
 
 
@@ -44,9 +49,13 @@ def load_planner(name: str) -> Planner:
     """Return the planner of that name; raises ValueError naming the known ones."""
     if name in _BUILT_IN:
         return _BUILT_IN[name]()
+    return HostedPlanner(name, _entry_point(name).value)
+
+
+def _entry_point(name: str) -> EntryPoint:
     for point in entry_points(group=GROUP):
         if point.name == name:
-            return HostedPlanner(name, point.value)
+            return point
     raise ValueError(f"unknown planner {name!r}; known: {', '.join(planner_names())}")
 
 
@@ -60,6 +69,15 @@ def check_planner(name: str) -> None:
 def in_another_process(name: str) -> bool:
     """Return whether a planner answers from a process that is not foretwin's own."""
     return name == "remote" or name not in _BUILT_IN
+
+
+def planner_origin(name: str) -> PlannerOrigin:
+    """Return what a planner is made of; raises ValueError naming the known ones."""
+    if name in _BUILT_IN:
+        # Those of foretwin share most of their modules: a change of one counts for all.
+        version = importlib.metadata.version("foretwin")
+        return PlannerOrigin("foretwin", version, files_digest([Path(__file__).parent]))
+    return origin_of(_entry_point(name))
 
 
 def drives_backwards(name: str) -> bool:

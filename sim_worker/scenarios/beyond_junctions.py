@@ -18,12 +18,11 @@ from foretwin.geometry.polyline import arc_lengths, points_at
 from foretwin.sim_worker.scenarios.places import Place
 from foretwin.sim_worker.scenarios.relations import ways_over
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way, own_way
+from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
 
 _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
 _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")
 _LEAST_M = {"motorway": 120.0, "road": 60.0, "circuit": 150.0, "parking_bay": 32.0}
-_END_M = 10.0
 _LEAST_RADIUS_M = 150.0
 """Of a motorway's lane: a bend for 80 km/h, at 0.34 g. Trunk roads through junctions bend more."""
 _ON_LANE_M = 2.5
@@ -37,30 +36,14 @@ _BAY_LENGTH_M = 6.0
 _BEND_RAD = math.radians(6.0)
 
 
-def other_places(
-    scenario: Scenario,
-    network: RoadNetwork,
-    *,
-    ego_path: FrenetPath | None = None,
-    ego_arc_m: float = 0.0,
-) -> tuple[Iterator[Place], str]:
-    """Return the places of a scenario that needs no junction, and why there is none if so.
-
-    With `ego_path` the car's own path is taken, where it runs on such a road.
-    """
+def other_places(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], str]:
+    """Return the places of a scenario that needs no junction, and why there is none if so."""
     setting = scenario.where.setting
     if setting == "parking_bay":
-        if ego_path is not None:
-            return iter(()), "a car that drives on does not back into a bay"
         return _bays(scenario, network)
     lanes = [lane for lane in network.world.lanes if _fits(lane, setting, network)]
     if not lanes:
         return iter(()), f"no {_WORDS[setting]} in the World"
-    if ego_path is not None:
-        way = _live(ego_path, ego_arc_m, lanes)
-        if way is None:
-            return iter(()), f"the path does not run on a {_WORDS[setting]} here"
-        return iter((_place(scenario, network, way),)), ""
     ways = _laps(network, lanes) if setting == "circuit" else _stretches(network, lanes)
     fitting = (
         way
@@ -160,15 +143,6 @@ def _onward(lane: Lane, among: dict[str, Lane], network: RoadNetwork) -> list[st
     apart = {id_: float(np.hypot(*(other.centerline[0] - end))) for id_, other in among.items()}
     nearest = min(apart, key=lambda id_: apart[id_])
     return [nearest] if apart[nearest] <= _JOINT_M else []
-
-
-def _live(path: FrenetPath, arc_m: float, lanes: list[Lane]) -> Way | None:
-    """Return the car's own path as a way, if it is on one of the lanes."""
-    here = shapely.Point(path.point_at(np.array([arc_m]))[0])
-    lines = [shapely.LineString(lane.centerline) for lane in lanes if len(lane.centerline) > 1]
-    if not lines or min(line.distance(here) for line in lines) > _ON_LANE_M:
-        return None
-    return own_way("the car's own path", path, path.length_m, path.length_m)
 
 
 def _bays(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], str]:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.scenario import Scenario, Span
+from foretwin.contracts.scenario import Distribution, Scenario
 from foretwin.sim_worker.scenarios.reading import NamedNumber, numbers
 
 Values = dict[str, float]
@@ -22,11 +22,13 @@ def draw_cases(scenario: Scenario, *, seed: int | None = None) -> tuple[Values, 
     same seed, the scenario's own unless given, gives the same cases.
     """
     found = tuple(numbers(scenario))
-    fixed = {n.name: float(n.value) for n in found if not isinstance(n.value, Span)}
+    fixed = {n.name: float(n.value) for n in found if not isinstance(n.value, Distribution)}
     listed = [
-        (n.name, n.value.values) for n in found if isinstance(n.value, Span) and n.value.values
+        (n.name, n.value.values)
+        for n in found
+        if isinstance(n.value, Distribution) and n.value.values
     ]
-    ranged = [n for n in found if isinstance(n.value, Span) and not n.value.values]
+    ranged = [n for n in found if isinstance(n.value, Distribution) and not n.value.values]
     combinations = list(itertools.product(*(values for _, values in listed)))
     samples = scenario.samples if ranged else 1
     draws = _draws(ranged, len(combinations) * samples, scenario.seed if seed is None else seed)
@@ -53,7 +55,7 @@ def _draws(ranged: list[NamedNumber], count: int, seed: int) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def _within(span: Span, even: Array) -> Array:
+def _within(span: Distribution, even: Array) -> Array:
     """Map numbers that fill 0 to 1 evenly onto a span, by its inverse distribution."""
     low = -np.inf if span.min is None else span.min
     high = np.inf if span.max is None else span.max

@@ -41,7 +41,7 @@ class LiveScenarios:
     def on(self, path: FrenetPath, from_arc_m: float, vehicle: VehicleParameters) -> PathScenarios:
         """Return the scenarios on a path, for a car at `from_arc_m` of it."""
         found = passage_on_path(self._network, path, from_arc_m)
-        return PathScenarios(self, path, vehicle, None if found is None else found[0])
+        return PathScenarios(self, path, vehicle, found)
 
     def places(self, scenario: Scenario, passage: Passage) -> tuple[Place, ...]:
         """Return where a scenario can take place on a passage, none where it does not apply."""

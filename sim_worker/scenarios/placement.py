@@ -20,7 +20,7 @@ from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.places import Place, Placement, Unplaced
 from foretwin.sim_worker.scenarios.relations import ways_of
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
-from foretwin.sim_worker.scenarios.ways import Way, own_way, unlike_its_turn
+from foretwin.sim_worker.scenarios.ways import Way, unlike_its_turn
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 _ON_CONNECTION_M = 3.0
@@ -172,43 +172,6 @@ def _places_of(
         )
 
 
-def place_on_path(
-    scenario: Scenario, network: RoadNetwork, ego_path: FrenetPath, ego_arc_m: float
-) -> Place | Unplaced:
-    """Return the place of a scenario at the next junction on a path that a car is driving.
-
-    The path's shape tells which way through the junction it takes; the ego then follows the path
-    itself. What cannot be cast from the car's state says so when it is cast.
-    """
-    own = network.world.intersection.id
-    if scenario.where.setting != "junction":
-        found, reason = other_places(scenario, network, ego_path=ego_path, ego_arc_m=ego_arc_m)
-        return next(found, None) or Unplaced(own, reason, False)
-    taken = passage_on_path(network, ego_path, ego_arc_m)
-    if taken is None:
-        return Unplaced(own, "the path leads through no junction of the World ahead", False)
-    passage, way = taken
-    summary = next(
-        j.summary for j in network.world.junctions if j.summary.id == passage.junction_id
-    )
-    refused = _refused(scenario, summary)
-    if refused:
-        return Unplaced(summary.id, refused, False)
-    if passage.turn != scenario.ego.turn and not _any_turn(scenario):
-        turns = _TURNS[passage.turn] if passage.turn else "turns back"
-        wanted = _TURNS[scenario.ego.turn]
-        return Unplaced(summary.id, f"the path {turns}; the scenario's ego {wanted}", False)
-    found_places = list(_places_of(scenario, network, passage, way))
-    if not found_places:
-        return Unplaced(summary.id, _nobody(scenario), False)
-    first = found_places[0]
-    merged = tuple(
-        tuple({id(way): way for place in found_places for way in place.actor_ways[i]}.values())
-        for i in range(len(first.actor_ways))
-    )
-    return first._replace(actor_ways=merged)
-
-
 def _any_turn(scenario: Scenario) -> bool:
     """Return whether which way the ego turns does not matter."""
     along = ("ahead", "behind", "beside", "parked", "crosses_entry")
@@ -231,14 +194,12 @@ def places_on_passage(
     return tuple(_places_of(scenario, network, passage, network.way(passage)))
 
 
-def passage_on_path(
-    network: RoadNetwork, ego_path: FrenetPath, ego_arc_m: float
-) -> tuple[Passage, Way] | None:
-    """Return the first passage ahead that a path takes, and the path as the way that takes it."""
+def passage_on_path(network: RoadNetwork, ego_path: FrenetPath, ego_arc_m: float) -> Passage | None:
+    """Return the first passage ahead that a path takes."""
     length = ego_path.length_m
     arcs = np.arange(max(0.0, ego_arc_m - _BEHIND_PATH_M), max(length, ego_arc_m + 1.0), 2.0)
     ahead = shapely.LineString(ego_path.point_at(arcs))
-    best: tuple[float, float, Passage, Way] | None = None
+    best: tuple[float, Passage] | None = None
     for junction in network.world.junctions:
         passages = network.passages(junction.summary.id)
         near = [
@@ -249,11 +210,10 @@ def passage_on_path(
         matches = [m for p, line in near if (m := _match(p, line, ego_path, ego_arc_m))]
         if not matches:
             continue
-        off, entry, exit_, passage = min(matches, key=lambda match: (match[0], match[3].name))
-        if best is not None and best[1] <= entry:
-            continue
-        best = (off, entry, passage, own_way(passage.name, ego_path, entry, exit_))
-    return None if best is None else (best[2], best[3])
+        _, entry, passage = min(matches, key=lambda match: (match[0], match[2].name))
+        if best is None or entry < best[0]:
+            best = (entry, passage)
+    return None if best is None else best[1]
 
 
 def _line(passage: Passage, network: RoadNetwork) -> Array:
@@ -264,8 +224,8 @@ def _line(passage: Passage, network: RoadNetwork) -> Array:
 
 def _match(
     passage: Passage, line: Array, path: FrenetPath, ego_arc_m: float
-) -> tuple[float, float, float, Passage] | None:
-    """Return how far a path lies from a passage, and where it enters and leaves; None if too far.
+) -> tuple[float, float, Passage] | None:
+    """Return how far a path lies from a passage, and where it enters; None if too far.
 
     The headings count as metres over half the junction, so that of ways that part late the right
     one wins.
@@ -281,4 +241,4 @@ def _match(
     if off > _ON_CONNECTION_M or float(turned.mean()) > _HEADS_ALIKE_RAD:
         return None
     score = off + 5.0 * float(turned.mean()) + 2.0 * float(turned[-1])
-    return score, entry, exit_, passage
+    return score, entry, passage

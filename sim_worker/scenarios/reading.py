@@ -17,12 +17,12 @@ from foretwin.contracts.scenario import (
     EGO,
     FAULTS,
     ActorPart,
+    Distribution,
     EgoPart,
     FaultPart,
     Number,
     Relation,
     Scenario,
-    Span,
 )
 
 CATALOGUE = Path(__file__).with_name("catalogue")
@@ -96,7 +96,7 @@ def numbers(scenario: Scenario) -> Iterator[NamedNumber]:
 @functools.cache
 def _number_fields(kind: type[EgoPart | ActorPart | FaultPart]) -> tuple[str, ...]:
     return tuple(
-        field.name for field in msgspec.structs.fields(kind) if Span in get_args(field.type)
+        field.name for field in msgspec.structs.fields(kind) if Distribution in get_args(field.type)
     )
 
 
@@ -161,7 +161,7 @@ def _check_actors(scenario: Scenario) -> None:
 
 def _check_number(name: str, value: Number) -> None:
     field = name.split(".")[-1]
-    if isinstance(value, Span):
+    if isinstance(value, Distribution):
         _check_span(name, value)
         least = min((*value.values, *(v for v in (value.min,) if v is not None)), default=0.0)
         most = max((*value.values, *(v for v in (value.max,) if v is not None)), default=0.0)
@@ -171,7 +171,7 @@ def _check_number(name: str, value: Number) -> None:
         raise ValueError(f"{name} {wrong}")
 
 
-def _check_span(name: str, span: Span) -> None:
+def _check_span(name: str, span: Distribution) -> None:
     has_range = span.min is not None or span.max is not None
     normal = span.mean is not None or span.std is not None
     if span.values and (has_range or normal):
@@ -212,7 +212,7 @@ def _known(part: str) -> str:
         "scenario": Scenario, "ego": EgoPart, "actors": ActorPart, "faults": FaultPart,
         "where": Where,
     }  # fmt: skip
-    return ", ".join(field.name for field in msgspec.structs.fields(kinds.get(part, Span)))
+    return ", ".join(field.name for field in msgspec.structs.fields(kinds.get(part, Distribution)))
 
 
 def _choices(field: str) -> str:

@@ -55,7 +55,6 @@ class RoadNetwork:
         self.driving_side: DrivingSide = world.intersection.driving_side
         self.lanes = {lane.id: lane for lane in world.lanes}
         self.connections = {c.id: c for c in world.connections}
-        self.road_of_lane = {lane.id: lane.road_id for lane in world.lanes}
         self.roads = {road.id: road for road in world.roads}
         self._into: dict[str, list[str]] = {}
         self._out_of: dict[str, list[str]] = {}

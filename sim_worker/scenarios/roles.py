@@ -8,7 +8,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
-from foretwin.contracts.scenario import EGO, ActorPart, Conduct, Relation, Scenario
+from foretwin.contracts.scenario import ActorPart, Conduct, Relation, Scenario
 from foretwin.geometry.polyline import length
 from foretwin.sim_worker.scenarios.drawing import Values
 from foretwin.sim_worker.scenarios.impact import EgoBox, Impact, Moving
@@ -99,10 +99,6 @@ class Staging(NamedTuple):
     def number(self, part: ActorPart, field: str) -> float:
         """Return a drawn number of an actor."""
         return self.values[f"{part.name}.{field}"]
-
-    def ego_number(self, field: str) -> float:
-        """Return a drawn number of the ego."""
-        return self.values[f"{EGO}.{field}"]
 
     def actor(
         self, part: ActorPart, xy_m: Array, start_arc_m: float, lateral_m: float, way: str

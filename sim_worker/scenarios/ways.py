@@ -68,23 +68,6 @@ def lengthened(name: str, xy: Array, limit: Array, entry_m: float, exit_m: float
     )
 
 
-def own_way(name: str, path: FrenetPath, entry_m: float, exit_m: float) -> Way:
-    """Return a car's own path as a way; it is taken as it comes, on lanes or not."""
-    arcs = np.arange(0.0, path.length_m + 1e-6, 1.0)
-    if path.length_m - arcs[-1] > 1e-3:
-        arcs = np.append(arcs, path.length_m)
-    return Way(
-        name=name,
-        xy_m=path.point_at(arcs),
-        speed_limit_mps=path.speed_limit_mps[np.searchsorted(path.arc_m, arcs - 0.5)],
-        path=path,
-        entry_m=entry_m,
-        exit_m=exit_m,
-        first_m=0.0,
-        last_m=path.length_m,
-    )
-
-
 def traffic_turn(turn: str, side: DrivingSide) -> TrafficTurn | None:
     """Name a turn by the traffic: left is across where one drives on the right."""
     if turn == "straight":

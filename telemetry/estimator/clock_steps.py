@@ -40,7 +40,7 @@ class _Doubt:
 
 
 @dataclass(slots=True)
-class _Channel:
+class _ChannelTime:
     shift_ns: int = 0
     """Continuous minus stamped time."""
     last_ns: int | None = None
@@ -61,7 +61,7 @@ class ClockSteps:
     def __init__(self, clock: ClockEstimator) -> None:
         """`clock` is fed by the caller with continuous stamps."""
         self._clock = clock
-        self._channels: dict[str, _Channel] = {}
+        self._channels: dict[str, _ChannelTime] = {}
         self._first_received_ns: int | None = None
         self.steps: list[ClockStep] = []
 
@@ -76,7 +76,7 @@ class ClockSteps:
         With `received_ns` None is returned for one that is in doubt; without, such a stamp is
         returned as it is and lies before the last one.
         """
-        known = self._channels.setdefault(channel, _Channel())
+        known = self._channels.setdefault(channel, _ChannelTime())
         placed_ns = stamp_ns + known.shift_ns
         if known.last_ns is None and received_ns is None:
             known.last_ns = placed_ns
@@ -102,7 +102,7 @@ class ClockSteps:
             return placed_ns if received_ns is None else None
         return self._step(channel, known, stamp_ns, received_ns)
 
-    def _fits(self, known: _Channel, placed_ns: int, received_ns: int | None) -> bool:
+    def _fits(self, known: _ChannelTime, placed_ns: int, received_ns: int | None) -> bool:
         if received_ns is None:
             assert known.last_ns is not None
             return 0 <= placed_ns - known.last_ns <= CLOCK_LEAP_NS
@@ -119,7 +119,7 @@ class ClockSteps:
         # What came first may have waited for the connection: then others may be ahead of it.
         return ahead_ns <= (_AHEAD_NS if settled else CLOCK_LEAP_NS)
 
-    def _believe(self, known: _Channel, placed_ns: int, received_ns: int | None) -> int:
+    def _believe(self, known: _ChannelTime, placed_ns: int, received_ns: int | None) -> int:
         if known.last_ns is not None and 0 < placed_ns - known.last_ns < _GAP_NS:
             step_ns = placed_ns - known.last_ns
             known.period_ns += (step_ns - known.period_ns) // 8 if known.period_ns else step_ns
@@ -131,7 +131,7 @@ class ClockSteps:
             known.least_excess_ns = excess_ns if least is None else min(least, excess_ns)
         return placed_ns
 
-    def _confirmed(self, known: _Channel, stamp_ns: int, received_ns: int | None) -> bool:
+    def _confirmed(self, known: _ChannelTime, stamp_ns: int, received_ns: int | None) -> bool:
         doubt = known.doubt
         delay_ns = 0 if received_ns is None else received_ns - stamp_ns
         if doubt is None or not _agrees(doubt, stamp_ns, received_ns):
@@ -143,7 +143,9 @@ class ClockSteps:
         doubt.count += 1
         return doubt.count >= _LEAST_SAMPLES and doubt.last_ns - doubt.first_ns >= CONFIRM_NS
 
-    def _step(self, channel: str, known: _Channel, stamp_ns: int, received_ns: int | None) -> int:
+    def _step(
+        self, channel: str, known: _ChannelTime, stamp_ns: int, received_ns: int | None
+    ) -> int:
         doubt, last_ns = known.doubt, known.last_ns
         assert doubt is not None
         if received_ns is None:

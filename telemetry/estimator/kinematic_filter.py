@@ -46,9 +46,8 @@ class KinematicFilter:
         self.mean: Array = np.zeros(SIZE)
         self.mean[: CURVATURE + 1] = xy_m[0], xy_m[1], yaw_rad, speed_mps, 0.0, 0.0
         spread = np.zeros(SIZE)
-        spread[: ACCEL_BIAS + 1] = (
-            0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05, motion_noise.GYRO_BIAS_STD_RADPS, 0.1,
-        )  # fmt: skip
+        spread[: CURVATURE + 1] = 0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05
+        spread[GYRO_BIAS], spread[ACCEL_BIAS] = motion_noise.GYRO_BIAS_STD_RADPS, 0.1
         self.covariance: Array = np.diag(spread * spread)
         self.may_reverse = speed_mps < 0.0
         self._gnss_std_m = 0.0
@@ -88,24 +87,18 @@ class KinematicFilter:
         by_curvature = distance * (0.5 * distance - slip * speed * speed)
         by_slip = -distance * speed * speed * curvature
         jacobian = _IDENTITY[:size, :size].copy()
-        jacobian[X, YAW : CURVATURE + 1] = (
-            -distance * sin, dt * cos - side * sin, half * cos - by_accel * sin,
-            -by_curvature * sin,
-        )  # fmt: skip
-        jacobian[Y, YAW : CURVATURE + 1] = (
-            distance * cos, dt * sin + side * cos, half * sin + by_accel * cos,
-            by_curvature * cos,
-        )  # fmt: skip
+        jacobian[X, YAW : SPEED + 1] = -distance * sin, dt * cos - side * sin
+        jacobian[Y, YAW : SPEED + 1] = distance * cos, dt * sin + side * cos
+        jacobian[X, ACCEL : CURVATURE + 1] = half * cos - by_accel * sin, -by_curvature * sin
+        jacobian[Y, ACCEL : CURVATURE + 1] = half * sin + by_accel * cos, by_curvature * cos
         jacobian[X, SLIP], jacobian[Y, SLIP] = -by_slip * sin, by_slip * cos
         jacobian[YAW, SPEED : CURVATURE + 1] = curvature * dt, curvature * half, distance
         jacobian[SPEED, ACCEL] = dt
         fading = math.exp(-dt / motion_noise.GNSS_CORRELATION_S)
         jacobian[GNSS_X, GNSS_X] = jacobian[GNSS_Y, GNSS_Y] = fading
         mean = self.mean.copy()
-        mean[:5] = (
-            x + distance * cos, y + distance * sin, yaw + curvature * distance,
-            speed + accel * dt, accel,
-        )  # fmt: skip
+        mean[X : YAW + 1] = x + distance * cos, y + distance * sin, yaw + curvature * distance
+        mean[SPEED], mean[ACCEL] = speed + accel * dt, accel
         mean[GNSS_X : GNSS_Y + 1] *= fading
         self.mean = mean
         covariance = jacobian @ self.covariance @ jacobian.T
@@ -191,9 +184,14 @@ class KinematicFilter:
         return float(np.hypot(*(xy_m - expected))), math.sqrt(spread)
 
     def correct_position(
-        self, xy_m: Array, std_m: float, lever_m: tuple[float, float], *, wander: bool = False,
+        self,
+        xy_m: Array,
+        std_m: float,
+        lever_m: tuple[float, float],
+        *,
+        wander: bool = False,
         hold_yaw: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Apply a position (2,) of a sensor at `lever_m` with white noise of `std_m`.
 
         `wander` says that the receiver's own slow error lies on top, as `expect_wander` has it.

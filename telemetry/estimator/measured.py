@@ -33,7 +33,7 @@ _LIMITS = {
 """Beyond these a number is no motion of a road vehicle."""
 
 
-class Measured:
+class MotionSamples:
     """Remembers samples beside positions; `skipped` counts what it refused, by reason."""
 
     def __init__(
@@ -48,9 +48,9 @@ class Measured:
         self.speed_mps = 0.0
         """The last measured speed; 0 before there is one."""
 
-    def copy(self, *, skipped: Counter[str]) -> Measured:
+    def copy(self, *, skipped: Counter[str]) -> MotionSamples:
         """Return another memory of the same samples that counts into `skipped`."""
-        other = object.__new__(Measured)
+        other = object.__new__(MotionSamples)
         other.__dict__.update(self.__dict__)
         other._skipped = skipped
         other._sample_ns, other._field_ns = self._sample_ns.copy(), self._field_ns.copy()

@@ -8,7 +8,7 @@ from typing import Any
 from foretwin.contracts.drive import HeadingSample, ImuSample, SpeedSample, SteeringSample
 from foretwin.telemetry.estimator.gyro import Gyro
 from foretwin.telemetry.estimator.kinematic_filter import SPEED, YAW, KinematicFilter
-from foretwin.telemetry.estimator.measured import Doubt, Measured
+from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
 
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
@@ -17,14 +17,14 @@ STANDING_MPS = 0.05
 class MotionCorrections:
     """Gives each kind of sample its weight; speeds and headings lose theirs as they surprise."""
 
-    def __init__(self, measured: Measured, *, wheelbase_m: float) -> None:
+    def __init__(self, measured: MotionSamples, *, wheelbase_m: float) -> None:
         self._measured = measured
         self._wheelbase_m = wheelbase_m
         self._speed_doubt = Doubt(0.05)
         self._yaw_doubt = Doubt(0.02)
         self._gyro = Gyro()
 
-    def copy(self, measured: Measured) -> MotionCorrections:
+    def copy(self, measured: MotionSamples) -> MotionCorrections:
         """Return others with the same doubts, which read `measured`."""
         other = object.__new__(MotionCorrections)
         other.__dict__.update(self.__dict__)

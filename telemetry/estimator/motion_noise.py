@@ -39,6 +39,10 @@ def densities(speed_mps: float, *, slip: float) -> tuple[float, ...]:
     """Return how much yaw, speed, acceleration, curvature and both inertial biases wander."""
     turning = min(_CURVATURE_RATE_PMPS, _LATERAL_JERK_MPS3 / max(speed_mps * speed_mps, 1e-6))
     return (
-        slip * min(1.0, abs(speed_mps) / 10.0), 0.0, _JERK_DENSITY, turning * turning,
-        GYRO_BIAS_DENSITY, _ACCEL_BIAS_DENSITY,
-    )  # fmt: skip
+        slip * min(1.0, abs(speed_mps) / 10.0),
+        0.0,
+        _JERK_DENSITY,
+        turning * turning,
+        GYRO_BIAS_DENSITY,
+        _ACCEL_BIAS_DENSITY,
+    )

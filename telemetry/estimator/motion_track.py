@@ -14,10 +14,10 @@ from foretwin.contracts.frames import GeoPoint, base_from_sensor
 from foretwin.telemetry.estimator.kinematic_filter import GYRO_BIAS, SPEED, YAW, KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
-from foretwin.telemetry.estimator.measured import Measured
+from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_corrections import STANDING_MPS, MotionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate
-from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
+from foretwin.telemetry.estimator.reported_state import StateHeader, moving_state, unmoved_state
 
 _WANDER_M = 0.5
 _WHITE_SHARE = 0.1
@@ -47,19 +47,18 @@ class MotionTrack:
         self._wheelbase_m = wheelbase_m
         self._lever = info.body_from_antenna_m or (0.0, 0.0, 0.0)
         self._gate = PositionGate()
-        self._measured = Measured(
-            steering_ratio=steering_ratio, steering_offset_rad=steering_offset_rad,
+        self._measured = MotionSamples(
+            steering_ratio=steering_ratio,
+            steering_offset_rad=steering_offset_rad,
             skipped=self._gate.skipped,
-        )  # fmt: skip
+        )
         self._corrections = MotionCorrections(self._measured, wheelbase_m=wheelbase_m)
         self._aid = MapAid()
         self._place: LocalPlace | None = None
-        self._start_ns = 0
         self._filter: KinematicFilter | None = None
-        self._filter_stamp_ns = 0
+        self._start_ns = self._filter_stamp_ns = 0
         self._fix: GnssFix | None = None
-        self._shifts = 0
-        self._standing = False
+        self._shifts, self._standing = 0, False
 
     @property
     def skipped(self) -> Counter[str]:
@@ -234,10 +233,10 @@ class MotionTrack:
             return
         measured, at = self._measured.fresh("speed_mps", stamp_ns), self._gate.recent[-1].xy_m
         xy = base_from_sensor(at, yaw_rad, self._lever)
+        speed_mps = self._measured.speed_mps if measured else self._gate.speed_mps()
         self._filter = KinematicFilter(
-            xy_m=xy, yaw_rad=yaw_rad, yaw_std_rad=yaw_std_rad,
-            speed_mps=self._measured.speed_mps if measured else self._gate.speed_mps(),
-        )  # fmt: skip
+            xy_m=xy, yaw_rad=yaw_rad, yaw_std_rad=yaw_std_rad, speed_mps=speed_mps
+        )
         self._corrections.begin(self._filter)
         self._filter_stamp_ns = stamp_ns
         if self._wanders:
@@ -282,17 +281,18 @@ class MotionTrack:
         if self._fix is None:
             raise ValueError("no position has come yet: there is no state")
         self._advance(stamp_ns)
-        position = self._position_out(fix)
+        header = StateHeader(self._info.vehicle_id, stamp_ns, self._position_out(fix))
         if self._filter is None:
-            return unmoved_state(
-                self._measured, vehicle_id=self._info.vehicle_id, stamp_ns=stamp_ns,
-                position=position, position_std_m=self._fix.std_m,
-            )  # fmt: skip
+            return unmoved_state(self._measured, header, position_std_m=self._fix.std_m)
         return moving_state(
-            self._filter, self._measured, vehicle_id=self._info.vehicle_id, stamp_ns=stamp_ns,
-            position=position, convergence_rad=self._convergence_rad,
-            wheelbase_m=self._wheelbase_m, standing=self._standing, map_shift_m=self._aid.shift_m,
-        )  # fmt: skip
+            self._filter,
+            self._measured,
+            header,
+            convergence_rad=self._convergence_rad,
+            wheelbase_m=self._wheelbase_m,
+            standing=self._standing,
+            map_shift_m=self._aid.shift_m,
+        )
 
     @property
     def gyro_bias_radps(self) -> float:

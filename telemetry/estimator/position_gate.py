@@ -26,8 +26,8 @@ _STANDING_MPS = 0.06
 Verdict = Literal["use", "relocate", "skip"]
 
 
-class Placed(NamedTuple):
-    """A believed fix: seconds since the first one and metres (2,) in the local frame."""
+class LocalFix(NamedTuple):
+    """A fix in seconds since the first one and metres (2,) in the local frame."""
 
     time_s: float
     xy_m: Array
@@ -41,10 +41,10 @@ class PositionGate:
 
     def __init__(self) -> None:
         self.skipped: Counter[str] = Counter()
-        self.recent: deque[Placed] = deque()
+        self.recent: deque[LocalFix] = deque()
         self._last_stamp_ns: int | None = None
         self._leap_stamp_ns: int | None = None
-        self._elsewhere: list[Placed] = []
+        self._elsewhere: list[LocalFix] = []
         self.roughness_m = 0.0
         """How far fixes lie, on average, off any motion with up to 4 m/s² through the last two."""
 
@@ -93,12 +93,12 @@ class PositionGate:
             # Where the filter is astray, a fix that follows from the last one is still no jump.
             away = min(_distance(xy_m, expected_xy_m), _distance(xy_m, last.xy_m))
             if away > MAX_SPEED_MPS * elapsed:
-                return self._judge_jump(Placed(time_s, xy_m))
+                return self._judge_jump(LocalFix(time_s, xy_m))
         self._elsewhere.clear()
-        self._remember(Placed(time_s, xy_m))
+        self._remember(LocalFix(time_s, xy_m))
         return "use"
 
-    def _judge_jump(self, fix: Placed) -> Verdict:
+    def _judge_jump(self, fix: LocalFix) -> Verdict:
         if self._elsewhere:
             last = self._elsewhere[-1]
             elapsed = max(fix.time_s - last.time_s, 0.02)
@@ -118,9 +118,9 @@ class PositionGate:
         """Forget all fixes but this one: the local frame is another."""
         self.recent.clear()
         self._elsewhere.clear()
-        self._remember(Placed(time_s, xy_m))
+        self._remember(LocalFix(time_s, xy_m))
 
-    def _remember(self, fix: Placed) -> None:
+    def _remember(self, fix: LocalFix) -> None:
         if len(self.recent) >= 2:
             last, before = self.recent[-1], self.recent[-2]
             step_s, step_before_s = fix.time_s - last.time_s, last.time_s - before.time_s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,16 +19,22 @@ from foretwin.telemetry.estimator.kinematic_filter import (
     Y,
 )
 from foretwin.telemetry.estimator.map_aid import ALIKE_M
-from foretwin.telemetry.estimator.measured import Measured
+from foretwin.telemetry.estimator.measured import MotionSamples
+
+
+class StateHeader(NamedTuple):
+    """Of which vehicle, when and where a state is."""
+
+    vehicle_id: str
+    stamp_ns: int
+    position: GeoPoint
 
 
 def moving_state(
     filter_: KinematicFilter,
-    measured: Measured,
+    measured: MotionSamples,
+    header: StateHeader,
     *,
-    vehicle_id: str,
-    stamp_ns: int,
-    position: GeoPoint,
     convergence_rad: float,
     wheelbase_m: float,
     standing: bool,
@@ -38,7 +45,7 @@ def moving_state(
     `convergence_rad` is the angle of the filter's frame against east; a car that stands has no
     speed, turning or acceleration. Fields without a fresh sample are named in `estimated`.
     """
-    estimated = measured.estimated(stamp_ns)
+    estimated = measured.estimated(header.stamp_ns)
     angle = None if "tire_angle_rad" in estimated else measured.tire_angle_rad
     if angle is None:
         angle = math.atan(wheelbase_m * filter_.mean[CURVATURE])
@@ -47,9 +54,9 @@ def moving_state(
     if map_shift_m is not None:
         position_std_m = math.hypot(position_std_m, ALIKE_M)
     return VehicleState(
-        vehicle_id=vehicle_id,
-        stamp_ns=stamp_ns,
-        position=position,
+        vehicle_id=header.vehicle_id,
+        stamp_ns=header.stamp_ns,
+        position=header.position,
         yaw_rad=float(wrap_angle(filter_.mean[YAW] - convergence_rad)),
         speed_mps=0.0 if standing else float(filter_.mean[SPEED]),
         yaw_rate_radps=0.0 if standing else filter_.yaw_rate_radps,
@@ -65,19 +72,14 @@ def moving_state(
 
 
 def unmoved_state(
-    measured: Measured,
-    *,
-    vehicle_id: str,
-    stamp_ns: int,
-    position: GeoPoint,
-    position_std_m: float | None,
+    measured: MotionSamples, header: StateHeader, *, position_std_m: float | None
 ) -> VehicleState:
     """Return the state of a car that has not moved yet: it is somewhere, its heading unknown."""
-    estimated = measured.estimated(stamp_ns)
+    estimated = measured.estimated(header.stamp_ns)
     return VehicleState(
-        vehicle_id=vehicle_id,
-        stamp_ns=stamp_ns,
-        position=position,
+        vehicle_id=header.vehicle_id,
+        stamp_ns=header.stamp_ns,
+        position=header.position,
         yaw_rad=0.0,
         speed_mps=0.0 if "speed_mps" in estimated else measured.speed_mps,
         yaw_rate_radps=0.0,

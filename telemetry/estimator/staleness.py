@@ -23,7 +23,7 @@ _LONGEST_PERIOD_NS = 5_000_000_000
 _MARGIN_NS = 5_000_000
 
 
-class _Channel:
+class _ChannelRate:
     """The rate of one channel, how many of its samples are lost, and how late they come."""
 
     def __init__(self) -> None:
@@ -73,13 +73,13 @@ class Staleness:
 
     def __init__(self, sends: tuple[str, ...]) -> None:
         self._watched = tuple(name for name in WATCHED if not sends or name in sends)
-        self._channels: dict[str, _Channel] = {}
+        self._channels: dict[str, _ChannelRate] = {}
 
     def take(self, channel: str, stamp_ns: int, now_ns: int) -> None:
         """Note a sample that came at `now_ns`, in the time of its stamp."""
         if channel not in self._watched:
             return
-        self._channels.setdefault(channel, _Channel()).take(stamp_ns, now_ns)
+        self._channels.setdefault(channel, _ChannelRate()).take(stamp_ns, now_ns)
 
     def overdue(self, now_ns: int) -> tuple[str, ...]:
         """Return the channels that have been seen and are overdue at `now_ns`."""

@@ -27,7 +27,7 @@ from foretwin.telemetry.logs.log import (
 from foretwin.telemetry.logs.map_origin import RecordingDeclaration
 from foretwin.telemetry.logs.mcap_records import Contents, Record
 from foretwin.telemetry.logs.merge import reordered
-from foretwin.telemetry.logs.ros_recording import Recording, decoder
+from foretwin.telemetry.logs.ros_recording import RosRecording, decoder
 from foretwin.telemetry.ros_messages.foreign import (
     FOREIGN,
     POSE,
@@ -49,7 +49,7 @@ Decode = Callable[[Record], Any]
 
 
 def open_foreign(
-    recording: Recording, declared: RecordingDeclaration, *, frame: LocalFrame | None = None
+    recording: RosRecording, declared: RecordingDeclaration, *, frame: LocalFrame | None = None
 ) -> Log:
     """Open a file of another program; `frame` is that of its plans and objects.
 
@@ -141,7 +141,7 @@ def _choose(contents: Contents, *, placed: bool) -> list[_Chosen]:
     return list(chosen.values())
 
 
-def _first_fix(recording: Recording, topic: str, decode: Decode) -> tuple[int, str]:
+def _first_fix(recording: RosRecording, topic: str, decode: Decode) -> tuple[int, str]:
     """Return how far the log time is ahead of the first readable fix's stamp, and its frame."""
     for record in recording.chosen({topic}, Counter()):
         try:
@@ -153,7 +153,7 @@ def _first_fix(recording: Recording, topic: str, decode: Decode) -> tuple[int, s
     return 0, ""
 
 
-def _antenna_m(recording: Recording, antenna_frame: str) -> drive.Vector3 | None:
+def _antenna_m(recording: RosRecording, antenna_frame: str) -> drive.Vector3 | None:
     schemas = recording.contents.schemas
     topics = {
         topic
@@ -173,7 +173,7 @@ def _antenna_m(recording: Recording, antenna_frame: str) -> drive.Vector3 | None
 
 
 def _foreign_samples(
-    recording: Recording,
+    recording: RosRecording,
     chosen: Sequence[_Chosen],
     decode: Decode,
     frame: LocalFrame | None,

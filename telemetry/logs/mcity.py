@@ -69,8 +69,13 @@ def read_mcity(path: Path) -> list[tuple[int, list[Detection]]]:
 def _detection(one: _Object) -> Detection:
     kind = _KINDS.get(str(one.kind), "unknown")
     return Detection(
-        str(one.id), kind, one.lat, one.lon,
+        str(one.id),
+        kind,
+        one.lat,
+        one.lon,
         # Walkers have no long side to tell a direction by.
         axis_rad=math.nan if kind == "pedestrian" else one.rotation,
-        speed_mps=one.speed * SPEED["km/h"], length_m=one.length, width_m=one.width,
-    )  # fmt: skip
+        speed_mps=one.speed * SPEED["km/h"],
+        length_m=one.length,
+        width_m=one.width,
+    )

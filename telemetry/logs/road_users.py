@@ -124,12 +124,17 @@ def detections_of(message: RoadUsers) -> tuple[int, list[Detection]]:
     """Return what a car said of those around it."""
     return message.stamp_ns, [
         Detection(
-            user.user_id, user.kind, user.position.lat_deg, user.position.lon_deg,
-            yaw_rad=user.yaw_rad, speed_mps=user.speed_mps, length_m=user.length_m,
+            user.user_id,
+            user.kind,
+            user.position.lat_deg,
+            user.position.lon_deg,
+            yaw_rad=user.yaw_rad,
+            speed_mps=user.speed_mps,
+            length_m=user.length_m,
             width_m=user.width_m,
         )
         for user in message.users
-    ]  # fmt: skip
+    ]
 
 
 def _track(
@@ -152,10 +157,12 @@ def _track(
     stamps, columns, xy, time_s = stamps[kept], columns[kept], xy[kept], time_s[kept]
     gone_after = breaks[1:][kept]
     lat, lon, yaw, axis, speed, length, width = columns.T
-    velocity = np.concatenate([
-        _velocity(time_s[piece], xy[piece])
-        for piece in np.split(np.arange(len(stamps)), np.flatnonzero(gone_after)[:-1] + 1)
-    ])  # fmt: skip
+    velocity = np.concatenate(
+        [
+            _velocity(time_s[piece], xy[piece])
+            for piece in np.split(np.arange(len(stamps)), np.flatnonzero(gone_after)[:-1] + 1)
+        ]
+    )
     moved_mps = np.hypot(velocity[:, 0], velocity[:, 1])
     course = _course(velocity, moved_mps)
     if course is not None:

@@ -16,7 +16,7 @@ from rosbags.rosbag2 import ReaderError as Error2
 
 from foretwin.telemetry.logs.log import FILE_CUT_SHORT, LogError
 from foretwin.telemetry.logs.mcap_records import Contents, Record
-from foretwin.telemetry.logs.ros_recording import NO_DEFINITION, ROS1, Recording
+from foretwin.telemetry.logs.ros_recording import NO_DEFINITION, ROS1, RosRecording
 
 _ENCODINGS = {
     MessageDefinitionFormat.NONE: NO_DEFINITION,
@@ -25,7 +25,7 @@ _ENCODINGS = {
 }
 
 
-def bag_recording(path: Path) -> Recording:
+def bag_recording(path: Path) -> RosRecording:
     """Open a bag; raises LogError where it cannot be read."""
     ros1 = path.is_file() and path.suffix.lower() != ".db3"
     kind: Any = Reader1 if ros1 else Reader2
@@ -52,7 +52,7 @@ def bag_recording(path: Path) -> Recording:
         except Exception:  # whatever rosbags, SQLite or zstd raise over bytes that are damaged
             skipped[FILE_CUT_SHORT] += 1
 
-    return Recording(path=path, contents=contents, read=read)
+    return RosRecording(path=path, contents=contents, read=read)
 
 
 def _contents(reader: Any, *, ros1: bool) -> Contents:

@@ -27,14 +27,13 @@ from foretwin.telemetry.logs.log import (
 from foretwin.telemetry.logs.map_origin import declared_of
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.logs.ros_bag import bag_recording
-from foretwin.telemetry.logs.ros_recording import Recording, decoder, mcap_recording
+from foretwin.telemetry.logs.ros_recording import RosRecording, decoder, mcap_recording
 from foretwin.telemetry.logs.write_mcap import FORMAT_METADATA, FRAME_METADATA, INFO_METADATA
 from foretwin.telemetry.ros_messages.table import (
     FRAME_TOPIC,
     INFO_TOPIC,
     TOPIC_PREFIX,
     kind_of,
-    message_from,
     message_of,
 )
 
@@ -69,23 +68,6 @@ def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
     return _open_own(recording, _Told(texts.get(FRAME_TOPIC), texts.get(INFO_TOPIC)))
 
 
-def read_drive(path: Path) -> Iterator[Sample]:
-    """Yield every message of our own MCAP by log time, the vehicle's states and `end` included.
-
-    Unlike `open_mcap(path).samples()` nothing is refused. Raises LogError for another's file.
-    """
-    recording = mcap_recording(path)
-    contents = recording.contents
-    if FORMAT_METADATA not in contents.metadata:
-        raise LogError(f"{path}: not written by foretwin: no metadata {FORMAT_METADATA!r}")
-    told = contents.metadata.get(FRAME_METADATA)
-    frame = _Told(None if told is None else told["json"], None).frame()
-    for record in recording.read(set(contents.counts), Counter()):
-        sample = message_from(record.topic, record.data, frame)
-        if sample is not None:
-            yield sample
-
-
 class _Told(NamedTuple):
     """What a file of ours says of itself, as JSON."""
 
@@ -98,7 +80,7 @@ class _Told(NamedTuple):
         return msgspec.json.decode(self.frame_json, type=LocalFrame)
 
 
-def _open_own(recording: Recording, told: _Told) -> Log:
+def _open_own(recording: RosRecording, told: _Told) -> Log:
     path, contents = recording.path, recording.contents
     frame = told.frame()
     topics = {
@@ -144,7 +126,7 @@ def _open_own(recording: Recording, told: _Told) -> Log:
 
 
 def _own_samples(
-    recording: Recording,
+    recording: RosRecording,
     topics: set[str],
     decode: Decode,
     frame: LocalFrame | None,

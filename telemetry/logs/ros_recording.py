@@ -24,7 +24,7 @@ _IDL_RULE = "=" * 80 + "\n"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recording:
+class RosRecording:
     """What a file holds, and how its messages are read again.
 
     `read` yields the messages of topics and counts damage in the counter it is given.
@@ -43,17 +43,17 @@ class Recording:
                 skipped[TYPE_CHANGED] += 1
 
 
-def mcap_recording(path: Path) -> Recording:
+def mcap_recording(path: Path) -> RosRecording:
     """Open an MCAP file; raises LogError where it is none."""
     contents = read_contents(path)
-    return Recording(
+    return RosRecording(
         path=path,
         contents=contents,
         read=lambda topics, _skipped: records(path, contents, topics),
     )
 
 
-def decoder(recording: Recording, topics: set[str]) -> Callable[[Record], Any]:
+def decoder(recording: RosRecording, topics: set[str]) -> Callable[[Record], Any]:
     """Return a decoder of topics by the definitions in the file itself, else by those known here.
 
     Raises LogError naming the topic whose definition cannot be read.

@@ -8,25 +8,21 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import signal
-import sys
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
-from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, Reply, ZenohBus
+from foretwin.contracts.bus import Bus, Mailbox, Received, Reply
 from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import InfoRequest
-from foretwin.contracts.keys import TELEMETRY_CHANNELS, alive_key
+from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import RecorderSetup
 from foretwin.contracts.simulation import Event
 from foretwin.telemetry.logs.write_mcap import create
-from foretwin.telemetry.processes.recording import SOURCE, Recording
-from foretwin.telemetry.processes.vehicle_process import ORCHESTRATOR
-from foretwin.telemetry.processes.vehicle_process import main as process_main
+from foretwin.telemetry.processes.recording import SOURCE, DriveRecording
 from foretwin.telemetry.ros_messages.parts import typestore
 
 DEPTH = 20_000
@@ -38,8 +34,6 @@ _NICENESS = 10
 _AT_ONCE = 500
 _FLUSH_EVERY_S = 1.0
 _ASK_EVERY_S = 1.0
-_GRACE_S = 1.0
-"""How long the orchestrator may be out of sight before it counts as gone."""
 _LAST_WORDS_S = 0.5
 """How long messages are still taken after the end of the run; in lock step as long as some come."""
 
@@ -47,30 +41,31 @@ log = logging.getLogger("foretwin.telemetry.processes.recorder")
 
 
 class RecorderProcess:
-    """Carries messages from the bus to a Recording; `step` works a moment, `run` until the end."""
+    """Carries messages from the bus to a DriveRecording: `step` a moment, `run` until the end.
+
+    `life` tells when that is.
+    """
 
     def __init__(
         self,
-        recording: Recording,
+        recording: DriveRecording,
         *,
         bus: Bus,
+        life: ProcessLife,
         run_id: str,
-        process_id: str,
         vehicle_id: str,
         lossless: bool,
         mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._recording = recording
-        self._bus = bus
+        self._bus, self._life = bus, life
         self._run_id = run_id
         self._vehicle_id = vehicle_id
         self._mono_s = mono_s
         self._lossless = lossless
         self._messages = Mailbox(DEPTH, when_full="block" if lossless else "drop_oldest")
-        # Apart, so that a flood of samples never drops the end of the run.
-        self._control = Mailbox(64)
-        self._stop = False
-        self._lost_s: float | None = None
+        # Apart, so that a flood of samples never drops an answer.
+        self._answers = Mailbox(64)
         self._told_lost = 0
         self._unreadable = 0
         self._lost = 0
@@ -81,19 +76,12 @@ class RecorderProcess:
         self._stamp_ns = 0
         for channel in (*TELEMETRY_CHANNELS, "state"):
             bus.subscribe(channel, self._messages, vehicle=vehicle_id)
-        bus.subscribe("run_end", self._control, run=run_id)
-        bus.watch_alive(alive_key(run=run_id, process=ORCHESTRATOR), self._control)
         self._publish(recording.started())
-        bus.declare_alive(alive_key(run=run_id, process=process_id))
-
-    def stop(self) -> None:
-        """Let `run` finish the file and return; safe in a signal handler."""
-        self._stop = True
+        life.ready()
 
     def run(self) -> None:
-        """Record until the run ends, the orchestrator is gone, or `stop` was called."""
-        parent = os.getppid()
-        while self.step() and os.getppid() == parent:
+        """Record until the run is over."""
+        while self.step():
             if not self._lossless:
                 time.sleep(_GATHER_S)
         self.finish()
@@ -101,18 +89,15 @@ class RecorderProcess:
     def step(self) -> bool:
         """Take what waits, or wait a moment; return False when it is time to finish."""
         self._take_messages(self._messages.take(_WAIT_S))
-        while (item := self._control.take()) is not None:
-            self._take_control(item)
+        while (item := self._answers.take()) is not None:
+            self._take_answer(item)
         now_s = self._mono_s()
         self._ask_for_info(now_s)
         if now_s - self._flushed_s >= _FLUSH_EVERY_S:
             self._flushed_s = now_s
             self._publish(self._recording.flush())
             self._tell_of_losses()
-        gone = self._lost_s is not None and now_s - self._lost_s > _GRACE_S
-        if gone:
-            log.warning("the orchestrator is gone")
-        return not (self._stop or gone)
+        return not self._life.over
 
     def finish(self) -> None:
         """Write what still waits or is on its way, and end the file.
@@ -162,18 +147,10 @@ class RecorderProcess:
         self._stamp_ns = message.stamp_ns
         self._publish(self._recording.add(item.channel, message))
 
-    def _take_control(self, item: Any) -> None:
-        match item:
-            case Received(channel="run_end"):
-                log.info("the run is over")
-                self._stop = True
-            case Alive(up=True):
-                self._lost_s = None
-            case Alive():
-                self._lost_s = self._mono_s()
-            case Reply(channel="info", message=info) if info is not None:
-                self._informed = True
-                self._publish(self._recording.set_info(info))
+    def _take_answer(self, item: Any) -> None:
+        if isinstance(item, Reply) and item.message is not None:
+            self._informed = True
+            self._publish(self._recording.set_info(item.message))
 
     def _ask_for_info(self, now_s: float) -> None:
         """Ask until the vehicle answers; the recording goes on without."""
@@ -181,7 +158,7 @@ class RecorderProcess:
             return
         self._asked_s = now_s
         self._bus.request(
-            "info", InfoRequest(), self._control, timeout_s=_ASK_EVERY_S, vehicle=self._vehicle_id
+            "info", InfoRequest(), self._answers, timeout_s=_ASK_EVERY_S, vehicle=self._vehicle_id
         )
 
     def _tell_of_losses(self, *, at_the_end: bool = False) -> None:
@@ -203,29 +180,20 @@ class RecorderProcess:
             self._bus.publish("event", event, run=self._run_id)
 
 
-def record(setup: RecorderSetup) -> None:
-    """Record until the run ends; blocks, and owns SIGTERM.
-
-    Raises foretwin.contracts.bus.BusUnreachable where no router answers at the start.
-    """
+def serve(setup: RecorderSetup, bus: Bus, life: ProcessLife) -> None:
+    """Record until the run is over."""
     typestore()  # Costs a third of a second: before the first message, not at it.
-    with ZenohBus(setup.bus) as bus:
-        path = Path(setup.file)
-        process = RecorderProcess(
-            Recording(lambda: create(path), name=path.name),
-            bus=bus,
-            run_id=setup.run_id,
-            process_id=setup.process_id,
-            vehicle_id=setup.vehicle_id,
-            lossless=setup.bus.lossless,
-        )
-
-        def leave(_signal: int, _frame: FrameType | None) -> None:
-            process.stop()
-
-        signal.signal(signal.SIGTERM, leave)
-        _give_way()
-        process.run()
+    path = Path(setup.file)
+    process = RecorderProcess(
+        DriveRecording(lambda: create(path), name=path.name),
+        bus=bus,
+        life=life,
+        run_id=setup.run_id,
+        vehicle_id=setup.vehicle_id,
+        lossless=setup.bus.lossless,
+    )
+    _give_way()
+    process.run()
 
 
 def _give_way() -> None:
@@ -238,8 +206,4 @@ def _give_way() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(
-        process_main(
-            sys.argv[1:], RecorderSetup, record, program="foretwin.telemetry.processes.recorder"
-        )
-    )
+    run_process(RecorderSetup, serve)

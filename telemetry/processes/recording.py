@@ -18,7 +18,7 @@ SOURCE = "recorder"
 log = logging.getLogger("foretwin.telemetry.processes.recorder")
 
 
-class Recording:
+class DriveRecording:
     """Writes the messages of one drive; what goes wrong becomes events, never an exception.
 
     Each call returns the events to publish. After the first write error nothing more is written

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
 import msgspec
 
+from foretwin.contracts.bus import Bus
 from foretwin.contracts.drive import GnssFix, VehicleInfo
 from foretwin.contracts.errors import UserError
+from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import ReplaySetup
-from foretwin.telemetry.processes.vehicle_process import main, run_vehicle
+from foretwin.telemetry.processes.vehicle_process import serve_vehicle
 
 
-class RecordedDrive(Protocol):
+class ReplayableLog(Protocol):
     """What replay needs of a log; `foretwin.telemetry.logs.open_log` gives it."""
 
     @property
@@ -40,7 +41,7 @@ class ReplaySource:
 
     def __init__(
         self,
-        drive: RecordedDrive,
+        drive: ReplayableLog,
         *,
         vehicle_id: str,
         start_s: float = 0.0,
@@ -107,8 +108,8 @@ def _placed(fix: GnssFix) -> bool:
     return math.isfinite(lat) and math.isfinite(lon) and (lat, lon) != (0.0, 0.0)
 
 
-def run(setup: ReplaySetup) -> None:
-    """Replay the log of `setup` until the run ends."""
+def serve(setup: ReplaySetup, bus: Bus, life: ProcessLife) -> None:
+    """Replay the log of `setup` until the run is over."""
     from foretwin.telemetry.logs import open_log
 
     source = ReplaySource(
@@ -117,8 +118,8 @@ def run(setup: ReplaySetup) -> None:
         start_s=setup.start_s,
         end_s=setup.end_s,
     )
-    run_vehicle(source, setup, speed=setup.speed)
+    serve_vehicle(source, bus, life, vehicle_id=setup.vehicle_id, speed=setup.speed)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:], ReplaySetup, run, program="foretwin.telemetry.processes.replay"))
+    run_process(ReplaySetup, serve)

@@ -38,17 +38,6 @@ def unpack(data: bytes) -> Attachment:
     return _unpack_labelled(data)
 
 
-def pack_labelled(attachment: Attachment) -> bytes:
-    """Return the form before rmw_zenoh 0.2.4: each value behind its name and the name's length."""
-    values = (
-        struct.pack("<q", attachment.seq),
-        struct.pack("<q", attachment.sent_ns),
-        bytes([_GID_BYTES]) + attachment.gid,
-    )
-    pairs = zip(_LABELS, values, strict=True)
-    return b"".join(bytes([len(label)]) + label + value for label, value in pairs)
-
-
 def _unpack_labelled(data: bytes) -> Attachment:
     offset = 0
     values: list[bytes] = []

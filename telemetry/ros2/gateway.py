@@ -82,9 +82,11 @@ class Gateway:
         self._sender = RosSender(mapping, foreign, wall_ns=wall_ns)
         self._last_ns: dict[str, int] = {}
         self._mirrored = MirroredObjects(
-            mapping.mirrored, car=car, drive_frame=drive_frame,
+            mapping.mirrored,
+            car=car,
+            drive_frame=drive_frame,
             alt_m=(mapping.map_frame or drive_frame).origin.alt_m,
-        )  # fmt: skip
+        )
         self._told = Told()
         self._inbox, self._words, self._views = Mailbox(2048), Mailbox(64), Mailbox(256)
         self._gate_told = self.gate.state

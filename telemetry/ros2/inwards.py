@@ -57,8 +57,6 @@ class Inwards:
         self.tire_angle_mono_ns = 0
         self.route: drive.RouteToGoal | None = None
         """The newest route of the vehicle's own driving stack."""
-        self.clock_ns: int | None = None
-        """The newest /clock of the vehicle's side."""
 
     def key_expressions(self) -> list[Wanted]:
         """Return what to subscribe to; of rmw_zenoh with any type and hash."""
@@ -138,7 +136,6 @@ class Inwards:
             self._transforms.add(ros)
             return []
         if row.type == CLOCK:
-            self.clock_ns = int(ros.clock.sec) * 10**9 + int(ros.clock.nanosec)
             return []
         if row.type == LANELET_ROUTE:
             self.route = route_from_lanelets(ros, self._mapping.map_frame)

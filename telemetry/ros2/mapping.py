@@ -20,7 +20,7 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.names import Dialect, check_topic, dds_type
-from foretwin.telemetry.ros2.safety import Limits
+from foretwin.telemetry.ros2.safety import CommandLimits
 from foretwin.telemetry.ros2.virtual_objects import PlacedObject
 from foretwin.telemetry.ros_messages.foreign import FOREIGN
 from foretwin.telemetry.ros_messages.parts import (
@@ -131,15 +131,17 @@ class MapPlace(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     alt_m: float = 0.0
 
 
-class TowardsVehicle(Limits, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class TowardsVehicle(CommandLimits, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The configuration's switch and the bounds; the other switch is on the command line."""
 
     enabled: bool = False
     max_objects: int = 64
 
-    def limits(self) -> Limits:
+    def limits(self) -> CommandLimits:
         """Return the bounds alone."""
-        return Limits(**{name: getattr(self, name) for name in Limits.__struct_fields__})
+        return CommandLimits(
+            **{name: getattr(self, name) for name in CommandLimits.__struct_fields__}
+        )
 
 
 class Mapping(

@@ -18,8 +18,6 @@ Dialect = Literal["rmw_zenoh", "ros2dds"]
 EntityKind = Literal["NN", "MP", "MS", "SS", "SC"]
 """Node, publisher, subscriber, service, client."""
 
-ANY_HASH = "*"
-"""In a subscription: Humble says `TypeHashNotSupported`, Jazzy and later `RIHS01_…`."""
 _TOKEN_ROOT = "@ros2_lv"
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)")
@@ -92,7 +90,7 @@ def type_hash(kind: str) -> str:
 
 
 def rmw_key(topic: str, kind: str, *, domain: int, type_hash: str) -> str:
-    """Return the key on which rmw_zenoh publishes; `type_hash` may be ANY_HASH."""
+    """Return the key on which rmw_zenoh publishes."""
     return f"{domain}/{check_topic(topic).strip('/')}/{dds_type(kind)}/{type_hash}"
 
 
@@ -129,9 +127,16 @@ def qos_text(qos: QosProfile) -> str:
 def token(entity: Entity) -> str:
     """Return the liveliness token of an entity."""
     parts = [
-        _TOKEN_ROOT, str(entity.domain), entity.session, str(entity.node_id),
-        str(entity.entity_id), entity.entity, "%", _mangled(entity.namespace), entity.node,
-    ]  # fmt: skip
+        _TOKEN_ROOT,
+        str(entity.domain),
+        entity.session,
+        str(entity.node_id),
+        str(entity.entity_id),
+        entity.entity,
+        "%",
+        _mangled(entity.namespace),
+        entity.node,
+    ]
     if entity.topic is not None:
         assert entity.kind is not None
         parts += [
@@ -141,40 +146,6 @@ def token(entity: Entity) -> str:
             entity.qos or qos_text(QosProfile()),
         ]
     return "/".join(parts)
-
-
-def topic_tokens_key(topic: str, *, domain: int) -> str:
-    """Return the expression of the tokens of all ends of a topic, on any node."""
-    return f"{_TOKEN_ROOT}/{domain}/*/*/*/*/*/*/*/{_mangled(check_topic(topic))}/*/*/*"
-
-
-def parse_token(key: str) -> Entity:
-    """Return what a liveliness token announces; raises ValueError for another key."""
-    parts = key.split("/")
-    if len(parts) not in (9, 13) or parts[0] != _TOKEN_ROOT:
-        raise ValueError(f"key {key!r}: no liveliness token of rmw_zenoh")
-    kinds: dict[str, EntityKind] = {k: k for k in ("NN", "MP", "MS", "SS", "SC")}
-    if parts[5] not in kinds or not all(parts[i].isdecimal() for i in (1, 3, 4)):
-        raise ValueError(f"key {key!r}: no liveliness token of rmw_zenoh")
-    entity = Entity(
-        domain=int(parts[1]),
-        session=parts[2],
-        node_id=int(parts[3]),
-        entity_id=int(parts[4]),
-        entity=kinds[parts[5]],
-        namespace=parts[7].replace("%", "/"),
-        node=parts[8],
-    )
-    if len(parts) == 9:
-        return entity
-    is_message = "::msg::" in parts[10]
-    return msgspec.structs.replace(
-        entity,
-        topic=parts[9].replace("%", "/"),
-        kind=ros_kind(parts[10]) if is_message else parts[10],
-        type_hash=parts[11],
-        qos=parts[12],
-    )
 
 
 def _mangled(name: str) -> str:

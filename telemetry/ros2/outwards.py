@@ -55,13 +55,23 @@ class Outwards:
         """Make what the first message of each type needs: a tenth of a second nobody shall wait."""
         at = self._drive_frame.origin
         user = drive.RoadUser(
-            user_id="none", kind="car", position=at, yaw_rad=0.0, speed_mps=0.0, length_m=1.0,
+            user_id="none",
+            kind="car",
+            position=at,
+            yaw_rad=0.0,
+            speed_mps=0.0,
+            length_m=1.0,
             width_m=1.0,
-        )  # fmt: skip
+        )
         car = drive.VehicleState(
-            vehicle_id="none", stamp_ns=0, position=at, yaw_rad=0.0, speed_mps=0.0,
-            yaw_rate_radps=0.0, accel_mps2=0.0,
-        )  # fmt: skip
+            vehicle_id="none",
+            stamp_ns=0,
+            position=at,
+            yaw_rad=0.0,
+            speed_mps=0.0,
+            yaw_rate_radps=0.0,
+            accel_mps2=0.0,
+        )
         command = VehicleCommand(
             stamp_ns=0, sent_mono_ns=0, tire_angle_rad=0.0, accel_mps2=0.0, speed_mps=0.0
         )

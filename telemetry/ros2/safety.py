@@ -23,7 +23,7 @@ _FROM_THE_FUTURE_NS = 1_000_000
 GateState = Literal["off", "waiting", "open", "shut"]
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class CommandLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Bounds of a command: values, how fast they may change, and how often one is sent."""
 
     max_speed_mps: float = 8.0
@@ -34,7 +34,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     max_tire_rate_radps: float = 0.3
     max_rate_hz: float = 50.0
 
-    def validate(self) -> Limits:
+    def validate(self) -> CommandLimits:
         """Return self; raises ValueError naming the first limit that is not positive and finite."""
         for name in self.__struct_fields__:
             value = getattr(self, name)
@@ -50,7 +50,7 @@ class VehicleGate:
     back and why, and what was bounded.
     """
 
-    def __init__(self, limits: Limits, *, config_on: bool, flag_on: bool) -> None:
+    def __init__(self, limits: CommandLimits, *, config_on: bool, flag_on: bool) -> None:
         self._limits = limits.validate()
         self._state: GateState = "waiting" if config_on and flag_on else "off"
         self._last_word_ns: int | None = None

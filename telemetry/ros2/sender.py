@@ -41,17 +41,27 @@ class RosSender:
         if self._mapping.dialect == "ros2dds":
             return
         node = Entity(
-            domain=self._mapping.domain, session=self._session, node_id=0, entity_id=0,
-            entity="NN", namespace="/", node=NODE,
-        )  # fmt: skip
+            domain=self._mapping.domain,
+            session=self._session,
+            node_id=0,
+            entity_id=0,
+            entity="NN",
+            namespace="/",
+            node=NODE,
+        )
         self._foreign.declare_alive(token(node))
         for number, row in enumerate(rows, 1):
             entity: EntityKind = "MS" if isinstance(row, InRow) else "MP"
             qos = QosProfile(transient_local=isinstance(row, InRow) and row.is_latched)
             end = msgspec.structs.replace(
-                node, entity_id=number, entity=entity, topic=row.topic, kind=row.type,
-                type_hash=type_hash(row.type), qos=qos_text(qos),
-            )  # fmt: skip
+                node,
+                entity_id=number,
+                entity=entity,
+                topic=row.topic,
+                kind=row.type,
+                type_hash=type_hash(row.type),
+                qos=qos_text(qos),
+            )
             self._foreign.declare_alive(token(end))
 
     def put(self, row: OutRow, payload: bytes) -> None:

@@ -60,11 +60,15 @@ class PlacedObject(
         driven = self.speed_mps * time_s % (2.0 * self.way_m) if self.way_m else 0.0
         back = driven > self.way_m
         user = RoadUser(
-            user_id=self.user_id, kind=self.kind, virtual=True,
+            user_id=self.user_id,
+            kind=self.kind,
+            virtual=True,
             position=GeoPoint(self.lat_deg, self.lon_deg, self.alt_m),
-            yaw_rad=math.radians(self.yaw_deg), speed_mps=self.speed_mps,
-            length_m=self.length_m, width_m=self.width_m,
-        )  # fmt: skip
+            yaw_rad=math.radians(self.yaw_deg),
+            speed_mps=self.speed_mps,
+            length_m=self.length_m,
+            width_m=self.width_m,
+        )
         there = moved(user, 2.0 * self.way_m - driven if back else driven)
         turned = math.remainder(user.yaw_rad + (math.pi if back else 0.0), math.tau)
         return msgspec.structs.replace(there, yaw_rad=turned)
@@ -114,9 +118,7 @@ class VirtualObjects:
         fresh = {
             name: said for name, said in self._said.items() if now_ns - said.heard_ns <= LIVES_NS
         }
-        fresh |= {
-            user.user_id: _Said(now_ns, message.stamp_ns, user) for user in message.users
-        }  # fmt: skip
+        fresh |= {user.user_id: _Said(now_ns, message.stamp_ns, user) for user in message.users}
         if len(fresh) > self._at_most:
             raise UnfitError("virtual objects that are too many")
         self._said = fresh
@@ -141,16 +143,20 @@ def moved(user: RoadUser, way_m: float) -> RoadUser:
     """Return the road user so far ahead along its yaw."""
     step = way_m * np.array([math.cos(user.yaw_rad), math.sin(user.yaw_rad)])
     lat_deg, lon_deg = geo_from_local(LocalFrame(user.position), step).tolist()
-    return msgspec.structs.replace(
-        user, position=GeoPoint(lat_deg, lon_deg, user.position.alt_m)
-    )  # fmt: skip
+    return msgspec.structs.replace(user, position=GeoPoint(lat_deg, lon_deg, user.position.alt_m))
 
 
 def _is_finite(user: RoadUser) -> bool:
     at = user.position
     numbers = (
-        at.lat_deg, at.lon_deg, at.alt_m, user.yaw_rad, user.speed_mps, user.length_m, user.width_m,
-    )  # fmt: skip
+        at.lat_deg,
+        at.lon_deg,
+        at.alt_m,
+        user.yaw_rad,
+        user.speed_mps,
+        user.length_m,
+        user.width_m,
+    )
     return all(map(math.isfinite, numbers))
 
 

@@ -14,7 +14,6 @@ from foretwin.telemetry.ros_messages.parts import (
     BASE_FRAME,
     CONTROL,
     MAP_FRAME,
-    VELOCITY_REPORT,
     header_from,
     ros_type,
     stamp_ns_of,
@@ -84,16 +83,6 @@ def ackermann_from_command(message: drive.ControlCommand, *, speed_mps: float) -
             acceleration=accel,
             jerk=0.0,
         ),
-    )
-
-
-def velocity_report(stamp_ns: int, *, speed_mps: float, yaw_rate_radps: float) -> Any:
-    """Return Autoware's VelocityReport."""
-    return ros_type(VELOCITY_REPORT)(
-        header=header_from(stamp_ns, BASE_FRAME),
-        longitudinal_velocity=within_float32(speed_mps),
-        lateral_velocity=0.0,
-        heading_rate=within_float32(yaw_rate_radps),
     )
 
 

@@ -10,17 +10,25 @@ import numpy as np
 from foretwin.contracts import drive
 from foretwin.telemetry.ros_messages.parts import ros_type, vector_from, within_float32
 
-_KIND_BY_LABEL: dict[int, drive.RoadUserKind] = {
-    1: "car", 2: "lorry", 3: "bus", 4: "lorry", 5: "motorcycle", 6: "bicycle", 7: "pedestrian",
-}  # fmt: skip
+_LABELS: tuple[drive.RoadUserKind, ...] = (
+    *("unknown", "car", "lorry", "bus", "lorry", "motorcycle", "bicycle", "pedestrian"),
+)
+_KIND_BY_LABEL = dict(enumerate(_LABELS))
 """ObjectClassification.label; the rest is unknown."""
 _PASSABLE = (10, 11)
 """OVER_DRIVABLE, UNDER_DRIVABLE."""
 _LABEL_BY_KIND = {
     # Autoware knows no vans and no trams: what plans around a tram must leave a bus's room.
-    "car": 1, "van": 1, "lorry": 2, "bus": 3, "tram": 3, "motorcycle": 5, "bicycle": 6,
-    "pedestrian": 7, "unknown": 0,
-}  # fmt: skip
+    "car": 1,
+    "van": 1,
+    "lorry": 2,
+    "bus": 3,
+    "tram": 3,
+    "motorcycle": 5,
+    "bicycle": 6,
+    "pedestrian": 7,
+    "unknown": 0,
+}
 _HEIGHT_M = {"van": 2.5, "lorry": 3.5, "bus": 3.2, "tram": 3.6, "pedestrian": 1.8, "bicycle": 1.8}
 _OTHER_HEIGHT_M = 1.6
 _BOX, _CYLINDER, _POLYGON = 0, 1, 2

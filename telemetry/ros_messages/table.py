@@ -102,16 +102,6 @@ def written() -> tuple[str, ...]:
     return (*_WRITERS, *_JSON_ALONE)
 
 
-def message_from(
-    topic: str, data: bytes, frame: LocalFrame | None
-) -> tuple[str, msgspec.Struct] | None:
-    """Return channel and message of one of our own topics, None for views and other topics."""
-    kind = kind_of(topic)
-    if kind is None:
-        return None
-    return message_of(topic, typestore().deserialize_cdr(data, kind), frame)
-
-
 def kind_of(topic: str) -> str | None:
     """Return the type of one of our own topics that is read back, None for any other."""
     name = topic.removeprefix(TOPIC_PREFIX)

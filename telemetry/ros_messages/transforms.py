@@ -1,4 +1,4 @@
-"""Transforms between the frames of a car (TFMessage), and the clock of a simulation."""
+"""Transforms between the frames of a car (TFMessage)."""
 
 from __future__ import annotations
 
@@ -8,16 +8,6 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import Vector3
-from foretwin.telemetry.ros_messages.parts import (
-    CLOCK,
-    TF,
-    header_from,
-    ros_type,
-    stamp_ns_of,
-    time_from,
-    turn_from,
-    vector_from,
-)
 
 
 class TransformTree:
@@ -54,30 +44,6 @@ class TransformTree:
             found[parent] = step @ found[name]
             name = parent
         return found
-
-
-def transform_message(
-    stamp_ns: int, *, parent: str, child: str, place_m: Vector3, yaw_rad: float
-) -> Any:
-    """Return a TFMessage of one frame, turned about z alone."""
-    stamped = ros_type("geometry_msgs/msg/TransformStamped")(
-        header=header_from(stamp_ns, parent),
-        child_frame_id=child,
-        transform=ros_type("geometry_msgs/msg/Transform")(
-            translation=vector_from(*place_m), rotation=turn_from(yaw_rad)
-        ),
-    )
-    return ros_type(TF)(transforms=[stamped])
-
-
-def clock_message(stamp_ns: int) -> Any:
-    """Return a Clock."""
-    return ros_type(CLOCK)(clock=time_from(stamp_ns))
-
-
-def clock_ns_of(ros: Any) -> int:
-    """Return the nanoseconds of a Clock."""
-    return stamp_ns_of(ros.clock)
 
 
 def _parent_from_child(transform: Any) -> Array:

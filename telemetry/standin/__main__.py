@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+from foretwin.contracts.bus import Bus
+from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import StandinSetup
-from foretwin.telemetry.processes.vehicle_process import main, run_vehicle
+from foretwin.telemetry.processes.vehicle_process import serve_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import read_path
 from foretwin.telemetry.standin.source import StandinSource
 
 
-def run(setup: StandinSetup) -> None:
-    """Drive the path of `setup` until the run ends."""
+def serve(setup: StandinSetup, bus: Bus, life: ProcessLife) -> None:
+    """Drive the path of `setup` until the run is over."""
     file = None if setup.parameters_file is None else Path(setup.parameters_file)
     parameters = read_parameters(file)
     source = StandinSource(
@@ -24,8 +25,8 @@ def run(setup: StandinSetup) -> None:
         end_s=setup.end_s,
         plan_shift_m=setup.plan_shift_m,
     )
-    run_vehicle(source, setup, speed=setup.speed)
+    serve_vehicle(source, bus, life, vehicle_id=setup.vehicle_id, speed=setup.speed)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:], StandinSetup, run, program="foretwin.telemetry.standin"))
+    run_process(StandinSetup, serve)

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, Request, ZenohBus
 from foretwin.contracts.drive import SpeedSample
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.simulation import PrepareRequest
+from tests.contracts.memory_bus import MemoryBus
 
 DEADLINE_S = 120.0
 """Long: it costs nothing where all goes well, and a busy machine is no fault of the code."""

@@ -12,7 +12,7 @@ from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction
 from foretwin.orchestrator.routing.map_matching import MapMatcher, Match
 from foretwin.orchestrator.routing.route import Route
-from foretwin.orchestrator.routing.route_follower import Progress, RouteFollower
+from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.logs.opening import open_log
 from foretwin.world_gen.junctions.find_intersections import find_intersections
@@ -70,7 +70,7 @@ class Replayed:
     """What matcher and follower said at each state up to the end of the replay."""
 
     matches: list[Match | None]
-    progress: list[Progress | None]
+    progress: list[RouteProgress | None]
     upcoming: list[list[tuple[str, float]]]
     passed: list[tuple[float, PassedJunction]]
     matcher: MapMatcher

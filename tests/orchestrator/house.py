@@ -15,7 +15,6 @@ from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw
 from foretwin.contracts.futures import FuturesResult, Job, Outcome, Trajectory
 from foretwin.contracts.keys import alive_key
 from foretwin.contracts.mailbox import Mailbox, Request
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.simulation import BuildReply, BuildRequest, PrepareReply, PrepareRequest
 from foretwin.contracts.world import World
 from foretwin.orchestrator.drive.conductor import Conductor
@@ -24,6 +23,7 @@ from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.world_gen.world_store import WorldStore
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.futures_rounds import nobody
 from tests.orchestrator.trip import START_NS, states_along, town, town_line, town_plan, town_world
 

@@ -16,7 +16,6 @@ from foretwin.contracts.bus import Alive, Bus, Mailbox, Received, ZenohBus, ask
 from foretwin.contracts.codec import write_message
 from foretwin.contracts.drive import ControlCommand
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.setup import BusSetup, WorkerSetup, write_setup
@@ -29,6 +28,7 @@ from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.worker import StageCache, serve_futures
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
 from tests.sim_worker.places import FRAME, crossroads, job, state_at
 from tests.starvation import unhindered_wait_s

@@ -48,15 +48,18 @@ def foretwin(out: Path, *arguments: str, timeout_s: float = 280.0) -> Finished:
 
 
 @contextmanager
-def started(out: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+def started(
+    out: Path, *arguments: str, entry: tuple[str, str] = ("-m", "foretwin")
+) -> Iterator[subprocess.Popen[str]]:
     """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards.
 
-    Without tuning unless it is asked for: a tenth of a core in each of these drives.
+    `entry` is what Python is given to run. Without tuning unless it is asked for: a tenth of a
+    core in each of these drives.
     """
     if "--tuning" not in arguments:
         arguments = (*arguments, "--tuning", "off")
     process = subprocess.Popen(
-        [sys.executable, "-P", "-m", "foretwin", "drive", "--view", "none", "--out", str(out),
+        [sys.executable, "-P", *entry, "drive", "--view", "none", "--out", str(out),
          *arguments],
         cwd=out.parent, env=environment(out.parent / "cache"), text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,

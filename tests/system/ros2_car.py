@@ -13,7 +13,6 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, loca
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.orchestrator.embedded import ROUTE_FILE
 from foretwin.telemetry.logs import read_line
-from foretwin.telemetry.ros_messages.commands import velocity_report
 from foretwin.telemetry.ros_messages.parts import (
     STEERING_REPORT,
     VELOCITY_REPORT,
@@ -22,6 +21,7 @@ from foretwin.telemetry.ros_messages.parts import (
     typestore,
 )
 from foretwin.telemetry.ros_messages.sensors import ros_from_gnss
+from tests.telemetry.autoware_messages import velocity_report
 
 SPEED_MPS = 8.0
 REPORT_EVERY_S = 0.02

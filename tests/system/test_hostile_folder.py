@@ -30,7 +30,7 @@ def test_modules_in_the_working_directory_are_not_executed(hostile: Path) -> Non
     done = foretwin(hostile / "runs", *SHORT)
 
     assert done.code == 0, done.screen
-    assert done.record()["complete"]
+    assert done.record()["exit"] == "completed"
     assert list(hostile.glob("*.sprung")) == []
 
 

@@ -8,8 +8,30 @@ from pathlib import Path
 
 import pytest
 
+from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.commands.cli import EXIT_USER, run
+from foretwin.orchestrator.commands.set import newest_running
 from tests.system.foretwin_command import Finished, run_folder, started, wait_for
+
+HELD_AT_JOIN = """
+import sys, time
+from pathlib import Path
+from foretwin.orchestrator.drive.conductor import Conductor
+
+join, folder = Conductor.join, Path.cwd()
+
+def held(conductor):
+    (folder / "held").touch()
+    while not (folder / "go").exists():
+        time.sleep(0.01)
+    join(conductor)
+
+Conductor.join = held
+from foretwin.__main__ import main
+
+sys.exit(main())
+"""
+"""A drive that listens to nobody before a file named `go` is there."""
 
 SMALL = ("--speed", "max", "--futures", "6", "--workers", "1", "--rate", "0.5", "--end", "10")
 
@@ -55,3 +77,26 @@ def test_roles_and_correction_of_a_running_drive_are_set(
         assert row["gap_m"] == pytest.approx(gap_m, abs=1e-6)
     assert {row["role"] for row in done.rows("mirror")} >= {"twin", "shadow"}
     assert json.loads((folder / "run.json").read_text())["config"]["role"] == "all"
+
+
+def test_a_run_is_listed_no_sooner_than_it_can_be_spoken_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "runs"
+
+    def is_listed() -> bool:
+        try:
+            newest_running(out)
+        except UserError:
+            return False
+        return True
+
+    with started(out, *SMALL, entry=("-c", HELD_AT_JOIN)) as process:
+        wait_for((tmp_path / "held").exists, "the drive to stand before it joins the bus")
+        assert not is_listed()
+        assert run(["set", "correction=follow", "--out", str(out)]) == EXIT_USER
+        assert "no drive is running there" in capsys.readouterr().err
+        (tmp_path / "go").touch()
+        wait_for(is_listed, "the run to be listed")
+        assert run(["set", "correction=follow", "--out", str(out)]) == 0
+        assert process.poll() is None

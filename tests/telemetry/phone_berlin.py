@@ -22,12 +22,12 @@ from foretwin.contracts.drive import GnssFix, ImuSample, SpeedSample, VehicleInf
 from foretwin.contracts.frames import GeoPoint, geo_from_local, local_from_geo, local_from_geo_yaw
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.telemetry.estimator.motion_track import MotionTrack
-from foretwin.telemetry.estimator.smoothing import SmoothedTrack, smooth_positions
 from foretwin.telemetry.logs.opening import open_log
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from tests.telemetry.phone_figures import Errors
+from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 from tests.telemetry.town_map import MapSeer
 
 ON_MAP_S = 262.0

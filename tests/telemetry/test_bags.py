@@ -33,9 +33,8 @@ from foretwin.telemetry.ros_messages.parts import (
     twist_from,
     typestore,
 )
-from foretwin.telemetry.ros_messages.status import ros_from_signals
-from foretwin.telemetry.ros_messages.transforms import transform_message
 from tests.telemetry import drive_messages
+from tests.telemetry.autoware_messages import ros_from_signals, transform_message
 from tests.telemetry.test_foreign_mcap import START_NS, ForeignFile, fix, velocity
 
 MS = 10**6

@@ -18,10 +18,10 @@ from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.telemetry.logs import LogError, open_log
-from foretwin.telemetry.logs.ros_log import read_drive
 from foretwin.telemetry.logs.write_mcap import create
-from foretwin.telemetry.ros_messages.table import message_from, messages_from, written
+from foretwin.telemetry.ros_messages.table import messages_from, written
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples
+from tests.telemetry.own_recordings import message_from, read_drive
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 

@@ -13,8 +13,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, wrap_angle
 from foretwin.telemetry.estimator.estimator import StateEstimator
-from foretwin.telemetry.estimator.smoothing import SmoothedTrack, smooth_positions
 from foretwin.telemetry.logs import open_log
+from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 
 pytestmark = pytest.mark.real_data
 END_NS = 262_000_000_000

@@ -12,9 +12,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, wrap_angle
 from foretwin.telemetry.estimator.estimator import StateEstimator
-from foretwin.telemetry.estimator.smoothing import SmoothedTrack, smooth_positions
 from foretwin.telemetry.logs import Log, open_log
 from tests.telemetry.estimator_figures import boreas
+from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 
 pytestmark = pytest.mark.real_data
 DECLARATIONS = Path(__file__).parents[1] / "data" / "declarations"

@@ -206,7 +206,10 @@ def test_findings_are_drawn_by_manoeuvre_and_told_in_words() -> None:
         independent=True,
     )  # fmt: skip
     shown = Shown(monitor.handle("gap", sample))
-    assert shown.paths == [f"reality/{name}/curve" for name in ("across_m", "along_m", "yaw_deg")]
+    assert shown.paths == [
+        f"reality/{name}/{drawn}"
+        for name in ("across_m", "along_m", "yaw_deg") for drawn in ("curve", "limit")
+    ]  # fmt: skip
     assert shown["reality/across_m/curve"].scalars.as_arrow_array().to_pylist() == [-0.4]
     assert not monitor.handle("gap", msgspec.structs.replace(sample, horizon_s=8.0))
 

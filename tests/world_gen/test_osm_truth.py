@@ -19,12 +19,12 @@ from foretwin.world_gen.build import build_region, build_world
 from foretwin.world_gen.junctions.find_intersections import find_intersections
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import index_map
-from foretwin.world_gen.junctions.traffic_lights import TrafficLight, traffic_lights
 from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from tests.world_gen.test_real_maps import MAPS
+from tests.world_gen.traffic_lights import TrafficLight, traffic_lights
 
 pytestmark = [pytest.mark.real_data, pytest.mark.judge]
 

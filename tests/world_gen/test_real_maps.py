@@ -16,8 +16,8 @@ from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
+from foretwin.world_gen.roads.road_classes import CAR_CLASSES
 from foretwin.world_gen.roads.road_graph import RoadGraph
-from foretwin.world_gen.roads.road_tags import CAR_CLASSES
 
 pytestmark = pytest.mark.real_data
 

@@ -42,13 +42,6 @@ class ConvexParts(NamedTuple):
     yaw_rad: Array
 
 
-def convex_parts(
-    outline: Array, holes: tuple[Array, ...] = (), *, tolerance_m: float = COLLISION_TOLERANCE_M
-) -> list[Array]:
-    """Return convex pieces (N, 2), counter-clockwise, that cover a polygon; see `convex_cover`."""
-    return convex_cover([(outline, holes)], tolerance_m=tolerance_m).rings
-
-
 def convex_cover(
     outlines: Sequence[tuple[Array, tuple[Array, ...]]],
     *,

@@ -63,12 +63,6 @@ class BuildingIndex:
     def __len__(self) -> int:
         return len(self._table.names)
 
-    def all(self) -> tuple[Footprint, ...]:
-        """Return all buildings, in the order of the map's objects."""
-        every = np.arange(len(self))
-        self._make(every)
-        return tuple(footprint for k in every.tolist() for footprint in self._done[k])
-
     def within(self, area: shapely.Geometry) -> tuple[Footprint, ...]:
         """Return the buildings that reach into `area`, a shape in the map's frame."""
         near = np.sort(self._tree.query(box_deg(area, self._osm.frame)))
@@ -144,15 +138,6 @@ class BuildingIndex:
 def _distinct(rows: Indices) -> Indices:
     """Return the rows once each, ascending; plain `np.unique` would load masked arrays for this."""
     return np.unique(rows, return_index=True)[0]
-
-
-def footprints(osm: OsmMap, notes: list[str]) -> tuple[Footprint, ...]:
-    """Return all buildings of a map; outlines that parts describe give way to their parts."""
-    index = BuildingIndex(osm)
-    found = index.all()
-    notes.extend(index.notes)
-    notes.extend(dict.fromkeys(f.note for f in found if f.note))
-    return found
 
 
 def buildings_in_frame(

@@ -43,7 +43,7 @@ class OutlineTable(msgspec.Struct, frozen=True, kw_only=True):
     notes: tuple[str, ...]
 
 
-class Outlines(NamedTuple):
+class BuildingOutlines(NamedTuple):
     """Polygons (M,), the entry asked for that each belongs to (M,), and what had to be mended.
 
     `owner` and the keys of `notes` count the entries as they were asked for; `owner` ascends.
@@ -153,7 +153,7 @@ def _boxes(latlon: Array, first: Indices) -> Array:
     return np.concatenate([low, high], axis=1)
 
 
-def outlines(osm: OsmMap, table: OutlineTable, entries: Indices) -> Outlines:
+def outlines(osm: OsmMap, table: OutlineTable, entries: Indices) -> BuildingOutlines:
     """Return the polygons of entries of a table in the map's frame, mended where they need it."""
     single = table.is_way[entries]
     at = np.flatnonzero(single)
@@ -173,7 +173,7 @@ def outlines(osm: OsmMap, table: OutlineTable, entries: Indices) -> Outlines:
     order = np.argsort(owner, kind="stable")
     odd = np.empty(len(found), dtype=object)
     odd[:] = [polygon for _, polygon in found]
-    return Outlines(np.concatenate([polygons[sound], odd])[order], owner[order], notes)
+    return BuildingOutlines(np.concatenate([polygons[sound], odd])[order], owner[order], notes)
 
 
 def _projected(osm: OsmMap, table: OutlineTable, rings: Indices) -> tuple[Array, Indices]:

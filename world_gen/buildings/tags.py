@@ -25,10 +25,18 @@ BRIDGE_CLEARANCE_M = 4.5
 
 HEIGHT_KEYS = frozenset(
     (
-        "height", "building:height", "est_height", "building:levels", "roof:levels", "roof:height",
-        "min_height", "building:min_height", "building:min_level", "min_level",
+        "height",
+        "building:height",
+        "est_height",
+        "building:levels",
+        "roof:levels",
+        "roof:height",
+        "min_height",
+        "building:min_height",
+        "building:min_level",
+        "min_level",
     )
-)  # fmt: skip
+)
 _FEET = re.compile(
     r"^\s*(\d+(?:\.\d+)?)\s*(?:'|ft|feet|foot)\s*(?:(\d+(?:\.\d+)?)\s*(?:\"|''|in))?\s*$"
 )
@@ -117,9 +125,13 @@ def _height(tags: Mapping[str, str], default_m: float) -> tuple[Quantity, str]:
         if value := height_in_m(tags.get(key)):
             return Quantity(value, "tagged"), ""
     note = next(
-        (f"{key}={tags[key]} is not understood" for key in ("height", "building:height")
-         if key in tags), "",
-    )  # fmt: skip
+        (
+            f"{key}={tags[key]} is not understood"
+            for key in ("height", "building:height")
+            if key in tags
+        ),
+        "",
+    )
     if value := height_in_m(tags.get("est_height")):
         return Quantity(value, "inferred"), note
     levels = _count(tags.get("building:levels"))

@@ -53,9 +53,15 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
         none = np.zeros(0, dtype=np.int64)
         flat = np.zeros(0)
         return Meetings(
-            first=none, second=none, merging=none.astype(bool), points=np.zeros((0, 2)), areas=(),
-            first_m=flat, second_m=flat, apart_m=flat,
-        )  # fmt: skip
+            first=none,
+            second=none,
+            merging=none.astype(bool),
+            points=np.zeros((0, 2)),
+            areas=(),
+            first_m=flat,
+            second_m=flat,
+            apart_m=flat,
+        )
     lines, swept = _swept(connections)
     a, b = shapely.STRtree(swept).query(swept)
     junction = np.array([id(c.cluster.junction) for c in connections])

@@ -112,9 +112,10 @@ def _guided(lines: list[Array]) -> list[Array]:
     wide = np.full(len(lines), _GUIDED_RADIUS_M)
     found = []
     for line, path in zip(
-        lines, rounded_through(Polylines.of(lines), wide, nothing, nothing).lines.split(),
+        lines,
+        rounded_through(Polylines.of(lines), wide, nothing, nothing).lines.split(),
         strict=True,
-    ):  # fmt: skip
+    ):
         path = np.round(path, 3)
         path[0], path[-1] = line[0], line[-1]
         found.append(path)

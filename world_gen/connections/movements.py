@@ -52,8 +52,11 @@ def movements(
         toward = DirectedEdge(leg.edge, not leg.reverse)
         if not toward.allowed:
             continue
-        marked = any("u_turn" in lane.turns for lane in around.section(toward).lanes
-                     if lane.reverse == toward.reverse)  # fmt: skip
+        marked = any(
+            "u_turn" in lane.turns
+            for lane in around.section(toward).lanes
+            if lane.reverse == toward.reverse
+        )
         ways = _ways_through(cluster, toward, inner, restrictions, back=marked)
         # Who has no other way out of a street may turn back.
         ways = [

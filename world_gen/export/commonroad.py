@@ -33,8 +33,11 @@ UNKNOWN_GEONAME = -999
 PASSABLE_UNDER_M = 2.5
 """Buildings that begin higher over the road stand in nobody's way and are left out."""
 _TYPES: dict[LaneKind, str] = {
-    "bus": "busLane", "bicycle": "bicycleLane", "parking": "parking", "tram": "restricted",
-}  # fmt: skip
+    "bus": "busLane",
+    "bicycle": "bicycleLane",
+    "parking": "parking",
+    "tram": "restricted",
+}
 _USERS: dict[LaneKind, tuple[str, ...]] = {
     "driving": ("vehicle", "bicycle"),
     "bus": ("bus", "taxi", "priorityVehicle"),
@@ -242,9 +245,10 @@ def _location(world: World) -> Any:
 def _tags(world: World) -> Any:
     tags = etree.Element("scenarioTags")
     kinds = {world.intersection.kind, *(j.summary.kind for j in world.junctions)}
-    urban = not world.lanes or np.median(
-        [lane.speed_limit_mps.value for lane in world.lanes]
-    ) <= URBAN_MPS  # fmt: skip
+    urban = (
+        not world.lanes
+        or np.median([lane.speed_limit_mps.value for lane in world.lanes]) <= URBAN_MPS
+    )
     child(tags, "urban" if urban else "rural")
     child(tags, "intersection")
     if kinds & {"roundabout", "circular", "mini_roundabout"}:

@@ -29,7 +29,7 @@ class CycleElement(NamedTuple):
     duration_s: float
 
 
-class Lights:
+class CommonRoadLights:
     """Elements of all lights, and which of them each lane obeys."""
 
     def __init__(self) -> None:
@@ -74,7 +74,7 @@ def cycle(plan: SignalPlan, group_id: str) -> list[CycleElement]:
 
 def traffic_lights(
     world: World, lanes: Mapping[str, int], time_step_s: float, ids: IdCounter
-) -> Lights:
+) -> CommonRoadLights:
     """Return a light for each head that some lane obeys; one without a plan is not active."""
     plans = {
         group.id: junction.plan
@@ -82,7 +82,7 @@ def traffic_lights(
         if junction.plan is not None
         for group in junction.plan.groups
     }
-    lights = Lights()
+    lights = CommonRoadLights()
     for signal in world.signals:
         governed = [name for name in signal.lane_ids if name in lanes]
         if not governed:

@@ -15,8 +15,11 @@ from foretwin.world_gen.export.lane_borders import Borders
 SignName = Literal["stop", "give_way", "priority", "max_speed"]
 DEFAULT_COUNTRY = "ZAM"
 _GERMAN: Mapping[SignName, str] = {
-    "stop": "206", "give_way": "205", "priority": "306", "max_speed": "274",
-}  # fmt: skip
+    "stop": "206",
+    "give_way": "205",
+    "priority": "306",
+    "max_speed": "274",
+}
 SIGNS: Mapping[str, Mapping[SignName, str]] = {
     "ZAM": _GERMAN,
     "DEU": _GERMAN,

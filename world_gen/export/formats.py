@@ -90,4 +90,12 @@ FORMATS: dict[str, Format] = {
         Format("svg", ".svg", _picture, True),
         Format("png", ".png", _picture, True),
     )
-}  # fmt: skip
+}
+DEFAULT_FORMAT = "mjcf"
+"""What is written into a folder, and what a suffix of several formats means."""
+
+
+def formats_by_suffix(suffix: str) -> tuple[str, ...]:
+    """Return the names of the formats whose files end so, the default one first."""
+    names = (name for name, format_ in FORMATS.items() if format_.suffix == suffix.lower())
+    return tuple(sorted(names, key=lambda name: name != DEFAULT_FORMAT))

@@ -19,12 +19,27 @@ from foretwin.contracts.world import World
 DEGREE_DIGITS = 9
 """A nanodegree is 0.1 mm: files keep the millimetres of a World."""
 
+FIELDS = {
+    "road": "osm_way name road_class left_m right_m lane_ids from_place to_place layer bridge "
+    "tunnel",
+    "lane": "osm_way name kind:lane_kind role width_m speed_limit_mps turns turns_source "
+    "direction_source change change_source left_id right_id road_id layer successor_ids",
+    "connection": "from_lane_id to_lane_id turn width_m control conflicts_with yields_to "
+    "junction_id place_id signal_group_id layer",
+    "stop_line": "lane_id connection_id control",
+    "crossing": "kind:crossing_kind width_m osm_node island:refuge",
+    "signal": "osm_node group_id lane_ids",
+    "conflict": "first_id second_id kind:conflict_kind yields_id rule source",
+    "building": "height_m min_height_m",
+}
+"""The fields of each kind of thing, in the order of the file; after a colon its name there."""
+
 Shape = Literal["Point", "LineString", "Polygon"]
 Json = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class _Draft:
+class _FeatureDraft:
     """A feature whose rings (each (N, 2), in the World's frame) are still metres."""
 
     kind: str
@@ -76,24 +91,23 @@ def geojson_of(world: World) -> Json:
     }
 
 
-def _drafts(world: World) -> Iterable[_Draft]:
+def _drafts(world: World) -> Iterable[_FeatureDraft]:
     yield from _junctions(world)
     yield from _ways(world)
     yield from _control(world)
     for kind, areas in (
-        ("road_surface", world.road_surface), ("sidewalk", world.sidewalks),
+        ("road_surface", world.road_surface),
+        ("sidewalk", world.sidewalks),
         ("island", world.islands),
-    ):  # fmt: skip
+    ):
         for area in areas:
             yield _polygon(kind, area.id, area.outline, area.holes, {"source": area.source})
     for building in world.buildings:
-        properties = {
-            **_valued("height_m", building.height_m), "min_height_m": building.min_height_m
-        }  # fmt: skip
+        properties = _properties("building", building)
         yield _polygon("building", building.id, building.outline, building.holes, properties)
 
 
-def _junctions(world: World) -> Iterable[_Draft]:
+def _junctions(world: World) -> Iterable[_FeatureDraft]:
     for junction in world.junctions:
         summary = msgspec.to_builtins(junction.summary)
         properties = {
@@ -104,106 +118,69 @@ def _junctions(world: World) -> Iterable[_Draft]:
         }
         if junction.area is None:
             at = _local_point(world.frame, junction.summary.lat, junction.summary.lon)
-            yield _Draft("junction", junction.summary.id, "Point", (at,), properties)
+            yield _FeatureDraft("junction", junction.summary.id, "Point", (at,), properties)
         else:
-            properties["area_source"] = junction.area.source
-            yield _polygon(
-                "junction", junction.summary.id, junction.area.outline, junction.area.holes,
-                properties,
-            )  # fmt: skip
+            area = junction.area
+            properties["area_source"] = area.source
+            yield _polygon("junction", junction.summary.id, area.outline, area.holes, properties)
 
 
-def _ways(world: World) -> Iterable[_Draft]:
+def _ways(world: World) -> Iterable[_FeatureDraft]:
     for road in world.roads:
-        yield _line(
-            "road", road.id, road.reference_line,
-            {
-                "osm_way": road.osm_way, "name": road.name, "road_class": road.road_class,
-                "left_m": road.left_m, "right_m": road.right_m, "lane_ids": road.lane_ids,
-                "from_place": road.from_place, "to_place": road.to_place, "layer": road.layer,
-                "bridge": road.bridge, "tunnel": road.tunnel,
-            },
-        )  # fmt: skip
+        yield _line("road", road.id, road.reference_line, _properties("road", road))
     for lane in world.lanes:
-        yield _line(
-            "lane", lane.id, lane.centerline,
-            {
-                "osm_way": lane.osm_way, "name": lane.name, "lane_kind": lane.kind,
-                "role": lane.role, **_valued("width_m", lane.width_m),
-                **_valued("speed_limit_mps", lane.speed_limit_mps),
-                "turns": lane.turns, "turns_source": lane.turns_source,
-                "direction_source": lane.direction_source,
-                "change": lane.change, "change_source": lane.change_source,
-                "left_id": lane.left_id, "right_id": lane.right_id, "road_id": lane.road_id,
-                "layer": lane.layer, "successor_ids": lane.successor_ids,
-            },
-        )  # fmt: skip
+        yield _line("lane", lane.id, lane.centerline, _properties("lane", lane))
     for connection in world.connections:
-        yield _line(
-            "connection", connection.id, connection.centerline,
-            {
-                "from_lane_id": connection.from_lane_id, "to_lane_id": connection.to_lane_id,
-                "turn": connection.turn, **_valued("width_m", connection.width_m),
-                "control": connection.control, "conflicts_with": connection.conflicts_with,
-                "yields_to": connection.yields_to, "junction_id": connection.junction_id,
-                "place_id": connection.place_id, "signal_group_id": connection.signal_group_id,
-                "layer": connection.layer,
-            },
-        )  # fmt: skip
+        properties = _properties("connection", connection)
+        yield _line("connection", connection.id, connection.centerline, properties)
 
 
-def _control(world: World) -> Iterable[_Draft]:
+def _control(world: World) -> Iterable[_FeatureDraft]:
     for line in world.stop_lines:
-        properties = {
-            "lane_id": line.lane_id, "connection_id": line.connection_id,
-            **_valued("control", line.control),
-        }  # fmt: skip
-        yield _line("stop_line", line.id, line.ends, properties)
+        yield _line("stop_line", line.id, line.ends, _properties("stop_line", line))
     for crossing in world.crossings:
-        yield _line(
-            "crossing", crossing.id, crossing.line,
-            {
-                **_valued("crossing_kind", crossing.kind), **_valued("width_m", crossing.width_m),
-                "osm_node": crossing.osm_node, "refuge": crossing.island,
-            },
-        )  # fmt: skip
+        yield _line("crossing", crossing.id, crossing.line, _properties("crossing", crossing))
     for signal in world.signals:
-        yield _Draft(
-            "signal", signal.id, "Point", (signal.position[None, :2],),
-            {
-                "osm_node": signal.osm_node, "group_id": signal.group_id,
-                "lane_ids": signal.lane_ids, "height_m": float(signal.position[2]),
-                "facing_rad": signal.yaw_rad, "source": signal.source,
-            },
-        )  # fmt: skip
-    for conflict in world.conflicts:
         properties = {
-            "first_id": conflict.first_id, "second_id": conflict.second_id,
-            "conflict_kind": conflict.kind, "yields_id": conflict.yields_id,
-            "rule": conflict.rule, "source": conflict.source,
-        }  # fmt: skip
+            **_properties("signal", signal),
+            "height_m": float(signal.position[2]),
+            "facing_rad": signal.yaw_rad,
+            "source": signal.source,
+        }
+        yield _FeatureDraft("signal", signal.id, "Point", (signal.position[None, :2],), properties)
+    for conflict in world.conflicts:
+        properties = _properties("conflict", conflict)
         name = f"{conflict.first_id}|{conflict.second_id}"
         if len(conflict.area) >= 3 and abs(_doubled_area(conflict.area)) > 1e-4:
             yield _polygon("conflict", name, conflict.area, (), properties)
         else:
-            yield _Draft("conflict", name, "Point", (conflict.point[None, :],), properties)
+            yield _FeatureDraft("conflict", name, "Point", (conflict.point[None, :],), properties)
 
 
-def _valued(name: str, value: Quantity | Choice) -> Json:
-    return {name: value.value, f"{name}_source": value.source}
+def _properties(kind: str, part: object) -> Json:
+    """Return what `FIELDS` names of a part; with a value that has a source, its source too."""
+    found: Json = {}
+    for field in FIELDS[kind].split():
+        own, _, shown = field.partition(":")
+        value, name = getattr(part, own), shown or own
+        if isinstance(value, Quantity | Choice):
+            found |= {name: value.value, f"{name}_source": value.source}
+        else:
+            found[name] = value
+    return found
 
 
-def _line(kind: str, name: str, points: Array, properties: Json) -> _Draft:
-    return _Draft(kind, name, "LineString", (points,), properties)
+def _line(kind: str, name: str, points: Array, properties: Json) -> _FeatureDraft:
+    return _FeatureDraft(kind, name, "LineString", (points,), properties)
 
 
 def _polygon(
     kind: str, name: str, outline: Array, holes: Sequence[Array], properties: Json
-) -> _Draft:
+) -> _FeatureDraft:
     """Close the rings, counter-clockwise outside and clockwise inside (RFC 7946, section 3.1.6)."""
     rings = [_turned(outline, 1.0), *(_turned(hole, -1.0) for hole in holes)]
     closed = tuple(np.concatenate([ring, ring[:1]]) for ring in rings)
-    return _Draft(kind, name, "Polygon", closed, properties)
+    return _FeatureDraft(kind, name, "Polygon", closed, properties)
 
 
 def _turned(ring: Array, sign: float) -> Array:

@@ -35,7 +35,7 @@ class Borders(NamedTuple):
     right: Array
 
 
-class _Side(NamedTuple):
+class _BorderIndices(NamedTuple):
     """Which of its road's borders, counted from the left, are a lane's left and right ones."""
 
     left: int
@@ -45,7 +45,7 @@ class _Side(NamedTuple):
 class _RoadDraft(NamedTuple):
     line: Array
     offsets_m: list[float]
-    sides: dict[str, _Side]
+    sides: dict[str, _BorderIndices]
 
 
 def lane_borders(world: World) -> dict[str, Borders]:
@@ -85,7 +85,7 @@ def _roads(world: World, lanes: Mapping[str, Lane]) -> dict[str, _RoadDraft]:
     for lane in world.lanes:
         if lane.id not in placed:
             half = lane.width_m.value / 2
-            side = _Side(1, 0) if lane.reverse else _Side(0, 1)
+            side = _BorderIndices(1, 0) if lane.reverse else _BorderIndices(0, 1)
             line = _distinct(lane.centerline[::-1] if lane.reverse else lane.centerline)
             found[f"lane {lane.id}"] = _RoadDraft(line, [half, -half], {lane.id: side})
     return found
@@ -101,7 +101,7 @@ def _distinct(line: Array) -> Array:
 
 def _road(line: Array, lanes: Sequence[Lane]) -> _RoadDraft:
     offsets: list[float] = []
-    sides: dict[str, _Side] = {}
+    sides: dict[str, _BorderIndices] = {}
     for lane in sorted(lanes, key=lambda lane: -lane.left_of_reference_m):
         left = lane.left_of_reference_m + lane.width_m.value / 2
         right = lane.left_of_reference_m - lane.width_m.value / 2
@@ -111,7 +111,9 @@ def _road(line: Array, lanes: Sequence[Lane]) -> _RoadDraft:
             offsets.append(left)
         offsets.append(right)
         outer = len(offsets) - 2
-        sides[lane.id] = _Side(outer + 1, outer) if lane.reverse else _Side(outer, outer + 1)
+        sides[lane.id] = (
+            _BorderIndices(outer + 1, outer) if lane.reverse else _BorderIndices(outer, outer + 1)
+        )
     return _RoadDraft(line, offsets, sides)
 
 

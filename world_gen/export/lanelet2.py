@@ -15,7 +15,7 @@ from foretwin.world_gen.export.lane_borders import Borders, lane_borders
 from foretwin.world_gen.export.lane_markings import SIDES, lane_markings
 from foretwin.world_gen.export.lanelet2_markings import VIRTUAL, border_tags
 from foretwin.world_gen.export.lanelet2_orientation import oriented
-from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
+from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
 from foretwin.world_gen.export.lanelet2_rules import LaneletRules, add_rules
 from foretwin.world_gen.export.lanelet2_surroundings import add_intersection_areas, add_surroundings
 from foretwin.world_gen.export.lanelets import (
@@ -30,9 +30,12 @@ from foretwin.world_gen.export.road_heights import RoadHeights
 AUTOWARE_MAP_NAME = "lanelet2_map.osm"
 """A map of this name gets the projector file under the name that Autoware looks for beside it."""
 _SUBTYPES: dict[LaneKind, str] = {
-    "driving": "road", "bus": "bus_lane", "bicycle": "bicycle_lane", "parking": "parking",
+    "driving": "road",
+    "bus": "bus_lane",
+    "bicycle": "bicycle_lane",
+    "parking": "parking",
     "tram": "rail",
-}  # fmt: skip
+}
 _PARTICIPANTS: dict[LaneKind, tuple[str, ...]] = {
     "driving": ("vehicle",),
     "bus": ("vehicle:bus", "vehicle:emergency", "vehicle:taxi"),
@@ -83,18 +86,18 @@ def lanelet2_map(world: World, *, crosswalk_rules: bool = False) -> Lanelet2Map:
 def _add_lanelet(
     name: str,
     tags: Tags,
-    members: dict[str, list[Member]],
+    members: dict[str, list[RelationMember]],
     ids: dict[str, int],
     rules: LaneletRules,
     drawn: Lanelet2Map,
 ) -> None:
-    mine = [Member("relation", rule, "regulatory_element") for rule in rules.of(name)]
+    mine = [RelationMember("relation", rule, "regulatory_element") for rule in rules.of(name)]
     drawn.relation([*members[name], *mine], tags, number=ids[name])
 
 
 def _lane_members(
     world: World, borders: dict[str, Borders], heights: RoadHeights, drawn: Lanelet2Map
-) -> dict[str, list[Member]]:
+) -> dict[str, list[RelationMember]]:
     """Draw the borders of lanes, each once, and return them as left and right of every lane."""
     nodes = {
         lane.id: tuple(
@@ -103,10 +106,10 @@ def _lane_members(
         for lane in world.lanes
     }
     markings = lane_markings(world, borders)
-    found: dict[str, list[Member]] = {}
+    found: dict[str, list[RelationMember]] = {}
     for lane in world.lanes:
         found[lane.id] = [
-            Member("way", drawn.road_way(line, border_tags(markings[lane.id, side])), side)
+            RelationMember("way", drawn.road_way(line, border_tags(markings[lane.id, side])), side)
             for side, line in zip(SIDES, nodes[lane.id], strict=True)
         ]
     return found
@@ -114,14 +117,14 @@ def _lane_members(
 
 def _connection_members(
     world: World, borders: dict[str, Borders], heights: RoadHeights, drawn: Lanelet2Map
-) -> dict[str, list[Member]]:
-    found: dict[str, list[Member]] = {}
+) -> dict[str, list[RelationMember]]:
+    found: dict[str, list[RelationMember]] = {}
     for connection in world.connections:
         if connection.id not in borders:
             continue
         lines = zip(SIDES, oriented(borders[connection.id]), strict=True)
         found[connection.id] = [
-            Member(
+            RelationMember(
                 "way",
                 drawn.road_way(
                     drawn.road_nodes(line, heights.along(line, connection.layer)), VIRTUAL
@@ -179,7 +182,7 @@ def _crosswalk(crossing: Crossing, drawn: Lanelet2Map) -> int:
     for name, edge in zip(SIDES, crosswalk_edges(crossing), strict=True):
         nodes = tuple(drawn.node(x, y, 0.0) for x, y in edge.tolist())
         way = drawn.way(nodes, paint if is_marked(crossing) else VIRTUAL)
-        sides.append(Member("way", way, name))
+        sides.append(RelationMember("way", way, name))
     return drawn.relation(
         sides,
         {

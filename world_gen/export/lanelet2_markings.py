@@ -7,9 +7,12 @@ from foretwin.world_gen.export.lanelet2_primitives import Tags
 
 VIRTUAL: Tags = {"type": "virtual"}
 _TYPES = {
-    "thin": "line_thin", "thick": "line_thick", "kerb": "curbstone", "edge": "road_border",
+    "thin": "line_thin",
+    "thick": "line_thick",
+    "kerb": "curbstone",
+    "edge": "road_border",
     "none": "virtual",
-}  # fmt: skip
+}
 
 
 def border_tags(marking: Marking) -> dict[str, str]:

@@ -18,7 +18,7 @@ Tags = Mapping[str, str]
 LICENSE_URL = "https://opendatacommons.org/licenses/odbl/1-0/"
 
 
-class Member(NamedTuple):
+class RelationMember(NamedTuple):
     """One member of a relation."""
 
     kind: Literal["way", "relation"]
@@ -28,7 +28,7 @@ class Member(NamedTuple):
 
 class _Relation(NamedTuple):
     id: int
-    members: Sequence[Member]
+    members: Sequence[RelationMember]
     tags: Tags
 
 
@@ -89,7 +89,9 @@ class Lanelet2Map:
         self._ways.append((way, nodes, tags))
         return way
 
-    def relation(self, members: Sequence[Member], tags: Tags, *, number: int | None = None) -> int:
+    def relation(
+        self, members: Sequence[RelationMember], tags: Tags, *, number: int | None = None
+    ) -> int:
         """Add a relation, under an id from `new_id` where one is given."""
         number = self.new_id() if number is None else number
         self._relations.append(_Relation(number, members, tags))

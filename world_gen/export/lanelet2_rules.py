@@ -12,7 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.signals import Signal, SignalPlan
 from foretwin.contracts.world import Conflict, Connection, Lane, StopLine, World
 from foretwin.geometry.polyline import left_of
-from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
+from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
 
 LIGHT_WIDTH_M = 0.35
 LIGHT_HEIGHT_M = 0.9
@@ -111,8 +111,8 @@ class _StopLines:
         return self._drawn.way(nodes, tags)
 
 
-def _refers(ways: Iterable[int], role: str) -> list[Member]:
-    return [Member("way", way, role) for way in ways]
+def _refers(ways: Iterable[int], role: str) -> list[RelationMember]:
+    return [RelationMember("way", way, role) for way in ways]
 
 
 def _rule(subtype: str, **tags: str) -> dict[str, str]:
@@ -208,7 +208,7 @@ def _add_all_way_stops(
             entering.setdefault(connection.junction_id, []).append(connection.from_lane_id)
     for junction in sorted(entering):
         lanes = list(dict.fromkeys(entering[junction]))
-        members = [Member("relation", ids[name], "yield") for name in lanes]
+        members = [RelationMember("relation", ids[name], "yield") for name in lanes]
         ways = [lines.way((name,)) for name in lanes]
         if all(way is not None for way in ways):  # one for each lanelet, or none
             members += _refers((way for way in ways if way is not None), "ref_line")
@@ -241,8 +241,8 @@ def _add_right_of_way(
         line = lines.where_it_waits(connections[loser], conflict)
         waits.setdefault((loser, fallback, line), []).append(winner)
     for (loser, fallback, line), winners in waits.items():
-        members = [Member("relation", ids[loser], "yield")]
-        members += [Member("relation", ids[name], "right_of_way") for name in winners]
+        members = [RelationMember("relation", ids[loser], "yield")]
+        members += [RelationMember("relation", ids[name], "right_of_way") for name in winners]
         members += _refers([] if line is None else [line], "ref_line")
         tags = _rule("right_of_way", **({"fallback": "yes"} if fallback else {}))
         rules.add(drawn.relation(members, tags), [loser, *winners])
@@ -283,7 +283,7 @@ def _add_crosswalk_rules(
             continue
         nodes = tuple(drawn.node(x, y, 0.0) for x, y in list(band.exterior.coords)[:-1])
         tags: Tags = {"type": "crosswalk_polygon", "area": "yes"}
-        members = [Member("relation", crosswalks[crossing.id], "refers")]
+        members = [RelationMember("relation", crosswalks[crossing.id], "refers")]
         members += _refers([drawn.way(nodes, tags)], "crosswalk_polygon")
         line = lines.way(names)
         members += _refers([] if line is None else [line], "ref_line")

@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import World
-from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, Member, Tags
+from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
 
 
 def add_surroundings(world: World, drawn: Lanelet2Map) -> None:
@@ -62,5 +62,5 @@ def _add_area(
     turned = shapely.orient_polygons(polygon, exterior_cw=True)
     for role, ring in (("outer", turned.exterior), *(("inner", r) for r in turned.interiors)):
         nodes = tuple(drawn.node(x, y, 0.0) for x, y in list(ring.coords)[:-1])
-        members.append(Member("way", drawn.way((*nodes, nodes[0]), edge), role))
+        members.append(RelationMember("way", drawn.way((*nodes, nodes[0]), edge), role))
     drawn.relation(members, {"type": "multipolygon", "location": "urban", **tags})

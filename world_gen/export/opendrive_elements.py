@@ -15,14 +15,20 @@ from foretwin.world_gen.export.xml_text import legal
 Version = Literal["1.8", "1.4"]
 LANE_TYPE = {
     "1.8": {
-        "driving": "driving", "bus": "bus", "bicycle": "biking", "parking": "parking",
+        "driving": "driving",
+        "bus": "bus",
+        "bicycle": "biking",
+        "parking": "parking",
         "tram": "tram",
     },
     "1.4": {
-        "driving": "driving", "bus": "restricted", "bicycle": "biking", "parking": "parking",
+        "driving": "driving",
+        "bus": "restricted",
+        "bicycle": "biking",
+        "parking": "parking",
         "tram": "tram",
     },
-}  # fmt: skip
+}
 """1.4 has no bus lanes."""
 ROAD_TYPE = {
     "motorway": ("motorway", "motorway"),
@@ -37,9 +43,12 @@ ROAD_TYPE = {
 }
 """Type of a road by OSM's class in towns and, where faster is allowed, in the open country."""
 IN_1_4 = {
-    "townExpressway": "town", "townArterial": "town", "townCollector": "town",
-    "townLocal": "town", "townPrivate": "town",
-}  # fmt: skip
+    "townExpressway": "town",
+    "townArterial": "town",
+    "townCollector": "town",
+    "townLocal": "town",
+    "townPrivate": "town",
+}
 TOWN_KMH = 70.0
 LINE_M = 0.12
 """Width of a lane marking."""

@@ -71,9 +71,14 @@ def _things(world: World, network: OdrNetwork) -> Iterator[_Thing]:
     for building in world.buildings:
         bottom = building.min_height_m
         yield _Thing(
-            "building", "", building.id, (building.outline, *building.holes), bottom,
-            max(building.height_m.value - bottom, 0.0), grounded=True,
-        )  # fmt: skip
+            "building",
+            "",
+            building.id,
+            (building.outline, *building.holes),
+            bottom,
+            max(building.height_m.value - bottom, 0.0),
+            grounded=True,
+        )
     for area in world.islands:
         yield _Thing(
             "trafficIsland", "", area.id, (area.outline, *area.holes), 0.0, ISLAND_HEIGHT_M

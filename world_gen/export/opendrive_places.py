@@ -78,7 +78,7 @@ class _PlainEnd(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Place:
+class _RoadJoint:
     ends: list[_PlainEnd] = field(default_factory=list)
     connections: list[Connection] = field(default_factory=list)
 
@@ -126,20 +126,20 @@ def network_of(world: World) -> OdrNetwork:
     )
 
 
-def _places(world: World, lanes: Mapping[str, Lane]) -> dict[str, _Place]:
-    found: dict[str, _Place] = {}
+def _places(world: World, lanes: Mapping[str, Lane]) -> dict[str, _RoadJoint]:
+    found: dict[str, _RoadJoint] = {}
     for road in world.roads:
         if not any(i in lanes for i in road.lane_ids):
             continue
         for key, at_end in ((road.from_place, False), (road.to_place, True)):
             if key is not None:
-                found.setdefault(key, _Place()).ends.append(_PlainEnd(road, at_end))
+                found.setdefault(key, _RoadJoint()).ends.append(_PlainEnd(road, at_end))
     for connection in world.connections:
-        found.setdefault(connection.place_id, _Place()).connections.append(connection)
+        found.setdefault(connection.place_id, _RoadJoint()).connections.append(connection)
     return found
 
 
-def _goes_on(place: _Place, lanes: Mapping[str, Lane]) -> bool:
+def _goes_on(place: _RoadJoint, lanes: Mapping[str, Lane]) -> bool:
     """Return whether two roads meet in a point and lanes of one lead straight into the other."""
     if len(place.ends) != 2 or place.connections:
         return False
@@ -173,7 +173,7 @@ def _outward(end: _PlainEnd) -> Array:
     return unit(line[-1] - line[-2] if end.at_end else line[0] - line[1])
 
 
-def _headings(joined: Sequence[_Place]) -> dict[tuple[str, bool], Array]:
+def _headings(joined: Sequence[_RoadJoint]) -> dict[tuple[str, bool], Array]:
     """Return the direction that both roads share where one goes on in the other."""
     found: dict[tuple[str, bool], Array] = {}
     for place in joined:

@@ -180,10 +180,12 @@ def _strips(lanes: Sequence[Lane], side: DrivingSide) -> tuple[list[OdrLane], fl
     ordered = sorted(lanes, key=lambda lane: -lane.left_of_reference_m)
     centre = _lane_zero(ordered, side)
     edges = [
-        (lane.left_of_reference_m + lane.width_m.value / 2.0,
-         lane.left_of_reference_m - lane.width_m.value / 2.0)
+        (
+            lane.left_of_reference_m + lane.width_m.value / 2.0,
+            lane.left_of_reference_m - lane.width_m.value / 2.0,
+        )
         for lane in ordered
-    ]  # fmt: skip
+    ]
     left: list[tuple[Lane | None, float]] = []
     right: list[tuple[Lane | None, float]] = []
     zero_m = edges[centre - 1][1] if centre else edges[0][0]

@@ -50,9 +50,15 @@ def add_signals(
         for road, mine in _by_road(signal.lane_ids, lanes, network):
             own = next(ids)
             _add(
-                elements[road.id], road, _ruled(road, mine), own, _light(signal), signal.position,
-                signal.yaw_rad, version,
-            )  # fmt: skip
+                elements[road.id],
+                road,
+                _ruled(road, mine),
+                own,
+                _light(signal),
+                signal.position,
+                signal.yaw_rad,
+                version,
+            )
             groups.setdefault(signal.group_id, []).append(own)
             into = leads_into.setdefault(signal.group_id, set())
             into.update(junction_of[lane.id] for lane in mine if lane.id in junction_of)

@@ -76,8 +76,9 @@ def _figure(world: World, report: WorldReport) -> Figure:
         _draw(whole, world, view)
         top = 0.57
     title = _title(world, report)
-    figure.text(0.01, 0.972, title, fontsize=min(18.0, 1550.0 / len(title)), weight="bold",
-                va="center")  # fmt: skip
+    figure.text(
+        0.01, 0.972, title, fontsize=min(18.0, 1550.0 / len(title)), weight="bold", va="center"
+    )
     figure.text(0.01, 0.945, _subtitle(world), fontsize=10.5, va="center", color="#444444")
     figure.text(0.99, 0.012, world.attribution, fontsize=12, ha="right", weight="bold")
     draw_legend(figure)

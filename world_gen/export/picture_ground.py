@@ -54,9 +54,10 @@ def draw_ground(axes: Axes, world: World, view: View) -> None:
         style = {"linestyle": DASH[source], "linewidth": 0.9, "zorder": 2.0}
         _areas(axes, view, islands, facecolor=ISLAND, edgecolor=ISLAND_EDGE, **style)
     axes.add_collection(
-        LineCollection(list(world.kerbs), colors=KERB, linewidths=1.2 if view.close else 0.6,
-                       zorder=4.7)
-    )  # fmt: skip
+        LineCollection(
+            list(world.kerbs), colors=KERB, linewidths=1.2 if view.close else 0.6, zorder=4.7
+        )
+    )
     _tunnels_and_decks(axes, world, view)
     _buildings(axes, world, view)
     _crossings(axes, world, view)
@@ -107,8 +108,9 @@ def _tunnels_and_decks(axes: Axes, world: World, view: View) -> None:
     below = [_edges(road) for road in near if road.tunnel or road.layer < 0]
     above = [_edges(road) for road in near if not road.tunnel and road.layer > 0]
     for roads, fill, edge, alpha, order in (
-        (below, TUNNEL, TUNNEL, 0.35, 2.2), (above, ROAD, DECK_EDGE, 1.0, 6.6),
-    ):  # fmt: skip
+        (below, TUNNEL, TUNNEL, 0.35, 2.2),
+        (above, ROAD, DECK_EDGE, 1.0, 6.6),
+    ):
         if roads:
             decks = [np.concatenate([left, right[::-1]]) for left, right in roads]
             axes.add_collection(
@@ -116,10 +118,13 @@ def _tunnels_and_decks(axes: Axes, world: World, view: View) -> None:
             )
             axes.add_collection(
                 LineCollection(
-                    [line for sides in roads for line in sides], colors=edge, linewidths=1.6,
-                    linestyles="-" if alpha == 1.0 else "--", zorder=order + 0.05,
+                    [line for sides in roads for line in sides],
+                    colors=edge,
+                    linewidths=1.6,
+                    linestyles="-" if alpha == 1.0 else "--",
+                    zorder=order + 0.05,
                 )
-            )  # fmt: skip
+            )
 
 
 def _edges(road: Road) -> tuple[Array, Array]:

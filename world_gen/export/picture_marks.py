@@ -55,18 +55,32 @@ def scale_bar(axes: Axes, view: View) -> None:
     x, y = view.west_m + 0.025 * view.width_m, view.south_m + 0.03 * height
     axes.plot([x, x + size], [y, y], color="black", linewidth=4, solid_capstyle="butt", zorder=10)
     axes.text(
-        x + size / 2, y + 0.008 * height, f"{size} m", ha="center", va="bottom", fontsize=11,
-        zorder=10, bbox=_BOX,
-    )  # fmt: skip
+        x + size / 2,
+        y + 0.008 * height,
+        f"{size} m",
+        ha="center",
+        va="bottom",
+        fontsize=11,
+        zorder=10,
+        bbox=_BOX,
+    )
 
 
 def north_arrow(axes: Axes) -> None:
     """Draw an arrow to the north at the upper right."""
     axes.annotate(
-        "N", xy=(0.97, 0.975), xytext=(0.97, 0.905), xycoords="axes fraction",
-        ha="center", va="center", fontsize=14, weight="bold", zorder=10,
-        arrowprops={"arrowstyle": "-|>", "lw": 2.5, "color": "black"}, bbox=_BOX,
-    )  # fmt: skip
+        "N",
+        xy=(0.97, 0.975),
+        xytext=(0.97, 0.905),
+        xycoords="axes fraction",
+        ha="center",
+        va="center",
+        fontsize=14,
+        weight="bold",
+        zorder=10,
+        arrowprops={"arrowstyle": "-|>", "lw": 2.5, "color": "black"},
+        bbox=_BOX,
+    )
 
 
 def number_junctions(axes: Axes, world: World, view: View) -> None:
@@ -75,9 +89,16 @@ def number_junctions(axes: Axes, world: World, view: View) -> None:
         at = local_from_geo(world.frame, junction.summary.lat, junction.summary.lon)
         if view.holds(at):
             axes.annotate(
-                str(number), tuple(at), xytext=(7, 7), textcoords="offset points", fontsize=8.5,
-                weight="bold", zorder=11, bbox={**_BOX, "pad": 0.8}, annotation_clip=True,
-            )  # fmt: skip
+                str(number),
+                tuple(at),
+                xytext=(7, 7),
+                textcoords="offset points",
+                fontsize=8.5,
+                weight="bold",
+                zorder=11,
+                bbox={**_BOX, "pad": 0.8},
+                annotation_clip=True,
+            )
 
 
 def _line(colour: str, label: str, style: Any = "-", width: float = 2.0) -> Line2D:
@@ -86,9 +107,16 @@ def _line(colour: str, label: str, style: Any = "-", width: float = 2.0) -> Line
 
 def _dot(marker: str, edge: str, fill: str, label: str, size: float = 8.0) -> Line2D:
     return Line2D(
-        [], [], marker=marker, linestyle="", color=fill, markeredgecolor=edge, markersize=size,
-        markeredgewidth=1.4, label=label,
-    )  # fmt: skip
+        [],
+        [],
+        marker=marker,
+        linestyle="",
+        color=fill,
+        markeredgecolor=edge,
+        markersize=size,
+        markeredgewidth=1.4,
+        label=label,
+    )
 
 
 def draw_legend(figure: Figure) -> None:
@@ -141,21 +169,34 @@ def draw_legend(figure: Figure) -> None:
     ]
     heights = [
         Patch(facecolor=_BUILDING, edgecolor="#3f3226", linewidth=1.4, label="height tagged"),
-        Patch(facecolor=_BUILDING, edgecolor=_GUESSED, hatch=HATCH["inferred"],
-              label="height from levels"),
-        Patch(facecolor=_BUILDING, edgecolor=_GUESSED, hatch=HATCH["default"],
-              label="height default"),
-        Patch(facecolor=_BUILDING, alpha=0.35, linestyle=":", edgecolor=_GUESSED,
-              label="open below"),
-    ]  # fmt: skip
+        Patch(
+            facecolor=_BUILDING,
+            edgecolor=_GUESSED,
+            hatch=HATCH["inferred"],
+            label="height from levels",
+        ),
+        Patch(
+            facecolor=_BUILDING, edgecolor=_GUESSED, hatch=HATCH["default"], label="height default"
+        ),
+        Patch(
+            facecolor=_BUILDING, alpha=0.35, linestyle=":", edgecolor=_GUESSED, label="open below"
+        ),
+    ]
     heights.insert(0, Patch(facecolor=PARKING, label="parking lane"))
     heights.append(Patch(facecolor="none", edgecolor="none", label=""))
     columns: list[list[Any]] = [sources, lanes, turns, waits, signs, ground, heights]
     figure.legend(
-        handles=[entry for column in columns for entry in column], loc="lower left",
-        bbox_to_anchor=(0.008, 0.022), ncols=len(columns), fontsize=9.2, frameon=False,
-        columnspacing=1.3, handlelength=2.2, handletextpad=0.6, labelcolor="#222222",
-    )  # fmt: skip
+        handles=[entry for column in columns for entry in column],
+        loc="lower left",
+        bbox_to_anchor=(0.008, 0.022),
+        ncols=len(columns),
+        fontsize=9.2,
+        frameon=False,
+        columnspacing=1.3,
+        handlelength=2.2,
+        handletextpad=0.6,
+        labelcolor="#222222",
+    )
 
 
 def draw_height_scale(figure: Figure, box: tuple[float, float, float, float]) -> None:
@@ -182,16 +223,24 @@ def draw_panel(figure: Figure, world: World, report: WorldReport, *, top: float)
     ]
     for note in report.notes:
         lines += textwrap.wrap(
-            f"{note.kind} ({note.count})", _PANEL_COLUMNS, initial_indent="note: ",
+            f"{note.kind} ({note.count})",
+            _PANEL_COLUMNS,
+            initial_indent="note: ",
             subsequent_indent="      ",
-        )  # fmt: skip
+        )
     room = _PANEL_LINES if world.bounds_m is None else 2 * _PANEL_LINES - 8
     if len(lines) > room:
         lines = [*lines[: room - 1], "… more in the report"]
     figure.text(
-        0.612, top, "\n".join(lines), fontsize=9.2, va="top", color="#222222", linespacing=1.25,
+        0.612,
+        top,
+        "\n".join(lines),
+        fontsize=9.2,
+        va="top",
+        color="#222222",
+        linespacing=1.25,
         family="monospace",
-    )  # fmt: skip
+    )
 
 
 def _listed(report: WorldReport) -> list[str]:

@@ -15,8 +15,13 @@ from foretwin.contracts.world import Turn
 
 GROUND, ROAD, JUNCTION, KERB, SIDEWALK = "#e9ece4", "#c9ccd1", "#b9bdc4", "#7c828a", "#d9d3c7"
 LANE_EDGE, LANE, BUS, BICYCLE, TRAM, RING = (
-    "#ffffff", "#4c5560", "#a8326e", "#00857a", "#6d4c41", "#2b6f9e",
-)  # fmt: skip
+    "#ffffff",
+    "#4c5560",
+    "#a8326e",
+    "#00857a",
+    "#6d4c41",
+    "#2b6f9e",
+)
 ISLAND, ISLAND_EDGE = "#b7cfa1", "#6f8f56"
 DECK_EDGE, TUNNEL, PARKING = "#20262d", "#8d7fa8", "#aebfd4"
 TURN_COLOUR: Mapping[Turn, str] = {

@@ -80,15 +80,11 @@ def _draw_lanes(axes: Axes, world: World, view: View) -> None:
         key = up, down, _colour(lane), counted.get(lane.road_id, "inferred")
         middles.setdefault(key, []).append(lane.centerline)
     for (up, down, source), lines in groups.items():
-        _lines(
-            axes, lines, colors=LANE_EDGE, linestyles=DASH[source], alpha=0.45 if down else 1.0,
-            linewidths=1.2 if view.close else 0.5, zorder=4.5 + _order(up),
-        )  # fmt: skip
+        style = {"colors": LANE_EDGE, "linestyles": DASH[source], "alpha": 0.45 if down else 1.0}
+        _lines(axes, lines, linewidths=1.2 if view.close else 0.5, zorder=4.5 + _order(up), **style)
     for (up, down, colour, source), lines in middles.items():
-        _lines(
-            axes, lines, colors=colour, linestyles=DASH[source], alpha=0.45 if down else 1.0,
-            linewidths=1.0 if view.close else 0.5, zorder=5.0 + _order(up),
-        )  # fmt: skip
+        style = {"colors": colour, "linestyles": DASH[source], "alpha": 0.45 if down else 1.0}
+        _lines(axes, lines, linewidths=1.0 if view.close else 0.5, zorder=5.0 + _order(up), **style)
     if view.close:
         _draw_arrows(axes, (lane for lane in near if lane.kind != "parking"), view)
 
@@ -121,16 +117,14 @@ def _draw_arrows(axes: Axes, lanes: Iterable[Lane], view: View) -> None:
             else:
                 heads.append(_head(tip, ahead, size))
         if heads:
-            axes.add_collection(
-                PolyCollection(
-                    heads,
-                    facecolors=colour if lane.direction_source == "tagged" else "white",
-                    edgecolors=colour,
-                    linewidths=0.9,
-                    alpha=fade,
-                    zorder=6.0 + _order(lane.layer),
-                )
-            )
+            order, tagged = 6.0 + _order(lane.layer), lane.direction_source == "tagged"
+            _filled(axes, heads, colour, tagged, linewidths=0.9, alpha=fade, zorder=order)
+
+
+def _filled(axes: Axes, shapes: list[Array], colour: str, tagged: bool, **style: Any) -> None:
+    """Fill shapes whose value is tagged; of others draw the edge alone."""
+    inner = colour if tagged else "white"
+    axes.add_collection(PolyCollection(shapes, facecolors=inner, edgecolors=colour, **style))
 
 
 def _head(tip: Array, ahead: Array, size: float) -> Array:
@@ -149,18 +143,11 @@ def _draw_turns(axes: Axes, lane: Lane, at: Array, ahead: Array, size: float) ->
         way = np.array([cos * ahead[0] - sin * ahead[1], sin * ahead[0] + cos * ahead[1]])
         tip = fork + reach[turn] * way
         colour, order = TURN_COLOUR[turn], 6.3 + _order(lane.layer)
-        axes.add_collection(
-            LineCollection(
-                [np.array([foot, fork, tip - 0.7 * size * way])], colors=colour, zorder=order,
-                linewidths=1.6, linestyles=DASH["tagged"] if tagged else (0, (2, 1)),
-            )
-        )  # fmt: skip
-        axes.add_collection(
-            PolyCollection(
-                [_head(tip, way, 0.75 * size)], facecolors=colour if tagged else "white",
-                edgecolors=colour, linewidths=1.0, zorder=order + 0.1,
-            )
-        )  # fmt: skip
+        shaft, dash = np.array([foot, fork, tip - 0.7 * size * way]), (0, (2, 1))
+        style = {"colors": colour, "linestyles": DASH["tagged"] if tagged else dash}
+        axes.add_collection(LineCollection([shaft], zorder=order, linewidths=1.6, **style))
+        head = _head(tip, way, 0.75 * size)
+        _filled(axes, [head], colour, tagged, linewidths=1.0, zorder=order + 0.1)
 
 
 def _draw_connections(axes: Axes, world: World, view: View) -> None:
@@ -168,18 +155,19 @@ def _draw_connections(axes: Axes, world: World, view: View) -> None:
     groups: dict[tuple[bool, Turn, bool, bool], list[Array]] = {}
     for connection in world.connections:
         if view.meets(connection.centerline):
-            key = (
-                connection.layer > 0, connection.turn, bool(connection.junction_id),
-                source.get(connection.from_lane_id) == "tagged",
-            )  # fmt: skip
+            tagged = source.get(connection.from_lane_id) == "tagged"
+            key = connection.layer > 0, connection.turn, bool(connection.junction_id), tagged
             groups.setdefault(key, []).append(connection.centerline)
     for (up, turn, in_junction, tagged), lines in groups.items():
         _lines(
-            axes, lines, colors=TURN_COLOUR[turn],
+            axes,
+            lines,
+            colors=TURN_COLOUR[turn],
             linestyles=DASH["tagged" if tagged else "inferred"],
-            alpha=0.9 if in_junction else 0.5, zorder=5.5 + _order(up),
+            alpha=0.9 if in_junction else 0.5,
+            zorder=5.5 + _order(up),
             linewidths=(1.8 if tagged else 1.3) * (1.0 if view.close else 0.45),
-        )  # fmt: skip
+        )
 
 
 def _draw_stop_lines(axes: Axes, world: World, view: View) -> None:
@@ -189,22 +177,36 @@ def _draw_stop_lines(axes: Axes, world: World, view: View) -> None:
             groups.setdefault((line.control.value, line.control.source), []).append(line.ends)
     for (control, source), lines in groups.items():
         _lines(
-            axes, lines, colors=LINE_COLOUR.get(control, LINE_COLOUR["none"]),
-            linestyles=DASH[source], capstyle="butt", zorder=6.0,
+            axes,
+            lines,
+            colors=LINE_COLOUR.get(control, LINE_COLOUR["none"]),
+            linestyles=DASH[source],
+            capstyle="butt",
+            zorder=6.0,
             linewidths=(4.0 if control != "none" else 2.2) * (1.0 if view.close else 0.4),
-        )  # fmt: skip
+        )
 
 
 def _draw_conflicts(axes: Axes, world: World, view: View) -> None:
     for kind, marker, colour in (
-        ("crossing", "x", CROSSING_CONFLICT), ("merging", "+", MERGING_CONFLICT),
-    ):  # fmt: skip
+        ("crossing", "x", CROSSING_CONFLICT),
+        ("merging", "+", MERGING_CONFLICT),
+    ):
         points = [c.point for c in world.conflicts if c.kind == kind and view.holds(c.point)]
         if points:
-            axes.plot(
-                *np.array(points).T, marker, color=colour, markersize=4.0, markeredgewidth=0.9,
-                linestyle="", zorder=7.5, alpha=0.85,
-            )  # fmt: skip
+            at, style = np.array(points), {"marker": marker, "color": colour, "alpha": 0.85}
+            _dots(axes, at, markersize=4.0, markeredgewidth=0.9, zorder=7.5, **style)
+
+
+def _dots(axes: Axes, at: Array, **style: Any) -> None:
+    """Draw marks at points (N, 2) or (2,)."""
+    axes.plot(*at.T, linestyle="", **style)
+
+
+def _sign(axes: Axes, at: Array, marker: str, colour: str, tagged: bool, **style: float) -> None:
+    """Draw a mark at (2,), filled where its value is tagged."""
+    inner = colour if tagged else "white"
+    _dots(axes, at, marker=marker, color=inner, markeredgecolor=colour, **style)
 
 
 def _draw_who_waits(axes: Axes, world: World, view: View) -> None:
@@ -230,11 +232,8 @@ def _draw_mark(
     if not view.holds(at):
         return
     colour = LINE_COLOUR["stop"] if shape == "8" else WAITS
-    axes.plot(
-        *(at - 1.6 * ahead), marker=shape, markersize=9.0,
-        color=colour if source == "tagged" else "white",
-        markeredgecolor=colour, markeredgewidth=1.4, linestyle="", zorder=7.8,
-    )  # fmt: skip
+    style = {"markersize": 9.0, "markeredgewidth": 1.4, "zorder": 7.8}
+    _sign(axes, at - 1.6 * ahead, shape, colour, source == "tagged", **style)
 
 
 def _rules_by_lane(
@@ -271,16 +270,20 @@ def _mark(
 
 def _draw_signals(axes: Axes, world: World, view: View) -> None:
     for signal in world.signals:
-        x, y = signal.position[:2]
-        if not view.holds(signal.position[:2]):
+        at = signal.position[:2]
+        if not view.holds(at):
             continue
         tagged = signal.source == "tagged"
-        axes.plot(
-            x, y, "o", markersize=12 if view.close else 3.5, color=SIGNAL if tagged else "white",
-            markeredgecolor=SIGNAL, markeredgewidth=1.6, zorder=8.6,
-        )  # fmt: skip
+        style = {"markersize": 12 if view.close else 3.5, "markeredgewidth": 1.6, "zorder": 8.6}
+        _sign(axes, at, "o", SIGNAL, tagged, **style)
         if view.close:
             axes.annotate(
-                signal.group_id.rpartition(":")[2], (x, y), ha="center", va="center", zorder=9.0,
-                fontsize=6.5, color="white" if tagged else SIGNAL, annotation_clip=True,
-            )  # fmt: skip
+                signal.group_id.rpartition(":")[2],
+                tuple(at),
+                ha="center",
+                va="center",
+                zorder=9.0,
+                fontsize=6.5,
+                color="white" if tagged else SIGNAL,
+                annotation_clip=True,
+            )

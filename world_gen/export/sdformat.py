@@ -178,9 +178,12 @@ def _stripe(link: StaticLink, name: str, ends: Array, width_m: float, rgba: Rgba
     if long < 0.05:
         return
     link.box(
-        name, (middle[0], middle[1], MARKING_TOP_M / 2), (long, width_m, MARKING_TOP_M),
-        yaw_rad=math.atan2(along[1], along[0]), rgba=rgba,
-    )  # fmt: skip
+        name,
+        (middle[0], middle[1], MARKING_TOP_M / 2),
+        (long, width_m, MARKING_TOP_M),
+        yaw_rad=math.atan2(along[1], along[0]),
+        rgba=rgba,
+    )
 
 
 def _signals(element: Element, world: World) -> None:
@@ -195,9 +198,12 @@ def _signals(element: Element, world: World) -> None:
         for number, (lamp, rgba) in enumerate(_LAMPS):
             at = np.array([x, y]) + 0.11 * facing
             link.box(
-                f"{signal.id}.{lamp}", (at[0], at[1], z + 0.3 * (1 - number)), (0.03, 0.2, 0.2),
-                yaw_rad=signal.yaw_rad, rgba=rgba,
-            )  # fmt: skip
+                f"{signal.id}.{lamp}",
+                (at[0], at[1], z + 0.3 * (1 - number)),
+                (0.03, 0.2, 0.2),
+                yaw_rad=signal.yaw_rad,
+                rgba=rgba,
+            )
 
 
 def _buildings(element: Element, world: World) -> None:

@@ -54,17 +54,24 @@ def gps_sensor(link: Element, vehicle: str, simulator: Simulator, *, above_m: fl
 
 
 def ackermann_plugin(
-    model: Element, vehicle: str, car: VehicleParameters, simulator: Simulator, *,
-    wheel_radius_m: float, track_m: float,
-) -> None:  # fmt: skip
+    model: Element,
+    vehicle: str,
+    car: VehicleParameters,
+    simulator: Simulator,
+    *,
+    wheel_radius_m: float,
+    track_m: float,
+) -> None:
     """Let a twin be driven by velocity and steering, and tell its odometry."""
     if simulator == "classic":
         _classic_ackermann(model, vehicle, car)
         return
     plugin = child(
-        model, "plugin",
-        filename="gz-sim-ackermann-steering-system", name="gz::sim::systems::AckermannSteering",
-    )  # fmt: skip
+        model,
+        "plugin",
+        filename="gz-sim-ackermann-steering-system",
+        name="gz::sim::systems::AckermannSteering",
+    )
     for tag, text in (
         ("left_joint", "rear_left_wheel_joint"),
         ("right_joint", "rear_right_wheel_joint"),

@@ -53,9 +53,15 @@ class StaticLink:
         self._names: set[str] = set()
 
     def box(
-        self, name: str, centre_m: Sequence[float], size_m: Sequence[float], *,
-        yaw_rad: float = 0.0, rgba: Rgba, solid: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        centre_m: Sequence[float],
+        size_m: Sequence[float],
+        *,
+        yaw_rad: float = 0.0,
+        rgba: Rgba,
+        solid: bool = False,
+    ) -> None:
         """Add a box of (length, width, height) around a centre."""
         for part in self._parts(name, solid, rgba):
             pose(part, centre_m[0], centre_m[1], centre_m[2], yaw_rad)
@@ -63,7 +69,7 @@ class StaticLink:
 
     def cylinder(
         self, name: str, centre_m: Sequence[float], radius_m: float, height_m: float, *, rgba: Rgba
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Add an upright cylinder that is only seen."""
         for part in self._parts(name, False, rgba):
             pose(part, centre_m[0], centre_m[1], centre_m[2])
@@ -74,17 +80,27 @@ class StaticLink:
             self._finish(part, geometry, rgba)
 
     def prism(
-        self, name: str, ring: Array, low_m: float, high_m: float, *, rgba: Rgba,
+        self,
+        name: str,
+        ring: Array,
+        low_m: float,
+        high_m: float,
+        *,
+        rgba: Rgba,
         solid: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Add an outline (N, 2) from one height to another, as a box where it is a rectangle."""
         rectangle = rectangle_of(ring)
         if rectangle is not None:
             x, y, length, width, yaw = rectangle
             self.box(
-                name, (x, y, (low_m + high_m) / 2), (length, width, high_m - low_m),
-                yaw_rad=yaw, rgba=rgba, solid=solid,
-            )  # fmt: skip
+                name,
+                (x, y, (low_m + high_m) / 2),
+                (length, width, high_m - low_m),
+                yaw_rad=yaw,
+                rgba=rgba,
+                solid=solid,
+            )
             return
         for part in self._parts(name, solid, rgba):
             pose(part, 0.0, 0.0, low_m)

@@ -99,9 +99,12 @@ def _add_shadow(model: Element, vehicle: SdfVehicle) -> None:
     _body(link, vehicle, solid=vehicle.kind == "shadow")
     car = vehicle.parameters
     _inertial(
-        link, car.mass_kg.value, car.cog_from_rear_axle_m.value, car.cog_height_m.value,
+        link,
+        car.mass_kg.value,
+        car.cog_from_rear_axle_m.value,
+        car.cog_height_m.value,
         _box_inertia(car, car.mass_kg.value, car.yaw_inertia_kgm2.value),
-    )  # fmt: skip
+    )
     child(link, "gravity", "0")
     child(link, "kinematic", "1")
 
@@ -129,9 +132,11 @@ def _add_twin(model: Element, vehicle: SdfVehicle, simulator: Simulator) -> None
     _inertial(body, body_kg, cog_x, cog_z, _box_inertia(car, body_kg, yaw_inertia))
     gps_sensor(body, vehicle.name, simulator, above_m=car.height_m.value)
     effort = (
-        mass * WHEEL_RADIUS_M / 2
+        mass
+        * WHEEL_RADIUS_M
+        / 2
         * max(car.max_drive_accel_mps2.value, car.max_brake_decel_mps2.value)
-    )  # fmt: skip
+    )
     inner = steering_limit_rad(car)
     for side, y in (("left", half_track), ("right", -half_track)):
         _wheel(model, f"rear_{side}_wheel", 0.0, y, wheel_kg, car.friction.value)
@@ -140,18 +145,20 @@ def _add_twin(model: Element, vehicle: SdfVehicle, simulator: Simulator) -> None
         pose(knuckle, wheelbase, y, WHEEL_RADIUS_M)
         _inertial(knuckle, knuckle_kg, 0.0, 0.0, (0.2, 0.2, 0.2))
         _hinge(
-            model, f"front_{side}_steer_joint", "base_link", f"front_{side}_knuckle",
-            axis="0 0 1", limit_rad=inner, rate_radps=car.max_tire_rate_radps.value,
+            model,
+            f"front_{side}_steer_joint",
+            "base_link",
+            f"front_{side}_knuckle",
+            axis="0 0 1",
+            limit_rad=inner,
+            rate_radps=car.max_tire_rate_radps.value,
             damping=STEERING_DAMPING_NMSPRAD,
-        )  # fmt: skip
+        )
         _wheel(model, f"front_{side}_wheel", wheelbase, y, wheel_kg, car.friction.value)
-        _hinge(
-            model, f"front_{side}_wheel_joint", f"front_{side}_knuckle", f"front_{side}_wheel"
-        )  # fmt: skip
+        _hinge(model, f"front_{side}_wheel_joint", f"front_{side}_knuckle", f"front_{side}_wheel")
     ackermann_plugin(
-        model, vehicle.name, car, simulator,
-        wheel_radius_m=WHEEL_RADIUS_M, track_m=2 * half_track,
-    )  # fmt: skip
+        model, vehicle.name, car, simulator, wheel_radius_m=WHEEL_RADIUS_M, track_m=2 * half_track
+    )
 
 
 def track_width_m(car: VehicleParameters) -> float:

@@ -29,7 +29,7 @@ CAR_HALF_WIDTH_M = 1.0
 """Paths must lie so far inside an outline, else the place is paved by what is swept."""
 
 
-class Outlines(NamedTuple):
+class PlaceOutlines(NamedTuple):
     """Simple places: rows of `Surroundings.clusters`, and their polygons."""
 
     rows: tuple[int, ...]
@@ -47,7 +47,7 @@ class _Mouths(NamedTuple):
 
 def simple_outlines(
     around: Surroundings, lanes: LaneSet, connections: Sequence[ConnectionDraft]
-) -> Outlines:
+) -> PlaceOutlines:
     """Return the outlines of places with one node whose paths all lie well inside."""
     row_of, ends = _road_ends(lanes)
     rows: list[int] = []
@@ -62,7 +62,7 @@ def simple_outlines(
             mouths += mine
             nodes.append(cluster.legs[0].xy_m[0])
     if not rows:
-        return Outlines((), np.array([], dtype=object))
+        return PlaceOutlines((), np.array([], dtype=object))
     count = np.array([len(around.clusters[i].legs) for i in rows])
     at = _Mouths(*(points[mouths] for points in ends))
     outward = at.left + at.right - 2.0 * np.repeat(nodes, count, axis=0)
@@ -75,7 +75,7 @@ def simple_outlines(
     place = {around.clusters[i].key: k for k, i in enumerate(rows)}
     fits &= ~_left_by_a_path(shapes, place, connections)
     kept = np.nonzero(fits)[0]
-    return Outlines(tuple(rows[k] for k in kept), shapes[kept])
+    return PlaceOutlines(tuple(rows[k] for k in kept), shapes[kept])
 
 
 def _road_ends(lanes: LaneSet) -> tuple[dict[tuple[int, bool], int], _Mouths]:
@@ -101,9 +101,11 @@ def _road_ends(lanes: LaneSet) -> tuple[dict[tuple[int, bool], int], _Mouths]:
         return np.stack([points[start, 0], points[stop, 1]], axis=1).reshape(-1, 2)
 
     return row_of, _Mouths(
-        left=outward(ends, left, right), left_next=outward(after, left, right),
-        right=outward(ends, right, left), right_next=outward(after, right, left),
-    )  # fmt: skip
+        left=outward(ends, left, right),
+        left_next=outward(after, left, right),
+        right=outward(ends, right, left),
+        right_next=outward(after, right, left),
+    )
 
 
 def _polygons(mouths: _Mouths, count: np.ndarray) -> np.ndarray:

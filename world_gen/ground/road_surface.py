@@ -224,9 +224,11 @@ def _junction_areas(
             else:
                 pieces.setdefault(name, []).append(shape)
     ring_of: dict[int, Junction] = {
-        i: junction for junction in around.junctions for i in junction.inner
+        i: junction
+        for junction in around.junctions
+        for i in junction.inner
         if i in around.ring_edges
-    }  # fmt: skip
+    }
     edge_of = {lane.road_id: lane.key.edge for lane in lanes.lanes.values()}
     for road, shape in zip(lanes.roads, paved.roads, strict=True):
         junction = ring_of.get(edge_of.get(road.id, -1))

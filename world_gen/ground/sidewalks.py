@@ -23,8 +23,12 @@ from foretwin.world_gen.roads.beside_roads import BesideRoads, in_frame
 WIDTH_M = 2.0
 """Width of a sidewalk without a width tag."""
 _SMALLEST_M2 = 1.0
-_BOTH = {"both": ("left", "right"), "yes": ("left", "right"), "left": ("left",),
-         "right": ("right",)}  # fmt: skip
+_BOTH = {
+    "both": ("left", "right"),
+    "yes": ("left", "right"),
+    "left": ("left",),
+    "right": ("right",),
+}
 
 
 def sides_with_sidewalk(tags: Mapping[str, str]) -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -12,9 +11,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.world import IntersectionSummary, JunctionKind
 from foretwin.world_gen.junctions.chains import CarRoads, car_roads
-from foretwin.world_gen.junctions.grouping import Cluster
+from foretwin.world_gen.junctions.grouping import JunctionCluster
 from foretwin.world_gen.junctions.intersections import Junction
-from foretwin.world_gen.junctions.junction_arms import Approach, ClusterRoads, approaches, roads_of
+from foretwin.world_gen.junctions.junction_arms import ArmChains, ClusterRoads, approaches, roads_of
 from foretwin.world_gen.junctions.junction_clusters import cluster_branchings
 from foretwin.world_gen.junctions.junction_control import control_of, lights_of
 from foretwin.world_gen.osm.osm_map import OsmMap
@@ -29,10 +28,8 @@ BESIDE_RAD = math.radians(45.0)
 """The stem of a T meets a road that bends no more, at no smaller angle; else the three make a Y."""
 
 
-def find_intersections(
-    osm: OsmMap, graph: RoadGraph, *, edges: Collection[int] | None = None
-) -> tuple[Junction, ...]:
-    """Return the junctions of a map, by id; with `edges`, those that touch one of these edges.
+def find_intersections(osm: OsmMap, graph: RoadGraph) -> tuple[Junction, ...]:
+    """Return the junctions of a map, by id.
 
     One roundabout is one junction with the nodes where its arms part; so are the crossings of
     dual carriageways, offset branchings close to each other, and corners with slip roads. Where
@@ -41,18 +38,9 @@ def find_intersections(
     no node and do not meet. The result for one place does not depend on the rest of the map.
     """
     roads = car_roads(osm, graph)
-    wanted = None
-    if edges is not None:
-        wanted = {
-            node
-            for index in edges
-            for node in (graph.edges[index].start_node, graph.edges[index].end_node)
-        }
-    places = []
-    for cluster in cluster_branchings(roads, graph, osm.node_tags):
-        place = _place(cluster, roads, osm, graph)
-        if place is not None and (wanted is None or not wanted.isdisjoint(place.nodes)):
-            places.append(place)
+    clusters = cluster_branchings(roads, graph, osm.node_tags)
+    found_places = (_place(cluster, roads, osm, graph) for cluster in clusters)
+    places = [place for place in found_places if place is not None]
     if not places:
         return ()
     centres = np.array([_centre_xy_m(place.cluster, graph) for place in places])
@@ -65,17 +53,19 @@ def find_intersections(
     return tuple(found)
 
 
-class _Place(NamedTuple):
+class _JunctionDraft(NamedTuple):
     """A junction to be: its branchings, its roads and arms, all its graph nodes."""
 
-    cluster: Cluster
+    cluster: JunctionCluster
     around: ClusterRoads
-    arms: tuple[Approach, ...]
+    arms: tuple[ArmChains, ...]
     mini: bool
     nodes: frozenset[int]
 
 
-def _place(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) -> _Place | None:
+def _place(
+    cluster: JunctionCluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph
+) -> _JunctionDraft | None:
     """Return what meets at a cluster; None where no three roads do."""
     around = roads_of(cluster, roads, graph)
     if len(around.leaving) < 2 and cluster.ring is None:
@@ -87,11 +77,11 @@ def _place(cluster: Cluster, roads: CarRoads, osm: OsmMap, graph: RoadGraph) -> 
     if len(arms) < 3 and cluster.ring is None and not (mini and len(arms) == 2):
         return None
     between = [node for chain in around.inside for node in chain.inner_nodes]
-    return _Place(cluster, around, arms, mini, frozenset(cluster.nodes).union(between))
+    return _JunctionDraft(cluster, around, arms, mini, frozenset(cluster.nodes).union(between))
 
 
 def _junction(
-    place: _Place, centre: Array, lat_lon_deg: list[float], osm: OsmMap, graph: RoadGraph
+    place: _JunctionDraft, centre: Array, lat_lon_deg: list[float], osm: OsmMap, graph: RoadGraph
 ) -> Junction:
     cluster, around, arms, mini, nodes = place
     inner = {item.edge.index for chain in around.inside for item in chain.edges}
@@ -132,7 +122,7 @@ def _junction(
     )
 
 
-def _centre_xy_m(cluster: Cluster, graph: RoadGraph) -> tuple[float, float]:
+def _centre_xy_m(cluster: JunctionCluster, graph: RoadGraph) -> tuple[float, float]:
     """Return the mean of the core nodes, of a ring the middle of its line."""
     if cluster.ring is None:
         points = [graph.node_xy_m[node] for node in sorted(cluster.core)]
@@ -146,7 +136,7 @@ def _centre_xy_m(cluster: Cluster, graph: RoadGraph) -> tuple[float, float]:
     return float(centre[0]), float(centre[1])
 
 
-def _kind(cluster: Cluster, arms: tuple[Approach, ...], mini: bool) -> JunctionKind:
+def _kind(cluster: JunctionCluster, arms: tuple[ArmChains, ...], mini: bool) -> JunctionKind:
     if cluster.ring is not None:
         return "roundabout" if cluster.ring.kind == "roundabout" else "circular"
     if mini:
@@ -160,7 +150,7 @@ def _kind(cluster: Cluster, arms: tuple[Approach, ...], mini: bool) -> JunctionK
     return "crossing" if len(arms) > 4 else "other"
 
 
-def _is_merge(arms: tuple[Approach, ...]) -> bool:
+def _is_merge(arms: tuple[ArmChains, ...]) -> bool:
     """Tell whether one-way roads join to one, or one parts, without a turn."""
     if len(arms) != 3 or any(len(item.chains) != 1 for item in arms):
         return False
@@ -176,7 +166,7 @@ def _is_merge(arms: tuple[Approach, ...]) -> bool:
     return abs(math.remainder(a - b, math.tau)) <= MERGE_RAD
 
 
-def _has_through_road(arms: tuple[Approach, ...]) -> bool:
+def _has_through_road(arms: tuple[ArmChains, ...]) -> bool:
     """Tell whether one of three roads meets the other two from the side, as a stem does."""
     for stem in range(3):
         a, b = (arms[i].arm.bearing_rad for i in range(3) if i != stem)
@@ -187,7 +177,7 @@ def _has_through_road(arms: tuple[Approach, ...]) -> bool:
     return False
 
 
-def _is_staggered(arms: tuple[Approach, ...]) -> bool:
+def _is_staggered(arms: tuple[ArmChains, ...]) -> bool:
     """Tell whether a road of four does not go straight on, but meets the other with an offset."""
     pairings = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
 
@@ -206,7 +196,7 @@ def _is_staggered(arms: tuple[Approach, ...]) -> bool:
     return False
 
 
-def _name(cluster: Cluster, arms: tuple[Approach, ...], around: ClusterRoads) -> str:
+def _name(cluster: JunctionCluster, arms: tuple[ArmChains, ...], around: ClusterRoads) -> str:
     """Return the ring's own name, else the names of the roads that meet."""
     names = dict.fromkeys(item.arm.name for item in arms if item.arm.name)
     if cluster.ring is not None:

@@ -10,7 +10,7 @@ import msgspec
 from foretwin.world_gen.junctions.chains import CarRoads, Chain, Ring
 
 
-class Cluster(msgspec.Struct):
+class JunctionCluster(msgspec.Struct):
     """Branchings of one junction; `core` without the far ends of flares and slip roads."""
 
     core: set[int]
@@ -25,15 +25,15 @@ class Grouping:
 
     def __init__(self, roads: CarRoads, xy_m: Mapping[int, tuple[float, float]]) -> None:
         self.xy_m = xy_m
-        self.of: dict[int, Cluster] = {}
+        self.of: dict[int, JunctionCluster] = {}
         for ring in roads.rings:
-            cluster = Cluster(core=set(ring.nodes), nodes=set(ring.nodes), ring=ring)
+            cluster = JunctionCluster(core=set(ring.nodes), nodes=set(ring.nodes), ring=ring)
             for node in ring.nodes:
                 # A node of two rings of different kinds stays with the first.
                 self.of.setdefault(node, cluster)
         for node in roads.chains_from:
             if node not in self.of and len(roads.chains_from[node]) >= 2:
-                self.of[node] = Cluster(core={node}, nodes={node})
+                self.of[node] = JunctionCluster(core={node}, nodes={node})
 
     def join(self, chain: Chain, widest_m: float) -> None:
         """Make one core of the two ends of a chain, unless one is a ring's."""
@@ -50,8 +50,8 @@ class Grouping:
 
     def attach(
         self,
-        cluster: Cluster,
-        other: Cluster,
+        cluster: JunctionCluster,
+        other: JunctionCluster,
         keys: tuple[tuple[int, int], ...],
         *,
         widest_m: float = math.inf,
@@ -67,21 +67,23 @@ class Grouping:
         self._merge(cluster, other, keys)
         return True
 
-    def _merge(self, a: Cluster, b: Cluster, keys: tuple[tuple[int, int], ...]) -> None:
+    def _merge(
+        self, a: JunctionCluster, b: JunctionCluster, keys: tuple[tuple[int, int], ...]
+    ) -> None:
         a.nodes |= b.nodes
         a.chains |= b.chains
         a.chains.update(keys)
         for node in b.nodes:
             self.of[node] = a
 
-    def _width_m(self, a: Cluster, b: Cluster) -> float:
+    def _width_m(self, a: JunctionCluster, b: JunctionCluster) -> float:
         return max(self.distance_m(m, n) for m in a.nodes for n in b.nodes)
 
     def distance_m(self, a: int, b: int) -> float:
         """Return metres between two nodes."""
         return math.dist(self.xy_m[a], self.xy_m[b])
 
-    def clusters(self) -> list[Cluster]:
+    def clusters(self) -> list[JunctionCluster]:
         """Return every cluster once, by smallest node id."""
         unique = {id(cluster): cluster for cluster in self.of.values()}
         return sorted(unique.values(), key=lambda cluster: min(cluster.core))

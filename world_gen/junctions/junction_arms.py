@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 from foretwin.world_gen.junctions.chains import CarRoads, Chain
-from foretwin.world_gen.junctions.grouping import Cluster
+from foretwin.world_gen.junctions.grouping import JunctionCluster
 from foretwin.world_gen.junctions.intersections import JunctionArm
 from foretwin.world_gen.roads.road_graph import RoadGraph
 
@@ -28,7 +28,7 @@ class ClusterRoads(NamedTuple):
     leaving: tuple[Chain, ...]
 
 
-class Approach(NamedTuple):
+class ArmChains(NamedTuple):
     """One arm with the chains that make it, each leaving the junction."""
 
     arm: JunctionArm
@@ -36,7 +36,7 @@ class Approach(NamedTuple):
     start_xy_m: tuple[float, float]
 
 
-def roads_of(cluster: Cluster, roads: CarRoads, graph: RoadGraph) -> ClusterRoads:
+def roads_of(cluster: JunctionCluster, roads: CarRoads, graph: RoadGraph) -> ClusterRoads:
     """Split the chains at a cluster's nodes into those inside and those that leave it."""
     nodes = cluster.nodes
     if len(nodes) == 1 and not cluster.ring:
@@ -68,7 +68,7 @@ def roads_of(cluster: Cluster, roads: CarRoads, graph: RoadGraph) -> ClusterRoad
     return ClusterRoads(inside=tuple(inside.values()), leaving=tuple(leaving))
 
 
-def approaches(leaving: tuple[Chain, ...]) -> tuple[Approach, ...]:
+def approaches(leaving: tuple[Chain, ...]) -> tuple[ArmChains, ...]:
     """Group the chains that leave a junction into its arms, by bearing from east."""
     ways_out = [_WayOut(chain, chain.bearing_rad(LOOK_M)) for chain in leaving]
     group = list(range(len(leaving)))
@@ -115,13 +115,13 @@ def _same_street(a: Chain, b: Chain) -> bool:
     return classes[0].removesuffix("_link") == classes[1].removesuffix("_link")
 
 
-def _approach(together: list[_WayOut]) -> Approach:
+def _approach(together: list[_WayOut]) -> ArmChains:
     chains = tuple([way_out.chain for way_out in together])
     x, y, east, north = 0.0, 0.0, 0.0, 0.0
     for chain, bearing_rad in together:
         x, y = x + chain.x_m[0], y + chain.y_m[0]
         east, north = east + math.cos(bearing_rad), north + math.sin(bearing_rad)
-    return Approach(
+    return ArmChains(
         arm=JunctionArm(
             name=next((chain.name for chain in chains if chain.name), ""),
             bearing_rad=math.atan2(north, east),

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 from foretwin.world_gen.junctions.chains import CarRoads, Chain, Tags
-from foretwin.world_gen.junctions.grouping import Cluster, Grouping
+from foretwin.world_gen.junctions.grouping import Grouping, JunctionCluster
 from foretwin.world_gen.junctions.junction_control import facing
 from foretwin.world_gen.junctions.slip_roads import add_slips, slip_ends
 from foretwin.world_gen.roads.road_graph import RoadGraph
@@ -35,7 +35,7 @@ WIDEST_M = 70.0
 
 def cluster_branchings(
     roads: CarRoads, graph: RoadGraph, node_tags: Mapping[int, Tags]
-) -> list[Cluster]:
+) -> list[JunctionCluster]:
     """Return the branchings and rings grouped into junctions, by their smallest node id.
 
     A group may still turn out to be no junction: a street that parts into its carriageways is a

@@ -15,8 +15,8 @@ from foretwin.world_gen.buildings.parts import Footprint
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.beside_roads import BesideIndex
+from foretwin.world_gen.roads.road_classes import OTHER_CLASSES
 from foretwin.world_gen.roads.road_graph import RoadGraph
-from foretwin.world_gen.roads.road_tags import OTHER_CLASSES
 from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions, read_turn_restrictions
 
 

@@ -9,7 +9,7 @@ from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 
-class Passage(NamedTuple):
+class JunctionPassage(NamedTuple):
     """A junction on a route and the index of the route's edge that enters it, or ends in it."""
 
     junction: Junction
@@ -18,7 +18,7 @@ class Passage(NamedTuple):
 
 def junctions_on_route(
     junctions: Iterable[Junction], directed_edges: Sequence[DirectedEdge]
-) -> list[Passage]:
+) -> list[JunctionPassage]:
     """Return the junctions that a route drives through, in order, once for every passage.
 
     A route passes a junction when it comes to one of its nodes. The opposite carriageway of a
@@ -26,7 +26,7 @@ def junctions_on_route(
     begins in a junction passes it only if it returns.
     """
     at_node = {node: junction for junction in junctions for node in junction.nodes}
-    passages: list[Passage] = []
+    passages: list[JunctionPassage] = []
     inside: Junction | None = None
     if directed_edges:
         inside = at_node.get(directed_edges[0].start_node)
@@ -34,6 +34,6 @@ def junctions_on_route(
         here = at_node.get(item.end_node)
         stays = here is inside and here is not None and item.edge.index in here.inner
         if here is not None and not stays:
-            passages.append(Passage(here, index))
+            passages.append(JunctionPassage(here, index))
         inside = here
     return passages

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from foretwin.world_gen.junctions.chains import CarRoads, Chain
-from foretwin.world_gen.junctions.grouping import Cluster, Grouping
+from foretwin.world_gen.junctions.grouping import Grouping, JunctionCluster
 
 SLIP_M, RAMP_SLIP_M = 50.0, 120.0
 """Length of a slip road around a corner, by any class and by a link class."""
@@ -109,7 +109,7 @@ def _attach_both(
         grouping.attach(corner, end, (slip.key, side.key), widest_m=widest_m, core=not bare)
 
 
-def _is_bare(cluster: Cluster, roads: CarRoads) -> bool:
+def _is_bare(cluster: JunctionCluster, roads: CarRoads) -> bool:
     """Tell whether a cluster is but the end of slip roads on a road or its two carriageways."""
     ends = sum(len(roads.chains_from[node]) for node in cluster.nodes)
     return len(cluster.nodes) <= 2 and ends <= 3 + len(cluster.nodes)
@@ -145,9 +145,9 @@ def _angle_joining(slip: Chain, roads: CarRoads) -> float:
 
 def _next_clusters(
     node: int, slip: Chain, limit_m: float, onward: bool, grouping: Grouping, roads: CarRoads
-) -> dict[int, tuple[Chain, Cluster]]:
+) -> dict[int, tuple[Chain, JunctionCluster]]:
     """Return the clusters that can be driven to (or come from) by one short road from a node."""
-    found: dict[int, tuple[Chain, Cluster]] = {}
+    found: dict[int, tuple[Chain, JunctionCluster]] = {}
     for chain in roads.chains_from[node]:
         other = grouping.of.get(chain.end)
         drivable = chain.outward if onward else chain.inward

@@ -183,7 +183,7 @@ def _in_frame(
     }
 
 
-class _Group(NamedTuple):
+class _ClusterNodes(NamedTuple):
     nodes: frozenset[int]
     inner: frozenset[int] = frozenset()
     junction: Junction | None = None
@@ -208,12 +208,12 @@ def _clusters(
         if found := index.junction_of_node.get(node):
             others.setdefault(found.summary.id, found)
     named = {j.summary.id for j in made_for}
-    groups: list[_Group] = []
+    groups: list[_ClusterNodes] = []
     for junction in others.values():
         whole = junction.summary.id in named or (junction.nodes <= near and _drawn(junction, edges))
         groups.extend(_groups_of(junction, leaving, whole=whole))
     taken = frozenset().union(*(group.nodes for group in groups))
-    groups.extend(_Group(frozenset([n])) for n in sorted(near - taken))
+    groups.extend(_ClusterNodes(frozenset([n])) for n in sorted(near - taken))
     clusters = []
     for group in groups:
         legs = tuple(
@@ -235,7 +235,7 @@ def _drawn(junction: Junction, edges: Mapping[int, RoadEdge]) -> bool:
 
 def _groups_of(
     junction: Junction, leaving: Mapping[int, list[DirectedEdge]], *, whole: bool
-) -> list[_Group]:
+) -> list[_ClusterNodes]:
     """A ring is driven node by node, every other junction in one go."""
     on_ring = {
         node for node in junction.nodes if any(is_ring_edge(d.edge) for d in leaving.get(node, ()))
@@ -243,8 +243,10 @@ def _groups_of(
     if junction.summary.kind in RING_KINDS and on_ring:
         # Where a street parts into entry and exit before the ring, nobody has to stop.
         return [
-            _Group(frozenset([n]), frozenset(), junction, whole and n in on_ring, n in on_ring)
+            _ClusterNodes(
+                frozenset([n]), frozenset(), junction, whole and n in on_ring, n in on_ring
+            )
             for n in sorted(junction.nodes)
         ]
     nodes = frozenset(node for node in junction.nodes if node in leaving)
-    return [_Group(nodes, frozenset(junction.inner), junction, whole)] if nodes else []
+    return [_ClusterNodes(nodes, frozenset(junction.inner), junction, whole)] if nodes else []

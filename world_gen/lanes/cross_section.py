@@ -13,13 +13,13 @@ from foretwin.world_gen.lanes.lane_plans import LanePlan as LanePlan
 from foretwin.world_gen.lanes.lane_plans import metres as metres
 from foretwin.world_gen.lanes.lane_tags import (
     BUS_WIDTH_M,
-    CLASS_WIDTH_M,
     DEFAULT_WIDTH_M,
     MAX_WIDTH_M,
     MIN_WIDTH_M,
     lanes_of_direction,
 )
 from foretwin.world_gen.lanes.side_lanes import side_lanes
+from foretwin.world_gen.roads.road_classes import road_class
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 MAX_LANES = 12
@@ -83,7 +83,7 @@ def _centre(
     notes.append(
         f"way {edge.way_id}: its centre lane, for turns from both directions, is driven one way"
     )
-    known = CLASS_WIDTH_M.get(edge.road_class, DEFAULT_WIDTH_M)
+    known = road_class(edge.road_class).lane_width_m or DEFAULT_WIDTH_M
     return [
         LanePlan(
             label="centre",

@@ -182,10 +182,11 @@ def _lane_count_source(edge: RoadEdge) -> Provenance:
     counts = [
         count.source
         for count, driven in (
-            (edge.lanes_forward, edge.forward), (edge.lanes_backward, edge.backward),
+            (edge.lanes_forward, edge.forward),
+            (edge.lanes_backward, edge.backward),
         )
         if driven
-    ]  # fmt: skip
+    ]
     return next((s for s in ("default", "inferred") if s in counts), "tagged")
 
 

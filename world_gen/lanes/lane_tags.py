@@ -8,25 +8,9 @@ from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.contracts.world import DrivingSide, LaneChange, LaneKind, Turn
 from foretwin.world_gen.lanes.lane_plans import LanePlan, metres, of_side
 from foretwin.world_gen.lanes.side_lanes import BICYCLE_WIDTH_M
+from foretwin.world_gen.roads.road_classes import road_class
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
-CLASS_WIDTH_M: Mapping[str, float] = {
-    "motorway": 3.75,
-    "trunk": 3.5,
-    "primary": 3.5,
-    "secondary": 3.25,
-    "tertiary": 3.25,
-    "unclassified": 3.0,
-    "residential": 3.0,
-    "living_street": 2.75,
-    "motorway_link": 3.75,
-    "trunk_link": 3.5,
-    "primary_link": 3.5,
-    "secondary_link": 3.5,
-    "tertiary_link": 3.25,
-    "raceway": 5.0,
-}
-"""Usual lane widths by highway class; what is not listed gets DEFAULT_WIDTH_M."""
 DEFAULT_WIDTH_M = 3.0
 BUS_WIDTH_M = 3.25
 MIN_WIDTH_M, MAX_WIDTH_M = 2.0, 7.5
@@ -46,9 +30,13 @@ _TURNS: Mapping[str, Turn | None] = {
     "slide_right": "straight",
 }
 _CHANGES: Mapping[str, LaneChange] = {
-    "yes": "both", "no": "none",
-    "not_left": "right", "only_right": "right", "not_right": "left", "only_left": "left",
-}  # fmt: skip
+    "yes": "both",
+    "no": "none",
+    "not_left": "right",
+    "only_right": "right",
+    "not_right": "left",
+    "only_left": "left",
+}
 _ALLOWED = frozenset({"designated", "yes"})
 
 
@@ -206,7 +194,7 @@ def _lane_width(edge: RoadEdge, tagged: str | None, kind: LaneKind) -> Quantity:
         return Quantity(BUS_WIDTH_M, "inferred")
     if kind == "bicycle":
         return Quantity(BICYCLE_WIDTH_M, "default")
-    known = CLASS_WIDTH_M.get(edge.road_class)
+    known = road_class(edge.road_class).lane_width_m
     base = Quantity(DEFAULT_WIDTH_M, "default") if known is None else Quantity(known, "inferred")
     ring = edge.tags.get("junction") in ("roundabout", "circular")
     if ring and edge.lanes_forward.value < 1.5:

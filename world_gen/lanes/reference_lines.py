@@ -81,10 +81,14 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
             piece = line if first and last else cut(line, from_m, to_m)
             found.append(
                 Stretch(
-                    index, piece, first, last,
-                    before if first else _NOWHERE, after if last else _NOWHERE,
+                    index,
+                    piece,
+                    first,
+                    last,
+                    before if first else _NOWHERE,
+                    after if last else _NOWHERE,
                 )
-            )  # fmt: skip
+            )
     return found, notes
 
 

@@ -26,9 +26,13 @@ class SideLanes(NamedTuple):
 
 
 _NUMBERS: Mapping[tuple[LaneKind, str], int] = {
-    ("bicycle", "left"): -2, ("bicycle", "right"): -3, ("parking", "left"): -4,
-    ("parking", "right"): -5, ("bus", "left"): -6, ("bus", "right"): -7,
-}  # fmt: skip
+    ("bicycle", "left"): -2,
+    ("bicycle", "right"): -3,
+    ("parking", "left"): -4,
+    ("parking", "right"): -5,
+    ("bus", "left"): -6,
+    ("bus", "right"): -7,
+}
 _KEYS = ("cycleway", "parking:", "busway")
 
 
@@ -38,10 +42,12 @@ def side_lanes(
     """Return the lanes at the kerbs; `with_bicycles` names directions that have theirs already."""
     if not any(key.startswith(_KEYS) for key in edge.tags):
         return SideLanes((), ())
-    return SideLanes(*(
-        tuple(_of_side(edge, side, driving_side, with_bicycles, bus_width_m))
-        for side in ("left", "right")
-    ))  # fmt: skip
+    return SideLanes(
+        *(
+            tuple(_of_side(edge, side, driving_side, with_bicycles, bus_width_m))
+            for side in ("left", "right")
+        )
+    )
 
 
 def _of_side(

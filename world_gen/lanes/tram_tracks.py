@@ -57,9 +57,13 @@ def tram_tracks(around: Surroundings, osm: OsmMap, beside: BesideRoads) -> TramT
 
 
 def _lay(
-    way: int, tags: Mapping[str, str], line: np.ndarray, piece: int, roads: list[Road],
+    way: int,
+    tags: Mapping[str, str],
+    line: np.ndarray,
+    piece: int,
+    roads: list[Road],
     lanes: list[Lane],
-) -> None:  # fmt: skip
+) -> None:
     road = f"w{way}.tram" if piece == 0 else f"w{way}.tram#{piece + 1}"
     rounded = np.round(line, 3)
     name = tags.get("name", "")

@@ -229,7 +229,10 @@ def _overlaps(
     order = np.lexsort((first_m, leg))
     return list(
         zip(
-            leg[order].tolist(), near_m[order].tolist(), first_m[order].tolist(),
-            last_m[order].tolist(), strict=True,
+            leg[order].tolist(),
+            near_m[order].tolist(),
+            first_m[order].tolist(),
+            last_m[order].tolist(),
+            strict=True,
         )
-    )  # fmt: skip
+    )

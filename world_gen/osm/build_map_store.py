@@ -270,8 +270,12 @@ def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: l
                     notes.append(f"relation {relation.id}: {NO_WAYS}")
                 else:
                     south, west, north, east = (column[rows] for column in ways.member_boxes)
-                    box = Boxes(south.min(keepdims=True), west.min(keepdims=True),
-                                north.max(keepdims=True), east.max(keepdims=True))  # fmt: skip
+                    box = Boxes(
+                        south.min(keepdims=True),
+                        west.min(keepdims=True),
+                        north.max(keepdims=True),
+                        east.max(keepdims=True),
+                    )
                     for cell in place(box).cells.tolist():
                         of_cell.setdefault(cell, []).append(line.decode())
             for cell, texts in sorted(of_cell.items()):

@@ -36,21 +36,23 @@ class _Ways(NamedTuple):
         begins = np.cumsum(self.counts) - self.counts
         if not len(begins):
             return Boxes(*(np.empty(0, dtype=np.int64),) * 4)
-        return Boxes(
-            np.minimum.reduceat(self.lat, begins), np.minimum.reduceat(self.lon, begins),
-            np.maximum.reduceat(self.lat, begins), np.maximum.reduceat(self.lon, begins),
-        )  # fmt: skip
+        edges = ((least, of) for least in (np.minimum, np.maximum) for of in (self.lat, self.lon))
+        return Boxes(*(least.reduceat(of, begins) for least, of in edges))
 
     def only(self, kept: BoolArray) -> _Ways:
         of_node = np.repeat(kept, self.counts)
         tags = [text for text, k in zip(self.tag_texts, kept.tolist(), strict=True) if k]
         return _Ways(
-            self.ids[kept], self.counts[kept], self.nodes[of_node], self.lat[of_node],
-            self.lon[of_node], tags,
-        )  # fmt: skip
+            self.ids[kept],
+            self.counts[kept],
+            self.nodes[of_node],
+            self.lat[of_node],
+            self.lon[of_node],
+            tags,
+        )
 
 
-class _Cells(NamedTuple):
+class _CellContents(NamedTuple):
     ways: _Ways
     nodes: NodePositions
     node_texts: list[str]
@@ -59,9 +61,13 @@ class _Cells(NamedTuple):
 
 
 def clip_map(
-    tables: TableReader, areas: Sequence[LatLonBounds], box: LatLonBounds, *, file: str,
+    tables: TableReader,
+    areas: Sequence[LatLonBounds],
+    box: LatLonBounds,
+    *,
+    file: str,
     frame: LocalFrame,
-) -> OsmMap:  # fmt: skip
+) -> OsmMap:
     """Return what touches `areas`: ways with all their nodes, their relations, their signals.
 
     A relation comes with any of its ways; with a building come all of its outlines.
@@ -101,9 +107,13 @@ def clip_map(
     )
     meta = tables.meta
     return assemble_map(
-        objects, file=file, sha256=meta.sha256, attribution=meta.attribution, bounds=box,
+        objects,
+        file=file,
+        sha256=meta.sha256,
+        attribution=meta.attribution,
+        bounds=box,
         frame=frame,
-    )  # fmt: skip
+    )
 
 
 def find_node(tables: TableReader, node: int) -> tuple[float, float] | None:
@@ -124,12 +134,18 @@ def _unpacked(body: bytes) -> _Ways:
     w = unpack(body, CellWays)
     counts = np.frombuffer(w.counts, dtype="<i4").astype(np.int64)
     return _Ways(
-        sums(w.ids, "<i8"), counts, sums(w.nodes, "<i8"), sums(w.lat, "<i4"), sums(w.lon, "<i4"),
+        sums(w.ids, "<i8"),
+        counts,
+        sums(w.nodes, "<i8"),
+        sums(w.lat, "<i4"),
+        sums(w.lon, "<i4"),
         w.tags.split("\n"),
-    )  # fmt: skip
+    )
 
 
-def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagReader) -> _Cells:
+def _read(
+    tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagReader
+) -> _CellContents:
     ways: list[_Ways] = []
     nodes: list[NodePositions] = []
     node_texts: list[str] = []
@@ -148,7 +164,7 @@ def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagRe
         elif kind == NOTES:
             lat, lon, words = unpack(body, str).split(" ", 2)
             note_places[words] = (int(lat) / UNITS_PER_DEG, int(lon) / UNITS_PER_DEG)
-    return _Cells(
+    return _CellContents(
         _joined(ways), NodePositions(*_columns(nodes, 3)), node_texts, relations, note_places
     )
 

@@ -108,18 +108,24 @@ def assemble_map(
         bounds = bounds or box
         frame = frame or LocalFrame(centre_of(box))
     return OsmMap(
-        file=file, sha256=sha256, attribution=attribution, bounds=bounds, frame=frame,
-        locations=locations, node_tags=objects.node_tags, ways=ways, relations=relations,
-        notes=tuple(dict.fromkeys(notes)), note_places=note_places,
-    )  # fmt: skip
+        file=file,
+        sha256=sha256,
+        attribution=attribution,
+        bounds=bounds,
+        frame=frame,
+        locations=locations,
+        node_tags=objects.node_tags,
+        ways=ways,
+        relations=relations,
+        notes=tuple(dict.fromkeys(notes)),
+        note_places=note_places,
+    )
 
 
 def sorted_positions(chunks: Sequence[NodePositions], notes: list[str]) -> NodePositions:
     """Join chunks of nodes in ascending order of ids, each once and only those on the Earth."""
-    ids, lat, lon = (
-        np.concatenate([np.empty(0, dtype=np.int64), *columns])
-        for columns in zip(*chunks, strict=True)
-    ) if chunks else (np.empty(0, dtype=np.int64),) * 3  # fmt: skip
+    none = (np.empty(0, dtype=np.int64),) * 3
+    ids, lat, lon = (np.concatenate(columns) for columns in zip(none, *chunks, strict=True))
     if len(ids) > 1 and not (ids[1:] > ids[:-1]).all():
         order = np.argsort(ids, kind="stable")
         ids, lat, lon = ids[order], lat[order], lon[order]

@@ -27,14 +27,14 @@ class Boxes(NamedTuple):
     east: IntArray
 
 
-class Placed(NamedTuple):
+class BoxCells(NamedTuple):
     """Cells (M,) and which of the given boxes (M,) each of them holds."""
 
     cells: IntArray
     boxes: IntArray
 
 
-def place(boxes: Boxes) -> Placed:
+def place(boxes: Boxes) -> BoxCells:
     """Return the cells that hold each box: at the finest level where it touches at most 2 by 2."""
     span = np.maximum(np.maximum(boxes.north - boxes.south, boxes.east - boxes.west), 1)
     level = np.floor(np.log2(_UNITS_AROUND / span)).astype(np.int64).clip(0, FINEST_LEVEL)
@@ -47,7 +47,7 @@ def place(boxes: Boxes) -> Placed:
         there = np.flatnonzero((x <= east) & (y <= north))
         cells.append(cell_key(level, x, y)[there])
         held.append(there)
-    return Placed(np.concatenate(cells), np.concatenate(held))
+    return BoxCells(np.concatenate(cells), np.concatenate(held))
 
 
 def cell_key(level: IntArray, x: IntArray, y: IntArray) -> IntArray:

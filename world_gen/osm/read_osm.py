@@ -37,14 +37,22 @@ from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation
 
 WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
 NODE_KEYS = (
-    "highway", "railway", "barrier", "crossing", "traffic_calming", "traffic_sign",
-    "traffic_signals", "junction", "stop", "give_way", "kerb", "driving_side",
-)  # fmt: skip
+    "highway",
+    "railway",
+    "barrier",
+    "crossing",
+    "traffic_calming",
+    "traffic_sign",
+    "traffic_signals",
+    "junction",
+    "stop",
+    "give_way",
+    "kerb",
+    "driving_side",
+)
 
 
-DECODE_ERRORS = (
-    RuntimeError, ValueError, IndexError, MemoryError, osmium.InvalidLocationError,
-)  # fmt: skip
+DECODE_ERRORS = (RuntimeError, ValueError, IndexError, MemoryError, osmium.InvalidLocationError)
 """All that osmium raises for a file that is damaged."""
 
 

@@ -191,9 +191,11 @@ def _speed(at: Neighbourhood, lane: Lane) -> Value:
 
 def _line(at: Neighbourhood, line: StopLine) -> Value:
     words = {
-        "signal": "stops at a signal", "stop": "stops at a sign", "give_way": "gives way at a sign",
+        "signal": "stops at a signal",
+        "stop": "stops at a sign",
+        "give_way": "gives way at a sign",
         "none": "no sign or signal",
-    }  # fmt: skip
+    }
     told = words.get(line.control.value, line.control.value)
     onto = at.connections.get(line.connection_id or "")
     if onto is not None:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import msgspec
-import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame
@@ -86,7 +85,3 @@ class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
     def at_node(self, node: int) -> tuple[DirectedEdge, ...]:
         """Return the directed edges that start at `node`, allowed or not."""
         return self.leaving.get(node, ())
-
-    def xy_of(self, node: int) -> Array:
-        """Return (2,) metres of a graph node in the map's frame."""
-        return np.asarray(self.node_xy_m[node], dtype=np.float64)

@@ -7,38 +7,40 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from foretwin.contracts.provenance import Quantity
+from foretwin.world_gen.roads.road_classes import CAR_CLASSES, OTHER_CLASSES, road_class
 
-CAR_CLASSES = frozenset({
-    "motorway", "motorway_link", "trunk", "trunk_link", "primary", "primary_link", "secondary",
-    "secondary_link", "tertiary", "tertiary_link", "unclassified", "residential", "living_street",
-    "road", "raceway",
-})  # fmt: skip
-OTHER_CLASSES = frozenset({"pedestrian", "service", "track", "busway"})
 _MOTOR_SPORTS = frozenset({"motor", "motor_sports", "motor_racing", "autocross", "rallycross"})
 """What races on a track for cars; kart, horse, bicycle and motocross tracks are none."""
 RING_TAGS = frozenset({"roundabout", "circular"})
 
-_FORBIDDEN = frozenset({
-    "no", "private", "agricultural", "forestry", "emergency", "official", "military",
-})  # fmt: skip
+_FORBIDDEN = frozenset(
+    {"no", "private", "agricultural", "forestry", "emergency", "official", "military"}
+)
 _ACCESS_KEYS = ("motorcar", "motor_vehicle", "vehicle", "access")
 
-# km/h; what is usual where a map says nothing.
-_DEFAULT_KMPH = {
-    "motorway": 120.0, "motorway_link": 60.0, "trunk": 100.0, "trunk_link": 60.0,
-    "residential": 30.0, "living_street": 10.0, "service": 10.0, "pedestrian": 7.0, "track": 20.0,
-    "raceway": 100.0,
-}  # fmt: skip
 _ZONE_KMPH = {
-    "urban": 50.0, "rural": 100.0, "motorway": 130.0, "trunk": 120.0, "living_street": 10.0,
-    "bicycle_road": 30.0, "pedestrian_zone": 7.0, "walk": 7.0,
-    "nsl_restricted": 48.28, "nsl_single": 96.56, "nsl_dual": 112.65,
-}  # fmt: skip
-# Km/h of rural roads where a country differs from the hundred of the table above.
+    "urban": 50.0,
+    "rural": 100.0,
+    "motorway": 130.0,
+    "trunk": 120.0,
+    "living_street": 10.0,
+    "bicycle_road": 30.0,
+    "pedestrian_zone": 7.0,
+    "walk": 7.0,
+    "nsl_restricted": 48.28,
+    "nsl_single": 96.56,
+    "nsl_dual": 112.65,
+}
 _RURAL_KMPH = {
-    "BE": 70.0, "NL": 80.0, "FR": 80.0, "CH": 80.0, "LI": 80.0, "DK": 80.0, "NO": 80.0, "SE": 70.0,
-    "IT": 90.0, "ES": 90.0, "PL": 90.0, "CZ": 90.0, "HU": 90.0, "SK": 90.0, "SI": 90.0, "GR": 90.0,
-}  # fmt: skip
+    country: kmph
+    for kmph, countries in (
+        (70.0, "BE SE"),
+        (80.0, "CH DK FR LI NL NO"),
+        (90.0, "CZ ES GR HU IT PL SI SK"),
+    )
+    for country in countries.split()
+}
+"""Of rural roads where a country differs from the hundred of the table above."""
 _KMPH_FROM_UNIT = {"": 1.0, "kmh": 1.0, "km/h": 1.0, "kph": 1.0, "mph": 1.609344, "knots": 1.852}
 _SPEED = re.compile(r"^\s*(\d+(?:\.\d+)?)\s*([a-z/]*)\s*$")
 
@@ -169,7 +171,7 @@ def speed_limit(tags: Mapping[str, str]) -> Quantity:
     for key in ("maxspeed", "maxspeed:type", "source:maxspeed", "zone:maxspeed", "zone:traffic"):
         if (speed := _zone_kmph(tags.get(key))) is not None:
             return Quantity(speed / 3.6, "inferred")
-    return Quantity(_DEFAULT_KMPH.get(tags.get("highway", ""), 50.0) / 3.6, "default")
+    return Quantity(road_class(tags.get("highway", "")).kmph / 3.6, "default")
 
 
 def _signed_kmph(text: str | None) -> float | None:

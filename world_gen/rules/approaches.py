@@ -58,7 +58,7 @@ class Approach(msgspec.Struct, kw_only=True):
     line_m: float | None
     signal_nodes: tuple[int, ...]
     standing: Standing
-    opposite: tuple[int, bool] | None
+    opposite: tuple[int, bool] | None = None
     """Key of the approach that lies straight ahead."""
     lit_inside: bool = False
     """Its light stands on the way through the junction, past where a slip road may part."""
@@ -77,7 +77,7 @@ class Approach(msgspec.Struct, kw_only=True):
         return self.toward.edge.index, self.toward.reverse
 
 
-class _Draft(msgspec.Struct, frozen=True, kw_only=True):
+class _ApproachDraft(msgspec.Struct, frozen=True, kw_only=True):
     """What is known of an approach before the junction's roads are compared."""
 
     cluster: Cluster
@@ -117,7 +117,7 @@ def approaches(
         for leg in cluster.legs
     }
     whole = {id(junction) for junction in around.junctions}
-    drafts: dict[str, list[_Draft]] = {}
+    drafts: dict[str, list[_ApproachDraft]] = {}
     behind: dict[str, list[tuple[int, DirectedEdge]]] = {}
     for cluster in around.clusters:
         junction = cluster.junction
@@ -152,7 +152,7 @@ def approaches(
                     and m.node not in junction_lights
                 ]
             drafts.setdefault(junction.summary.id, []).append(
-                _Draft(
+                _ApproachDraft(
                     cluster=cluster,
                     toward=toward,
                     met=met,
@@ -190,7 +190,7 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
         ahead.signal_nodes = (*ahead.signal_nodes, node)
 
 
-def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
+def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approach]:
     junction = drafts[0].cluster.junction
     assert junction is not None
     kind, control = junction.summary.kind, junction.summary.control
@@ -227,9 +227,8 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
     )
     lights_for_all = control == "signals" and kind not in RING_KINDS and _for_all(drafts)
     found = []
-    for d, entry, rank in zip(drafts, entries, ranks, strict=True):
+    for d, entry, standing in zip(drafts, entries, ranks, strict=True):
         ahead = None if entry.opposite is None else drafts[entry.opposite].toward
-        standing = rank
         entering = d.cluster.ring and not is_ring_edge(d.toward.edge)
         if (entering and ring_has_way) or kind == "mini_roundabout":
             source = "tagged" if d.sign or kind != "circular" else "inferred"
@@ -241,7 +240,7 @@ def _compared(drafts: list[_Draft], around: Surroundings) -> list[Approach]:
     return found
 
 
-def _for_all(drafts: list[_Draft]) -> bool:
+def _for_all(drafts: list[_ApproachDraft]) -> bool:
     """Return whether lights stop every road in, not only those who would hit pedestrians.
 
     A single light that is tagged on a crossing before the junction serves that crossing.
@@ -254,7 +253,7 @@ def _for_all(drafts: list[_Draft]) -> bool:
     )
 
 
-def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> Approach:
+def _approach(d: _ApproachDraft, standing: Standing, signalled: bool, for_all: bool) -> Approach:
     inside = d.sign is None and d.sign_inside is not None
     sign_nearer = (inside or d.sign is not None) and not d.lights
     if signalled and (d.lights or (for_all and not sign_nearer and standing.rank > Rank.YARD)):
@@ -262,23 +261,25 @@ def _approach(d: _Draft, standing: Standing, signalled: bool, for_all: bool) -> 
         far = max(on_leg, key=lambda m: m.distance_m, default=None)
         line = _before_crossing(d.met)
         if far is not None and far.distance_m > OWN_LINE_M:
-            on_crossing = "crossing" in far.tags
-            line = far.distance_m + (BEFORE_CROSSING_M if on_crossing else 0.0)
+            line = far.distance_m + (BEFORE_CROSSING_M if "crossing" in far.tags else 0.0)
         nodes = tuple(dict.fromkeys(m.node for m in d.lights))
         word = Choice("signal", "tagged" if nodes else "inferred")
-        return Approach(
-            cluster=d.cluster, toward=d.toward, control=word, line_m=line, signal_nodes=nodes,
-            standing=standing, opposite=None, lit_inside=bool(d.lights) and not on_leg,
-            signed_inside=inside,
-        )  # fmt: skip
-    line = None
-    if d.sign is not None and OWN_LINE_M < d.sign.distance_m <= _SIGN_NEAR_M:
-        line = d.sign.distance_m
+        lit_inside = bool(d.lights) and not on_leg
+    else:
+        line, nodes, lit_inside = None, (), False
+        if d.sign is not None and OWN_LINE_M < d.sign.distance_m <= _SIGN_NEAR_M:
+            line = d.sign.distance_m
+        word = Choice("none", "inferred") if inside else _word(standing)
     return Approach(
-        cluster=d.cluster, toward=d.toward,
-        control=Choice("none", "inferred") if inside else _word(standing), line_m=line,
-        signal_nodes=(), standing=standing, opposite=None, signed_inside=inside,
-    )  # fmt: skip
+        cluster=d.cluster,
+        toward=d.toward,
+        control=word,
+        line_m=line,
+        signal_nodes=nodes,
+        standing=standing,
+        lit_inside=lit_inside,
+        signed_inside=inside,
+    )
 
 
 def _word(standing: Standing) -> Choice:

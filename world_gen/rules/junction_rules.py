@@ -21,7 +21,7 @@ from foretwin.world_gen.rules.signs_inside import SignsInside, signs_inside
 from foretwin.world_gen.rules.stop_lines import line_controls, lines_at_signs, stop_lines
 
 
-class JunctionRules(NamedTuple):
+class TrafficControl(NamedTuple):
     """What tells drivers when to go.
 
     `plans` are by junction id, `crossing_plans` those of lights away from junctions.
@@ -41,7 +41,7 @@ def junction_rules(
     connections: Sequence[ConnectionDraft],
     crossings: Sequence[Crossing],
     junction_lights: Collection[int],
-) -> JunctionRules:
+) -> TrafficControl:
     """Return the rules of every whole junction, and of every light away from one.
 
     `junction_lights` are the nodes of the lights of all junctions of the map.
@@ -59,7 +59,7 @@ def junction_rules(
     heads = signal_heads(groups, {line.lane_id: line for line in lines}, around)
     known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
     lone = lone_lights(around, node_tags, lanes, crossings, known)
-    return JunctionRules(
+    return TrafficControl(
         # Where a lane has two lines the one at the junction stands last, so that it wins by lane.
         stop_lines=(*lone.stop_lines, *lines, *lines_at_signs(connections, signs)),
         signals=(*heads, *lone.signals),

@@ -10,13 +10,9 @@ from typing import NamedTuple
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import DrivingSide, YieldRule
 from foretwin.world_gen.lanes.legs import heading_out
+from foretwin.world_gen.roads.road_classes import road_class
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
-_IMPORTANCE: Mapping[str, float] = {
-    "motorway": 8.0, "trunk": 7.0, "primary": 6.0, "secondary": 5.0, "tertiary": 4.0,
-    "unclassified": 3.0, "residential": 3.0, "road": 3.0, "raceway": 3.0, "busway": 3.0,
-    "living_street": 1.0, "pedestrian": 1.0, "service": 1.0, "track": 0.5,
-}  # fmt: skip
 _YARD = 1.0
 _NUMBERED, _CLASSIFIED = 4.0, 5.0
 """From tertiary up a road of higher class is usually signed as the one with priority; from
@@ -87,12 +83,10 @@ def outward(toward: DirectedEdge) -> tuple[float, float]:
 
 
 def importance(edge: RoadEdge) -> float:
-    """Return how important a road is by its class; links rank below every street but a yard."""
-    if edge.road_class.endswith("_link"):
-        return 2.0 + 0.1 * _IMPORTANCE.get(edge.road_class.removesuffix("_link"), 3.0)
-    if edge.tags.get("service") == "driveway":
+    """Return how important a road is by its class."""
+    if edge.tags.get("service") == "driveway" and not edge.road_class.endswith("_link"):
         return 0.2
-    return _IMPORTANCE.get(edge.road_class, 2.0)
+    return road_class(edge.road_class).importance
 
 
 def has_priority(tags: Mapping[str, str]) -> bool:

@@ -56,7 +56,7 @@ class Answer(NamedTuple):
     source: Provenance
 
 
-class Way(msgspec.Struct, kw_only=True):
+class ConnectionFacts(msgspec.Struct, kw_only=True):
     """What the rules ask about one connection."""
 
     id: str
@@ -107,17 +107,14 @@ def right_of_way(
     conflicts = []
     conflicting: list[list[str]] = [[] for _ in ways]
     waiting: list[list[str]] = [[] for _ in ways]
-    rows = zip(
-        met.first.tolist(), met.second.tolist(), met.merging.tolist(), met.points, met.areas,
-        met.apart_m.tolist(), angle.tolist(), strict=True,
-    )  # fmt: skip
-    for i, j, merging, point, area, apart_m, from_first in rows:
+    told = (column.tolist() for column in (met.first, met.second, met.merging, met.apart_m, angle))
+    rows = zip(*told, met.points, met.areas, strict=True)
+    for i, j, merging, apart_m, from_first, point, area in rows:
         a, b = ways[i], ways[j]
         standing = a.standing, b.standing
         if a.sign_node != b.sign_node:
-            standing = (
-                _standing_at(a, area, point, merging), _standing_at(b, area, point, merging)
-            )  # fmt: skip
+            own, other = (_standing_at(way, area, point, merging) for way in (a, b))
+            standing = own, other
         answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side)
         loser, winner = (i, j) if answer.first_waits else (j, i)
         conflicting[i].append(b.id)
@@ -146,7 +143,7 @@ def _ways(
     found: Sequence[Approach],
     signs: SignsInside,
     driving_side: DrivingSide,
-) -> list[Way]:
+) -> list[ConnectionFacts]:
     by_road: dict[tuple[int, bool], Approach] = {item.key: item for item in found}
     near = "right" if driving_side == "right" else "left"
     weight: Mapping[str, int] = {"straight": 0, near: 1, "u_turn": 3}
@@ -162,10 +159,8 @@ def _ways(
     ahead = np.arctan2(gap[:, 1], gap[:, 0])
     start, end = ahead[paths.first[:-1]], ahead[paths.first[1:] - 2]
     bend = np.abs(wrap_angle(end - start))
-    rows = zip(
-        connections, start.tolist(), end.tolist(), bend.tolist(), paths.length_m.tolist(),
-        strict=True,
-    )  # fmt: skip
+    told = (column.tolist() for column in (start, end, bend, paths.length_m))
+    rows = zip(connections, *told, strict=True)
     ways = []
     for c, heading, exit_heading, bend_rad, length_m in rows:
         toward = c.movement.toward
@@ -175,7 +170,7 @@ def _ways(
         kind = junction.summary.kind if junction is not None else "other"
         sign = next(iter(signs.get(c.id, ())), None)
         ways.append(
-            Way(
+            ConnectionFacts(
                 id=c.id,
                 turn_weight=weight.get(c.turn, 2),
                 on_the_spot=c.turn == "u_turn" and not c.movement.inside,
@@ -212,8 +207,8 @@ def _runs_along_main(
 
 
 def _answer(
-    a: Way,
-    b: Way,
+    a: ConnectionFacts,
+    b: ConnectionFacts,
     standing: tuple[Standing, Standing],
     angle: float,
     crossing: bool,
@@ -262,7 +257,7 @@ def _answer(
     return _beside(a, b)
 
 
-def _standing_at(way: Way, area: Array, point: Array, merging: bool) -> Standing:
+def _standing_at(way: ConnectionFacts, area: Array, point: Array, merging: bool) -> Standing:
     """Return the standing with which a path comes to the ground that it shares with another."""
     if way.sign is None or way.standing.rank < way.sign.rank:
         return way.standing
@@ -274,7 +269,7 @@ def _standing_at(way: Way, area: Array, point: Array, merging: bool) -> Standing
     return way.sign if reached_m > way.sign_m else way.standing
 
 
-def _passes(mover: Way, waiting: Way, driving_side: DrivingSide) -> bool:
+def _passes(mover: ConnectionFacts, waiting: ConnectionFacts, driving_side: DrivingSide) -> bool:
     """Return whether a driver on a mini-roundabout passes another one's entry."""
     turn = 1.0 if driving_side == "right" else -1.0
     entry = mover.heading + math.pi
@@ -283,13 +278,13 @@ def _passes(mover: Way, waiting: Way, driving_side: DrivingSide) -> bool:
     return 1e-3 < to_waiting < to_exit - 1e-3
 
 
-def _across(a: Way, b: Way) -> Answer:
+def _across(a: ConnectionFacts, b: ConnectionFacts) -> Answer:
     if a.turn_weight != b.turn_weight:
         return Answer(a.turn_weight > b.turn_weight, "turn_across", "inferred")
     return Answer(a.id > b.id, "turn_across" if a.turn_weight else "order", "default")
 
 
-def _beside(a: Way, b: Way) -> Answer:
+def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Answer:
     if a.turn_weight != b.turn_weight:
         return Answer(a.turn_weight > b.turn_weight, "merge_order", "inferred")
     if abs(a.bend_rad - b.bend_rad) > math.radians(1.0):

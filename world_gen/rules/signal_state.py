@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import SignalColour, SignalState
+from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.signals import SignalPlan
 from foretwin.contracts.world import World
 
@@ -22,17 +22,6 @@ class LiveColour(NamedTuple):
 
     time_s: float
     colour: SignalColour
-
-
-def live_colours(states: Iterable[SignalState], *, start_stamp_ns: int) -> dict[str, LiveColour]:
-    """Return the latest state of each group; drive time counts from `start_stamp_ns`."""
-    found: dict[str, LiveColour] = {}
-    for state in states:
-        time_s = (state.stamp_ns - start_stamp_ns) / 1e9
-        known = found.get(state.group_id)
-        if known is None or time_s >= known.time_s:
-            found[state.group_id] = LiveColour(time_s, state.colour)
-    return found
 
 
 def cycle_s(plan: SignalPlan) -> float:
@@ -53,13 +42,11 @@ def colours_at(
     plan: SignalPlan,
     time_s: float,
     live: Mapping[str, LiveColour] | None = None,
-    *,
-    live_for_s: float = LIVE_FOR_S,
 ) -> dict[str, SignalColour]:
     """Return the colour of each group of a plan at a drive time; cycles begin at time 0.
 
     A group that the next phase lets go as well stays green in between. Those on foot get no
-    amber. What was heard no more than `live_for_s` ago counts instead, unless it is `unknown`;
+    amber. What was heard no more than `LIVE_FOR_S` ago counts instead, unless it is `unknown`;
     so does what is heard later than `time_s`, since clocks differ.
     """
     colours: dict[str, SignalColour] = {group.id: "red" for group in plan.groups}
@@ -77,21 +64,15 @@ def colours_at(
             break
         into_s -= step_s
     for name, heard in (live or {}).items():
-        if name in colours and time_s - heard.time_s <= live_for_s and heard.colour != "unknown":
+        if name in colours and time_s - heard.time_s <= LIVE_FOR_S and heard.colour != "unknown":
             colours[name] = heard.colour
     return colours
 
 
-def world_colours_at(
-    world: World,
-    time_s: float,
-    live: Mapping[str, LiveColour] | None = None,
-    *,
-    live_for_s: float = LIVE_FOR_S,
-) -> dict[str, SignalColour]:
+def world_colours_at(world: World, time_s: float) -> dict[str, SignalColour]:
     """Return the colour of each signal group of a World at a drive time, as `colours_at` does."""
     plans = [junction.plan for junction in world.junctions if junction.plan is not None]
     found: dict[str, SignalColour] = {}
     for plan in (*plans, *world.crossing_plans):
-        found.update(colours_at(plan, time_s, live, live_for_s=live_for_s))
+        found.update(colours_at(plan, time_s))
     return found

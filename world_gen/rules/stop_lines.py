@@ -33,10 +33,8 @@ def stop_lines(
         for approach in found
         for lane in entering(approach, around, lanes)
     ]
-    return lines_across(
-        [lane for lane, _, _ in mine], [back_m for _, back_m, _ in mine],
-        [control for _, _, control in mine],
-    )  # fmt: skip
+    drawn, back_m = [lane for lane, _, _ in mine], [away_m for _, away_m, _ in mine]
+    return lines_across(drawn, back_m, [control for _, _, control in mine])
 
 
 def entering(approach: Approach, around: Surroundings, lanes: LaneSet) -> list[LaneDraft]:
@@ -108,6 +106,9 @@ def _ends_across(paths: Polylines, at_m: Array, width_m: Sequence[float]) -> Arr
 def line_controls(lines: Sequence[StopLine]) -> dict[str, LineControl]:
     """Return the control of each lane that has a stop line."""
     known: dict[str, LineControl] = {
-        "signal": "signal", "stop": "stop", "give_way": "give_way", "none": "none",
-    }  # fmt: skip
+        "signal": "signal",
+        "stop": "stop",
+        "give_way": "give_way",
+        "none": "none",
+    }
     return {line.lane_id: known[line.control.value] for line in lines}

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from foretwin.contracts.gap import GapAlarm, GapSample
+from foretwin.contracts.gap import ALARM_HORIZON_S, ALARM_LIMITS_PER_S, GapAlarm, GapSample
 
-LIMITS_PER_S = {
-    "along_m": 0.8,
-    "across_m": 0.5,
-    "yaw_rad": 0.07,
-    "speed_mps": 0.6,
-}
-"""What may be lost for each second that the model was left to itself."""
 _BACK = 0.7
 _OVER_IN_A_ROW, _BACK_IN_A_ROW = 2, 3
 
@@ -25,7 +18,10 @@ class GapLimits:
     """
 
     def __init__(
-        self, *, horizon_s: float = 2.0, limits_per_s: Mapping[str, float] = LIMITS_PER_S
+        self,
+        *,
+        horizon_s: float = ALARM_HORIZON_S,
+        limits_per_s: Mapping[str, float] = ALARM_LIMITS_PER_S,
     ) -> None:
         """Raises ValueError for a limit that is not above zero."""
         for name, limit in limits_per_s.items():

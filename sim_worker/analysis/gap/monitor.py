@@ -8,12 +8,12 @@ from typing import Any
 
 from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.frames import LocalFrame
-from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
+from foretwin.contracts.gap import ALARM_LIMITS_PER_S, GapAlarm, GapSample, Verdict
 from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.errors import GapMeter
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.limits import LIMITS_PER_S, GapLimits
+from foretwin.sim_worker.analysis.gap.limits import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
 from foretwin.sim_worker.analysis.gap.verdict import Judge, without_manual_commands
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
@@ -39,7 +39,7 @@ class GapMonitor:
         *,
         frame: LocalFrame,
         horizons_s: Sequence[float] = HORIZONS_S,
-        limits_per_s: Mapping[str, float] = LIMITS_PER_S,
+        limits_per_s: Mapping[str, float] = ALARM_LIMITS_PER_S,
     ) -> None:
         self._vehicle_id = info.vehicle_id
         self._frame = frame

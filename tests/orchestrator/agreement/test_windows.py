@@ -11,7 +11,7 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import PathAhead
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines, judged_row
 from foretwin.orchestrator.agreement.windows import WindowDesk, judge_in
-from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.sim_worker.analysis.agreement.tally import Judged
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.orchestrator.futures_rounds import round_done, straight
@@ -38,7 +38,7 @@ def driven(
         )  # fmt: skip
         seen = RoadUsers(stamp_ns=state.stamp_ns, users=(lorry,)) if others else None
         light = SignalState(stamp_ns=state.stamp_ns, group_id="g", colour="green")
-        desk.take(Surroundings(None, seen, (light,)), state)
+        desk.take(LatestReports(None, seen, (light,)), state)
         if number % 10 == 0:
             ahead = straight((FROM_X + 0.5 * number, Y), speed_mps=5.0)
             done = round_done(ahead, round_id=number, stamp_ns=state.stamp_ns)

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from foretwin.orchestrator.commands import doctor
-from foretwin.orchestrator.commands.doctor import Finding, examine
+from foretwin.orchestrator.commands.doctor import CheckResult, examine
 
 
-def findings() -> dict[str, Finding]:
+def findings() -> dict[str, CheckResult]:
     return {finding.what: finding for finding in (check() for check in doctor.CHECKS)}
 
 

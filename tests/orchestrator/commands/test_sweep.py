@@ -20,6 +20,7 @@ from foretwin.orchestrator.commands.sweep import crew_for, run_sweep
 from foretwin.orchestrator.record.job_tables import JOB_TABLES
 from foretwin.orchestrator.sweep.spec import load_spec
 from tests.orchestrator.sweeps import SMALL, Alone, small_sweep
+from tests.sim_worker.planners.installed import install
 from tests.starvation import kept_waiting
 
 ENDS_WITHIN_S = 3.0
@@ -114,6 +115,39 @@ def test_another_spec_is_refused_in_the_same_folder(
     other = small_sweep(tmp_path, SMALL.replace("cases = 2", "cases = 1"))
     assert run(["sweep", str(other), "--out", str(folder / "out")]) == 2
     assert "--fresh starts anew" in capsys.readouterr().err
+
+
+PLANNER = """
+from foretwin.sim_worker.planner_interface import PlannerOutput
+
+class Rolling:
+    def plan(self, view):
+        return PlannerOutput({accel_mps2} + 0.0 * view.arc_m, 0.0 * view.arc_m)
+"""
+
+
+def test_a_changed_planner_does_not_get_the_rows_of_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(tmp_path, "changed_planner", PLANNER.format(accel_mps2=0.0), rolling="Rolling")
+    monkeypatch.syspath_prepend(tmp_path)
+    rolling = SMALL.replace('"scp", "cpta", "reversing_parking"', '"scp"')
+    rolling = rolling.replace('"pure_pursuit_idm", "constant_speed"', '"rolling"')
+    spec, out = small_sweep(tmp_path, rolling), str(tmp_path / "out")
+    request = ["sweep", str(spec), "--out", out, "--workers", "1", "--json"]
+    assert run(request) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert first["planners"]["rolling"]["distribution"] == "changed_planner"
+    assert run(request) == 0
+    assert json.loads(capsys.readouterr().out)["jobs_played"] == 0
+
+    (tmp_path / "changed_planner.py").write_text(PLANNER.format(accel_mps2=-4.0))
+    assert run(request) == 2
+    assert "another spec, map, planner or version" in capsys.readouterr().err
+    assert run([*request, "--fresh"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["jobs_played"] == first["jobs_played"] > 0
+    assert again["rows_sha256"] != first["rows_sha256"]
 
 
 def _pressed(spec: Path, out: Path) -> tuple[int, str]:

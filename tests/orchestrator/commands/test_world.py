@@ -33,6 +33,27 @@ def a_junction() -> str:
     return open_map(MAP_FILE).junctions[0].summary.id
 
 
+HOLDS = {
+    ".xml": b"<mujoco", "": b"<mujoco", ".sdf": b"<sdf", ".xodr": b"<OpenDRIVE", ".osm": b"<osm",
+    ".geojson": b"FeatureCollection", ".svg": b"<svg", ".png": b"PNG", ".PNG": b"PNG",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", HOLDS)
+def test_a_file_holds_what_its_suffix_says(suffix: str, tmp_path: Path) -> None:
+    assert {one.suffix for one in FORMATS.values()} <= HOLDS.keys()
+    out = tmp_path / f"world{suffix}"
+    assert run(["world", MAP, "--id", a_junction(), "--out", str(out)]) == 0
+    assert HOLDS[suffix] in out.read_bytes()[:2000]
+
+
+def test_a_suffix_of_none_is_free_where_the_format_is_named(tmp_path: Path) -> None:
+    out = tmp_path / "town.world"
+    arguments = ["--id", a_junction(), "--format", "sdf", "--out", str(out)]
+    assert run(["world", MAP, *arguments]) == 0
+    assert b"<sdf" in out.read_bytes()
+
+
 @pytest.mark.parametrize("name", sorted(FORMATS))
 def test_every_format_is_written(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -8,8 +8,8 @@ import pytest
 from foretwin.contracts.codec import SchemaMismatch, encode
 from foretwin.contracts.drive import DriveEnd, GnssFix, PlannedTrajectory
 from foretwin.contracts.mailbox import Mailbox, Received
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.orchestrator.drive.intake import Intake
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import INFO
 from tests.orchestrator.trip import START_NS, states_along, town
 

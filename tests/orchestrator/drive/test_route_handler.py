@@ -15,12 +15,12 @@ import pytest
 from foretwin.contracts.drive import PlannedTrajectory, RouteToGoal, VehicleState
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.mailbox import Mailbox
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.orchestrator.config import ConfigError, DriveConfig
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2
 from foretwin.orchestrator.drive.route_handler import RouteDesk
 from foretwin.orchestrator.routing.route import Route
 from foretwin.telemetry.ros2.mapping import AUTOWARE, MappingError
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.grid_map import FRAME
 from tests.orchestrator.routing.test_route_to_goal import EAST, NORTH, TOWN, degrees, pose
 from tests.orchestrator.trip import town_plan

@@ -20,15 +20,15 @@ from foretwin.contracts.drive import (
 )
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, local_from_geo
 from foretwin.contracts.mailbox import Mailbox
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.roles import OtherVehicles, Role
 from foretwin.orchestrator.config import VehicleBeside
-from foretwin.orchestrator.drive.intake import Surroundings
+from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.orchestrator.drive.plan import Beside
 from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.telemetry.logs.write_mcap import create
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.house import House
 from tests.orchestrator.trip import START_NS, town_plan
 
@@ -228,7 +228,7 @@ def test_futures_meet_twins_and_shadows_once_and_no_ghosts(tmp_path: Path) -> No
     users = (user("17", 60.0), user("5", 21.0), user("6", 40.0))
     seen = RoadUsers(stamp_ns=now.stamp_ns, users=users)
     beside.keep_up_with(now, seen)
-    said = Surroundings(None, seen, ())
+    said = LatestReports(None, seen, ())
 
     def ids(**roles: str) -> list[str]:
         found = beside.among(said, now, roles).road_users  # type: ignore[arg-type]
@@ -252,7 +252,7 @@ def test_the_van_as_a_road_user_has_its_own_size_and_centre(tmp_path: Path) -> N
         tmp_path, VehicleBeside(id="van", log=str(van_log(tmp_path, start_ns=START_NS)))
     )
     drive(beside, until_s=2.0)
-    users = beside.among(Surroundings(None, None, ()), own(2.0), {"van": "twin"}).road_users
+    users = beside.among(LatestReports(None, None, ()), own(2.0), {"van": "twin"}).road_users
     assert users is not None
     (van,) = users.users
     assert (van.length_m, van.width_m) == (VAN.length_m.value, VAN.width_m.value)

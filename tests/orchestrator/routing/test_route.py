@@ -23,7 +23,6 @@ def test_positions_count_from_the_origin() -> None:
 
     assert route.end_m == pytest.approx(700.0)
     assert route.index_at(650.0) == 1
-    assert route.xy_at(650.0) == pytest.approx([150.0, 0.0])
 
 
 def test_the_most_probable_way_is_straight_on() -> None:

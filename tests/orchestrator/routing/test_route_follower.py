@@ -6,7 +6,7 @@ import pytest
 from foretwin.orchestrator.routing.map_matching import MapMatcher
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
-from foretwin.orchestrator.routing.route_follower import Progress, RouteFollower
+from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import drive, grid, headings, junctions
 
@@ -21,7 +21,7 @@ class Driver:
     def __init__(self, given: tuple[Route, ...] = ()) -> None:
         self.matcher = MapMatcher(TOWN, index=INDEX)
         self.follower = RouteFollower(TOWN, JUNCTIONS, given, index=INDEX)
-        self.progress: list[Progress | None] = []
+        self.progress: list[RouteProgress | None] = []
         self.passed: list[tuple[str, float, float]] = []
 
     def go(self, corners: list[tuple[float, float]]) -> Driver:

@@ -48,6 +48,10 @@ def test_samples_draw_more_cases(tmp_path: Path) -> None:
         ('map = "a"\ncases = "some"', "cases"),
         ('map = "a"\ncases = 0', "cases 0: at least 1"),
         ('map = "a"\nplanners = ["nobody"]', "unknown planner 'nobody'"),
+        (
+            'map = "a"\nplanners = ["constant_speed", "remote"]',
+            "planners: remote asks a stack over the bus of a drive; a sweep has none to join yet",
+        ),
         ('map = "a"\nvehicles = ["tank"]', "no vehicle file tank"),
         ('map = "a"\nmetrics = ["ade"]', "compares with a reference"),
         ('map = "a"\nmetrics = ["ttc_series"]', "is a series"),

@@ -10,7 +10,6 @@ import msgspec
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.simulation import BuildReply, BuildRequest
 from foretwin.contracts.world import World
 from foretwin.orchestrator.config import DriveConfig
@@ -20,6 +19,7 @@ from foretwin.orchestrator.worlds.builder_process import serve_builds
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds, read_given_worlds
 from foretwin.world_gen.build import with_id
 from foretwin.world_gen.world_store import WorldStore
+from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.trip import town, town_plan, town_world
 
 

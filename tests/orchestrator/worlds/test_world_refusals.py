@@ -63,10 +63,16 @@ def test_an_output_that_cannot_be_is_named(
         (["--at", "45,-30", "--out", str(tmp_path)], "is a folder"),
         (["--at", "45,-30", "--out", str(tmp_path / "no" / "w.xml")], "does not exist"),
         (["--at", "45,-30", "--format", "svg", "--out", str(tmp_path / "w.png")], "ends in .svg"),
+        (["--at", "45,-30", "--format", "mjcf", "--out", str(tmp_path / "w.png")], "ends in .xml"),
+        (["--at", "45,-30", "--format", "sdf", "--out", str(tmp_path / "w.OSM")], "ends in .sdf"),
+        (["--at", "45,-30", "--out", str(tmp_path / "w.gltf")], "ends in none of .xml, .sdf, "),
         (["--all", "--out", str(file / "worlds")], "is no folder"),
     ):
         assert run(["world", MAP, *arguments]) == 2
-        assert named in capsys.readouterr().err
+        said = capsys.readouterr().err
+        assert named in said
+        assert said.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [file]
 
 
 @pytest.mark.parametrize(

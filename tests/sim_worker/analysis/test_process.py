@@ -12,7 +12,6 @@ import pytest
 from foretwin.contracts.bus import Mailbox, Received, Reply, Request
 from foretwin.contracts.gap import GapSample
 from foretwin.contracts.mailbox import Item
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.setup import BusSetup, TuningSetup
 from foretwin.contracts.tuning import TuneReply, TuneRequest, UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
@@ -22,6 +21,7 @@ from foretwin.sim_worker.analysis.tuning import SAMPLES
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.standin.source import START_STAMP_NS
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
 from tests.telemetry.city_drive import city_drive
 from tests.telemetry.standin_drive import FRAME

@@ -16,10 +16,8 @@ from foretwin.sim_worker.metrics.comparison import (
     NominalTrack,
     compare_nominal,
     compare_plan,
-    compare_plans,
 )
 from foretwin.sim_worker.metrics.displacement import distinct_count, horizon_error
-from tests.sim_worker.metrics.motions import Mover, rollout
 from tests.sim_worker.places import FRAME, straight_path
 
 TIME_S = np.arange(0.0, 8.01, 0.1)
@@ -139,25 +137,6 @@ def test_a_plan_of_another_time_is_not_compared() -> None:
         )
         is None
     )  # fmt: skip
-
-
-def test_each_simulated_plan_is_compared_with_the_received_one() -> None:
-    driven = rollout(Mover(0, 0), time_s=TIME_S, futures=3)
-    for row, (left_m, speed_mps) in enumerate([(0.0, 8.0), (1.0, 8.0), (0.0, 9.0)]):
-        driven.states[row, :, 0] = -50.0 + 8.0 * 0.4 + speed_mps * TIME_S
-        driven.states[row, :, 1] = -1.5 + left_m
-    driven.valid[0] = False
-
-    found = compare_plans(_plan(left_m=0.0), driven, stamp_ns=400_000_000, world_frame=FRAME)
-
-    # The plan ends 5.6 s after the futures begin.
-    assert found["fde"].values[1:] == pytest.approx([1.0, 5.6], abs=1e-3)
-    assert found["lateral"].values[1:] == pytest.approx([1.0, 0.0], abs=1e-3)
-    assert found["longitudinal"].values[1:] == pytest.approx([0.0, 5.6], abs=1e-3)
-    assert found["frechet"].values[1] == pytest.approx(1.0, abs=1e-3)
-    assert found["ade"].valid.tolist() == [False, True, True]
-    apart = compare_plans(_plan(left_m=0.0), driven, stamp_ns=60_000_000_000, world_frame=FRAME)
-    assert not any(measure.valid.any() for measure in apart.values())
 
 
 def test_distinct_ends_are_counted_once() -> None:

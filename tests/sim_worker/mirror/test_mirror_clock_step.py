@@ -17,12 +17,12 @@ from foretwin.contracts.drive import (
     VehicleInfo,
 )
 from foretwin.contracts.frames import GeoPoint, geo_from_local
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.setup import BusSetup, WorkerSetup
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.sim_worker.mirror.process import MirrorWorker
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.estimator.estimator import StateEstimator
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.places import FRAME
 
 S = 1_000_000_000

@@ -8,7 +8,6 @@ import msgspec
 import pytest
 
 from foretwin.contracts.mailbox import Mailbox, Received, Request
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.roles import (
     CastVehicle,
     MirrorCast,
@@ -20,6 +19,7 @@ from foretwin.contracts.setup import BusSetup, WorkerSetup
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.sim_worker.mirror.process import MirrorWorker
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.places import FRAME, state_at
 
 VAN = CastVehicle(vehicle_id="van", vehicle=load_vehicle("vw_vanagon"))

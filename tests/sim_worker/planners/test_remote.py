@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.bus import Mailbox, Received
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.remote import RemoteDriver, RemotePlanner
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.planners.driven import Other, at_rest_on, drive, see, straight, view_of
 from tests.starvation import kept_waiting
 

@@ -10,12 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario, Span
+from foretwin.contracts.scenario import ActorPart, Distribution, EgoPart, Scenario
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.reading import catalogue
 
 
-def scenario(ego: Span | float = 5.0, other: Span | float = 8.0, **more: int) -> Scenario:
+def scenario(
+    ego: Distribution | float = 5.0, other: Distribution | float = 8.0, **more: int
+) -> Scenario:
     actors = (ActorPart(name="other", relation="oncoming", speed_mps=other),)
     return Scenario(
         id="x", title="x", shows="x.", source="x", ego=EgoPart(speed_mps=ego), actors=actors, **more
@@ -38,7 +40,9 @@ def test_every_number_of_a_case_has_a_name() -> None:
 
 
 def test_samples_are_drawn_for_each_combination() -> None:
-    cases = draw_cases(scenario(Span(values=(1.0, 2.0, 3.0)), Span(min=4.0, max=6.0), samples=5))
+    cases = draw_cases(
+        scenario(Distribution(values=(1.0, 2.0, 3.0)), Distribution(min=4.0, max=6.0), samples=5)
+    )
     counted = collections.Counter(case["ego.speed_mps"] for case in cases)
     assert counted == {1.0: 5, 2.0: 5, 3.0: 5}
     assert len({case["other.speed_mps"] for case in cases}) == 15
@@ -55,13 +59,15 @@ def test_the_seed_alone_decides(seed: int, other: int) -> None:
 @given(seed=st.integers(0, 2**31), low=st.floats(0.0, 10.0), width=st.floats(0.1, 10.0))
 def test_ranges_are_filled_evenly(seed: int, low: float, width: float) -> None:
     """Each 16th of the range holds exactly one of 16 draws, as Sobol's sequence promises."""
-    cases = draw_cases(scenario(other=Span(min=low, max=low + width), samples=16), seed=seed)
+    cases = draw_cases(
+        scenario(other=Distribution(min=low, max=low + width), samples=16), seed=seed
+    )
     shares = (np.array([case["other.speed_mps"] for case in cases]) - low) / width
     assert sorted(np.clip(shares * 16.0, 0.0, 15.999).astype(int).tolist()) == list(range(16))
 
 
 def test_normal_numbers_have_their_mean_and_stay_within_bounds() -> None:
-    span = Span(mean=10.0, std=2.0, min=7.0, max=13.0)
+    span = Distribution(mean=10.0, std=2.0, min=7.0, max=13.0)
     drawn = np.array(
         [case["other.speed_mps"] for case in draw_cases(scenario(other=span, samples=512))]
     )

@@ -16,18 +16,19 @@ import pytest
 from foretwin.contracts.bus import Alive, Mailbox, Received, ZenohBus
 from foretwin.contracts.drive import SpeedSample
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.ports import free_endpoint
-from foretwin.contracts.setup import BusSetup, RecorderSetup, write_setup
+from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
+from foretwin.contracts.setup import BusSetup, ProcessSetup, RecorderSetup, write_setup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.logs import open_log
-from foretwin.telemetry.logs.ros_log import read_drive
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
 from foretwin.telemetry.processes.recorder import RecorderProcess
-from foretwin.telemetry.processes.recording import Recording
+from foretwin.telemetry.processes.recording import DriveRecording
 from tests.contracts.bus_sides import DEADLINE_S
+from tests.contracts.memory_bus import MemoryBus
 from tests.starvation import unhindered_wait_s
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
+from tests.telemetry.own_recordings import read_drive
 
 ORCHESTRATOR = alive_key(run="r1", process="orchestrator")
 RECORDER = alive_key(run="r1", process="recorder")
@@ -44,11 +45,18 @@ class Wall:
 
 
 def recorder(
-    bus: MemoryBus, recording: Recording, *, lossless: bool = True, mono_s: Any = time.monotonic
+    bus: MemoryBus,
+    recording: DriveRecording,
+    *,
+    lossless: bool = True,
+    mono_s: Any = time.monotonic,
 ) -> RecorderProcess:
+    setup = ProcessSetup(
+        run_id="r1", process_id="recorder", vehicle_id="car", bus=BusSetup(endpoint=""), log_file=""
+    )
     return RecorderProcess(
-        recording, bus=bus, run_id="r1", process_id="recorder", vehicle_id="car",
-        lossless=lossless, mono_s=mono_s,
+        recording, bus=bus, life=ProcessLife(setup, bus, mono_s=mono_s), run_id="r1",
+        vehicle_id="car", lossless=lossless, mono_s=mono_s,
     )  # fmt: skip
 
 
@@ -60,7 +68,7 @@ def publish_all(bus: MemoryBus | ZenohBus) -> None:
 def test_all_channels_and_the_vehicle_are_recorded(tmp_path: Path) -> None:
     bus, path, questions = MemoryBus(), tmp_path / "drive.mcap", Mailbox(4)
     bus.serve("info", questions, vehicle="car")
-    process = recorder(bus, Recording(lambda: create(path), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(lambda: create(path), name="drive.mcap"))
     publish_all(bus)
     assert process.step()
     questions.take().reply(INFO)
@@ -78,7 +86,7 @@ def test_in_lock_step_nothing_is_left_out_however_slow_the_machine_is(tmp_path: 
             return self.now_s
 
     bus, path = MemoryBus(), tmp_path / "drive.mcap"
-    recording = Recording(lambda: create(path), name="drive.mcap")
+    recording = DriveRecording(lambda: create(path), name="drive.mcap")
     process = recorder(bus, recording, mono_s=Slow())
     publish_all(bus)
     process.finish()
@@ -87,7 +95,7 @@ def test_in_lock_step_nothing_is_left_out_however_slow_the_machine_is(tmp_path: 
 
 def test_a_vehicle_that_does_not_answer_is_recorded_all_the_same(tmp_path: Path) -> None:
     bus, path = MemoryBus(), tmp_path / "drive.mcap"
-    process = recorder(bus, Recording(lambda: create(path), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(lambda: create(path), name="drive.mcap"))
     publish_all(bus)
     assert process.step()
     process.finish()
@@ -113,7 +121,7 @@ def test_a_write_error_reaches_the_bus_and_the_process_goes_on(tmp_path: Path) -
 
     bus, events = MemoryBus(), Mailbox(10)
     bus.subscribe("event", events, run="r1")
-    process = recorder(bus, Recording(lambda: DriveWriter(Broken()), name="drive.mcap"))
+    process = recorder(bus, DriveRecording(lambda: DriveWriter(Broken()), name="drive.mcap"))
     publish_all(bus)
     assert process.step()
     event = events.take().message()
@@ -124,7 +132,7 @@ def test_a_write_error_reaches_the_bus_and_the_process_goes_on(tmp_path: Path) -
 
 def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path: Path) -> None:
     bus, wall = MemoryBus(), Wall()
-    recording = Recording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
     process = recorder(bus, recording, mono_s=wall)
     wall.now_s = 100.0
     assert process.step(), "it never saw the orchestrator"
@@ -133,11 +141,11 @@ def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path
     bus.lose(ORCHESTRATOR)
     assert process.step(), "a link may come back"
     bus.declare_alive(ORCHESTRATOR)
-    wall.now_s += 5.0
+    wall.now_s += 2.0 * ORCHESTRATOR_GRACE_S
     assert process.step()
     bus.lose(ORCHESTRATOR)
     assert process.step()
-    wall.now_s += 1.1
+    wall.now_s += 1.1 * ORCHESTRATOR_GRACE_S
     assert not process.step()
     process.finish()
 
@@ -145,7 +153,7 @@ def test_it_leaves_when_the_orchestrator_is_gone_but_not_before_it_came(tmp_path
 def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:
     bus, events, wall = MemoryBus(), Mailbox(10), Wall()
     bus.subscribe("event", events, run="r1")
-    recording = Recording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
     process = recorder(bus, recording, lossless=False, mono_s=wall)
     bus.publish("speed", SpeedSample(stamp_ns=START_NS, speed_mps=0.0), vehicle="car")
     assert process.step()
@@ -164,7 +172,7 @@ def test_what_is_missing_is_counted_and_told(tmp_path: Path) -> None:
 def test_losses_are_told_again_when_there_are_twice_as_many_and_at_the_end(tmp_path: Path) -> None:
     bus, events, wall = MemoryBus(), Mailbox(32), Wall()
     bus.subscribe("event", events, run="r1")
-    recording = Recording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
     process = recorder(bus, recording, lossless=False, mono_s=wall)
     nobody = Mailbox(1)
     sample = SpeedSample(stamp_ns=START_NS, speed_mps=0.0)
@@ -239,8 +247,5 @@ def test_a_wrong_setup_is_told_without_a_traceback(tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=DEADLINE_S, check=False,
     )  # fmt: skip
     assert done.returncode == 2
-    assert (
-        "foretwin.telemetry.processes.recorder: Expected `str`, got `int` - at `$.run_id`"
-        in done.stderr
-    )
+    assert "setup.json: Expected `str`, got `int` - at `$.run_id`" in done.stderr
     assert "Traceback" not in done.stderr

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.drive import ImuSample, SpeedSample
-from foretwin.telemetry.logs.ros_log import read_drive
 from foretwin.telemetry.logs.write_mcap import DriveWriter, create
-from foretwin.telemetry.processes.recording import Recording
+from foretwin.telemetry.processes.recording import DriveRecording
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
+from tests.telemetry.own_recordings import read_drive
 
 
 class SmallDisk(io.BytesIO):
@@ -46,7 +46,9 @@ def test_a_full_disk_is_told_once_and_what_was_written_stays_readable(
     tmp_path: Path, room: int
 ) -> None:
     path = tmp_path / "drive.mcap"
-    recording = Recording(lambda: DriveWriter(SmallDisk(room, path), info=INFO), name="drive.mcap")
+    recording = DriveRecording(
+        lambda: DriveWriter(SmallDisk(room, path), info=INFO), name="drive.mcap"
+    )
     events = list(recording.started())
     for number in range(6000):
         events += recording.add("imu", imu(number))
@@ -66,7 +68,7 @@ def test_a_full_disk_is_told_once_and_what_was_written_stays_readable(
 
 def test_a_folder_that_is_not_there_stops_the_recording_alone(tmp_path: Path) -> None:
     path = tmp_path / "missing" / "drive.mcap"
-    recording = Recording(lambda: create(path), name="drive.mcap")
+    recording = DriveRecording(lambda: create(path), name="drive.mcap")
     (event,) = recording.started()
     assert event.level == "error"
     assert "cannot be written" in event.text
@@ -77,7 +79,7 @@ def test_a_folder_that_is_not_there_stops_the_recording_alone(tmp_path: Path) ->
 
 def test_every_channel_is_recorded(tmp_path: Path) -> None:
     path = tmp_path / "drive.mcap"
-    recording = Recording(lambda: create(path), name="drive.mcap")
+    recording = DriveRecording(lambda: create(path), name="drive.mcap")
     for channel, message in every_channel():
         assert recording.add(channel, message) == []
     assert recording.finish() == []
@@ -85,7 +87,7 @@ def test_every_channel_is_recorded(tmp_path: Path) -> None:
 
 
 def test_a_message_that_no_file_can_hold_is_counted_and_told_once(tmp_path: Path) -> None:
-    recording = Recording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
+    recording = DriveRecording(lambda: create(tmp_path / "drive.mcap"), name="drive.mcap")
     impossible = SpeedSample(stamp_ns=-5, speed_mps=1.0)
     (event,) = recording.add("speed", impossible)
     assert event.level == "warning"

@@ -13,10 +13,12 @@ from foretwin.contracts.drive import (
     VehicleInfo,
 )
 from foretwin.contracts.keys import alive_key
-from foretwin.contracts.memory_bus import MemoryBus
+from foretwin.contracts.process import ORCHESTRATOR_GRACE_S, ProcessLife
+from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.processes.replay import ReplaySource
 from foretwin.telemetry.processes.vehicle_process import VehicleProcess
+from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.processes.test_replay import SECOND_NS, START_NS, RecordedMinute
 
 ORCHESTRATOR = alive_key(run="r", process="orchestrator")
@@ -32,11 +34,14 @@ class Rig:
         for channel in ("gnss", "speed", "end"):
             self.bus.subscribe(channel, self.inbox, vehicle="car")
         source = ReplaySource(RecordedMinute(), vehicle_id="car", end_s=end_s)
+        setup = ProcessSetup(
+            run_id="r", process_id="vehicle", vehicle_id="car", bus=BusSetup(endpoint=""),
+            log_file="",
+        )  # fmt: skip
         self.process = VehicleProcess(
             source,
             bus=self.bus,
-            run_id="r",
-            process_id="vehicle",
+            life=ProcessLife(setup, self.bus, mono_s=lambda: self.now_s),
             vehicle_id="car",
             speed=speed,
             mono_s=lambda: self.now_s,
@@ -135,14 +140,14 @@ def test_it_leaves_when_the_orchestrator_stays_away() -> None:
     assert rig.process.step()
     rig.bus.lose(ORCHESTRATOR)
     assert rig.process.step()
-    rig.now_s += 1.0
+    rig.now_s += 0.5 * ORCHESTRATOR_GRACE_S
     rig.bus.declare_alive(ORCHESTRATOR)
     assert rig.process.step()
-    rig.now_s += 5.0
+    rig.now_s += 2.0 * ORCHESTRATOR_GRACE_S
     assert rig.process.step()
     rig.bus.lose(ORCHESTRATOR)
     rig.process.step()
-    rig.now_s += 2.0
+    rig.now_s += 1.1 * ORCHESTRATOR_GRACE_S
     assert not rig.process.step()
 
 

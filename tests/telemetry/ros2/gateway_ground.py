@@ -108,7 +108,7 @@ def steering(stamp_ns: int, angle_rad: float) -> bytes:
 
 def antenna_at(forward_m: float, left_m: float, up_m: float) -> bytes:
     """Return a TFMessage that places the frame `gnss` in base_link."""
-    from foretwin.telemetry.ros_messages.transforms import transform_message
+    from tests.telemetry.autoware_messages import transform_message
 
     place_m = (forward_m, left_m, up_m)
     message = transform_message(0, parent="base_link", child="gnss", place_m=place_m, yaw_rad=0.0)

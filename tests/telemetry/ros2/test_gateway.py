@@ -9,13 +9,13 @@ import pytest
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.drive import GnssFix, RoadUser, RoadUsers, SteeringSample, VehicleState
 from foretwin.contracts.frames import GeoPoint
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.foreign import FOREIGN
 from foretwin.telemetry.ros_messages.parts import ODOMETRY, typestore, yaw_of
+from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import (
     FIX_KEY,
     FRAME,

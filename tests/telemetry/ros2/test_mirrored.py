@@ -10,7 +10,6 @@ import pytest
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.contracts.roles import Role
 from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState
 from foretwin.contracts.towards_vehicle import Authority
@@ -25,6 +24,7 @@ from foretwin.telemetry.ros_messages.parts import (
     typestore,
     yaw_of,
 )
+from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import RecordingForeign
 
 S = 10**9

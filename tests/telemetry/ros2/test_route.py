@@ -10,7 +10,6 @@ import pytest
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.drive import RouteToGoal
 from foretwin.contracts.frames import local_from_geo
-from foretwin.contracts.memory_bus import MemoryBus
 from foretwin.telemetry.ros2.gateway import Gateway
 from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.parts import (
@@ -20,6 +19,7 @@ from foretwin.telemetry.ros_messages.parts import (
     ros_type,
     turn_from,
 )
+from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import FRAME, RecordingForeign, cdr
 
 S = 10**9

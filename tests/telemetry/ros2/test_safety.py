@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.towards_vehicle import VehicleCommand
-from foretwin.telemetry.ros2.safety import DEAD_MAN_NS, Limits, VehicleGate
+from foretwin.telemetry.ros2.safety import DEAD_MAN_NS, CommandLimits, VehicleGate
 
-LIMITS = Limits()
+LIMITS = CommandLimits()
 MS = 1_000_000
 
 

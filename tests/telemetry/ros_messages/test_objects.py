@@ -36,20 +36,17 @@ from foretwin.telemetry.ros_messages.parts import (
 from foretwin.telemetry.ros_messages.status import (
     StatusJoiner,
     gear_from_ros,
-    group_number,
     indicator_from_ros,
     mode_from_ros,
-    ros_from_signals,
-    ros_from_status,
     signals_from_ros,
 )
-from foretwin.telemetry.ros_messages.transforms import (
-    TransformTree,
-    clock_message,
-    clock_ns_of,
+from foretwin.telemetry.ros_messages.transforms import TransformTree
+from tests.telemetry import drive_messages
+from tests.telemetry.autoware_messages import (
+    ros_from_signals,
+    ros_from_status,
     transform_message,
 )
-from tests.telemetry import drive_messages
 
 FRAME = LocalFrame(GeoPoint(52.5121, 13.3925, 34.0))
 AT = drive_messages.START_NS
@@ -187,11 +184,6 @@ def test_signal_colours_come_back(colours: list[drive.SignalColour]) -> None:
     assert signals_from_ros(through_cdr(ros_from_signals(AT, said), TRAFFIC_LIGHTS)) == said
 
 
-@given(st.text())
-def test_every_group_has_a_number_that_fits_and_stays(group_id: str) -> None:
-    assert 0 <= group_number(group_id) == group_number(group_id) < 2**63
-
-
 def test_a_green_arrow_beside_a_red_light_is_no_colour() -> None:
     message = ros_from_signals(AT, [drive.SignalState(stamp_ns=AT, group_id="7", colour="red")])
     arrow = ros_from_signals(AT, [drive.SignalState(stamp_ns=AT, group_id="7", colour="green")])
@@ -256,7 +248,3 @@ def test_frames_in_a_circle_end() -> None:
             transform_message(AT, parent=parent, child=child, place_m=(1.0, 0.0, 0.0), yaw_rad=0.0)
         )
     assert tree.place_of("c", within="a") is None
-
-
-def test_a_clock_comes_back() -> None:
-    assert clock_ns_of(clock_message(AT)) == AT

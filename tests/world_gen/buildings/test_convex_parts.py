@@ -15,10 +15,13 @@ from shapely.geometry import Point, Polygon
 from foretwin.world_gen.buildings.convex_parts import (
     COLLISION_TOLERANCE_M,
     convex_cover,
-    convex_parts,
 )
 
 L_SHAPE = np.array([[0, 0], [20, 0], [20, 6], [6, 6], [6, 20], [0, 20]], dtype=np.float64)
+
+
+def convex_parts(outline: np.ndarray, holes: tuple[np.ndarray, ...] = ()) -> list[np.ndarray]:
+    return convex_cover([(outline, holes)]).rings
 
 
 def _area(parts: list[np.ndarray]) -> float:

@@ -18,9 +18,9 @@ from foretwin.world_gen.buildings.footprints import (
     FOOTPRINT_TOLERANCE_M,
     BuildingIndex,
     buildings_in_frame,
-    footprints,
 )
 from foretwin.world_gen.buildings.parts import Footprint
+from foretwin.world_gen.osm.osm_map import OsmMap
 from tests.world_gen.drawn_maps import drawn_map
 
 SQUARE = {1: (0.0, 0.0), 2: (20.0, 0.0), 3: (20.0, 20.0), 4: (0.0, 20.0)}
@@ -29,6 +29,15 @@ HALVES = SQUARE | {9: (10.0, 0.0), 10: (10.0, 20.0)}
 OUTLINE = (20, [1, 2, 3, 4, 1], {"building": "yes", "height": "10"})
 NOWHERE = np.zeros(0, dtype=object)
 FRAME = LocalFrame(GeoPoint(52.0, 10.0))
+EVERYWHERE = shapely.box(-1e5, -1e5, 1e5, 1e5)
+
+
+def footprints(osm: OsmMap, notes: list[str]) -> tuple[Footprint, ...]:
+    index = BuildingIndex(osm)
+    found = index.within(EVERYWHERE)
+    notes.extend(index.notes)
+    notes.extend(dict.fromkeys(f.note for f in found if f.note))
+    return found
 
 
 def test_a_multipolygon_has_its_courtyard():
@@ -168,7 +177,7 @@ def test_asking_by_place_gives_what_asking_for_all_gives():
     assert [f.id for f in near] == ["w21"]  # the rest of the outline does not reach there
     far = index.within(shapely.Point(510.0, 10.0).buffer(30.0))
     assert [f.id for f in far] == ["w30", "w31"]
-    every = BuildingIndex(osm).all()
+    every = footprints(osm, [])
     assert [f for f in every if f.id in ("w21", "w30", "w31")] == [*near, *far]
     assert index.within(shapely.Point(5000.0, 0.0).buffer(10.0)) == ()
 

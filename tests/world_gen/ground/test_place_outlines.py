@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
 
 from foretwin.world_gen.ground import road_surface
-from foretwin.world_gen.ground.place_outlines import Outlines
+from foretwin.world_gen.ground.place_outlines import PlaceOutlines
 from tests.world_gen.drawn_maps import GERMANY, crossing, drawn_map, world_of
 
 
@@ -52,7 +52,7 @@ def test_cars_stay_on_the_paved_ground(twelfths):
 def test_the_outline_is_about_what_is_swept(monkeypatch):
     quick = place_of(world_of(crossing()))
     monkeypatch.setattr(
-        road_surface, "simple_outlines", lambda *_: Outlines((), np.array([], dtype=object))
+        road_surface, "simple_outlines", lambda *_: PlaceOutlines((), np.array([], dtype=object))
     )
     general = place_of(world_of(crossing()))
     assert quick.symmetric_difference(general).area < 0.12 * general.area

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foretwin.world_gen.junctions.find_intersections import find_intersections
 from tests.world_gen.sketch import MANCHESTER, Sketch, off_centre_m, only, star
 
 
@@ -204,20 +203,6 @@ def test_an_edit_elsewhere_changes_no_id(tmp_path: Path) -> None:
     after = [junction.summary.id for junction in sketch.junctions(tmp_path)]
     assert before in after
     assert len(after) == 2
-
-
-def test_only_those_that_touch_given_edges(tmp_path: Path) -> None:
-    sketch = star([0, 90, 180, 270])
-    for node, x_m, y_m in ((50, 400, 0), (51, 400, 100), (52, 500, 0)):
-        sketch.node(node, x_m, y_m)
-    sketch.road(50, [2, 50], "Arm 2")
-    sketch.road(51, [51, 50, 52], "Fern")
-    osm = sketch.read(tmp_path)
-    graph = sketch.graph(tmp_path)
-    every = find_intersections(osm, graph)
-    assert len(every) == 2
-    near = [edge.index for edge in graph.edges if edge.name == "Arm 4"]
-    assert [j.summary.id for j in find_intersections(osm, graph, edges=near)] == ["n1"]
 
 
 def test_side_streets_on_the_same_side_stay_two_junctions(tmp_path: Path) -> None:

@@ -35,7 +35,6 @@ def test_ways_are_cut_where_they_meet_alone(crossing: Sketch, tmp_path: Path) ->
     assert [edge.node_ids for edge in graph.edges] == [(1, 2), (2, 6, 3), (4, 2), (2, 5)]
     assert [edge.length_m for edge in graph.edges] == pytest.approx([100, 100, 80, 80], abs=0.01)
     assert [edge.index for edge in graph.edges] == [0, 1, 2, 3]
-    assert graph.xy_of(2).shape == (2,)
 
 
 def test_all_leave_from_a_node_allowed_or_not(crossing: Sketch, tmp_path: Path) -> None:

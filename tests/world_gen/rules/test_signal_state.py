@@ -8,13 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.contracts.drive import SignalState
 from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
 from foretwin.world_gen.rules.signal_state import (
     LiveColour,
     colours_at,
     cycle_s,
-    live_colours,
     world_colours_at,
 )
 from tests.world_gen.drawn_maps import crossing, world_of
@@ -71,17 +69,13 @@ def test_a_group_of_two_phases_in_a_row_stays_green():
 
 
 def test_what_is_heard_counts_until_it_is_old():
-    states = [
-        SignalState(stamp_ns=3_000_000_000, group_id="w", colour="dark"),
-        SignalState(stamp_ns=2_000_000_000, group_id="w", colour="amber"),
-        SignalState(stamp_ns=3_000_000_000, group_id="elsewhere", colour="green"),
-        SignalState(stamp_ns=3_000_000_000, group_id="n", colour="unknown"),
-    ]
-    live = live_colours(states, start_stamp_ns=1_000_000_000)
-    assert live["w"] == LiveColour(2.0, "dark")
+    live = {
+        "w": LiveColour(2.0, "dark"),
+        "elsewhere": LiveColour(2.0, "green"),
+        "n": LiveColour(2.0, "unknown"),
+    }
     assert colours_at(PLAN, 4.0, live) == {"w": "dark", "n": "red", "foot": "green"}
     assert colours_at(PLAN, 4.1, live)["w"] == "green"
-    assert colours_at(PLAN, 4.1, live, live_for_s=3.0)["w"] == "dark"
 
 
 @given(
@@ -120,5 +114,3 @@ def test_a_world_shows_all_its_lights():
     colours = world_colours_at(world, 1.0)
     assert set(colours) == {signal.group_id for signal in world.signals}
     assert sorted(colours.values()) == ["green", "green", "red", "red"]
-    name = next(name for name, colour in colours.items() if colour == "red")
-    assert world_colours_at(world, 1.0, {name: LiveColour(0.5, "green")})[name] == "green"

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foretwin.telemetry.estimator.smoothing import smooth_positions
+from tests.telemetry.smoothing import smooth_positions
 
 STAMPS = (np.arange(0.0, 20.0, 0.2) * 1e9).astype(np.int64)
 

@@ -1,4 +1,4 @@
-"""The bus in one process, for tests: same calls, same mailboxes, no network."""
+"""The bus in one process: same calls, same mailboxes, no network."""
 
 from __future__ import annotations
 

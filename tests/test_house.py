@@ -1,0 +1,43 @@
+"""What holds of the whole tree's names: one class, one name."""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+
+import pytest
+
+from tests.test_layout import ROOT, tracked_files
+
+TWICE = frozenset({
+    "Cast", "Casting", "Course", "Follower", "Impact", "Measured", "Meeting", "Motion", "Pairs",
+    "Place", "Scene", "SteeringSignals",
+})  # fmt: skip
+"""Names of two classes still, all in sim_worker; only to become fewer."""
+
+
+@pytest.fixture(scope="module")
+def classes() -> dict[str, list[str]]:
+    """Every class outside tests by its name: the files that define it, inner classes too."""
+    found = defaultdict(list)
+    for path in sorted(set(tracked_files())):
+        name = str(path.relative_to(ROOT))
+        if path.suffix == ".py" and not name.startswith("tests/"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ClassDef):
+                    found[node.name].append(name)
+    return found
+
+
+def test_no_class_has_the_name_of_another(classes: dict[str, list[str]]) -> None:
+    assert len(classes) > 500
+    twice = {name: files for name, files in classes.items() if len(files) > 1}
+
+    assert {name: files for name, files in twice.items() if name not in TWICE} == {}
+    assert TWICE - twice.keys() == set(), "no longer needed"
+
+
+def test_names_that_stand_twice_stay_in_one_room(classes: dict[str, list[str]]) -> None:
+    rooms = {file.split("/")[0] for name in TWICE for file in classes[name]}
+
+    assert rooms <= {"sim_worker"}
