@@ -11,6 +11,7 @@ LEAST_RADIUS_M = 4.0
 """Of base_link's path: cars turn hardly tighter. Chosen: passenger cars' turning circles are 10 to
 12 m across from kerb to kerb, as the outer front wheel goes; those of base_link some 8 m."""
 MAX_CURVATURE_PM = 1.0 / LEAST_RADIUS_M
+"""1/m, the same."""
 
 _Angle = TypeVar("_Angle", float, Array)
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 
+Numbers = Array | float
+
 LATERAL_ACCEL_MPS2 = 2.5
 """In bends. Chosen: half of the 4.89 m/s² up to which nuPlan calls human driving comfortable."""
 COMFORT_DECEL_MPS2 = 2.0
@@ -54,18 +56,11 @@ LEAST_START_MPS = 2.0
 
 
 def dynamic_gap_m(
-    speed_mps: Array,
-    lead_mps: Array,
-    *,
-    time_gap_s: float,
-    accel_mps2: Array | float,
-    decel_mps2: Array | float,
+    speed_mps: Array, lead_mps: Array, time_gap_s: float, accel_mps2: Numbers, decel_mps2: Numbers
 ) -> Array:
     """Return what IDM wants ahead beyond the gap at a standstill: v T + v Δv / (2 √(a b)), or 0.
 
     All of one shape; speeds of who follows and of who leads.
     """
-    approach = speed_mps * (speed_mps - lead_mps)
-    return np.maximum(
-        speed_mps * time_gap_s + approach / (2.0 * np.sqrt(accel_mps2 * decel_mps2)), 0.0
-    )
+    closing = speed_mps * (speed_mps - lead_mps) / (2.0 * np.sqrt(accel_mps2 * decel_mps2))
+    return np.maximum(speed_mps * time_gap_s + closing, 0.0)

@@ -16,6 +16,7 @@ import numpy as np
 
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
 from foretwin.orchestrator.routing.route import Route
+from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.world_gen.junctions.intersections import Junction
 
 USUAL_SHARE = 0.75
@@ -23,7 +24,6 @@ USUAL_SHARE = 0.75
 LEARNING_S = 40.0
 EASING_S = 4.0
 DWELL_S = 5.0
-STANDING_MPS = 0.5
 _MOVING_MPS = 1.5
 _LEAST_SPEED_MPS = 2.0
 

@@ -183,12 +183,16 @@ def _view(heedless: Run, planned: Run | None, aspect: float) -> View:
     spread = np.clip(
         np.concatenate(points), middle - 1.6 * _MOST_HALF_M, middle + 1.6 * _MOST_HALF_M
     )
-    low, high = spread.min(axis=0) - _MARGIN_M, spread.max(axis=0) + _MARGIN_M
-    half = max((high - low)[1] / 2.0, (high - low)[0] / 2.0 / aspect)
-    half = min(max(half, _LEAST_HALF_M), _MOST_HALF_M)
-    centre = (low + high) / 2.0
+    centre, half = framed(spread, aspect)
     reach = 0.75 * half * np.array([aspect, 1.0])
     return view_around(np.clip(centre, middle - reach, middle + reach), half, aspect, close=False)
+
+
+def framed(xy_m: Array, aspect: float) -> tuple[Array, float]:
+    """Return the middle (2,) of points (N, 2), and half the height of a picture that shows them."""
+    low, high = xy_m.min(axis=0) - _MARGIN_M, xy_m.max(axis=0) + _MARGIN_M
+    half = max((high - low)[1] / 2.0, (high - low)[0] / 2.0 / aspect)
+    return (low + high) / 2.0, min(max(half, _LEAST_HALF_M), _MOST_HALF_M)
 
 
 def _ghosts(run: Run) -> list[int]:

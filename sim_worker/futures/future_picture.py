@@ -13,13 +13,19 @@ from foretwin.contracts.futures import FuturesResult, Job
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.rectangles import Rectangles
-from foretwin.sim_worker.futures.case_picture import IMPACT, OTHERS, PLANNED, draw_box, draw_lanes
+from foretwin.sim_worker.futures.case_picture import (
+    IMPACT,
+    OTHERS,
+    PLANNED,
+    draw_box,
+    draw_lanes,
+    framed,
+)
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.export.picture_ground import draw_ground
 from foretwin.world_gen.export.picture_marks import scale_bar
 from foretwin.world_gen.export.picture_style import view_around
 
-_LEAST_HALF_M, _MOST_HALF_M, _MARGIN_M = 20.0, 75.0, 8.0
 _ASPECT = 0.96 * 9.0 / 8.3
 
 
@@ -44,10 +50,7 @@ def write_future_picture(
     ego = np.column_stack([states[:, :2] + ahead, yaw])
     figure = Figure(figsize=(9.0, 10.0), dpi=110, facecolor="white")
     axes = figure.add_axes((0.02, 0.05, 0.96, 0.83))
-    low, high = ego[:, :2].min(axis=0) - _MARGIN_M, ego[:, :2].max(axis=0) + _MARGIN_M
-    half = max((high - low)[1] / 2.0, (high - low)[0] / 2.0 / _ASPECT)
-    half = min(max(half, _LEAST_HALF_M), _MOST_HALF_M)
-    view = view_around((low + high) / 2.0, half, _ASPECT, close=False)
+    view = view_around(*framed(ego[:, :2], _ASPECT), _ASPECT, close=False)
     draw_ground(axes, world, view)
     draw_lanes(axes, world, view)
     size = (vehicle.length_m.value, vehicle.width_m.value)

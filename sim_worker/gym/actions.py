@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.driver_model import MAX_DECEL_MPS2
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.tracking import pure_pursuit
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
@@ -14,8 +15,8 @@ from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 Control = Literal["free", "along_path"]
 """`free`: acceleration and tyre angle; `along_path`: acceleration, steered by pure pursuit."""
 
-MAX_ACCEL_MPS2, MAX_DECEL_MPS2 = 3.0, 8.0
-"""What 1 and -1 stand for; 0 keeps the speed."""
+MAX_ACCEL_MPS2 = 3.0
+"""What 1 stands for, as -1 does for `MAX_DECEL_MPS2`; 0 keeps the speed. Chosen: a quick car's."""
 
 
 def action_size(control: Control) -> int:

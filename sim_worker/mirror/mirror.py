@@ -12,7 +12,7 @@ from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.sim_worker.mirror.casting import Casting, FreeTwin
-from foretwin.sim_worker.mirror.member import CastMember
+from foretwin.sim_worker.mirror.member import STEP_NS, CastMember
 from foretwin.sim_worker.mirror.mirror_world import GHOST, SHADOW, MirrorWorld
 from foretwin.sim_worker.mirror.samples import plane_state
 from foretwin.sim_worker.vehicle.commands import (
@@ -24,7 +24,6 @@ from foretwin.sim_worker.vehicle.commands import (
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
 from foretwin.sim_worker.vehicle.seeding import local_state
 
-_STEP_NS = round(TIMESTEP_S * 1e9)
 _ALONE = MirrorCast()
 _GRID_TOLERANCE = 0.05
 """Of a sample period: how early a state may be and still count for its instant."""
@@ -169,7 +168,7 @@ class Mirror:
     def _seed(self, measured: Array, stamp_ns: int) -> None:
         scene = self._scene
         history = self._commands.angles_before(
-            stamp_ns, count=scene.history_samples, step_ns=_STEP_NS
+            stamp_ns, count=scene.history_samples, step_ns=STEP_NS
         )
         scene.place(SHADOW, measured[:3])
         scene.place(GHOST, measured[:3])
@@ -193,11 +192,11 @@ class Mirror:
         )
         turn = float(wrap_angle(measured[2] - before[2]))
         moved = np.array([measured[0] - before[0], measured[1] - before[1], turn])
-        total = (stamp_ns - self._seed_stamp_ns) // _STEP_NS
+        total = (stamp_ns - self._seed_stamp_ns) // STEP_NS
         while self._steps < total:
-            now_ns = self._seed_stamp_ns + self._steps * _STEP_NS
+            now_ns = self._seed_stamp_ns + self._steps * STEP_NS
             command = self._command(now_ns, guess)
-            share = (now_ns + _STEP_NS - start_ns) / (stamp_ns - start_ns)
+            share = (now_ns + STEP_NS - start_ns) / (stamp_ns - start_ns)
             pose = before[:3] + min(max(share, 0.0), 1.0) * moved
             self._scene.place(SHADOW, pose)
             self._scene.place(GHOST, pose)
@@ -215,7 +214,7 @@ class Mirror:
     def _free_twin(self) -> FreeTwin | None:
         if self._measured is None:
             return None
-        stamp_ns = self._seed_stamp_ns + self._steps * _STEP_NS
+        stamp_ns = self._seed_stamp_ns + self._steps * STEP_NS
         return FreeTwin(self._scene.twin_state, stamp_ns)
 
     def _sound(self) -> bool:

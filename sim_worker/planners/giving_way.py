@@ -17,15 +17,7 @@ import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
-from foretwin.sim_worker.driver_model import (
-    COMFORT_DECEL_MPS2,
-    LAG_S,
-    LATERAL_ACCEL_MPS2,
-    LEAD_S,
-    MAX_ACCEL_MPS2,
-    SIGHT_M,
-    STANDING_MPS,
-)
+from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.planner_interface import PlannerView, SeenUsers, SharedGround, rows_of
 from foretwin.sim_worker.planners.tracking import front_from_base_m
 
@@ -88,7 +80,7 @@ def wait_arcs(view: PlannerView) -> Array:
     front = view.arc_m + front_from_base_m(view.vehicle)
     ahead = lines.stop_arc_m - front[:, None]
     speed = np.maximum(view.states[:, 3], 0.0)
-    reach = np.square(speed) / (2.0 * COMFORT_DECEL_MPS2) + _LOOKS_M
+    reach = np.square(speed) / (2.0 * driver.COMFORT_DECEL_MPS2) + _LOOKS_M
     concerns = (ahead > 0.0) & (ahead < reach[:, None])
     rows = np.flatnonzero(concerns.any(axis=1))
     if not len(rows):
@@ -121,14 +113,14 @@ def _taken(view: PlannerView, ground: SharedGround, front_arc_m: Array) -> Flags
     pace = _pace(view, ground, pieces)
     enter_s = _time_to(ground.enter_arc_m[pieces] - front_arc_m[:, None], speed, pace)
     left_m = ground.leave_arc_m[pieces] + view.vehicle.length_m.value - front_arc_m[:, None]
-    needed_s = _time_to(left_m, speed, pace) + LAG_S
-    stands = (speed < STANDING_MPS)[:, None]
+    needed_s = _time_to(left_m, speed, pace) + driver.LAG_S
+    stands = (speed < driver.STANDING_MPS)[:, None]
     follows = ((view.lead_gap_m < 12.0) & (view.lead_speed_mps > 1.0))[:, None]
     least_s = np.where(stands, np.where(follows, FOLLOW_UP_S, CRITICAL_GAP_S), 0.0)
     needed_s = np.maximum(needed_s, least_s)
     course = _courses(users, ground, pieces, row, user)
     meets = course.heads & (course.arrive_s < needed_s[row])
-    meets &= course.gone_s > enter_s[row] - LEAD_S
+    meets &= course.gone_s > enter_s[row] - driver.LEAD_S
     pair, piece = np.nonzero(meets)
     taken[row[pair], pieces[piece]] = True
     return taken
@@ -138,7 +130,7 @@ def _near(users: SeenUsers, front_arc_m: Array, points_m: Array) -> Flags:
     """(S, R) bool: who could matter, being near the ground, on wheels and not in the own lane."""
     if not len(points_m):
         return np.zeros(users.speed_mps.shape, dtype=bool)
-    low, high = points_m.min(axis=0) - SIGHT_M, points_m.max(axis=0) + SIGHT_M
+    low, high = points_m.min(axis=0) - driver.SIGHT_M, points_m.max(axis=0) + driver.SIGHT_M
     x, y = users.poses[..., 0], users.poses[..., 1]
     near = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & ~users.walks
     near &= (
@@ -153,7 +145,7 @@ def _pace(view: PlannerView, ground: SharedGround, pieces: Indices) -> Array:
     """Return (S, W) the speed at which pieces of the ground are crossed, as bends allow."""
     middle = 0.5 * (ground.enter_arc_m + ground.leave_arc_m)[pieces]
     profile = view.path.speed_profile(
-        lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
+        lateral_accel_mps2=driver.LATERAL_ACCEL_MPS2, decel_mps2=driver.COMFORT_DECEL_MPS2
     )
     bend = view.path.at_nodes(profile, middle)
     pace = np.minimum(view.target_speed_mps[:, None], view.speed_factor[:, None] * bend)
@@ -165,9 +157,11 @@ def _time_to(distance_m: Array, speed_mps: Array, pace_mps: Array) -> Array:
     speed = speed_mps[:, None]
     pace = np.maximum(pace_mps, speed)
     distance = np.maximum(distance_m, 0.0)
-    gaining = (np.square(pace) - np.square(speed)) / (2.0 * MAX_ACCEL_MPS2)
-    short = (np.sqrt(np.square(speed) + 2.0 * MAX_ACCEL_MPS2 * distance) - speed) / MAX_ACCEL_MPS2
-    long = (pace - speed) / MAX_ACCEL_MPS2 + (distance - gaining) / pace
+    gaining = (np.square(pace) - np.square(speed)) / (2.0 * driver.MAX_ACCEL_MPS2)
+    short = (
+        np.sqrt(np.square(speed) + 2.0 * driver.MAX_ACCEL_MPS2 * distance) - speed
+    ) / driver.MAX_ACCEL_MPS2
+    long = (pace - speed) / driver.MAX_ACCEL_MPS2 + (distance - gaining) / pace
     return np.where(distance < gaining, short, long)
 
 
@@ -203,8 +197,8 @@ def _courses(
         arrives = wrap_angle(2.0 * bearing - yaw - ground.their_yaw_rad[pieces])
         heads = np.abs(arrives) < _AIMS_WITHIN_RAD
         heads &= np.abs(wrap_angle(bearing - yaw)) < _BEARS_WITHIN_RAD
-    moves = speed > STANDING_MPS
-    pace = np.maximum(speed, STANDING_MPS)
+    moves = speed > driver.STANDING_MPS
+    pace = np.maximum(speed, driver.STANDING_MPS)
     within = far < reach
     arrive_s = np.where(within, 0.0, (far - reach) / pace)
     gone_s = np.where(moves, (ahead + reach) / pace, np.inf)
@@ -239,5 +233,5 @@ def walker_gap_m(view: PlannerView) -> Array:
     speed = np.maximum(view.states[:, 3], 1.5)[:, None]
     passed_s = (ahead + 2.0 * half + vehicle.length_m.value) / speed
     meets = counts & (ahead > -1.0) & (in_s < _WALKER_AHEAD_S)
-    meets &= (in_s < passed_s + LAG_S) & (out_s > ahead / speed - LEAD_S)
+    meets &= (in_s < passed_s + driver.LAG_S) & (out_s > ahead / speed - driver.LEAD_S)
     return np.asarray(np.where(meets, np.maximum(ahead, 0.1), np.inf).min(axis=1))

@@ -30,6 +30,7 @@ from foretwin.sim_worker.planners.host_link import (
 START_S = 60.0
 """To import its package and say so: many times what that takes, for a machine that is busy."""
 FIRST_ANSWER_S, ANSWER_S = 1.0, 0.5
+"""Of a planner in another process, or on another machine. Chosen."""
 _BUFFER_BYTES = 1 << 20
 
 log = logging.getLogger("foretwin.sim_worker.planners")

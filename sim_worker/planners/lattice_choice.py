@@ -9,14 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.driver_model import (
-    BRISK_TIME_GAP_S,
-    COMFORT_DECEL_MPS2,
-    LATERAL_ACCEL_MPS2,
-    LINE_GAP_M,
-    MAX_DECEL_MPS2,
-    STANDSTILL_GAP_M,
-)
+from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.planner_interface import PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
 from foretwin.sim_worker.planners.lattice_rating import (
@@ -68,7 +61,7 @@ def choose(
             for planned, present in zip(before[1:], (offset, slide, push), strict=True)
         )
     accel = np.where(speed < 0.1, np.maximum(accel, 0.0), accel)
-    accel = np.minimum(np.maximum(accel, -MAX_DECEL_MPS2), CANDIDATE_ACCEL_MPS2)
+    accel = np.minimum(np.maximum(accel, -driver.MAX_DECEL_MPS2), CANDIDATE_ACCEL_MPS2)
     stop = _stop_places(view)
     along = _along(view, speed, accel, stop)
     across = _across(view, offset, slide, push)
@@ -101,7 +94,7 @@ def _along(view: PlannerView, speed: Array, accel: Floats, stop: Array) -> Motio
     """Return (S, L) motions along the path."""
     arc, speed, accel = view.arc_m[:, None], speed[:, None], accel[:, None]
     profile = view.path.speed_profile(
-        lateral_accel_mps2=LATERAL_ACCEL_MPS2, decel_mps2=COMFORT_DECEL_MPS2
+        lateral_accel_mps2=driver.LATERAL_ACCEL_MPS2, decel_mps2=driver.COMFORT_DECEL_MPS2
     )
     bend = view.path.at_nodes(profile, arc + speed * _SPEED_TIMES_S)
     wanted = np.minimum(view.target_speed_mps[:, None], view.speed_factor[:, None] * bend)
@@ -111,9 +104,9 @@ def _along(view: PlannerView, speed: Array, accel: Floats, stop: Array) -> Motio
 
     brake_s = np.maximum(speed / np.array([6.0, 3.5]) * 1.3, 0.5)
     braking = to_speed(arc, speed, accel, end_speed=np.zeros_like(brake_s), end_s=brake_s)
-    emergency = braked(arc, speed, decel=MAX_DECEL_MPS2)
+    emergency = braked(arc, speed, decel=driver.MAX_DECEL_MPS2)
 
-    way = np.minimum(np.maximum(stop[:, None] - LINE_GAP_M - arc, 0.0), 150.0)
+    way = np.minimum(np.maximum(stop[:, None] - driver.LINE_GAP_M - arc, 0.0), 150.0)
     stop_s = np.clip(2.0 * way / np.maximum(speed, 2.0), 1.0, 12.0) * np.array([1.0, 1.4])
     stopping = to_place(
         arc, speed, accel, end_place=arc + way, end_speed=np.zeros_like(stop_s), end_s=stop_s
@@ -121,7 +114,7 @@ def _along(view: PlannerView, speed: Array, accel: Floats, stop: Array) -> Motio
 
     lead = np.maximum(view.lead_speed_mps, 0.0)[:, None]
     gap = np.minimum(view.lead_gap_m, 150.0)[:, None]
-    room = gap + lead * _SPEED_TIMES_S - STANDSTILL_GAP_M - BRISK_TIME_GAP_S * lead
+    room = gap + lead * _SPEED_TIMES_S - driver.STANDSTILL_GAP_M - driver.BRISK_TIME_GAP_S * lead
     following = to_place(
         arc, speed, accel, end_place=arc + np.maximum(room, 0.0),
         end_speed=np.broadcast_to(lead, room.shape), end_s=_SPEED_TIMES_S,

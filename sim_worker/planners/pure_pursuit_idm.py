@@ -8,21 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.driver_model import (
-    ACCEL_EXPONENT,
-    CALM_TIME_GAP_S,
-    COMFORT_DECEL_MPS2,
-    HASTE,
-    HOLD_MPS2,
-    HOLD_SPEED_MPS,
-    LATERAL_ACCEL_MPS2,
-    LINE_DECEL_MPS2,
-    LINE_GAP_M,
-    MAX_ACCEL_MPS2,
-    MAX_DECEL_MPS2,
-    STANDSTILL_GAP_M,
-    dynamic_gap_m,
-)
+from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import compiled, tracking
 from foretwin.sim_worker.planners.tracking import front_from_base_m
@@ -88,7 +74,7 @@ class PurePursuitIdm:
             np.asarray(view.offset_m, dtype=np.float64),
             np.asarray(view.desired_offset_m, dtype=np.float64),
             np.asarray(view.speed_factor, dtype=np.float64),
-            path.with_curve_speeds(LATERAL_ACCEL_MPS2, COMFORT_DECEL_MPS2),
+            path.with_curve_speeds(driver.LATERAL_ACCEL_MPS2, driver.COMFORT_DECEL_MPS2),
             path.first_arc_m,
             vehicle.wheelbase_m.value,
             vehicle.max_tire_angle_rad.value,
@@ -99,17 +85,22 @@ class PurePursuitIdm:
         )
         wishes = self._wishes(view)
         compiled.free_road(
-            states, wishes.speed_mps, wishes.accel_mps2, wishes.exponent, COMFORT_DECEL_MPS2, accel
+            states,
+            wishes.speed_mps,
+            wishes.accel_mps2,
+            wishes.exponent,
+            driver.COMFORT_DECEL_MPS2,
+            accel,
         )
         if wishes.stand is not None:
-            accel = np.where(wishes.stand, np.minimum(accel, -COMFORT_DECEL_MPS2), accel)
+            accel = np.where(wishes.stand, np.minimum(accel, -driver.COMFORT_DECEL_MPS2), accel)
         if view.stop_arc_m is not None or np.count_nonzero(view.lead_gap_m < np.inf):
             accel -= self._interaction(view, speed)
-        np.maximum(accel, -MAX_DECEL_MPS2, out=accel)
+        np.maximum(accel, -driver.MAX_DECEL_MPS2, out=accel)
         command = accel + resistance_mps2(view.vehicle, speed)
-        slow = speed < HOLD_SPEED_MPS
+        slow = speed < driver.HOLD_SPEED_MPS
         if np.count_nonzero(slow):
-            command = np.where(slow & (accel <= 0.0), HOLD_MPS2, command)
+            command = np.where(slow & (accel <= 0.0), driver.HOLD_MPS2, command)
         return PlannerOutput(command, angle)
 
     def _wishes(self, view: PlannerView) -> _Wishes:
@@ -120,8 +111,8 @@ class PurePursuitIdm:
             or known.target_speed_mps is not target
             or known.speed_factor is not factor
         ):
-            start = MAX_ACCEL_MPS2 * np.minimum(
-                np.maximum(factor, HASTE[0], dtype=np.float64), HASTE[1]
+            start = driver.MAX_ACCEL_MPS2 * np.minimum(
+                np.maximum(factor, driver.HASTE[0], dtype=np.float64), driver.HASTE[1]
             )
             stand = target < 0.05
             known = self._wished = _Wishes(
@@ -129,7 +120,7 @@ class PurePursuitIdm:
                 factor,
                 speed_mps=np.maximum(target, 0.1, dtype=np.float64),
                 accel_mps2=start,
-                exponent=-start * ACCEL_EXPONENT / COMFORT_DECEL_MPS2,
+                exponent=-start * driver.ACCEL_EXPONENT / driver.COMFORT_DECEL_MPS2,
                 stand=stand if stand.any() else None,
             )
         return known
@@ -137,14 +128,14 @@ class PurePursuitIdm:
     def _interaction(self, view: PlannerView, speed: Array) -> Array:
         """IDM deceleration for what is ahead: a (s* / s)², s* = s0 + v T + v Δv / (2 √(a b))."""
         gap = np.maximum(view.lead_gap_m, 0.1)
-        wanted = STANDSTILL_GAP_M + dynamic_gap_m(
+        wanted = driver.STANDSTILL_GAP_M + driver.dynamic_gap_m(
             speed,
             view.lead_speed_mps,
-            time_gap_s=CALM_TIME_GAP_S,
-            accel_mps2=MAX_ACCEL_MPS2,
-            decel_mps2=COMFORT_DECEL_MPS2,
+            driver.CALM_TIME_GAP_S,
+            driver.MAX_ACCEL_MPS2,
+            driver.COMFORT_DECEL_MPS2,
         )
-        following = np.asarray(MAX_ACCEL_MPS2 * np.square(wanted / gap))
+        following = np.asarray(driver.MAX_ACCEL_MPS2 * np.square(wanted / gap))
         if view.stop_arc_m is None:
             return following
         return np.asarray(np.maximum(following, self._stopping(view, view.stop_arc_m, speed)))
@@ -152,9 +143,12 @@ class PurePursuitIdm:
     def _stopping(self, view: PlannerView, stop_arc_m: Array, speed: Array) -> Array:
         """IDM deceleration for a line, as for somebody who stands a little behind it."""
         ahead = np.maximum(stop_arc_m - view.arc_m - front_from_base_m(view.vehicle), 0.1)
-        wanted = STANDSTILL_GAP_M + speed * (
-            CALM_TIME_GAP_S + speed / (2.0 * np.sqrt(MAX_ACCEL_MPS2 * COMFORT_DECEL_MPS2))
+        wanted = driver.STANDSTILL_GAP_M + speed * (
+            driver.CALM_TIME_GAP_S
+            + speed / (2.0 * np.sqrt(driver.MAX_ACCEL_MPS2 * driver.COMFORT_DECEL_MPS2))
         )
-        braking = MAX_ACCEL_MPS2 * np.square(wanted / (ahead + STANDSTILL_GAP_M - LINE_GAP_M))
-        stops = np.square(speed) < 2.0 * LINE_DECEL_MPS2 * ahead
+        braking = driver.MAX_ACCEL_MPS2 * np.square(
+            wanted / (ahead + driver.STANDSTILL_GAP_M - driver.LINE_GAP_M)
+        )
+        stops = np.square(speed) < 2.0 * driver.LINE_DECEL_MPS2 * ahead
         return np.where(stops, braking, 0.0)

@@ -18,11 +18,11 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.bus import Bus, Mailbox, Received
 from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
 from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView, rows_of
+from foretwin.sim_worker.planners.hosted import ANSWER_S, FIRST_ANSWER_S
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.trajectory_tracking import Trajectories, check_trajectories, track
 
 ASK_EVERY_S = 0.1
-FIRST_ANSWER_S, ANSWER_S = 1.0, 0.5
 _REPEAT_S = 0.25
 """The first question of a job is repeated: the stack may be joining the bus."""
 _PATIENCE = 3

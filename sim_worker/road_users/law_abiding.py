@@ -12,18 +12,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.speed_profile import speed_in_bends_mps
-from foretwin.sim_worker.driver_model import (
-    ACCEL_EXPONENT,
-    BRISK_TIME_GAP_S,
-    LAG_S,
-    LATERAL_ACCEL_MPS2,
-    LEAD_S,
-    LINE_GAP_M,
-    SIGHT_M,
-    STANDING_MPS,
-    STANDSTILL_GAP_M,
-    dynamic_gap_m,
-)
+from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.path_table import Indices, PathTable
 from foretwin.sim_worker.road_users.right_of_way import PathRules
@@ -79,12 +68,12 @@ class LawAbiding:
         still = np.minimum(self._before(red, arc, speed), self._wait(now, ego, arc, speed))
         nearer = still < gap
         gap, lead_speed = np.where(nearer, still, gap), np.where(nearer, 0.0, lead_speed)
-        wanted = STANDSTILL_GAP_M * (~nearer) + dynamic_gap_m(
-            speed, lead_speed, time_gap_s=BRISK_TIME_GAP_S, accel_mps2=most, decel_mps2=decel
+        wanted = driver.STANDSTILL_GAP_M * (~nearer) + driver.dynamic_gap_m(
+            speed, lead_speed, driver.BRISK_TIME_GAP_S, most, decel
         )
-        curve = speed_in_bends_mps(bend, LATERAL_ACCEL_MPS2)
+        curve = speed_in_bends_mps(bend, driver.LATERAL_ACCEL_MPS2)
         allowed = np.minimum(self._desired, curve)
-        free = 1.0 - (speed / np.maximum(allowed, 0.1)) ** ACCEL_EXPONENT
+        free = 1.0 - (speed / np.maximum(allowed, 0.1)) ** driver.ACCEL_EXPONENT
         accel = most * (free - np.square(wanted / np.maximum(gap, 0.1)))
         return np.clip(accel, -2.0 * decel, most)
 
@@ -122,7 +111,7 @@ class LawAbiding:
         long, wide = length.take(at), width.take(at)
         gap = ahead - self._half[k] - 0.5 * (long * along + wide * across)
         beside = 0.5 * (self._width[k] + long * across + wide * along) + _BESIDE_M
-        in_way = (np.abs(left) < beside) & (np.square(dx) + np.square(dy) < SIGHT_M**2)
+        in_way = (np.abs(left) < beside) & (np.square(dx) + np.square(dy) < driver.SIGHT_M**2)
         nearest = np.full(len(s), np.inf)
         np.minimum.at(nearest, k[in_way], gap[in_way])
         chosen = in_way & (gap == nearest[k])
@@ -137,22 +126,26 @@ class LawAbiding:
         ahead = ground[:, 0] - arc[k] - self._half[k]
         # Whoever has entered, or can no more stop before, goes on.
         reach = np.square(speed[k]) / (2.0 * self._decel[k])
-        meets = np.flatnonzero((ahead > reach - LINE_GAP_M) & (ahead < reach + SIGHT_M))
+        meets = np.flatnonzero(
+            (ahead > reach - driver.LINE_GAP_M) & (ahead < reach + driver.SIGHT_M)
+        )
         k, row, o, ground, ahead = k[meets], row[meets], o[meets], ground[meets], ahead[meets]
         arcs = _with_ego(ego.arc_m, now.arc_m)[row, o]
         speeds = _with_ego(ego.speed_mps, now.speed_mps)[row, o]
         halves = 0.5 * _with_ego(ego.length_m, self._crowd.length_m)[row, o]
         _, leave, their_in, their_out = ground.T
-        moving = np.maximum(speeds, STANDING_MPS)
+        moving = np.maximum(speeds, driver.STANDING_MPS)
         reach_s = (their_in - arcs - halves) / moving
-        reach_s = np.where((speeds < STANDING_MPS) & (reach_s > 0.0), np.inf, reach_s)
+        reach_s = np.where((speeds < driver.STANDING_MPS) & (reach_s > 0.0), np.inf, reach_s)
         gone_s = (their_out - arcs + halves) / moving
         pace = np.maximum(speed[k], 4.0)
         enter_s = np.maximum(ahead, 0.0) / pace
         clear_s = (leave - arc[k] + self._half[k]) / pace
-        taken = (gone_s > 0.0) & (reach_s < clear_s + LAG_S) & (gone_s > enter_s - LEAD_S)
+        taken = (
+            (gone_s > 0.0) & (reach_s < clear_s + driver.LAG_S) & (gone_s > enter_s - driver.LEAD_S)
+        )
         gap = np.full(len(self.rows), np.inf)
-        np.minimum.at(gap, k[taken], ahead[taken] - LINE_GAP_M)
+        np.minimum.at(gap, k[taken], ahead[taken] - driver.LINE_GAP_M)
         return gap
 
     def _pairs_with(self, ego_path: int) -> _Pairs:
@@ -174,8 +167,8 @@ class LawAbiding:
         """Return how far ahead the next of the lines (K, L) is that can still be stopped at."""
         ahead = lines_m - (arc + self._half)[:, None]
         reach = np.square(speed) / (4.0 * self._decel)
-        ahead = np.where(ahead > reach[:, None] - LINE_GAP_M, ahead, np.inf)
-        return np.asarray(ahead.min(axis=1, initial=np.inf)) - LINE_GAP_M
+        ahead = np.where(ahead > reach[:, None] - driver.LINE_GAP_M, ahead, np.inf)
+        return np.asarray(ahead.min(axis=1, initial=np.inf)) - driver.LINE_GAP_M
 
 
 def _in_front(
@@ -197,7 +190,7 @@ def _in_front(
     dy -= bent
     near = np.abs(dy, out=dy) < within_m
     near &= ahead > 0.0
-    near &= ahead < SIGHT_M
+    near &= ahead < driver.SIGHT_M
     other, who = np.divmod(np.flatnonzero(near), len(x))
     return np.stack([who + first, other])
 

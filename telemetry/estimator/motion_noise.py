@@ -1,32 +1,38 @@
 """How much a car's motion and the errors of its sensors wander: the filter's process noise.
 
-Densities are variances per second; spreads are standard deviations before anything is known.
+Densities are variances per second; spreads are standard deviations before anything is known. What
+is chosen is what a car does; `python -m tests.telemetry.estimator_figures` measures how well the
+estimates are with it.
 """
 
 from __future__ import annotations
 
 _JERK_DENSITY = 4.0**2
-"""(m/s³)² s: acceleration wanders by 4 m/s² in one second."""
+"""(m/s³)² s: acceleration wanders by 4 m/s² in one second. Chosen."""
 _CURVATURE_RATE_PMPS = 0.25
-"""Of a fast turn of the wheel at walking speed; less would make the yaw rate lag by over 0.2 s."""
+"""1/(m s), of a fast turn of the wheel at walking speed. Chosen: with less, the yaw rate would lag
+by over 0.2 s."""
 _LATERAL_JERK_MPS3 = 5.0
-"""Limits how fast the curvature changes at speed: v² dκ/dt."""
+"""Limits how fast the curvature changes at speed: v² dκ/dt. Chosen."""
 SLIP_DENSITY = 0.01**2
-"""rad² / s: the body's direction differs from the path's by the rear tyres' slip."""
+"""rad² / s: the body's direction differs from the path's by the rear tyres' slip. Chosen."""
 GYRO_SLIP_DENSITY = 0.0005**2
-"""The same where a gyro tells the body's turning from the path's and the slip is estimated."""
+"""The same where a gyro tells the body's turning from the path's and the slip is estimated.
+Chosen."""
 GYRO_BIAS_STD_RADPS = 0.01
+"""Of a gyro that was switched on. Chosen: half a degree per second."""
 GYRO_BIAS_DENSITY = (2e-5) ** 2
-"""(rad/s)² / s: an automotive gyro warms up by 0.01 °/s in a minute."""
+"""(rad/s)² / s: an automotive gyro warms up by 0.01 °/s in a minute. Chosen."""
 _ACCEL_BIAS_DENSITY = 0.02**2
-"""(m/s²)² / s: the grade of the road changes with the place."""
+"""(m/s²)² / s: the grade of the road changes with the place. Chosen."""
 SLIP_RADPMPS2 = (0.004, 0.002)
 """The rear axle's slip per lateral acceleration, mean and spread over passenger cars: load over
 cornering stiffness (Gillespie 1992, 6-2)."""
 SPEED_SCALE_STD = 0.01
-"""Of a wheel's radius against the one its speed was calibrated with."""
+"""Of a wheel's radius against the one its speed was calibrated with. Chosen: wear and pressure."""
 GNSS_CORRELATION_S = 30.0
-"""How long the error of a receiver without corrections stays alike: satellites, air, walls."""
+"""How long the error of a receiver without corrections stays alike: satellites, air, walls.
+Chosen."""
 
 
 def densities(speed_mps: float, *, slip: float) -> tuple[float, ...]:

@@ -20,11 +20,8 @@ from foretwin.sim_worker.metrics.comfort import BOUNDS
 
 def wanted_m(speed_mps: float, lead_mps: float, *, time_gap_s: float = 1.5) -> float:
     return float(
-        dynamic_gap_m(
-            np.array([speed_mps]), np.array([lead_mps]),
-            time_gap_s=time_gap_s, accel_mps2=1.0, decel_mps2=4.0,
-        )[0]
-    )  # fmt: skip
+        dynamic_gap_m(np.array([speed_mps]), np.array([lead_mps]), time_gap_s, 1.0, 4.0)[0]
+    )
 
 
 @given(speed=st.floats(0.0, 40.0), time_gap=st.floats(0.5, 2.0))

@@ -19,15 +19,13 @@ from foretwin.world_gen.buildings.outlines import (
     outlines,
     valid_polygons,
 )
+from foretwin.world_gen.buildings.parts import GRID_M, resolve_parts
 from foretwin.world_gen.buildings.parts import Footprint as Footprint
-from foretwin.world_gen.buildings.parts import resolve_parts
 from foretwin.world_gen.buildings.tags import building_extent
 from foretwin.world_gen.extent import box_deg
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.polygon_areas import rings_of
 
-GRID_M = 0.001
-"""Outlines are written in millimetres."""
 SILHOUETTE_TOLERANCE_M = 0.25
 """How far a silhouette may move from the map's outline to the parts that are run into."""
 FOOTPRINT_TOLERANCE_M = 0.05

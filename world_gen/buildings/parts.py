@@ -18,7 +18,8 @@ _OWN_SHARE = 0.5
 _SLIVER_M = 0.25
 """Where no more than this width of an outline is left beside its parts, it was drawn inexactly."""
 _ON_TOP_M = 0.5
-_GRID_M = 0.001
+GRID_M = 0.001
+"""Outlines are written in millimetres."""
 
 
 class Footprint(NamedTuple):
@@ -84,11 +85,11 @@ def _with_height_of(part: Footprint, outline: Footprint) -> Footprint:
 
 
 def _remainder(outline: Footprint, parts: list[Polygon]) -> list[Footprint]:
-    free = shapely.difference(outline.polygon, shapely.union_all(parts), grid_size=_GRID_M)
+    free = shapely.difference(outline.polygon, shapely.union_all(parts), grid_size=GRID_M)
     # Opened: slivers and spikes vanish, mitred corners come back.
     core = shapely.buffer(free, -_SLIVER_M / 2, join_style="mitre")
     opened = shapely.buffer(core, _SLIVER_M / 2, join_style="mitre")
-    pieces = valid_polygons(shapely.intersection(opened, free, grid_size=_GRID_M))
+    pieces = valid_polygons(shapely.intersection(opened, free, grid_size=GRID_M))
     return [
         outline._replace(id=outline.id if n == 0 else f"{outline.id}.rest{n}", polygon=piece)
         for n, piece in enumerate(pieces)

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import MITRE_LIMIT, left_of
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 
 SWEPT_HALF_WIDTH_M = 1.0
@@ -21,7 +21,6 @@ BESIDE_M = 1.0
 """Neighbouring lanes are drawn no nearer where neither driver leaves the own one."""
 PATH_TOLERANCE_M = 0.03
 """Paths have a point each metre; where they meet is told to within this."""
-_MITRE_LIMIT = 2.0
 Indices = NDArray[np.int64]
 
 
@@ -186,7 +185,7 @@ def _swept(connections: Sequence[ConnectionDraft]) -> tuple[Array, Array]:
     normal = left_of(arriving + leaving)
     norm2 = (normal * normal).sum(axis=1)
     # |in + out| = 2 cos(bend / 2), and the mitre is 1 / cos(bend / 2) long.
-    normal *= (2.0 / np.maximum(norm2, 4.0 / _MITRE_LIMIT**2))[:, None] * SWEPT_HALF_WIDTH_M
+    normal *= (2.0 / np.maximum(norm2, 4.0 / MITRE_LIMIT**2))[:, None] * SWEPT_HALF_WIDTH_M
     outline = np.empty((2 * len(xy), 2))
     at = np.arange(len(xy)) + first[owner]
     outline[at] = xy - normal

@@ -8,10 +8,10 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.gap.fitting import Follower, Line, follower, line_through
-from foretwin.sim_worker.analysis.gap.pairs import Pairs
+from foretwin.sim_worker.analysis.gap.pairs import MIN_TURN_RAD, Pairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
-_MIN_TURN_RAD, _MIN_CURVATURE_PM = 0.012, 0.006
+_MIN_CURVATURE_PM = 0.006
 _HARD_MPS2 = 1.2
 _LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
 _TOGETHER_S = 0.3
@@ -89,7 +89,7 @@ def consistency_of(pairs: Pairs) -> Consistency:
 
 def _varies(angle: Array) -> bool:
     known = angle[np.isfinite(angle)]
-    return len(known) > 50 and bool(np.ptp(known) > _MIN_TURN_RAD)
+    return len(known) > 50 and bool(np.ptp(known) > MIN_TURN_RAD)
 
 
 def _stop(asked: Array, done: Array, model: Array) -> float:

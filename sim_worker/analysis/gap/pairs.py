@@ -31,7 +31,7 @@ MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
 """Above them turning, and acceleration alone, say something."""
 _FASTEST_MPS = 80.0
 """No car's: positions that leap say nothing of its sensors."""
-_MIN_TURN_RAD = 0.012
+MIN_TURN_RAD = 0.012
 
 
 class Pairs(NamedTuple):
@@ -109,7 +109,7 @@ def pairs_of(
     course, gyro, ground, wheels = sensors
     by_measured, by_command, tire, pushes = _runs(record, runner, memory or RunMemory())
     return Pairs(
-        stamp_ns=record.stamp_ns, moves=moves, excited=moves & (turn > _MIN_TURN_RAD),
+        stamp_ns=record.stamp_ns, moves=moves, excited=moves & (turn > MIN_TURN_RAD),
         course_radps=course, gyro_radps=gyro, ground_mps=ground, wheel_mps=wheels,
         asked_rad=np.where(moves, asked, np.nan), done_rad=np.where(moves, done, np.nan),
         arc_rad=np.where(moves, arc, np.nan), speed_mps=speed,

@@ -20,6 +20,9 @@ from foretwin.sim_worker.vehicle.parameters import check_vehicle, understeer_gra
 from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
 
 HALF_OF_95 = 1.96
+"""Standard deviations to either side that hold 95 % of a Gaussian."""
+MUCH_WIDER = 1.5
+"""Times the standard deviation before: what is known so much worse is no news. Chosen."""
 _STIFFNESS = "front_cornering_stiffness_npr"
 
 

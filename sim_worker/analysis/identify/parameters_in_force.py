@@ -15,6 +15,7 @@ from foretwin.contracts.tuning import (
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.analysis.identify.acceptance import (
     HALF_OF_95,
+    MUCH_WIDER,
     accepted,
     in_force,
     is_acceptable,
@@ -22,7 +23,6 @@ from foretwin.sim_worker.analysis.identify.acceptance import (
 from foretwin.sim_worker.vehicle.parameters import check_vehicle
 from foretwin.sim_worker.vehicle.plausible import check_plausible
 
-_MUCH_WIDER = 1.5
 STIFFNESS = "front_cornering_stiffness_npr"
 
 
@@ -62,7 +62,7 @@ class ParametersInForce:
 
     def _is_news(self, found: ParameterEstimate) -> bool:
         before = self._taken.get(found.name)
-        return before is None or std_of(found) <= _MUCH_WIDER * std_of(before)
+        return before is None or std_of(found) <= MUCH_WIDER * std_of(before)
 
     def set(self, name: str, value: float, *, stamp_ns: int) -> ParameterChange:
         """Set a parameter by hand and pin it; UserError for a name or value that is none."""

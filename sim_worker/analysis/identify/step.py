@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.analysis.identify.acceptance import MUCH_WIDER
 from foretwin.sim_worker.analysis.identify.steering import PLAY_RAD, SteeringFit
 from foretwin.sim_worker.analysis.identify.steering_signals import (
     INVERSE_RATIO,
@@ -23,7 +24,6 @@ from foretwin.sim_worker.analysis.identify.steering_signals import (
 
 STRETCH_S, _LEAST_TURNING_S = 2.0, 1.0
 _LEAST_STRETCHES = 4
-_MUCH_WIDER = 1.5
 _STDS = 3.0
 """Twice in a row to the same side: once in 250,000 by chance, were it Gaussian."""
 _SEEN_STDS, _TOGETHER_STDS = 2.0, 4.5
@@ -53,7 +53,7 @@ class BendsBefore(NamedTuple):
             self.covariance[UNDERSTEER, UNDERSTEER],
             other.covariance[UNDERSTEER, UNDERSTEER],
         )
-        return bool(mine > (_MUCH_WIDER**2) * known)
+        return bool(mine > (MUCH_WIDER**2) * known)
 
 
 class Step(NamedTuple):
