@@ -47,7 +47,7 @@ class _Simulated(NamedTuple):
     path: PathAhead
 
 
-class WindowDesk:
+class OpenWindows:
     """Takes states, what is seen and heard, and rounds; gives verdicts at the end."""
 
     def __init__(self, vehicle: VehicleParameters, *, horizon_s: float) -> None:

@@ -12,24 +12,24 @@ from foretwin.contracts.codec import SchemaMismatch
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.simulation import ActiveWorld
 from foretwin.contracts.world import World
-from foretwin.orchestrator.drive.events import EventDesk
+from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
-from foretwin.orchestrator.drive.mirror_handler import MirrorDesk
+from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.drive.mission import Mission
 from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.drive.processes import BUILDER, MIRROR, ORCHESTRATOR
 from foretwin.orchestrator.drive.questions import Questions
-from foretwin.orchestrator.drive.route_handler import RouteDesk
-from foretwin.orchestrator.drive.side_by_side_handler import HumanDesk
+from foretwin.orchestrator.drive.route_handler import RouteHandler
+from foretwin.orchestrator.drive.side_by_side_handler import SideBySideHandler
 from foretwin.orchestrator.instructions import BuildWorld, Instruction, NotReady, Tell, UseWorld
 from foretwin.orchestrator.other_vehicles.vehicles import VehiclesBeside
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.runtime_configuration import roles
-from foretwin.orchestrator.runtime_configuration.handler import ChangeDesk
+from foretwin.orchestrator.runtime_configuration.handler import RuntimeConfiguration
 from foretwin.orchestrator.tuning.by_hand import VehicleHandler
 from foretwin.orchestrator.tuning.link import FINDINGS, TuningLink
-from foretwin.orchestrator.worlds.handler import WorldDesk
+from foretwin.orchestrator.worlds.handler import WorldHandler
 
 log = logging.getLogger(ORCHESTRATOR)
 
@@ -52,11 +52,11 @@ class Conductor:
             MAILBOX_DEPTH, when_full="block" if plan.config.lock_step else "drop_oldest"
         )
         self.intake = Intake(plan.vehicle, pace=plan.config.speed)
-        self.events = EventDesk(
+        self.events = EventHandler(
             bus, tables, run_id=plan.run_id, now_stamp_ns=lambda: self.intake.now_stamp_ns
         )
         self.tell = self.events.tell
-        self.worlds = WorldDesk(
+        self.worlds = WorldHandler(
             plan, bus, self.mailbox, on_ready=self._world_ready, on_failed=self._world_failed,
             tell=self.tell,
         )  # fmt: skip
@@ -64,7 +64,7 @@ class Conductor:
             plan, bus, self.mailbox, tables, world_of=self.worlds.world, tell=self.tell,
             on_round=lambda junction_id, count: mission.on_round(junction_id, futures=count),
         )  # fmt: skip
-        self.human = HumanDesk(plan, bus, tables, self.intake, mission, tell=self.tell)
+        self.ads = SideBySideHandler(plan, bus, tables, self.intake, mission, tell=self.tell)
         self.alive: set[str] = set()
         self.missed_rounds = 0
         self.spared_rounds = 0
@@ -72,7 +72,7 @@ class Conductor:
         self.unseeded_rounds = 0
         """Rounds that no machine could have run: no heading known yet, or no road ahead."""
         self.questions = Questions(bus, self.mailbox, run_id=plan.run_id, alive=self.alive)
-        self.mirror = MirrorDesk(tables, self.tell)
+        self.mirror = MirrorHandler(tables, self.tell)
         self.roles = roles.RolesInForce(
             plan.config.roles,
             plan.config.correction,
@@ -82,13 +82,13 @@ class Conductor:
             plan, bus, self.mailbox, tables, events=self.events, intake=self.intake,
             rounds=self.rounds, alive=self.alive,
         )  # fmt: skip
-        self.changes = ChangeDesk({
+        self.changes = RuntimeConfiguration({
             "role": roles.RoleHandler(self.roles),
             "correction": roles.CorrectionHandler(self.roles),
             "vehicle": VehicleHandler(self.tuning.parameters),
         })  # fmt: skip
         self.beside = VehiclesBeside(plan, bus, self.mailbox, tell=self.tell)
-        self.route = RouteDesk(plan, use=mission.give_route, tell=self.tell)
+        self.route = RouteHandler(plan, use=mission.give_route, tell=self.tell)
         self._active_world: str | None = None
         self._world_untold = False
         self._on_message: dict[str, Callable[[Received], object]] = {
@@ -168,7 +168,7 @@ class Conductor:
             if self.intake.refused == 1:
                 self.tell(Tell("error", str(error)))
             return
-        self.human.take(state)
+        self.ads.take(state)
         if state is None:
             return
         self.watch_telemetry(item.received_mono_ns)
@@ -206,7 +206,7 @@ class Conductor:
     def finish(self) -> None:
         """Compare what can still be compared and settle the counts."""
         self.rounds.finish()
-        self.human.finish()
+        self.ads.finish()
         if self.intake.end is not None:
             self.intake.counts.settle(self.intake.end.published)
 

@@ -16,7 +16,7 @@ log = logging.getLogger(ORCHESTRATOR)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
 
-class EventDesk:
+class EventHandler:
     """Tells the orchestrator's own events, and keeps those of all processes."""
 
     def __init__(

@@ -13,7 +13,7 @@ _APART_NS = 2_000_000_000
 """Who touches again sooner is not told of again."""
 
 
-class MirrorDesk:
+class MirrorHandler:
     """Takes the mirror's samples in order."""
 
     def __init__(self, tables: ResultTables, tell: Callable[[Tell], None]) -> None:

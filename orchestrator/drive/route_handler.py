@@ -25,7 +25,7 @@ PLAN_AWAY_M = 25.0
 """A plan that ends farther from the route leads elsewhere."""
 
 
-class RouteDesk:
+class RouteHandler:
     """Finds the way to the vehicle's goal, and hands it on; one thread does the looking.
 
     A large map takes a second to search, and nothing may hold up a live drive.

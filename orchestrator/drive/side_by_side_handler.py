@@ -33,7 +33,7 @@ MOST_LISTED = 1000
 """Disagreements in run.json; all are in the table."""
 
 
-class HumanDesk:
+class SideBySideHandler:
     """Feeds the comparison with what came in, and hands on what it finds."""
 
     def __init__(

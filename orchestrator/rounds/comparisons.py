@@ -26,7 +26,7 @@ KEEP_S = 5.0
 
 
 @dataclass(slots=True)
-class ComparisonDesk:
+class OpenComparisons:
     """Takes states and rounds in the order of their stamps, gives comparisons as they fall due.
 
     `truth` positions are those that the vehicle measured: what is compared with is never smoothed

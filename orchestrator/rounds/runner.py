@@ -15,7 +15,7 @@ from foretwin.contracts.simulation import Comparison
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.orchestrator.agreement.verdict_rows import judged_row
-from foretwin.orchestrator.agreement.windows import WindowDesk
+from foretwin.orchestrator.agreement.windows import OpenWindows
 from foretwin.orchestrator.drive.intake import LatestReports, LatestState
 from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.instructions import RoundIntent, Tell
@@ -28,7 +28,7 @@ from foretwin.orchestrator.record.result_rows import (
     round_row,
 )
 from foretwin.orchestrator.record.results import ResultTables
-from foretwin.orchestrator.rounds.comparisons import ComparisonDesk
+from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import PLAN_FRESH_NS, RoundPlanner
 from foretwin.orchestrator.rounds.open_rounds import OpenRounds, RoundDone, RoundGivenUp, RoundOrder
 from foretwin.orchestrator.rounds.pace import Pace, RoundPace
@@ -81,8 +81,8 @@ class RoundRunner:
         self._world_of = world_of
         self._on_round = on_round
         self._tell = tell
-        self._comparison_desk = ComparisonDesk(plan.drive_frame, plan.config.horizon_s)
-        self.windows = WindowDesk(plan.vehicle, horizon_s=plan.config.horizon_s)
+        self._open_comparisons = OpenComparisons(plan.drive_frame, plan.config.horizon_s)
+        self.windows = OpenWindows(plan.vehicle, horizon_s=plan.config.horizon_s)
         self._planner = RoundPlanner(plan.config, plan.vehicle)
         self.draw_cases = self._planner.draw_cases
         keep_vehicles(plan.folder, [plan.vehicle])
@@ -195,12 +195,12 @@ class RoundRunner:
 
     def take_state(self, state: VehicleState) -> None:
         """Add where the car is: comparisons fall due."""
-        for comparison in self._comparison_desk.take_state(state):
+        for comparison in self._open_comparisons.take_state(state):
             self._keep(comparison)
 
     def finish(self) -> None:
         """Compare what can still be compared at the drive's end."""
-        for comparison in self._comparison_desk.flush():
+        for comparison in self._open_comparisons.flush():
             self._keep(comparison)
         rows = [judged_row(o, start_stamp_ns=self.start_stamp_ns) for o in self.windows.finish()]
         self._tables.add("agreement", rows)
@@ -231,7 +231,7 @@ class RoundRunner:
         self._bus.publish("round", view, run=self._plan.run_id)
         self._tell_of_planners(done)
         if futures.valid[0]:  # a nominal future that diverged says nothing of anything
-            self._comparison_desk.take_round(done, world.frame, seed.state)
+            self._open_comparisons.take_round(done, world.frame, seed.state)
             self.windows.take_round(done, seed.intent.path, world)
             self._compare_plans(done, seed, world)
 

@@ -23,7 +23,7 @@ class Made(NamedTuple):
 
 
 class ChangeHandler(Protocol):
-    """Makes the changes of one kind of key, such as `role.ID`; see ChangeDesk."""
+    """Makes the changes of one kind of key, such as `role.ID`; see RuntimeConfiguration."""
 
     @property
     def keys(self) -> str:
@@ -61,7 +61,7 @@ class _Waiting(NamedTuple):
     asked_stamp_ns: int
 
 
-class ChangeDesk:
+class RuntimeConfiguration:
     """Takes questions of the channel `set`, refuses what makes no sense, and lets the rest wait.
 
     `make` is called between two rounds, so that no round is half of one kind and half of another.

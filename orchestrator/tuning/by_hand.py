@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from foretwin.contracts.errors import UserError
 from foretwin.orchestrator.runtime_configuration.handler import Made, RefusedError
-from foretwin.orchestrator.tuning.parameter_versions import ParameterDesk
+from foretwin.orchestrator.tuning.parameter_versions import ParameterVersions
 from foretwin.sim_worker.analysis.identify.acceptance import in_force
 
 _WORDS = ("pin", "unpin", "rollback")
@@ -15,12 +15,12 @@ class VehicleHandler:
 
     keys = "vehicle.NAME"
 
-    def __init__(self, desk: ParameterDesk) -> None:
-        self._desk = desk
+    def __init__(self, handler: ParameterVersions) -> None:
+        self._handler = handler
 
     def check(self, name: str, value: str) -> None:
         """Raise RefusedError for an unknown parameter, a word or a number that cannot be."""
-        parameters = self._desk.in_force
+        parameters = self._handler.in_force
         try:
             if value == "rollback":
                 parameters.check_rollback(name)
@@ -34,7 +34,7 @@ class VehicleHandler:
     def make(self, name: str, value: str, *, stamp_ns: int) -> Made:
         """Let the parameter count from `stamp_ns` on; raises RefusedError where it cannot."""
         self.check(name, value)
-        parameters = self._desk.in_force
+        parameters = self._handler.in_force
         before = in_force(parameters.vehicle, name)
         if value == "pin":
             parameters.pin(name)
@@ -46,7 +46,7 @@ class VehicleHandler:
             change = parameters.rollback(name, stamp_ns=stamp_ns)
         else:
             change = parameters.set(name, _number(name, value), stamp_ns=stamp_ns)
-        self._desk.note([change])
+        self._handler.note([change])
         return Made(f"{before:.6g}", f"{change.value:.6g}, pinned")
 
 

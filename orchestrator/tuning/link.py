@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 from foretwin.contracts.bus import Bus, Mailbox, Received, Reply
 from foretwin.contracts.tuning import Identification, TuneReply, TuneRequest, UseVehicle
-from foretwin.orchestrator.drive.events import EventDesk
+from foretwin.orchestrator.drive.events import EventHandler
 from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.plan import DrivePlan
 from foretwin.orchestrator.drive.processes import MIRROR, TUNING
@@ -14,7 +14,11 @@ from foretwin.orchestrator.instructions import Tell
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.rounds.runner import RoundRunner
 from foretwin.orchestrator.tuning.findings import Findings
-from foretwin.orchestrator.tuning.parameter_versions import ParameterDesk, change_row, change_text
+from foretwin.orchestrator.tuning.parameter_versions import (
+    ParameterVersions,
+    change_row,
+    change_text,
+)
 
 FINDINGS = ("identification", "gap", "gap_alarm", "verdict")
 """Channels of the process `tuning`; in lock step its answers bring the same, in order."""
@@ -32,14 +36,14 @@ class TuningLink:
         mailbox: Mailbox,
         tables: ResultTables,
         *,
-        events: EventDesk,
+        events: EventHandler,
         intake: Intake,
         rounds: RoundRunner,
         alive: Collection[str],
     ) -> None:
         self._plan, self._bus, self._mailbox, self._tables = plan, bus, mailbox, tables
         self._events, self._intake, self._rounds, self._alive = events, intake, rounds, alive
-        self.parameters = ParameterDesk(
+        self.parameters = ParameterVersions(
             plan.vehicle, vehicle_id=plan.config.vehicle_id, ask=self._ask
         )
         self.findings = Findings(

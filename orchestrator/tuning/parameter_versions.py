@@ -23,7 +23,7 @@ from foretwin.sim_worker.analysis.identify.parameters_in_force import Parameters
 _BY_HAND = ("set", "rolled_back")
 
 
-class ParameterDesk:
+class ParameterVersions:
     """Holds the parameters of one drive; `ask` sends a UseVehicle to a process.
 
     Every process that was asked answers once by `answered`; no round may start before.

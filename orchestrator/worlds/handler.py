@@ -1,4 +1,4 @@
-"""The desk where Worlds are asked for, built by the builder, and loaded by every worker."""
+"""The handler where Worlds are asked for, built by the builder, and loaded by every worker."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class _Order:
     asked_again: bool = False
 
 
-class WorldDesk:
+class WorldHandler:
     """Asks builder and workers; a World is ready once every worker that is up has loaded it.
 
     A builder that dies is asked again when it is back; a worker that dies is waited for no more.

@@ -128,7 +128,7 @@ class Trip:
                 self._answer(instruction, mono_s)
 
     def _answer(self, wanted: BuildWorld, mono_s: float) -> None:
-        """Answer as the world desk does: what is asked for again has been answered already."""
+        """Answer as the world handler does: what is asked for again has been answered already."""
         if wanted.junction_id in self._asked:
             return
         self._asked.add(wanted.junction_id)

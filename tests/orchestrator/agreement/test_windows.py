@@ -1,4 +1,4 @@
-"""Nominal futures against what was then driven: what a desk collects, and its verdicts."""
+"""Nominal futures against what was then driven: what a handler collects, and its verdicts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from foretwin.contracts.drive import RoadUser, RoadUsers, SignalState
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.futures import PathAhead
 from foretwin.orchestrator.agreement.verdict_rows import agreement_lines, judged_row
-from foretwin.orchestrator.agreement.windows import WindowDesk, judge_in
+from foretwin.orchestrator.agreement.windows import OpenWindows, judge_in
 from foretwin.orchestrator.drive.intake import LatestReports
 from foretwin.sim_worker.analysis.agreement.tally import Judged
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -25,9 +25,9 @@ FROM_X, Y = -60.0, -1.6
 
 def driven(
     *, others: bool = False, until_s: float = 22.0, std_m: float | None = 0.05
-) -> WindowDesk:
+) -> OpenWindows:
     """Drive at 5 m/s for 22 s, each second with a round whose nominal future is right."""
-    desk = WindowDesk(VEHICLE, horizon_s=8.0)
+    handler = OpenWindows(VEHICLE, horizon_s=8.0)
     line = np.array([[FROM_X, Y], [FROM_X + 5.0 * until_s, Y]])
     path = PathAhead(xy_m=line, speed_limit_mps=np.full(2, 14.0))
     for number, plain in enumerate(states_along(WORLD.frame, line, speed_mps=5.0)):
@@ -38,13 +38,13 @@ def driven(
         )  # fmt: skip
         seen = RoadUsers(stamp_ns=state.stamp_ns, users=(lorry,)) if others else None
         light = SignalState(stamp_ns=state.stamp_ns, group_id="g", colour="green")
-        desk.take(LatestReports(None, seen, (light,)), state)
+        handler.take(LatestReports(None, seen, (light,)), state)
         if number % 10 == 0:
             ahead = straight((FROM_X + 0.5 * number, Y), speed_mps=5.0)
             done = round_done(ahead, round_id=number, stamp_ns=state.stamp_ns)
-            desk.take_round(done, path, WORLD)
-    desk.finish()
-    return desk
+            handler.take_round(done, path, WORLD)
+    handler.finish()
+    return handler
 
 
 def outcomes(judged: list[Judged]) -> set[str]:
@@ -52,12 +52,12 @@ def outcomes(judged: list[Judged]) -> set[str]:
 
 
 def test_every_second_is_judged_and_recorded() -> None:
-    desk = driven()
-    record = desk.record(START_NS)
+    handler = driven()
+    record = handler.record(START_NS)
     assert record is not None
     assert record["windows"] == 14  # of 22 s, those that still have 8 s before them
     assert sum(record["overall"].values()) == 14
-    rows = [judged_row(one, start_stamp_ns=START_NS) for one in desk.judged]
+    rows = [judged_row(one, start_stamp_ns=START_NS) for one in handler.judged]
     assert [row["drive_time_s"] for row in rows] == pytest.approx(np.arange(14.0))
     assert {row["intersection_id"] for row in rows} == {"n4"}
     assert all(row["gap_across_m"] < 0.05 and row["gap_along_m"] < 0.05 for row in rows)
@@ -106,6 +106,6 @@ def test_a_long_drive_keeps_no_more_windows_than_fit(monkeypatch: pytest.MonkeyP
 
 
 def test_a_desk_that_saw_nothing_says_nothing() -> None:
-    desk = WindowDesk(VEHICLE, horizon_s=8.0)
-    assert desk.finish() == []
-    assert desk.record(0) is None
+    handler = OpenWindows(VEHICLE, horizon_s=8.0)
+    assert handler.finish() == []
+    assert handler.record(0) is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from foretwin.contracts.simulation import MirrorSample, PlaneState
-from foretwin.orchestrator.drive.mirror_handler import MirrorDesk
+from foretwin.orchestrator.drive.mirror_handler import MirrorHandler
 from foretwin.orchestrator.instructions import Tell
 
 HERE = PlaneState(0.0, 0.0, 0.0, 0.0)
@@ -29,15 +29,15 @@ def sample(at_s: float, *touches: tuple[str, str]) -> MirrorSample:
 
 def test_a_touch_is_told_as_it_begins_and_again_only_after_a_while() -> None:
     tables, told = Tables(), list[Tell]()
-    desk = MirrorDesk(tables, told.append)  # type: ignore[arg-type]
+    handler = MirrorHandler(tables, told.append)  # type: ignore[arg-type]
     for at_s in (1.0, 1.1, 1.2, 2.5, 5.0):
-        desk.take(sample(at_s, ("ego", "van")))
-    desk.take(sample(5.1, ("ego", "van"), ("ego", "world")))
+        handler.take(sample(at_s, ("ego", "van")))
+    handler.take(sample(5.1, ("ego", "van"), ("ego", "world")))
     assert [tell.text for tell in told] == [
         "in the mirror, ego and van touch",
         "in the mirror, ego and van touch",
         "in the mirror, ego and what stands touch",
     ]
-    assert desk.touches == 3
+    assert handler.touches == 3
     assert tables.rows == {"mirror": 6, "touches": 7}
-    assert (desk.stamp_ns, desk.independent) == (5_100_000_000, True)
+    assert (handler.stamp_ns, handler.independent) == (5_100_000_000, True)

@@ -17,7 +17,7 @@ from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.orchestrator.config import ConfigError, DriveConfig
 from foretwin.orchestrator.drive.ros2_mapping import read_ros2
-from foretwin.orchestrator.drive.route_handler import RouteDesk
+from foretwin.orchestrator.drive.route_handler import RouteHandler
 from foretwin.orchestrator.routing.route import Route
 from foretwin.telemetry.ros2.mapping import AUTOWARE, MappingError
 from tests.contracts.memory_bus import MemoryBus
@@ -29,7 +29,7 @@ S = 10**9
 
 
 class Ground:
-    """A desk on the grid town, and what it hands on."""
+    """A handler on the grid town, and what it hands on."""
 
     def __init__(self, folder: Path) -> None:
         plan = town_plan(folder)
@@ -37,18 +37,18 @@ class Ground:
         self.routes: list[Route] = []
         self.told: list[str] = []
         self.bus, self.box = MemoryBus(), Mailbox(8)
-        self.desk = RouteDesk(
+        self.handler = RouteHandler(
             replace(plan, graph=TOWN, config=config), use=self.routes.append,
             tell=lambda told: self.told.append(f"{told.level}: {told.text}"),
         )  # fmt: skip
-        self.desk.join(self.bus, self.box)
+        self.handler.join(self.bus, self.box)
 
     def say(self, said: RouteToGoal) -> None:
         self.bus.publish("route", said, vehicle="ego")
-        self.desk.take(self.box.take())
+        self.handler.take(self.box.take())
 
     def drive(self, t_s: float, plan: PlannedTrajectory | None = None) -> None:
-        self.desk.keep_up_with(state(t_s), plan)
+        self.handler.keep_up_with(state(t_s), plan)
 
     def settle(self, t_s: float, count: int, plan: PlannedTrajectory | None = None) -> None:
         """Drive on until so much has been told."""
@@ -63,7 +63,7 @@ class Ground:
 def ground(tmp_path: Path) -> Iterator[Ground]:
     found = Ground(tmp_path)
     yield found
-    found.desk.close()
+    found.handler.close()
 
 
 def state(t_s: float) -> VehicleState:

@@ -54,7 +54,7 @@ def test_another_lane_of_the_software_is_listed_with_its_place(house: House) -> 
     house.bus.subscribe("disagreement", house.seen, run=house.plan.run_id)
     drive(house, {0: "manual"}, shifted=range(60, 90), left_m=3.5)
 
-    record = house.conductor.human.record()
+    record = house.conductor.ads.record()
     assert record is not None
     found = [one for one in record["disagreements"] if one["drive_time_s"] > 3.0]
     (one,) = found  # before, the heading is not known well yet
@@ -81,7 +81,7 @@ def test_another_lane_of_the_software_is_listed_with_its_place(house: House) -> 
 
 def test_a_takeover_parts_what_is_compared(house: House) -> None:
     drive(house, {0: "autonomous", 60: "manual"}, shifted=range(30, 60), left_m=3.5)
-    record = house.conductor.human.record()
+    record = house.conductor.ads.record()
     assert record is not None
     software, human = record["segments"]
     assert (software["control_mode"], human["control_mode"]) == ("autonomous", "manual")
@@ -94,4 +94,4 @@ def test_a_takeover_parts_what_is_compared(house: House) -> None:
 def test_a_drive_without_plans_has_nothing_beside_it(house: House) -> None:
     house.drive(20, working=False)
     house.end()
-    assert house.conductor.human.record() is None
+    assert house.conductor.ads.record() is None

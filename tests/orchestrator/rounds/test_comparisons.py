@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.simulation import Comparison
-from foretwin.orchestrator.rounds.comparisons import ComparisonDesk
+from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from tests.orchestrator.futures_rounds import round_done, straight
 from tests.orchestrator.trip import START_NS, states_along
 
@@ -28,14 +28,14 @@ def car(frame: LocalFrame, *, length_m: float = 200.0, heading_rad: float = 0.0)
 def compared(
     states: list[VehicleState], done: object, *, world: LocalFrame = DRIVE, flush: bool = True
 ) -> dict[float, Comparison]:
-    desk = ComparisonDesk(DRIVE, 8.0)
+    handler = OpenComparisons(DRIVE, 8.0)
     found = []
     for state in states:
-        found += desk.take_state(state)
+        found += handler.take_state(state)
         if state.stamp_ns == START_NS:
-            desk.take_round(done, world, state)  # type: ignore[arg-type]
+            handler.take_round(done, world, state)  # type: ignore[arg-type]
     if flush:
-        found += desk.flush()
+        found += handler.flush()
     return {c.horizon_s: c for c in found}
 
 
@@ -111,9 +111,9 @@ def test_nothing_is_said_across_a_hole_in_the_track() -> None:
 
 
 def test_a_short_future_is_compared_over_its_own_horizons() -> None:
-    desk = ComparisonDesk(DRIVE, 4.0)
+    handler = OpenComparisons(DRIVE, 4.0)
 
-    assert desk.horizons_s == (1.0, 2.0, 4.0)
+    assert handler.horizons_s == (1.0, 2.0, 4.0)
 
 
 def test_positions_without_a_heading_are_no_truth() -> None:
@@ -131,22 +131,22 @@ def test_a_comparison_looks_no_further_than_its_horizon() -> None:
 
 
 def test_the_track_is_forgotten_when_nobody_needs_it() -> None:
-    desk = ComparisonDesk(DRIVE, 8.0)
+    handler = OpenComparisons(DRIVE, 8.0)
     for state in states_along(DRIVE, np.array([[0.0, 0.0], [1000.0, 0.0]])):
-        desk.take_state(state)
+        handler.take_state(state)
 
-    assert len(desk._stamps_ns) < 10 * 15
+    assert len(handler._stamps_ns) < 10 * 15
 
 
 def test_after_the_clock_has_stepped_back_comparisons_go_on() -> None:
-    desk = ComparisonDesk(DRIVE, 8.0)
+    handler = OpenComparisons(DRIVE, 8.0)
     hour_ns = 3600 * 10**9
     for state in car(DRIVE)[:10]:
         later = msgspec.structs.replace(state, stamp_ns=state.stamp_ns + hour_ns)
-        assert desk.take_state(later) == []
+        assert handler.take_state(later) == []
     found = []
     for state in car(DRIVE):
-        found += desk.take_state(state)
+        found += handler.take_state(state)
         if state.stamp_ns == START_NS:
-            desk.take_round(round_done(straight()), DRIVE, state)
+            handler.take_round(round_done(straight()), DRIVE, state)
     assert {comparison.horizon_s for comparison in found} == {1.0, 2.0, 4.0, 8.0}

@@ -16,9 +16,9 @@ from foretwin.contracts.tuning import SetReply, SetRequest
 from foretwin.orchestrator.commands.set import ask_drive
 from foretwin.orchestrator.runtime_configuration.handler import (
     Change,
-    ChangeDesk,
     Made,
     RefusedError,
+    RuntimeConfiguration,
 )
 from tests.orchestrator.house import House, Process
 from tests.orchestrator.trip import START_NS
@@ -166,15 +166,15 @@ class Dial:
 
 
 def test_a_handler_may_refuse_once_its_turn_has_come(house: House) -> None:
-    desk = ChangeDesk({"dial": Dial()})
+    handler = RuntimeConfiguration({"dial": Dial()})
     house.bus.serve("set", box := Mailbox(8), run="r")
     answers = [Mailbox(1), Mailbox(1)]
     for one in answers:
         request = SetRequest(key="dial.left", value="7")
         house.bus.request("set", request, one, run="r")
-        desk.take(box.take(), stamp_ns=5)
-    made = desk.make(stamp_ns=9, start_stamp_ns=0)
-    assert made == [Change(9, 5, "dial.left", "0", "7")] == desk.made
+        handler.take(box.take(), stamp_ns=5)
+    made = handler.make(stamp_ns=9, start_stamp_ns=0)
+    assert made == [Change(9, 5, "dial.left", "0", "7")] == handler.made
     first, second = (answer(one) for one in answers)
     assert first is not None
     assert first.done

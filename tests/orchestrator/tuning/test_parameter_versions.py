@@ -7,7 +7,7 @@ import pytest
 from foretwin.contracts.tuning import Identification, ParameterEstimate, UseVehicle
 from foretwin.orchestrator.runtime_configuration.handler import RefusedError
 from foretwin.orchestrator.tuning.by_hand import VehicleHandler
-from foretwin.orchestrator.tuning.parameter_versions import ParameterDesk, change_text
+from foretwin.orchestrator.tuning.parameter_versions import ParameterVersions, change_text
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 CAR = load_vehicle()
@@ -15,23 +15,23 @@ EVERYBODY = ("mirror", "tuning", "w0")
 
 
 class Told:
-    """A desk, and what it told whom."""
+    """A handler, and what it told whom."""
 
     def __init__(self) -> None:
         self.sent: list[tuple[str, UseVehicle]] = []
-        self.desk = ParameterDesk(
+        self.handler = ParameterVersions(
             CAR, vehicle_id="ego", ask=lambda who, what: self.sent.append((who, what))
         )
-        self.hand = VehicleHandler(self.desk)
+        self.hand = VehicleHandler(self.handler)
 
     @property
     def settled(self) -> bool:
-        return self.desk.settled
+        return self.handler.settled
 
     def hand_over(self, stamp_ns: int = 100) -> list[UseVehicle]:
         """What workers are told."""
         self.sent.clear()
-        self.desk.hand_over(EVERYBODY, watcher="tuning", stamp_ns=stamp_ns)
+        self.handler.hand_over(EVERYBODY, watcher="tuning", stamp_ns=stamp_ns)
         return [what for who, what in self.sent if who == "w0"]
 
 
@@ -47,7 +47,7 @@ def told(*estimates: ParameterEstimate) -> Identification:
 
 def test_what_departs_from_the_value_in_use_counts_and_everybody_is_told_once() -> None:
     it = Told()
-    it.desk.apply(told(found("steering_ratio", 15.3), found("drive_gain", 1.1)))
+    it.handler.apply(told(found("steering_ratio", 15.3), found("drive_gain", 1.1)))
     assert it.settled
     (use,) = it.hand_over(100)
     assert (use.version, use.stamp_ns) == (1, 100)
@@ -59,15 +59,15 @@ def test_what_departs_from_the_value_in_use_counts_and_everybody_is_told_once() 
     assert [who for who, _ in it.sent] == list(EVERYBODY)
     assert not it.settled
     for who in EVERYBODY:
-        it.desk.answered(who)
+        it.handler.answered(who)
     assert it.settled
     assert it.hand_over() == []
 
 
 def test_an_estimate_with_a_reason_against_it_does_not_count() -> None:
     it = Told()
-    it.desk.apply(told(found("steering_ratio", 15.3, reason="nearly straight")))
-    assert not it.desk.waiting
+    it.handler.apply(told(found("steering_ratio", 15.3, reason="nearly straight")))
+    assert not it.handler.waiting
 
 
 def test_a_hand_sets_pins_and_rolls_back() -> None:
@@ -76,16 +76,16 @@ def test_a_hand_sets_pins_and_rolls_back() -> None:
     assert it.hand.make("steering_ratio", "15", stamp_ns=10) == ("16", "15, pinned")
     (use,) = it.hand_over()
     assert (use.vehicle.steering_ratio.value, use.pinned) == (15.0, ("steering_ratio",))
-    it.desk.apply(told(found("steering_ratio", 17.0)))
-    assert not it.desk.waiting, "pinned"
+    it.handler.apply(told(found("steering_ratio", 17.0)))
+    assert not it.handler.waiting, "pinned"
     assert it.hand.make("steering_ratio", "rollback", stamp_ns=20) == ("15", "16, pinned")
     (use,) = it.hand_over()
     assert (use.version, use.vehicle) == (2, CAR)
     it.hand.make("steering_ratio", "unpin", stamp_ns=30)
-    it.desk.apply(told(found("steering_ratio", 17.0)))
+    it.handler.apply(told(found("steering_ratio", 17.0)))
     (use,) = it.hand_over()
     assert use.vehicle.steering_ratio.value == 17.0
-    origins = [change.origin for change in it.desk.made]
+    origins = [change.origin for change in it.handler.made]
     assert origins == ["set", "rolled_back", "identified"]
 
 
@@ -113,27 +113,27 @@ def test_what_cannot_be_is_refused_in_one_line(name: str, value: str, text: str)
     it = Told()
     with pytest.raises(RefusedError, match=text):
         it.hand.check(name, value)
-    assert not it.desk.waiting
+    assert not it.handler.waiting
 
 
 def test_who_comes_up_late_is_told_what_counts_and_what_a_hand_has_set() -> None:
     it = Told()
-    assert not it.desk.tell("w1")
+    assert not it.handler.tell("w1")
     it.hand.make("mass_kg", "1300", stamp_ns=10)
-    it.desk.apply(told(found("steering_ratio", 15.3)))
+    it.handler.apply(told(found("steering_ratio", 15.3)))
     it.hand_over(40)
     for who in EVERYBODY:
-        it.desk.answered(who)
-    assert it.desk.tell("w1")
+        it.handler.answered(who)
+    assert it.handler.tell("w1")
     who, use = it.sent[-1]
     assert (who, use.version, use.stamp_ns) == ("w1", 1, 40)
-    assert use.vehicle == it.desk.in_force.vehicle
+    assert use.vehicle == it.handler.in_force.vehicle
     assert [change.name for change in use.changes] == ["mass_kg"]
     assert not it.settled
 
 
 def test_a_change_reads_as_the_engineer_would_say_it() -> None:
     it = Told()
-    it.desk.apply(told(found("steering_ratio", 15.3)))
+    it.handler.apply(told(found("steering_ratio", 15.3)))
     it.hand_over()
-    assert change_text(it.desk.made[0]) == "steering_ratio 16 -> 15.3 ± 0.2, as the driving says"
+    assert change_text(it.handler.made[0]) == "steering_ratio 16 -> 15.3 ± 0.2, as the driving says"

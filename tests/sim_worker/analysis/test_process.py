@@ -15,7 +15,7 @@ from foretwin.contracts.mailbox import Item
 from foretwin.contracts.setup import BusSetup, TuningSetup
 from foretwin.contracts.tuning import TuneReply, TuneRequest, UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.orchestrator.tuning.parameter_versions import ParameterDesk
+from foretwin.orchestrator.tuning.parameter_versions import ParameterVersions
 from foretwin.sim_worker.analysis.process import TuningWorker
 from foretwin.sim_worker.analysis.tuning import SAMPLES
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -111,7 +111,7 @@ def test_a_wrong_steering_ratio_is_found_counts_and_the_gap_falls() -> None:
     """The twin believes in 18; the car's own 15.3 is hidden from it."""
     wrong = altered(CAR, steering_ratio=18.0)
     watched = Watched(wrong)
-    desk = ParameterDesk(wrong, vehicle_id="standin", ask=lambda _, use: watched.use(use))
+    handler = ParameterVersions(wrong, vehicle_id="standin", ask=lambda _, use: watched.use(use))
     changed_s = None
     before: list[GapSample] = []
     after: list[GapSample] = []
@@ -123,24 +123,24 @@ def test_a_wrong_steering_ratio_is_found_counts_and_the_gap_falls() -> None:
         elif second > changed_s + 2:
             after += short
         for told in reply.identifications:
-            desk.apply(told)
-        changes = desk.hand_over(["tuning"], watcher="tuning", stamp_ns=0)
+            handler.apply(told)
+        changes = handler.hand_over(["tuning"], watcher="tuning", stamp_ns=0)
         if any(change.name == "steering_ratio" for change in changes) and changed_s is None:
             changed_s = second
         if len(after) >= 10:
             break
-    ratio = desk.in_force.vehicle.steering_ratio.value
+    ratio = handler.in_force.vehicle.steering_ratio.value
     assert ratio == pytest.approx(HIDDEN_RATIO, rel=0.02)
     assert all(sample.independent for sample in before + after)
     falls = rms(before, "across_m"), rms(after, "across_m")
     print(f"gap across after 2 s: {falls[0]:.3f} m before, {falls[1]:.3f} m after, {changed_s} s")
     assert falls[1] < 0.4 * falls[0]
     assert rms(after, "yaw_rad") < 0.4 * rms(before, "yaw_rad")
-    first = next(change for change in desk.made if change.name == "steering_ratio")
+    first = next(change for change in handler.made if change.name == "steering_ratio")
     assert (first.before, first.origin) == (18.0, "identified")
-    last = [change for change in desk.made if change.name == "steering_ratio"][-1]
-    desk.note([desk.in_force.rollback("steering_ratio", stamp_ns=0)])
-    desk.hand_over(["tuning"], watcher="tuning", stamp_ns=0)
+    last = [change for change in handler.made if change.name == "steering_ratio"][-1]
+    handler.note([handler.in_force.rollback("steering_ratio", stamp_ns=0)])
+    handler.hand_over(["tuning"], watcher="tuning", stamp_ns=0)
     assert watched._worker._watch._in_force.steering_ratio.value == last.before
 
 
