@@ -75,7 +75,7 @@ def test_a_killed_worker_is_replaced_and_no_result_counts_twice(tmp_path: Path) 
     assert when(run, "w0 ended with code -9") - killed_s - kept.seconds < 1.0
     assert when(run, "started w0 again") - killed_s - kept.seconds < 2.0
     rows = pq.read_table(run / "results" / "futures.parquet").to_pylist()
-    seen = [(row["round_id"], row["future"]) for row in rows]
+    seen = [(row["round_id"], row["index"]) for row in rows]
     assert len(seen) == len(set(seen)) > 0
     assert_readable(run)
     assert_nothing_left(run)

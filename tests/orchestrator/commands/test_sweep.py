@@ -131,6 +131,7 @@ def test_a_changed_planner_does_not_get_the_rows_of_the_old_one(
 ) -> None:
     install(tmp_path, "changed_planner", PLANNER.format(accel_mps2=0.0), rolling="Rolling")
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))  # for workers
     rolling = SMALL.replace('"scp", "cpta", "reversing_parking"', '"scp"')
     rolling = rolling.replace('"pure_pursuit_idm", "constant_speed"', '"rolling"')
     spec, out = small_sweep(tmp_path, rolling), str(tmp_path / "out")
