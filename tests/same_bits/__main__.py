@@ -59,6 +59,7 @@ def main(arguments: Sequence[str]) -> int:
         print(error, file=sys.stderr)
         return WRONG_REQUEST
     except KeyboardInterrupt:
+        print("interrupted: nothing is known", file=sys.stderr)
         return INTERRUPTED
     finally:
         if not asked.keep:
