@@ -76,4 +76,4 @@ class PlaceRequest(msgspec.Struct, frozen=True, kw_only=True):
     scenarios: tuple[Scenario, ...]
     vehicle: str
     most: int
-    starts: dict[int, RecordedStart] = {}
+    starts: tuple[tuple[int, RecordedStart], ...] = ()

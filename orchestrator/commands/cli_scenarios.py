@@ -47,10 +47,10 @@ def place_scenarios(
     as_json: Annotated[bool, typer.Option("--json", help="a JSON list")] = False,
 ) -> None:
     """Say which junctions of a map take which scenarios, and why not elsewhere."""
-    from foretwin.orchestrator.commands.scenarios import PlaceRequest
+    from foretwin.orchestrator.commands.scenarios import PlacesAsked
     from foretwin.orchestrator.commands.scenarios import place_scenarios as place_them
 
-    request = PlaceRequest(map_file, scenario or (), junction_id, at, service_roads)
+    request = PlacesAsked(map_file, scenario or (), junction_id, at, service_roads)
     raise typer.Exit(place_them(request, as_json=as_json))
 
 
@@ -76,9 +76,9 @@ def export_scenario(
     """Write one case at one junction as OpenSCENARIO 1.2, with its roads as OpenDRIVE."""
     from foretwin.orchestrator.commands.scenario_export import CaseRequest
     from foretwin.orchestrator.commands.scenario_export import export_scenario as export
-    from foretwin.orchestrator.commands.scenarios import PlaceRequest
+    from foretwin.orchestrator.commands.scenarios import PlacesAsked
 
-    where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
+    where = PlacesAsked(map_file, (scenario,), junction_id, at, service_roads)
     export(CaseRequest(scenario, where, case, vehicle), out)
 
 
@@ -97,7 +97,7 @@ def draw_scenario(
     """Draw one case at one junction from above: as planned, and as a planner drives it."""
     from foretwin.orchestrator.commands.scenario_export import CaseRequest
     from foretwin.orchestrator.commands.scenario_export import draw_scenario as draw
-    from foretwin.orchestrator.commands.scenarios import PlaceRequest
+    from foretwin.orchestrator.commands.scenarios import PlacesAsked
 
-    where = PlaceRequest(map_file, (scenario,), junction_id, at, service_roads)
+    where = PlacesAsked(map_file, (scenario,), junction_id, at, service_roads)
     draw(CaseRequest(scenario, where, case, vehicle), out, planner=planner)

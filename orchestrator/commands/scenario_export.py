@@ -9,7 +9,7 @@ from typing import NamedTuple
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import World
-from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlaceRequest, asked_junctions
+from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlacesAsked, asked_junctions
 from foretwin.sim_worker.planners.registry import check_planner
 from foretwin.sim_worker.scenarios.casting import Cast, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
@@ -25,7 +25,7 @@ class CaseRequest(NamedTuple):
     """Which case of which scenario, and where; the first case is 1."""
 
     scenario: str
-    where: PlaceRequest
+    where: PlacesAsked
     case: int
     vehicle: Path | None = None
 

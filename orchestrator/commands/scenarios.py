@@ -51,7 +51,7 @@ class PlacedScenario(msgspec.Struct, kw_only=True):
     does_not_apply: dict[str, int] = {}
 
 
-class PlaceRequest(NamedTuple):
+class PlacesAsked(NamedTuple):
     """What was asked for on the command line, as it was typed."""
 
     map_file: Path
@@ -88,7 +88,7 @@ def check_scenario_file(file: Path) -> None:
     print(f"{file}: {scenario.id}, {scenario.title}: {cases} cases, {_where(scenario)}")
 
 
-def place_scenarios(request: PlaceRequest, *, as_json: bool) -> int:
+def place_scenarios(request: PlacesAsked, *, as_json: bool) -> int:
     """Print where scenarios take place on a map's junctions, and why not elsewhere.
 
     Returns 0, or 3 where a junction that a scenario applies to has no place for it.
@@ -104,7 +104,7 @@ def place_scenarios(request: PlaceRequest, *, as_json: bool) -> int:
     return 3 if any(scenario.unplaced for scenario in found) else 0
 
 
-def asked_junctions(request: PlaceRequest) -> tuple[OpenMap, tuple[Junction, ...]]:
+def asked_junctions(request: PlacesAsked) -> tuple[OpenMap, tuple[Junction, ...]]:
     """Open as much of a map as is needed; returns it and the junctions that were asked for."""
     if request.at is not None and request.junction_id is not None:
         raise UserError("name the junction by --at LAT,LON or by --id ID, not by both")

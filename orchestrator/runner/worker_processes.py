@@ -36,7 +36,7 @@ _END_S = 0.5
 _MAILBOX_DEPTH = 4096
 
 
-class _Row(NamedTuple):
+class _WorkerRow(NamedTuple):
     module: str = "sim_worker"
     when_dead: WhenDead = "report"
     nice: int = 0
@@ -183,7 +183,9 @@ class WorkerProcesses:
             raise RuntimeError(f"no worker can be started; see {self._setup.log_file}")
         missing = min(self._count, self._dispatcher.dispatch.open) - len(running)
         for name in [name for name in able if name not in running][: max(missing, 0)]:
-            self._supervisor.start(_Row(), msgspec.structs.replace(self._setup, process_id=name))
+            self._supervisor.start(
+                _WorkerRow(), msgspec.structs.replace(self._setup, process_id=name)
+            )
 
 
 def _how(death: Death) -> str:

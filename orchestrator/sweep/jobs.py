@@ -18,7 +18,7 @@ from foretwin.sim_worker.futures.future_rows import Row, future_rows, rows_from_
 def place_request(loaded: Loaded, world_id: str) -> PlaceRequest:
     """Return the question where the scenarios of a sweep take place, for its first vehicle."""
     vehicle = next(iter(loaded.vehicles.values()))
-    starts = {n: start for n, start in enumerate(loaded.starts) if start.world_id == world_id}
+    starts = tuple((n, one) for n, one in enumerate(loaded.starts) if one.world_id == world_id)
     return PlaceRequest(
         world_id=world_id, scenarios=loaded.scenarios, vehicle=vehicle_digest(vehicle),
         most=loaded.spec.places, starts=starts,

@@ -59,7 +59,7 @@ def _places_recorded(
     """Return which scenarios can happen on the ways that a recorded car took from its starts."""
     world, known = network.world, LiveScenarios(network)
     placed, unplaced = [], []
-    for number, start in asked.starts.items():
+    for number, start in asked.starts:
         path = FrenetPath(start.path(world.frame).xy_m)
         here = local_from_geo(
             world.frame, start.state.position.lat_deg, start.state.position.lon_deg

@@ -16,6 +16,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import Future
 from foretwin.geometry import compiled as compiled_geometry
 from foretwin.geometry.frenet_path import FrenetPath
+from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.metrics import compiled_pairs
@@ -166,20 +167,20 @@ def test_curves_and_free_roads_are_driven_by_the_formulas(
 
     assert wanted == pytest.approx(pure_pursuit(seen), abs=1e-12)
     profile = CIRCLE.speed_profile(
-        lateral_accel_mps2=idm.LATERAL_ACCEL_MPS2, decel_mps2=idm.COMFORT_DECEL_MPS2
+        lateral_accel_mps2=driver.LATERAL_ACCEL_MPS2, decel_mps2=driver.COMFORT_DECEL_MPS2
     )
     ahead = CIRCLE.at_nodes(profile, seen.arc_m + idm._CURVE_TIME_S * speed)
     turning = turning_speed(seen, wanted, lateral_accel_mps2=idm.TURNING_ACCEL_MPS2)
     curve = (np.minimum(ahead * factor, turning) - speed) / idm._CURVE_TIME_S
-    most = idm.MAX_ACCEL_MPS2 * factor
+    most = driver.MAX_ACCEL_MPS2 * factor
     ratio = speed / target
-    slower = idm.COMFORT_DECEL_MPS2 * (
-        np.maximum(ratio, 1.0) ** (-most * idm.EXPONENT / idm.COMFORT_DECEL_MPS2) - 1.0
+    slower = driver.COMFORT_DECEL_MPS2 * (
+        np.maximum(ratio, 1.0) ** (-most * driver.ACCEL_EXPONENT / driver.COMFORT_DECEL_MPS2) - 1.0
     )
     free = np.where(ratio < 1.0, most * (1.0 - ratio**4), slower)
-    expected = np.maximum(np.minimum(curve, free), -idm.MAX_DECEL_MPS2)
+    expected = np.maximum(np.minimum(curve, free), -driver.MAX_DECEL_MPS2)
     command = expected + resistance_mps2(CAR, speed)
-    command = np.where((speed < idm._HOLD_SPEED_MPS) & (expected <= 0), idm._HOLD_MPS2, command)
+    command = np.where((speed < driver.HOLD_SPEED_MPS) & (expected <= 0), driver.HOLD_MPS2, command)
     assert accel == pytest.approx(command, abs=1e-9)
 
 

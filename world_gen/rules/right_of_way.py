@@ -48,7 +48,7 @@ ALONGSIDE_RAD, FAST_ALONGSIDE_RAD = math.radians(10.0), math.radians(50.0)
 _FAST = ("motorway", "motorway_link", "trunk", "trunk_link")
 
 
-class Answer(NamedTuple):
+class Yielding(NamedTuple):
     """Whether the first of a pair waits, by which rule, and who said so."""
 
     first_waits: bool
@@ -213,21 +213,21 @@ def _answer(
     angle: float,
     crossing: bool,
     driving_side: DrivingSide,
-) -> Answer:
+) -> Yielding:
     """Return who of two waits; `angle` turns a's first heading into b's, positive to the left.
 
     `crossing` tells that the middles of their paths cross.
     """
     if a.on_the_spot != b.on_the_spot:
-        return Answer(a.on_the_spot, "u_turn", "inferred")
+        return Yielding(a.on_the_spot, "u_turn", "inferred")
     if a.on_ring != b.on_ring:
         entry = b if a.on_ring else a
         if entry.standing.rule == "roundabout":
-            return Answer(b.on_ring, "roundabout", entry.standing.source)
+            return Yielding(b.on_ring, "roundabout", entry.standing.source)
     elif a.mini and b.mini and a.road != b.road:
         past_a = _passes(b, a, driving_side)
         if past_a != _passes(a, b, driving_side):
-            return Answer(past_a, "roundabout", "tagged")
+            return Yielding(past_a, "roundabout", "tagged")
     if a.road == b.road or (a.on_ring and b.on_ring):
         return _beside(a, b)
     oncoming = a.opposite == b.road and b.opposite == a.road
@@ -240,20 +240,20 @@ def _answer(
         way.slip and way.sign is at for way, at in zip((a, b), standing, strict=True)
     )
     if a_slips and second is not b.sign:
-        return Answer(True, first.rule, first.source)
+        return Yielding(True, first.rule, first.source)
     if b_slips and first is not a.sign:
-        return Answer(False, second.rule, second.source)
+        return Yielding(False, second.rule, second.source)
     if first.rank != second.rank:
         loser, winner = sorted((first, second))
         told = loser if loser.rank < Rank.PLAIN else winner
-        return Answer(loser is first, told.rule, told.source)
+        return Yielding(loser is first, told.rule, told.source)
     if a.on_main != b.on_main and first.rank < Rank.PLAIN:
-        return Answer(b.on_main, first.rule if b.on_main else second.rule, "inferred")
+        return Yielding(b.on_main, first.rule if b.on_main else second.rule, "inferred")
     if oncoming:
         return _across(a, b)
     if abs(angle) > (FAST_ALONGSIDE_RAD if a.fast and b.fast else ALONGSIDE_RAD):
         # Who is seen to the right comes with a heading turned to the left.
-        return Answer((angle > 0.0) == (driving_side == "right"), "near_side", "default")
+        return Yielding((angle > 0.0) == (driving_side == "right"), "near_side", "default")
     return _beside(a, b)
 
 
@@ -278,17 +278,17 @@ def _passes(mover: ConnectionFacts, waiting: ConnectionFacts, driving_side: Driv
     return 1e-3 < to_waiting < to_exit - 1e-3
 
 
-def _across(a: ConnectionFacts, b: ConnectionFacts) -> Answer:
+def _across(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
     if a.turn_weight != b.turn_weight:
-        return Answer(a.turn_weight > b.turn_weight, "turn_across", "inferred")
-    return Answer(a.id > b.id, "turn_across" if a.turn_weight else "order", "default")
+        return Yielding(a.turn_weight > b.turn_weight, "turn_across", "inferred")
+    return Yielding(a.id > b.id, "turn_across" if a.turn_weight else "order", "default")
 
 
-def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Answer:
+def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
     if a.turn_weight != b.turn_weight:
-        return Answer(a.turn_weight > b.turn_weight, "merge_order", "inferred")
+        return Yielding(a.turn_weight > b.turn_weight, "merge_order", "inferred")
     if abs(a.bend_rad - b.bend_rad) > math.radians(1.0):
-        return Answer(a.bend_rad > b.bend_rad, "merge_order", "inferred")
+        return Yielding(a.bend_rad > b.bend_rad, "merge_order", "inferred")
     if abs(a.length_m - b.length_m) > 0.05:
-        return Answer(a.length_m > b.length_m, "merge_order", "default")
-    return Answer(a.id > b.id, "merge_order", "default")
+        return Yielding(a.length_m > b.length_m, "merge_order", "default")
+    return Yielding(a.id > b.id, "merge_order", "default")
