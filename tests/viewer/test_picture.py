@@ -91,7 +91,8 @@ def test_the_3d_view_shows_roads_buildings_and_futures(whole: Picture, empty: Pi
 
 @pytest.mark.parametrize("name", GAP_VIEWS.values())
 def test_each_gap_plot_shows_its_curve_and_limit(whole: Picture, empty: Picture, name: str) -> None:
-    assert _count(whole.views[name], TWIN) > 150
+    # Limits that grow with the time since the twin began anew leave a small curve little height.
+    assert _count(whole.views[name], TWIN) > 100
     assert _count(whole.views[name], LIMIT, within=40.0) > 150
     assert _count(empty.views[name], TWIN) == 0
     assert _count(empty.views[name], LIMIT, within=40.0) == 0
