@@ -40,12 +40,16 @@ Instruction = BuildWorld | UseWorld | Tell
 
 @dataclass(frozen=True, slots=True)
 class RoundIntent:
-    """A round that should run now: in which World, along which path, at which speed."""
+    """A round that should run now: in which World, along which path, at which speed.
+
+    For `off_lanes_m` the path is driven in the World along none of its lanes.
+    """
 
     junction_id: str
     world_id: str
     path: PathAhead
     cruise_speed_mps: float
+    off_lanes_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -173,7 +173,7 @@ class Mission:
         if not car.yaw_valid:
             return NotReady("the heading is not known", world_late=False)
         path = self._way.path(
-            visit.world.frame, speed_mps=car.speed_mps, horizon_s=self._settings.horizon_s
+            visit.world, speed_mps=car.speed_mps, horizon_s=self._settings.horizon_s
         )
         if path is None:
             return NotReady("the road ends here", world_late=False)
@@ -182,6 +182,7 @@ class Mission:
             world_id=visit.world.id,
             path=path,
             cruise_speed_mps=self._way.cruise_speed_mps,
+            off_lanes_m=self._way.off_lanes_m,
         )
 
     def records(self, *, mono_s: float) -> list[dict[str, Any]]:

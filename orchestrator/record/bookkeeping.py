@@ -67,6 +67,8 @@ class FuturesCount:
     latencies_ms: list[float] = field(default_factory=list)
     rounds_of: Counter[int] = field(default_factory=Counter)
     """Complete rounds by the number of their futures."""
+    off_lanes_rounds: int = 0
+    """Rounds whose paths are driven in part where their World has no lane that way."""
     _hash: Any = field(default_factory=hashlib.sha256)
 
     def take(self, done: RoundDone, *, distinct: int) -> str:
@@ -95,7 +97,7 @@ class FuturesCount:
 
         `missed_rounds` were due and late, `unseeded_rounds` had nothing to start from. Since the
         machine was too slow, `smaller_rounds` had fewer futures than `wanted` and `spared_rounds`
-        were not run.
+        were not run. In `off_lanes_rounds` the path leaves the lanes of the World.
         """
         return {
             "count": self.count,
@@ -107,6 +109,7 @@ class FuturesCount:
             "missed_rounds": missed,
             "spared_rounds": spared,
             "unseeded_rounds": unseeded,
+            "off_lanes_rounds": self.off_lanes_rounds,
             "rounds": self.rounds,
             "sim_seconds": round(self.sim_seconds, 3),
             "cpu_seconds": round(self.cpu_seconds, 3),

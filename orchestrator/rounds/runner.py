@@ -114,6 +114,7 @@ class RoundRunner:
         started_mono_ns: int,
     ) -> None:
         """Open a round and give its jobs out."""
+        self.futures.off_lanes_rounds += intent.off_lanes_m > 0.0
         round_id, self._next_round_id = self._next_round_id, self._next_round_id + 1
         pace = self.pace.now
         jobs = self._planner.plan(

@@ -1,5 +1,7 @@
 """The line a car is expected to drive along its route: in its lane, with rounded turns.
 
+Lanes are those of the roads' cross-sections, or of a World where the caller leads the line there.
+
 A future keeps the car's own lateral offset from this line, so its shape (heading and curvature)
 matters more than its place across the road.
 """
@@ -7,8 +9,10 @@ matters more than its place across the road.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
@@ -25,12 +29,13 @@ from foretwin.orchestrator.routing.rounding import (
     simplified,
     smoothed,
     turns,
+    with_driven_turns,
     without_straight,
 )
 from foretwin.orchestrator.routing.route import Route, turn_angle
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+from foretwin.world_gen.lanes.cross_section import cross_section
+from foretwin.world_gen.roads.road_graph import RoadGraph
 
-LANE_WIDTH_M = 3.0
 KERB_TURN_RADIUS_M = 10.5
 FAR_TURN_RADIUS_M = 9.5
 """Of the driven lane, in turns towards the near kerb and across the other side of the road.
@@ -61,10 +66,19 @@ class PathGeometry(NamedTuple):
     s_m: Array
 
 
-def driving_path(graph: RoadGraph, route: Route, *, s_from_m: float, s_to_m: float) -> PathGeometry:
+def driving_path(
+    graph: RoadGraph,
+    route: Route,
+    *,
+    s_from_m: float,
+    s_to_m: float,
+    onto_lanes: Callable[[Array, Array], Array] | None = None,
+) -> PathGeometry:
     """Return the lane-centre path of `route` between two positions.
 
-    It ends where the route ends. Raises ValueError where the stretch is empty or off the route.
+    `onto_lanes` moves points (N, 2), with the route's s (N,) beside them, to lanes known better
+    than from their roads. The path ends where the route ends. Raises ValueError where the stretch
+    is empty or off the route.
     """
     begin, end = max(s_from_m, route.origin_m), min(s_to_m, route.end_m)
     if end - begin < 2.0 * SPACING_M:
@@ -79,14 +93,23 @@ def driving_path(graph: RoadGraph, route: Route, *, s_from_m: float, s_to_m: flo
     centre = smoothed(centre, SMOOTHING_M)
     offset = _held_in_curves(lanes.smooth_at(place), centre)
     xy = drivable(smoothed(centre + offset[:, None] * normals(centre), 0.5 * SMOOTHING_M))
+    if onto_lanes is not None:
+        xy, place = evenly_spaced(onto_lanes(xy, place), place)
+        xy, place = with_driven_turns(xy, place, _lane_radii(graph))
+        xy = drivable(smoothed(xy, 0.5 * SMOOTHING_M))
     return _resampled(route, xy, place, begin, end)
+
+
+def _lane_radii(graph: RoadGraph) -> tuple[float, float]:
+    """Return the radii of the driven lane in turns to the left and to the right."""
+    radii = KERB_TURN_RADIUS_M, FAR_TURN_RADIUS_M
+    return radii if graph.driving_side == "left" else radii[::-1]
 
 
 def _turn_radii(graph: RoadGraph, line: Array, offset: Array) -> Array:
     """Return the radius of the road's line at each inner vertex, from that of the driven lane."""
     turn = turns(line)
-    to_kerb = turn > 0.0 if graph.driving_side == "left" else turn < 0.0
-    lane_radius = np.where(to_kerb, KERB_TURN_RADIUS_M, FAR_TURN_RADIUS_M)
+    lane_radius = np.where(turn > 0.0, *_lane_radii(graph))
     radius = np.maximum(lane_radius + np.sign(turn) * offset[1:-1], 5.0)
     return np.asarray(np.where(np.abs(turn) < TURN_RAD, BEND_RADIUS_M, radius))
 
@@ -135,25 +158,21 @@ def _held_in_curves(offset: Array, centre: Array) -> Array:
 def _lane_offset(graph: RoadGraph, route: Route, number: int) -> float:
     """Return the driven lane's offset from the way's line, positive to the left.
 
-    The way is drawn in the middle of its carriageway. The lane is the middle one (of two, that
-    nearer to the kerb), before a turn the one on the turn's side.
+    The lane is the middle one (of two, that nearer to the kerb), before a turn the one on the
+    turn's side. What is driven as the map forbids (the drive may be older) counts as allowed.
     """
-    directed = route.edges[number]
-    against = DirectedEdge(directed.edge, not directed.reverse)
-    own = max(1, round(directed.lanes.value))
-    other = max(1, round(against.lanes.value)) if against.allowed else 0
-    left_hand = graph.driving_side == "left"
+    edge, reverse = route.edges[number]
+    used = msgspec.structs.replace(
+        edge, forward=edge.forward or not reverse, backward=edge.backward or reverse
+    )
+    driven = cross_section(used, graph.driving_side).driven(reverse=reverse)
+    own = [lane for lane in driven if lane.kind == "driving"] or driven
     turn = _next_turn(route, number)
-    kerb_turn = turn if left_hand else -turn
-    if kerb_turn > 0.0:
-        lane = 0
-    elif kerb_turn < 0.0:
-        lane = own - 1
+    if turn == 0.0:
+        lane = own[(len(own) if graph.driving_side == "right" else len(own) - 1) // 2]
     else:
-        lane = (own - 1) // 2
-    from_kerb = LANE_WIDTH_M * (lane + 0.5)
-    right_of_line = LANE_WIDTH_M * (own + other) / 2.0 - from_kerb
-    return right_of_line if left_hand else -right_of_line
+        lane = own[0 if turn > 0.0 else -1]
+    return -lane.left_m if reverse else lane.left_m
 
 
 def _next_turn(route: Route, number: int) -> float:

@@ -6,23 +6,22 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import VehicleState
-from foretwin.contracts.frames import (
-    LocalFrame,
-    local_from_geo,
-    local_from_geo_yaw,
-    target_from_source,
-)
+from foretwin.contracts.frames import local_from_geo, local_from_geo_yaw, target_from_source_m
 from foretwin.contracts.futures import PathAhead
+from foretwin.contracts.world import World
 from foretwin.orchestrator.routing.arrival import DrivingPace, predict_arrivals
 from foretwin.orchestrator.routing.cruise import CruiseSpeed
-from foretwin.orchestrator.routing.driving_path import driving_path
+from foretwin.orchestrator.routing.driving_path import SPACING_M, driving_path
 from foretwin.orchestrator.routing.junctions_ahead import PassedJunction, UpcomingJunction
+from foretwin.orchestrator.routing.lane_chain import LaneGuide
 from foretwin.orchestrator.routing.map_matching import MapMatcher, Match, OffRoadStretch
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.road_line import RoadLines
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
+from foretwin.orchestrator.routing.world_lanes import WorldLanes, inside
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.roads.road_graph import RoadGraph
@@ -64,6 +63,10 @@ class WayAhead:
         self._given = bool(routes)
         self._match: Match | None = None
         self._progress: RouteProgress | None = None
+        self._xy_m: Array = np.zeros(2)
+        self._lanes: WorldLanes | None = None
+        self.off_lanes_m = 0.0
+        """So much of the latest path is driven in its World along none of its lanes."""
         self.junctions: tuple[JunctionAhead, ...] = ()
 
     def give(self, route: Route) -> None:
@@ -78,7 +81,7 @@ class WayAhead:
     def locate(self, state: VehicleState) -> tuple[PassedJunction, ...] | None:
         """Find the car on the map; returns the junctions just passed, None off the map."""
         lat, lon = state.position.lat_deg, state.position.lon_deg
-        xy = local_from_geo(self._graph.frame, lat, lon)
+        xy = self._xy_m = local_from_geo(self._graph.frame, lat, lon)
         yaw = float(local_from_geo_yaw(self._graph.frame, state.yaw_rad, lat, lon))
         self._match = self._matcher.update(xy, yaw, state.yaw_valid, state.speed_mps)
         self._progress = self._follower.update(self._match)
@@ -142,20 +145,27 @@ class WayAhead:
         """Stretches driven where the map says that cars may not."""
         return self._matcher.off_road_stretches
 
-    def path(self, frame: LocalFrame, *, speed_mps: float, horizon_s: float) -> PathAhead | None:
+    def path(self, world: World, *, speed_mps: float, horizon_s: float) -> PathAhead | None:
         """Return the way ahead in a World's frame; None where the road ends within a few metres.
 
-        Long enough for a car that speeds up by 8 m/s over the horizon.
+        Along the World's lanes, and beyond them in the lane that the road's tags make likely. Long
+        enough for a car that speeds up by 8 m/s over the horizon.
         """
         if self._follower.route.end_m - self.s_m < MIN_PATH_M:
             return None
         reach_m = horizon_s * max(speed_mps + 8.0, 15.0) + PATH_SPARE_M
+        if self._lanes is None or self._lanes.world_id != world.id:
+            self._lanes = WorldLanes(world, self._graph.frame)
+        route = self._follower.route
+        guide = LaneGuide(self._lanes, route, car_s_m=self.s_m, car_xy_m=self._xy_m)
         geometry = driving_path(
             self._graph,
-            self._follower.route,
+            route,
             s_from_m=self.s_m - PATH_BEHIND_M,
             s_to_m=self.s_m + reach_m,
+            onto_lanes=guide.onto_lanes,
         )
-        still = np.zeros(len(geometry.xy_m))
-        moved = target_from_source(frame, self._graph.frame, geometry.xy_m, still)
-        return PathAhead(xy_m=moved.xy_m, speed_limit_mps=geometry.speed_limit_mps)
+        xy = target_from_source_m(world.frame, self._graph.frame, geometry.xy_m)
+        off_lanes = inside(world, xy) & guide.without_lanes(geometry.s_m)
+        self.off_lanes_m = SPACING_M * int(np.count_nonzero(off_lanes))
+        return PathAhead(xy_m=xy, speed_limit_mps=geometry.speed_limit_mps)

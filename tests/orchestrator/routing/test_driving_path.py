@@ -10,13 +10,15 @@ from hypothesis import strategies as st
 from foretwin.orchestrator.routing.driving_path import (
     FAR_TURN_RADIUS_M,
     KERB_TURN_RADIUS_M,
-    LANE_WIDTH_M,
     PathGeometry,
     driving_path,
 )
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
 from tests.orchestrator.grid_map import graph_of, grid, road
+
+LANE_WIDTH_M = 3.0
+"""Of a residential road without tags."""
 
 
 def route_over(graph: RoadGraph) -> Route:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -10,10 +11,18 @@ from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_ahead import MIN_PATH_M, WayAhead
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, junctions, road
-from tests.orchestrator.trip import states_along
+from tests.orchestrator.routing.path_against_lanes import LanesOfWorld
+from tests.orchestrator.trip import (
+    states_along,
+    town,
+    town_line,
+    town_world,
+    world_named,
+)
 
 GRID = grid(5, 4)
 CORNERS = junctions(GRID)
+EMPTY = msgspec.structs.replace(world_named("empty", FRAME), lanes=(), connections=())
 
 
 def driven(
@@ -56,7 +65,7 @@ def test_off_the_map_nothing_lies_ahead() -> None:
 
 
 def test_the_path_begins_behind_the_car_and_reaches_past_the_horizon() -> None:
-    path = driven((110, 100), (150, 100)).path(FRAME, speed_mps=10.0, horizon_s=8.0)
+    path = driven((110, 100), (150, 100)).path(EMPTY, speed_mps=10.0, horizon_s=8.0)
     assert path is not None
 
     assert path.xy_m[0] == pytest.approx([139.0, 98.5], abs=1.5)  # right of the middle
@@ -69,8 +78,9 @@ def test_the_path_begins_behind_the_car_and_reaches_past_the_horizon() -> None:
 def test_the_same_path_in_another_frame() -> None:
     way = driven((110, 100), (150, 100))
     other = LocalFrame(GeoPoint(52.501, 13.403))
-    here = way.path(FRAME, speed_mps=10.0, horizon_s=8.0)
-    there = way.path(other, speed_mps=10.0, horizon_s=8.0)
+    moved = msgspec.structs.replace(EMPTY, frame=other)
+    here = way.path(EMPTY, speed_mps=10.0, horizon_s=8.0)
+    there = way.path(moved, speed_mps=10.0, horizon_s=8.0)
     assert here is not None
     assert there is not None
 
@@ -79,16 +89,39 @@ def test_the_same_path_in_another_frame() -> None:
     assert not np.allclose(there.xy_m, here.xy_m, atol=50.0)
 
 
+def test_in_a_world_the_path_follows_its_lanes() -> None:
+    inputs = town()
+    way = WayAhead(inputs.graph, inputs.junctions, inputs.routes, index=inputs.index)
+    world = town_world("n4")
+    lanes = LanesOfWorld(world)
+    off_lanes, away = [], []
+    for state in states_along(inputs.graph.frame, town_line()[:200]):
+        way.locate(state)
+        path = way.path(world, speed_mps=10.0, horizon_s=8.0)
+        assert path is not None
+        beside = lanes.beside(path)
+        away.append(beside.away_m[beside.covered & ~beside.turning])
+        assert np.isfinite(beside.away_m[beside.covered]).mean() > 0.95  # but near the World's edge
+        off_lanes.append(way.off_lanes_m)
+
+    every = np.concatenate(away)
+    assert every[np.isfinite(every)].max() < 0.2
+    assert max(off_lanes) == 0.0
+    empty = msgspec.structs.replace(world, id="empty", lanes=(), connections=())
+    assert way.path(empty, speed_mps=10.0, horizon_s=8.0) is not None
+    assert way.off_lanes_m > 50.0
+
+
 def test_no_path_where_the_road_ends() -> None:
     street = graph_of([road(0, 1, 2, [(0, 0), (100, 0)])])
     way = WayAhead(street, (), ())
     for state in states_along(FRAME, drive([(20, 0), (78, 0)])):
         way.locate(state)
-    assert way.path(FRAME, speed_mps=10.0, horizon_s=8.0) is not None
+    assert way.path(EMPTY, speed_mps=10.0, horizon_s=8.0) is not None
     for state in states_along(FRAME, drive([(78, 0), (100 - MIN_PATH_M + 4, 0)]), start_s=5.8):
         way.locate(state)
 
-    assert way.path(FRAME, speed_mps=10.0, horizon_s=8.0) is None
+    assert way.path(EMPTY, speed_mps=10.0, horizon_s=8.0) is None
 
 
 def test_other_turns_are_looked_down_where_the_way_is_predicted() -> None:

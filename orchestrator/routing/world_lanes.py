@@ -1,0 +1,160 @@
+"""The lanes and connections of a World that run along the path of a route.
+
+A lane does where it is of the route's way, in its direction, and near the path; a connection where
+it joins two such lanes. What is not driven as the map allows has no lanes in a World.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from foretwin.contracts.arrays import Array
+from foretwin.contracts.frames import LocalFrame, target_from_source_m
+from foretwin.contracts.world import World
+from foretwin.geometry.polyline import arc_lengths
+from foretwin.orchestrator.routing.rounding import FINE_M
+from foretwin.orchestrator.routing.route import Route
+
+BESIDE_M = 15.0
+"""A lane farther from the route's path than this is no lane of its road."""
+AHEAD_RAD = math.radians(60.0)
+"""One that heads farther aside is not driven along the route."""
+EDGE_SLACK_M = 25.0
+"""A lane may begin and end so far from where its road does in the graph: junctions cut lanes."""
+
+
+class Piece(NamedTuple):
+    """A lane or connection: its line (N, 2) about 0.5 m apart, and the road that it belongs to.
+
+    `road` is the way and whether it is driven against its nodes, None of connections, whose lanes
+    are `joins`. `after` and `beside` name what follows and the lanes that it may be left for.
+    """
+
+    id: str
+    xy_m: Array
+    road: tuple[int, bool] | None
+    joins: tuple[str, ...]
+    after: tuple[str, ...]
+    beside: tuple[str, ...]
+
+
+class Followed(NamedTuple):
+    """A piece beside a path: its points (N, 2) and the path's s (N,) there, rising."""
+
+    piece: Piece
+    xy_m: Array
+    s_m: Array
+    aside_m: float
+    """Mean distance from the path."""
+
+    @property
+    def begin_m(self) -> float:
+        """Where on the path it begins."""
+        return float(self.s_m[0])
+
+    @property
+    def end_m(self) -> float:
+        """Where on the path it ends."""
+        return float(self.s_m[-1])
+
+
+class WorldLanes:
+    """The lanes of a World that cars drive, in the road graph's frame."""
+
+    def __init__(self, world: World, frame: LocalFrame) -> None:
+        def line(xy_m: Array) -> Array:
+            moved = target_from_source_m(frame, world.frame, xy_m)
+            arc = arc_lengths(moved)
+            at = np.linspace(0.0, arc[-1], max(2, math.ceil(arc[-1] / FINE_M) + 1))
+            return np.stack([np.interp(at, arc, moved[:, k]) for k in (0, 1)], axis=-1)
+
+        self.world_id = world.id
+        pieces = {}
+        for lane in world.lanes:
+            if lane.kind != "driving" or len(lane.centerline) < 2:
+                continue
+            left = lane.left_id if lane.change in ("both", "left") else None
+            right = lane.right_id if lane.change in ("both", "right") else None
+            beside = tuple(name for name in (left, right) if name is not None)
+            road = (lane.osm_way, lane.reverse)
+            pieces[lane.id] = Piece(
+                lane.id, line(lane.centerline), road, (), lane.successor_ids, beside
+            )
+        for one in world.connections:
+            if one.from_lane_id in pieces and one.to_lane_id in pieces:
+                xy = line(one.centerline)
+                joins = one.from_lane_id, one.to_lane_id
+                pieces[one.id] = Piece(one.id, xy, None, joins, (one.to_lane_id,), ())
+        self._pieces = tuple(pieces.values())
+
+    def beside(self, route: Route, xy_m: Array, s_m: Array) -> list[Followed]:
+        """Return the lanes and connections along a path (N, 2) of `route`, with its s (N,)."""
+        tree, heading = cKDTree(xy_m), _headings(xy_m)
+        first, last = route.index_at(float(s_m[0])), route.index_at(float(s_m[-1]))
+        spans: dict[tuple[int, bool], list[tuple[float, float]]] = {}
+        for number in range(first, last + 1):
+            edge = route.edges[number]
+            span = float(route.start_m[number]), float(route.start_m[number + 1])
+            spans.setdefault((edge.edge.way_id, edge.reverse), []).append(span)
+        found = {}
+        for piece in self._pieces:
+            if piece.road is not None and piece.road in spans:
+                one = _followed(piece, tree, heading, s_m, spans[piece.road])
+                if one is not None:
+                    found[piece.id] = one
+        for piece in self._pieces:
+            if piece.road is None and all(name in found for name in piece.joins):
+                one = _followed(piece, tree, heading, s_m, None)
+                if one is not None:
+                    found[piece.id] = one
+        return list(found.values())
+
+
+def inside(world: World, xy_m: Array) -> npt.NDArray[np.bool_]:
+    """Return which of the points (N, 2) in a World's frame it covers."""
+    if world.bounds_m is None:
+        return np.asarray(np.hypot(xy_m[:, 0], xy_m[:, 1]) < world.radius_m)
+    west, south, east, north = world.bounds_m
+    return np.asarray(((xy_m > (west, south)) & (xy_m < (east, north))).all(axis=1))
+
+
+def _headings(xy_m: Array) -> Array:
+    tangent = np.gradient(xy_m, axis=0)
+    return np.asarray(np.arctan2(tangent[:, 1], tangent[:, 0]))
+
+
+def _followed(
+    piece: Piece,
+    tree: cKDTree,
+    heading: Array,
+    s_m: Array,
+    spans: Sequence[tuple[float, float]] | None,
+) -> Followed | None:
+    """Return the part of a piece that runs along the path; None where it has none."""
+    away, nearest = tree.query(piece.xy_m, distance_upper_bound=BESIDE_M)
+    along = (nearest > 0) & (nearest < len(s_m) - 1)
+    nearest = np.minimum(nearest, len(s_m) - 1)
+    if spans is not None:
+        turned = _headings(piece.xy_m) - heading[nearest]
+        along &= np.cos(turned) > math.cos(AHEAD_RAD)
+        at = s_m[nearest]
+        along &= np.any(
+            [(at > a - EDGE_SLACK_M) & (at < b + EDGE_SLACK_M) for a, b in spans], axis=0
+        )
+    if not along.any():
+        return None
+    first, last = int(along.argmax()), len(along) - int(along[::-1].argmax())
+    # Points that lie abreast of one and the same point of the path tell nothing more of it.
+    risen = np.maximum.accumulate(s_m[nearest[first:last]])
+    keep = np.concatenate([[True], np.diff(risen) > 1e-6])
+    if not along[first:last].all():
+        return None
+    return Followed(
+        piece, piece.xy_m[first:last][keep], risen[keep], float(away[first:last].mean())
+    )
