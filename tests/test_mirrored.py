@@ -1,0 +1,128 @@
+"""What holds of the tests themselves: every module has its test.
+
+`tests/world_gen/roads/test_width.py` is the test of `world_gen/roads/width.py`. A test that
+exercises further modules names them: `COVERS = ("foretwin.world_gen.roads.kerb",)`. It has to reach
+what it names through its imports, or start the program as a whole (`tests/system`).
+"""
+
+from __future__ import annotations
+
+import ast
+from functools import cache
+from pathlib import Path
+
+from tests.test_layout import ROOT, tracked_files
+
+ROOMS = (
+    "contracts", "foretwin", "geometry", "orchestrator", "sim_worker", "telemetry", "viewer",
+    "world_gen",
+)  # fmt: skip
+NOT_YET = "not_covered_yet.txt"
+"""In a room's folder of tests: its modules that no test names; only to become fewer."""
+
+
+def test_every_module_is_mirrored_or_named_as_covered() -> None:
+    missing = modules().keys() - mirrored() - covered().keys()
+
+    assert sorted(missing - not_yet()) == [], "mirror it, or name it in the COVERS of its test"
+    assert sorted(not_yet() - missing) == [], f"covered now: take it out of {NOT_YET}"
+
+
+def test_what_a_test_names_is_there_and_not_mirrored_as_well() -> None:
+    assert sorted(covered().keys() - modules().keys()) == []
+    assert sorted(covered().keys() & mirrored()) == []
+
+
+def test_a_test_reaches_what_it_says_it_covers() -> None:
+    out_of_reach = {
+        module: str(test)
+        for module, test in covered().items()
+        if test.parts[1] != "system" and module not in reached(".".join(test.with_suffix("").parts))
+    }
+
+    assert out_of_reach == {}
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """Every module of the program that holds a definition or a table, by its dotted name."""
+    found = {}
+    for path in tracked_files():
+        relative = path.relative_to(ROOT)
+        if path.suffix == ".py" and relative.parts[0] in ROOMS and _defines_something(path):
+            parts = [part for part in relative.with_suffix("").parts if part != "__init__"]
+            found[".".join(parts if parts[0] == "foretwin" else ["foretwin", *parts])] = path
+    return found
+
+
+def _defines_something(path: Path) -> bool:
+    said = (ast.Import, ast.ImportFrom, ast.Expr)
+    return any(not isinstance(node, said) for node in _tree(path).body)
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def mirrored() -> set[str]:
+    """Return the modules that have a test file of their own name at the same place."""
+    return {name for name, path in modules().items() if _mirror_of(path).is_file()}
+
+
+def _mirror_of(path: Path) -> Path:
+    relative = path.relative_to(ROOT)
+    name = relative.parent.name if relative.stem == "__init__" else relative.stem
+    return ROOT / "tests" / relative.parent / f"test_{name.strip('_')}.py"
+
+
+def covered() -> dict[str, Path]:
+    """Return the modules named in the COVERS of a test, and that test."""
+    found = {}
+    for path in tracked_files():
+        if path.name.startswith("test_") and path.suffix == ".py":
+            for node in _tree(path).body:
+                if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "COVERS":
+                    for name in ast.literal_eval(node.value):
+                        found[name] = path.relative_to(ROOT)
+    return found
+
+
+def not_yet() -> set[str]:
+    """Return the modules whose tests are still to be named."""
+    files = (ROOT / "tests").glob(f"*/{NOT_YET}")
+    return {line for file in files for line in file.read_text(encoding="utf-8").split()}
+
+
+def reached(test: str) -> set[str]:
+    """Return what a test imports, directly or through what it imports."""
+    seen: set[str] = set()
+    left = [test]
+    while left:
+        name = left.pop()
+        if name not in seen:
+            seen.add(name)
+            left += _imports(name)
+    return seen
+
+
+@cache
+def _imports(name: str) -> list[str]:
+    path = modules().get(name)
+    if path is None and name.startswith("tests."):
+        path = ROOT / Path(*name.split(".")).with_suffix(".py")
+    if path is None or not path.is_file():
+        return []
+    found = []
+    for node in ast.walk(_tree(path)):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        elif (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and node.value.startswith("foretwin.")
+        ):
+            found.append(node.value.replace(":", "."))
+    return found
