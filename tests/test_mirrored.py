@@ -36,7 +36,8 @@ def test_what_a_test_names_is_there_and_not_mirrored_as_well() -> None:
 def test_a_test_reaches_what_it_says_it_covers() -> None:
     out_of_reach = {
         module: str(test)
-        for module, test in covered().items()
+        for module, tests in covered().items()
+        for test in tests
         if test.parts[1] != "system" and module not in reached(".".join(test.with_suffix("").parts))
     }
 
@@ -67,24 +68,24 @@ def _tree(path: Path) -> ast.Module:
 
 def mirrored() -> set[str]:
     """Return the modules that have a test file of their own name at the same place."""
-    return {name for name, path in modules().items() if _mirror_of(path).is_file()}
+    return {name for name, path in modules().items() if mirror_of(path).is_file()}
 
 
-def _mirror_of(path: Path) -> Path:
+def mirror_of(path: Path) -> Path:
     relative = path.relative_to(ROOT)
     name = relative.parent.name if relative.stem == "__init__" else relative.stem
     return ROOT / "tests" / relative.parent / f"test_{name.strip('_')}.py"
 
 
-def covered() -> dict[str, Path]:
-    """Return the modules named in the COVERS of a test, and that test."""
-    found = {}
+def covered() -> dict[str, list[Path]]:
+    """Return the modules named in the COVERS of tests, and those tests."""
+    found: dict[str, list[Path]] = {}
     for path in tracked_files():
         if path.name.startswith("test_") and path.suffix == ".py":
             for node in _tree(path).body:
                 if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "COVERS":
                     for name in ast.literal_eval(node.value):
-                        found[name] = path.relative_to(ROOT)
+                        found.setdefault(name, []).append(path.relative_to(ROOT))
     return found
 
 
