@@ -16,13 +16,13 @@ import msgspec
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.logs.write_mcap import position_of
-from foretwin.telemetry.ros_messages.definitions import DEFINITIONS
-from foretwin.telemetry.ros_messages.parts import STRING, json_string, schema_text, typestore
+from foretwin.telemetry.ros_messages import parts
+from foretwin.telemetry.ros_messages.parts import STRING, typestore
 from foretwin.telemetry.ros_messages.table import FRAME_TOPIC, INFO_TOPIC, messages_from
 
 
@@ -68,7 +68,7 @@ class BagWriter:
         self._writer.abort()
 
     def _tell(self, topic: str, what: msgspec.Struct, stamp_ns: int) -> None:
-        data = typestore().serialize_cdr(json_string(what), STRING)
+        data = typestore().serialize_cdr(parts.json_string(what), STRING)
         self._write(topic, STRING, bytes(data), stamp_ns)
 
     def _write(self, topic: str, kind: str, data: bytes, stamp_ns: int) -> None:
@@ -82,7 +82,7 @@ class BagWriter:
 
 @functools.cache
 def _ros2_definition(kind: str) -> dict[str, str]:
-    return {"msgdef": schema_text(kind), "rihs01": typestore().hash_rihs01(kind)}
+    return {"msgdef": parts.schema_text(kind), "rihs01": typestore().hash_rihs01(kind)}
 
 
 @functools.cache
@@ -94,8 +94,8 @@ def _ros1_definition(kind: str) -> dict[str, str]:
 @functools.cache
 def _ros1_types() -> Any:
     store = get_typestore(Stores.ROS1_NOETIC)
-    types: dict[str, Any] = {}
-    for name, text in DEFINITIONS.items():
-        types.update(get_types_from_msg(text, name))
-    store.register({name: one for name, one in types.items() if name not in store.types})
+    missing = {
+        name: one for name, one in parts.types_beside_ros().items() if name not in store.types
+    }
+    store.register(missing)
     return store

@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.telemetry.logs import LogError, open_log
-from foretwin.telemetry.ros_messages.motion import ros_from_state
+from foretwin.telemetry.ros_messages.motion import odometry_from_state
 from foretwin.telemetry.ros_messages.objects import predicted_from_users
 from foretwin.telemetry.ros_messages.parts import (
     CONTROL_MODE_REPORT,
@@ -240,7 +240,7 @@ def test_objects_without_a_known_frame_are_counted(tmp_path: Path) -> None:
 def test_a_recording_without_a_receiver_is_placed_by_its_odometry(tmp_path: Path) -> None:
     frame = LocalFrame(GeoPoint(52.5, 13.4))
     state = drive_messages.state(START_NS)
-    odometry = ros_from_state(state, frame)[0][2]
+    odometry = odometry_from_state(state, frame)
     bag = write_bag(
         tmp_path / "bag", StoragePlugin.SQLITE3, [("/odometry", ODOMETRY, odometry, START_NS)]
     )

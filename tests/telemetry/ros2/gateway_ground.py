@@ -14,7 +14,7 @@ from foretwin.contracts.foreign_bus import Arrived
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.setup import BusSetup, Ros2Setup, write_setup
-from foretwin.telemetry.ros_messages.parts import typestore
+from foretwin.telemetry.ros_messages.parts import ros_message, typestore
 
 ROOT = Path(__file__).resolve().parents[3]
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
@@ -90,7 +90,7 @@ def attached(seq: int) -> bytes:
 
 
 def cdr(kind: str, **fields: Any) -> bytes:
-    return bytes(typestore().serialize_cdr(typestore().types[kind](**fields), kind))
+    return bytes(typestore().serialize_cdr(ros_message(kind, **fields), kind))
 
 
 def ros_time(stamp_ns: int) -> Any:
