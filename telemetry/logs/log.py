@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from foretwin.contracts import drive
-from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.errors import UserError
 
 Sample = tuple[str, msgspec.Struct]
@@ -34,16 +32,6 @@ class LogError(UserError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Declared:
-    """What a reader holds to be true of its source, in words for people."""
-
-    units: str
-    frame: str
-    time_base: str
-    reference_point: str
-
-
-@dataclass(frozen=True, kw_only=True)
 class Log:
     """One recorded drive: its facts, and its samples as often as they are asked for.
 
@@ -51,7 +39,6 @@ class Log:
     """
 
     info: drive.VehicleInfo
-    declared: Declared
     read: Callable[[Counter[str]], Iterator[Sample]]
     skipped: Counter[str] = field(default_factory=Counter)
     """Samples refused by reason, as far as the latest `samples()` has come."""
@@ -124,24 +111,3 @@ _NUMBERS: dict[type, Callable[[Any], tuple[float | None, ...]]] = {
     drive.ControlCommand: lambda m: (m.accel_mps2, m.steering_wheel_rad, m.tire_angle_rad),
     drive.PlannedTrajectory: _plan_numbers,
 }
-
-
-def fixes_log(
-    path: Path, stamps_ns: Sequence[int], read: Callable[[Counter[str]], Iterator[Sample]]
-) -> Log:
-    """Return the log of a file that holds timed satellite positions in UTC and nothing else."""
-    return Log(
-        info=VehicleInfo(
-            vehicle_id="car",
-            time_base="utc",
-            start_stamp_ns=stamps_ns[0],
-            end_stamp_ns=max(stamps_ns),
-            source=path.name,
-            reference_point="antenna",
-            sends=("gnss",),
-        ),
-        declared=Declared(
-            units="degrees, m", frame="WGS84", time_base="UTC", reference_point="antenna"
-        ),
-        read=read,
-    )

@@ -23,7 +23,7 @@ from typing import NamedTuple
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, wrap_angle
 from foretwin.telemetry.logs import units
-from foretwin.telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.ros_messages.foreign import NO_FIX
 
@@ -82,7 +82,6 @@ def open_nmea(path: Path) -> Log:
     if not any(channel == "gnss" for channel, _ in samples):
         raise LogError(f"{path}: no RMC or GGA sentence with a fix, so no positions")
     stamps = [message.stamp_ns for _, message in samples]  # type: ignore[attr-defined]
-    course = "heading" if "HDT" in found.formatters else "course over ground"
     return Log(
         info=drive.VehicleInfo(
             vehicle_id="car",
@@ -92,12 +91,6 @@ def open_nmea(path: Path) -> Log:
             source=path.name,
             reference_point="antenna",
             sends=tuple(dict.fromkeys(channel for channel, _ in samples)),
-        ),
-        declared=Declared(
-            units=f"degrees, knots, {course} in degrees clockwise from true north",
-            frame="WGS84",
-            time_base="UTC",
-            reference_point="antenna, place unknown",
         ),
         read=lambda skipped: reordered(_samples(path, found, skipped), window_ns=_WINDOW_NS),
     )

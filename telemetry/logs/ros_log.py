@@ -19,7 +19,6 @@ from foretwin.telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign,
 from foretwin.telemetry.logs.log import (
     FILE_CUT_SHORT,
     VALUE_NOT_FINITE,
-    Declared,
     Log,
     LogError,
     Sample,
@@ -115,12 +114,6 @@ def _open_own(recording: RosRecording, told: _Told) -> Log:
 
     return Log(
         info=info,
-        declared=Declared(
-            units="degrees, m/s, rad, m/s²",
-            frame="WGS84",
-            time_base=info.time_base,
-            reference_point=info.reference_point,
-        ),
         read=read,
     )
 
