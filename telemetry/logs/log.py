@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts import drive
 from foretwin.contracts.errors import UserError
@@ -25,6 +26,17 @@ TIME_DOUBLED = "time doubled"
 TIME_BEFORE_ZERO = "time before zero"
 UNREADABLE_ROW = "unreadable row"
 FILE_CUT_SHORT = "file cut short"
+
+
+_MOTION = (
+    drive.ImuSample,
+    drive.SpeedSample,
+    drive.HeadingSample,
+    drive.SteeringSample,
+    drive.ControlCommand,
+    drive.PlannedTrajectory,
+)
+"""Messages that are of no use where one number is missing."""
 
 
 class LogError(UserError):
@@ -78,12 +90,23 @@ def fault_of(message: msgspec.Struct) -> str | None:
         return TIME_BEFORE_ZERO
     if isinstance(message, drive.GnssFix):
         return fault_of_position(message.position.lat_deg, message.position.lon_deg)
-    numbers = _NUMBERS.get(type(message))
-    if numbers is not None and not all(
-        math.isfinite(value) for value in numbers(message) if value is not None
-    ):
+    if isinstance(message, _MOTION) and not is_finite(message):
         return VALUE_NOT_FINITE
     return None
+
+
+def is_finite(value: Any) -> bool:
+    """Tell whether all numbers in a message, or in a field of one, are finite."""
+    match value:
+        case float():
+            return math.isfinite(value)
+        case np.ndarray():
+            return bool(np.isfinite(value).all())
+        case msgspec.Struct():
+            return all(is_finite(getattr(value, name)) for name in value.__struct_fields__)
+        case tuple():
+            return all(map(is_finite, value))
+    return True
 
 
 def fault_of_position(lat_deg: float, lon_deg: float) -> str | None:
@@ -95,19 +118,3 @@ def fault_of_position(lat_deg: float, lon_deg: float) -> str | None:
     if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
         return POSITION_OFF_EARTH
     return None
-
-
-def _plan_numbers(plan: drive.PlannedTrajectory) -> tuple[float, ...]:
-    # One sum tells of any NaN or infinity without a loop over the points.
-    arrays = (plan.time_from_stamp_s, plan.lat_deg, plan.lon_deg, plan.yaw_rad, plan.speed_mps)
-    return tuple(float(array.sum()) for array in arrays)
-
-
-_NUMBERS: dict[type, Callable[[Any], tuple[float | None, ...]]] = {
-    drive.ImuSample: lambda m: (*m.accel_mps2, *m.rate_radps),
-    drive.SpeedSample: lambda m: (m.speed_mps,),
-    drive.HeadingSample: lambda m: (m.yaw_rad, m.yaw_rate_radps),
-    drive.SteeringSample: lambda m: (m.steering_wheel_rad, m.tire_angle_rad),
-    drive.ControlCommand: lambda m: (m.accel_mps2, m.steering_wheel_rad, m.tire_angle_rad),
-    drive.PlannedTrajectory: _plan_numbers,
-}

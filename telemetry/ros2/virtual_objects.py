@@ -11,6 +11,7 @@ import numpy as np
 
 from foretwin.contracts.drive import RoadUser, RoadUserKind, RoadUsers
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.telemetry.logs.log import is_finite
 
 _MOST_SPEED_MPS, _MOST_SIZE_M = 100.0, 50.0
 _STEP_BACK_NS = 1_000_000_000
@@ -111,7 +112,7 @@ class VirtualObjects:
         """
         if not all(user.virtual for user in message.users):
             raise UnfitError("road users that are not marked as virtual")
-        if not all(map(_is_finite, message.users)):
+        if not is_finite(message):
             raise UnfitError("virtual objects that are not finite")
         if not all(map(_is_possible, message.users)):
             raise UnfitError("virtual objects of an impossible size or speed")
@@ -144,20 +145,6 @@ def moved(user: RoadUser, way_m: float) -> RoadUser:
     step = way_m * np.array([math.cos(user.yaw_rad), math.sin(user.yaw_rad)])
     lat_deg, lon_deg = geo_from_local(LocalFrame(user.position), step).tolist()
     return msgspec.structs.replace(user, position=GeoPoint(lat_deg, lon_deg, user.position.alt_m))
-
-
-def _is_finite(user: RoadUser) -> bool:
-    at = user.position
-    numbers = (
-        at.lat_deg,
-        at.lon_deg,
-        at.alt_m,
-        user.yaw_rad,
-        user.speed_mps,
-        user.length_m,
-        user.width_m,
-    )
-    return all(map(math.isfinite, numbers))
 
 
 def _is_possible(user: RoadUser) -> bool:
