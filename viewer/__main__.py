@@ -25,7 +25,7 @@ from foretwin.viewer.live_viewer import (
     offline_environment,
     rerun_program,
 )
-from foretwin.viewer.monitor import RUN_CHANNELS, VEHICLE_CHANNELS, Monitor, read_world
+from foretwin.viewer.monitor import Monitor, read_world
 from foretwin.viewer.recordings import copy_with_blueprint, is_complete
 from foretwin.viewer.rows import Row
 from foretwin.viewer.sinks import FileStream, LiveStream
@@ -75,6 +75,7 @@ class Recorder:
             attribution=setup.attribution,
             load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
         )
+        self.channels = self._monitor.channels
         blueprint = drive_blueprint()
         self._live_viewer = live_viewer(setup.live)
         self._file = FileStream(
@@ -154,10 +155,8 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
         return int(info.start_stamp_ns)
 
     recorder = Recorder(setup, messages, find_start)
-    for channel in VEHICLE_CHANNELS:
-        bus.subscribe(channel, messages, vehicle=setup.vehicle_id)
-    for channel in RUN_CHANNELS:
-        bus.subscribe(channel, messages, run=setup.run_id)
+    for channel in recorder.channels:
+        bus.subscribe(channel, messages, vehicle=setup.vehicle_id, run=setup.run_id)
     life.ready()
     while not life.over:
         recorder.take_one(0.1)

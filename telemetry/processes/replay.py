@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -68,7 +69,7 @@ class ReplaySource:
         """What the log has refused so far."""
         return self._drive.skipped.total()
 
-    def advance(self, until_stamp_ns: int) -> Iterator[Sample]:
+    def advance(self, until_stamp_ns: int) -> Iterator[tuple[str, Any]]:
         """Yield the samples up to and including the stamp, each once."""
         while (sample := self._next_sample) is not None and stamp_ns_of(sample) <= until_stamp_ns:
             self._next_sample = next(self._samples, None)
