@@ -46,6 +46,14 @@ LOSSLESS_WAIT_US = 600_000_000
 """How long a writer waits for a reader that stands still where nothing may be lost."""
 
 
+_QUEUE_SIZES = {
+    **dict.fromkeys(("real_time", "interactive_high", "data_high", "data"), 16),
+    "interactive_low": 4,
+    **dict.fromkeys(("control", "data_low", "background"), 2),
+}
+"""Batches that may wait to be sent, by priority; docs/bus.md."""
+
+
 class BusUnreachable(ConnectionError):  # noqa: N818
     """No router answers at the endpoint."""
 
@@ -60,9 +68,15 @@ class Bus(Protocol):
         """Let every message of the channel land in `mailbox` as Received."""
 
     def request(
-        self, channel: str, message: msgspec.Struct, mailbox: Mailbox, *, tag: Any = None,
-        timeout_s: float = 10.0, **ids: str,
-    ) -> None:  # fmt: skip
+        self,
+        channel: str,
+        message: msgspec.Struct,
+        mailbox: Mailbox,
+        *,
+        tag: Any = None,
+        timeout_s: float = 10.0,
+        **ids: str,
+    ) -> None:
         """Ask; exactly one Reply lands in `mailbox`, also when nobody answers."""
 
     def serve(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
@@ -118,21 +132,17 @@ def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
         "timestamping/enabled": True,
         "transport/shared_memory/enabled": False,
         "transport/link/tx/lease": LOSSLESS_LEASE_MS if setup.lossless else LEASE_MS,
-        "transport/link/tx/queue/size": {
-            "control": 2, "real_time": 16, "interactive_high": 16, "interactive_low": 4,
-            "data_high": 16, "data": 16, "data_low": 2, "background": 2,
-        },
+        "transport/link/tx/queue/size": _QUEUE_SIZES,
         "listen/endpoints": [setup.endpoint] if router else [],
-    }  # fmt: skip
+    }
     if setup.lossless:
         queue = "transport/link/tx/queue/congestion_control/block"
         settings[f"{queue}/wait_before_close"] = LOSSLESS_WAIT_US
     if not router:
         settings["connect/endpoints"] = [setup.endpoint]
         settings["connect/timeout_ms"] = round(1e3 * CONNECT_S)
-        settings["connect/retry"] = {
-            "period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2,
-        }  # fmt: skip
+        retry = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+        settings["connect/retry"] = retry
     for name, value in settings.items():
         config.insert_json5(name, json.dumps(value))
     return config
@@ -247,9 +257,15 @@ class ZenohBus(ZenohSession):
         self._declared.append(self._session.declare_subscriber(channel_key(channel, **ids), land))
 
     def request(
-        self, channel: str, message: msgspec.Struct, mailbox: Mailbox, *, tag: Any = None,
-        timeout_s: float = 10.0, **ids: str,
-    ) -> None:  # fmt: skip
+        self,
+        channel: str,
+        message: msgspec.Struct,
+        mailbox: Mailbox,
+        *,
+        tag: Any = None,
+        timeout_s: float = 10.0,
+        **ids: str,
+    ) -> None:
         """Ask; see Bus."""
         kind = CHANNELS[channel].reply
         if kind is None:
