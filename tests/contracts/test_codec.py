@@ -65,9 +65,13 @@ def test_equal_messages_have_equal_content_whatever_their_header() -> None:
 @pytest.mark.parametrize("array", [np.ones((2, 3))[:, ::2], np.arange(3, dtype=">f8")])
 def test_arrays_of_any_layout_arrive_contiguous_and_little_endian(array: np.ndarray) -> None:
     plan = PlannedTrajectory(
-        stamp_ns=0, time_from_stamp_s=array, lat_deg=array, lon_deg=array, yaw_rad=array,
+        stamp_ns=0,
+        time_from_stamp_s=array,
+        lat_deg=array,
+        lon_deg=array,
+        yaw_rad=array,
         speed_mps=array,
-    )  # fmt: skip
+    )
 
     arrived = decode(encode(plan), PlannedTrajectory).message.yaw_rad
 

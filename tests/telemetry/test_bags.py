@@ -110,10 +110,12 @@ def test_a_ros1_bag_is_read(tmp_path: Path) -> None:
             ros = types[NAV_SAT_FIX](
                 header=head,
                 status=types["sensor_msgs/msg/NavSatStatus"](status=0, service=1),
-                latitude=52.5, longitude=13.4, altitude=30.0,
+                latitude=52.5,
+                longitude=13.4,
+                altitude=30.0,
                 position_covariance=fix(0, 52.5).position_covariance,
                 position_covariance_type=2,
-            )  # fmt: skip
+            )
             writer.write(fixes, sec * 10**9, store.serialize_ros1(ros, NAV_SAT_FIX))
             twist = types[TWIST_STAMPED](
                 header=head,
@@ -209,9 +211,14 @@ def test_bytes_that_are_no_message_are_counted(tmp_path: Path) -> None:
 
 def test_objects_without_a_known_frame_are_counted(tmp_path: Path) -> None:
     user = drive.RoadUser(
-        user_id="u", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=1.0,
-        length_m=4.0, width_m=2.0,
-    )  # fmt: skip
+        user_id="u",
+        kind="car",
+        position=GeoPoint(52.5, 13.4),
+        yaw_rad=0.0,
+        speed_mps=1.0,
+        length_m=4.0,
+        width_m=2.0,
+    )
     frame = LocalFrame(GeoPoint(52.5, 13.4))
     objects = predicted_from_users(drive.RoadUsers(stamp_ns=START_NS, users=(user,)), frame)
     messages = [

@@ -185,8 +185,11 @@ def test_rerun_converts_it(recorded: Path, tmp_path: Path) -> None:
     rerun = Path(sys.executable).with_name("rerun")
     done = subprocess.run(
         [rerun, "mcap", "convert", str(recorded), "-o", str(rrd)],
-        capture_output=True, text=True, timeout=240, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert rrd.stat().st_size > 1000
     for topic in ("gnss", "imu", "steering", "control", "plan", "state"):

@@ -145,8 +145,10 @@ def test_no_fix_zero_stamp_and_imu_without_values(tmp_path: Path) -> None:
     found = list(log.samples())
     assert [(channel, m.stamp_ns) for channel, m in found] == [("gnss", START_NS + 10**9)]  # type: ignore[attr-defined]
     assert log.skipped == {
-        "receiver without fix": 1, "imu without values": 1, "position not finite": 1,
-    }  # fmt: skip
+        "receiver without fix": 1,
+        "imu without values": 1,
+        "position not finite": 1,
+    }
 
 
 def test_a_file_without_positions_is_no_log(tmp_path: Path) -> None:

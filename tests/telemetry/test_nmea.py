@@ -142,9 +142,11 @@ def test_what_is_refused_is_counted(tmp_path: Path) -> None:
         gga("120006"),
     )
     assert log.skipped == {
-        "sentence before any time": 1, "checksum wrong": 1, "receiver without fix": 3,
+        "sentence before any time": 1,
+        "checksum wrong": 1,
+        "receiver without fix": 3,
         "unreadable row": 1,
-    }  # fmt: skip
+    }
     assert [fix.stamp_ns for fix in found["gnss"]] == [NOON_NS + 6 * 10**9]
 
 

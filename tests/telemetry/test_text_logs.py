@@ -35,8 +35,10 @@ def test_gpx_track_is_a_log_in_utc(tmp_path: Path) -> None:
     log = open_log(write(tmp_path, "ride.gpx", GPX.format(track=TRACK)))
     samples = list(log.samples())
     assert [m.stamp_ns - log.info.start_stamp_ns for _, m in samples] == [  # type: ignore[attr-defined]
-        0, 250_000_000, 2_000_000_000,
-    ]  # fmt: skip
+        0,
+        250_000_000,
+        2_000_000_000,
+    ]
     assert log.info.start_stamp_ns == 1_772_359_200_000_000_000
     assert log.info.time_base == "utc"
     assert log.skipped == {"position (0, 0)": 1, "time backwards": 1, "unreadable row": 1}
@@ -74,8 +76,9 @@ def test_geojson_line_with_times_is_a_log(tmp_path: Path, name: str, times: list
     log = open_log(write(tmp_path, "drive.geojson", feature(**{name: times})))
     fixes = [message for _, message in log.samples()]
     assert [fix.stamp_ns for fix in fixes] == [  # type: ignore[attr-defined]
-        1_772_359_200_000_000_000, 1_772_359_201_000_000_000,
-    ]  # fmt: skip
+        1_772_359_200_000_000_000,
+        1_772_359_201_000_000_000,
+    ]
     assert line_of_log(log).lon_deg.tolist() == [13.4, 13.5]
 
 
@@ -117,8 +120,11 @@ def test_smartloc_counts_what_it_cannot_use(tmp_path: Path) -> None:
     stamps = [message.stamp_ns for _, message in log.samples()]  # type: ignore[attr-defined]
     assert stamps == [0, 800_000_000, 1_000_000_000]
     assert log.skipped == {
-        "unreadable row": 2, "position not finite": 2, "time doubled": 1, "time backwards": 1,
-    }  # fmt: skip
+        "unreadable row": 2,
+        "position not finite": 2,
+        "time doubled": 1,
+        "time backwards": 1,
+    }
 
 
 def test_files_that_are_no_log(tmp_path: Path) -> None:

@@ -185,9 +185,11 @@ def test_the_start_is_asked_for_when_the_vehicle_first_speaks() -> None:
         return scene.START_NS
 
     monitor = Monitor(
-        drive_frame=scene.DRIVE_FRAME, find_start=find_start, title="t",
+        drive_frame=scene.DRIVE_FRAME,
+        find_start=find_start,
+        title="t",
         load_world=lambda _id: scene.junction(),
-    )  # fmt: skip
+    )
     before = Event(stamp_ns=0, level="info", source="s", text="preparing")
     early = msgspec.structs.replace(before, stamp_ns=scene.START_NS - 5)
     assert monitor.handle("event", before)[0].drive_ns == 0
@@ -201,23 +203,37 @@ def test_findings_are_drawn_by_manoeuvre_and_told_in_words() -> None:
     monitor = _monitor()
     stamp_ns = scene.START_NS + 5_000_000_000
     sample = GapSample(
-        vehicle_id="ego", stamp_ns=stamp_ns, horizon_s=2.0, manoeuvre="curve", along_m=0.1,
-        across_m=-0.4, yaw_rad=0.1, yaw_rate_radps=0.0, speed_mps=0.0, accel_mps2=0.0,
+        vehicle_id="ego",
+        stamp_ns=stamp_ns,
+        horizon_s=2.0,
+        manoeuvre="curve",
+        along_m=0.1,
+        across_m=-0.4,
+        yaw_rad=0.1,
+        yaw_rate_radps=0.0,
+        speed_mps=0.0,
+        accel_mps2=0.0,
         independent=True,
-    )  # fmt: skip
+    )
     shown = Shown(monitor.handle("gap", sample))
     assert shown.paths == [
         f"reality/{name}/{drawn}"
-        for name in ("across_m", "along_m", "yaw_deg") for drawn in ("curve", "limit")
-    ]  # fmt: skip
+        for name in ("across_m", "along_m", "yaw_deg")
+        for drawn in ("curve", "limit")
+    ]
     assert shown["reality/across_m/curve"].scalars.as_arrow_array().to_pylist() == [-0.4]
     assert not monitor.handle("gap", msgspec.structs.replace(sample, horizon_s=8.0))
 
     verdict = Verdict(
-        vehicle_id="ego", stamp_ns=stamp_ns, since_stamp_ns=stamp_ns, culprit="vehicle",
-        cause="steering_gain", text="turns too little", confidence=0.9,
+        vehicle_id="ego",
+        stamp_ns=stamp_ns,
+        since_stamp_ns=stamp_ns,
+        culprit="vehicle",
+        cause="steering_gain",
+        text="turns too little",
+        confidence=0.9,
         evidence=(Evidence(name="gain", value=0.7, expected=1.0, std=0.02, text="by the tyre"),),
-    )  # fmt: skip
+    )
     monitor.handle("verdict", msgspec.structs.replace(verdict, cause="brake_gain"))
     text = _text(Shown(monitor.handle("verdict", verdict))["reality/verdict"])
     assert text.index("steering_gain") < text.index("brake_gain"), "the newest first"
@@ -228,14 +244,16 @@ def test_parameters_have_curves_with_intervals_and_a_table() -> None:
     monitor = _monitor()
     stamp_ns = scene.START_NS + 5_000_000_000
     told = Identification(
-        vehicle_id="ego", from_stamp_ns=0, stamp_ns=stamp_ns,
+        vehicle_id="ego",
+        from_stamp_ns=0,
+        stamp_ns=stamp_ns,
         estimates=(
             ParameterEstimate(name="steering_ratio", value=15.3, low=15.1, high=15.5, prior=16.0),
             ParameterEstimate(
                 name="brake_gain", value=None, low=None, high=None, prior=1.0, reason="no | grade"
             ),
         ),
-    )  # fmt: skip
+    )
     shown = Shown(monitor.handle("identification", told))
     for curve, value in (("in_use", 16.0), ("value", 15.3), ("low", 15.1), ("high", 15.5)):
         scalars = shown[f"parameters/steering_ratio/{curve}"].scalars
@@ -246,9 +264,14 @@ def test_parameters_have_curves_with_intervals_and_a_table() -> None:
     assert "| brake_gain | 1 | - |  | no / grade |" in table
 
     change = ParameterChange(
-        vehicle_id="ego", stamp_ns=stamp_ns, name="steering_ratio", before=16.0, value=15.3,
-        std=0.1, origin="identified",
-    )  # fmt: skip
+        vehicle_id="ego",
+        stamp_ns=stamp_ns,
+        name="steering_ratio",
+        before=16.0,
+        value=15.3,
+        std=0.1,
+        origin="identified",
+    )
     rows = monitor.handle("parameter", change)
     assert [row.drive_ns for row in rows] == [4_999_999_999, 5_000_000_000, 5_000_000_000]
 
@@ -260,15 +283,26 @@ def _text(document: Any) -> str:
 
 def test_where_human_and_ads_disagree_a_mark_stays() -> None:
     one = Disagreement(
-        vehicle_id="ego", segment=0, aspect="pace", kind="ads_stops",
-        stamp_ns=scene.START_NS + 2_000_000_000, end_stamp_ns=scene.START_NS + 3_000_000_000,
-        over=False, position=scene.DRIVE_FRAME.origin, junction_id=None, route_m=None,
-        lateral_m=0.0, along_m=-9.0, speed_mps=-6.0,
-    )  # fmt: skip
+        vehicle_id="ego",
+        segment=0,
+        aspect="pace",
+        kind="ads_stops",
+        stamp_ns=scene.START_NS + 2_000_000_000,
+        end_stamp_ns=scene.START_NS + 3_000_000_000,
+        over=False,
+        position=scene.DRIVE_FRAME.origin,
+        junction_id=None,
+        route_m=None,
+        lateral_m=0.0,
+        along_m=-9.0,
+        speed_mps=-6.0,
+    )
     monitor = Monitor(
-        drive_frame=scene.DRIVE_FRAME, find_start=lambda _ns: scene.START_NS, title="t",
+        drive_frame=scene.DRIVE_FRAME,
+        find_start=lambda _ns: scene.START_NS,
+        title="t",
         load_world=lambda _id: scene.junction(),
-    )  # fmt: skip
+    )
     (row,) = monitor.handle("disagreement", one)
     assert row.path.startswith("world/disagreements/pace_")
     assert row.drive_ns == 2_000_000_000

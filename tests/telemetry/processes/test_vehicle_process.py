@@ -35,9 +35,12 @@ class Rig:
             self.bus.subscribe(channel, self.inbox, vehicle="car")
         source = ReplaySource(recorded_minute(), vehicle_id="car", end_s=end_s)
         setup = ProcessSetup(
-            run_id="r", process_id="vehicle", vehicle_id="car", bus=BusSetup(endpoint=""),
+            run_id="r",
+            process_id="vehicle",
+            vehicle_id="car",
+            bus=BusSetup(endpoint=""),
             log_file="",
-        )  # fmt: skip
+        )
         self.process = VehicleProcess(
             source,
             bus=self.bus,

@@ -176,10 +176,16 @@ def gateway_process(
 ) -> Iterator[subprocess.Popen[str]]:
     file = folder / "ros2.json"
     setup = Ros2Setup(
-        run_id="r", process_id="ros2", vehicle_id="ego", bus=BusSetup(endpoint=run_endpoint),
-        log_file=str(folder / "log.jsonl"), mapping=mapping, mapping_name="m.toml",
-        drive_frame=FRAME, towards_vehicle=flag,
-    )  # fmt: skip
+        run_id="r",
+        process_id="ros2",
+        vehicle_id="ego",
+        bus=BusSetup(endpoint=run_endpoint),
+        log_file=str(folder / "log.jsonl"),
+        mapping=mapping,
+        mapping_name="m.toml",
+        drive_frame=FRAME,
+        towards_vehicle=flag,
+    )
     write_setup(setup, file)
     command = [sys.executable, "-m", "foretwin.telemetry.ros2", "--setup", str(file)]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:

@@ -61,9 +61,17 @@ def test_a_key_of_the_bridge() -> None:
 
 def test_a_token_of_a_subscription() -> None:
     entity = Entity(
-        domain=0, session="aac3178e", node_id=0, entity_id=8, entity="MS", namespace="/",
-        node="listener", topic="/chatter", kind="std_msgs/msg/String", type_hash=STRING_HASH,
-    )  # fmt: skip
+        domain=0,
+        session="aac3178e",
+        node_id=0,
+        entity_id=8,
+        entity="MS",
+        namespace="/",
+        node="listener",
+        topic="/chatter",
+        kind="std_msgs/msg/String",
+        type_hash=STRING_HASH,
+    )
     text = token(entity)
     assert text == (
         "@ros2_lv/0/aac3178e/0/8/MS/%/%/listener/%chatter/"
@@ -73,9 +81,14 @@ def test_a_token_of_a_subscription() -> None:
 
 def test_a_token_of_a_node_in_a_namespace() -> None:
     node = Entity(
-        domain=3, session="ab12", node_id=7, entity_id=7, entity="NN", namespace="/bot/arm",
+        domain=3,
+        session="ab12",
+        node_id=7,
+        entity_id=7,
+        entity="NN",
+        namespace="/bot/arm",
         node="n",
-    )  # fmt: skip
+    )
     assert token(node) == "@ros2_lv/3/ab12/7/7/NN/%/%bot%arm/n"
 
 

@@ -54,9 +54,15 @@ class Ground:
         self.bus.subscribe("route", self.box, vehicle="ego")
         self.gateway = Gateway(
             parse_mapping(TEXT.format(map=MAP if placed else ""), name="m.toml"),
-            bus=self.bus, foreign=self.foreign, run_id="r", vehicle_id="ego", drive_frame=FRAME,
-            flag_on=False, mono_ns=lambda: self.now_ns, wall_ns=lambda: 10**18,
-        )  # fmt: skip
+            bus=self.bus,
+            foreign=self.foreign,
+            run_id="r",
+            vehicle_id="ego",
+            drive_frame=FRAME,
+            flag_on=False,
+            mono_ns=lambda: self.now_ns,
+            wall_ns=lambda: 10**18,
+        )
 
     def step(self, *payloads: bytes, passed_s: float = 0.0) -> list[RouteToGoal]:
         self.now_ns += round(passed_s * S)

@@ -101,15 +101,19 @@ NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-2.0, 2.0)
 STEPS = st.tuples(
     st.integers(0, 200 * MS),  # passes first
     st.sampled_from(["word", "stale word", "command", "link down", "command", "word"]),
-    NUMBERS, NUMBERS, NUMBERS,
-)  # fmt: skip
+    NUMBERS,
+    NUMBERS,
+    NUMBERS,
+)
 
 
 @settings(max_examples=300, deadline=None)
 @given(
-    st.booleans(), st.booleans(), st.floats(-0.5, 0.5),
+    st.booleans(),
+    st.booleans(),
+    st.floats(-0.5, 0.5),
     st.lists(st.tuples(st.integers(0, 60 * MS), STEPS), max_size=40),
-)  # fmt: skip
+)
 def test_never_outside_the_bounds_and_never_after_the_dead_mans_time(
     config_on: bool,
     flag_on: bool,

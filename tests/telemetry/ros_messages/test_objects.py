@@ -74,8 +74,10 @@ def assert_same_user(found: drive.RoadUser, user: drive.RoadUser) -> None:
     assert found.position.alt_m == pytest.approx(user.position.alt_m, abs=1e-6)
     assert math.cos(found.yaw_rad - user.yaw_rad) == pytest.approx(1.0)
     assert (found.speed_mps, found.length_m, found.width_m) == (
-        user.speed_mps, user.length_m, user.width_m,
-    )  # fmt: skip
+        user.speed_mps,
+        user.length_m,
+        user.width_m,
+    )
 
 
 @given(said=st.lists(users, max_size=2))
@@ -93,9 +95,14 @@ def test_road_users_come_back_from_both_kinds_of_message(said: list[drive.RoadUs
 
 def one_car(user_id: str = "u1", speed_mps: float = 5.0) -> drive.RoadUsers:
     user = drive.RoadUser(
-        user_id=user_id, kind="car", position=FRAME.origin, yaw_rad=0.5 * math.pi,
-        speed_mps=speed_mps, length_m=4.5, width_m=1.8,
-    )  # fmt: skip
+        user_id=user_id,
+        kind="car",
+        position=FRAME.origin,
+        yaw_rad=0.5 * math.pi,
+        speed_mps=speed_mps,
+        length_m=4.5,
+        width_m=1.8,
+    )
     return drive.RoadUsers(stamp_ns=AT, users=(user,))
 
 
