@@ -6,10 +6,11 @@ What arrives lands in a `foretwin.contracts.mailbox.Mailbox`.
 from __future__ import annotations
 
 import collections
+import itertools
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any, Protocol, Self
 
@@ -105,20 +106,6 @@ def ask(
     return reply.message
 
 
-class _Sequence:
-    """Counts the messages of each key."""
-
-    def __init__(self) -> None:
-        self._next: dict[str, int] = collections.defaultdict(int)
-        self._lock = threading.Lock()
-
-    def take(self, full_key: str) -> int:
-        with self._lock:
-            seq = self._next[full_key]
-            self._next[full_key] = seq + 1
-            return seq
-
-
 def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
     """Return the Zenoh configuration; docs/bus.md gives the reason for each setting."""
     import zenoh
@@ -202,6 +189,11 @@ class ZenohSession:
             heard = self._session.declare_subscriber(key, land)
         self._declared.append(heard)
 
+    def _publisher(self, key: str, **qos: Any) -> Any:
+        if key not in self._publishers:
+            self._publishers[key] = self._session.declare_publisher(key, **qos)
+        return self._publishers[key]
+
     def close(self) -> None:
         """Close the session; idempotent."""
         self._publishers.clear()
@@ -216,36 +208,29 @@ class ZenohBus(ZenohSession):
     def __init__(self, setup: BusSetup, *, router: bool = False) -> None:
         super().__init__(setup, router=router)
         self._lossless = setup.lossless
-        self._sequence = _Sequence()
+        self._sent: dict[str, Iterator[int]] = collections.defaultdict(itertools.count)
+        """The next sequence number of each key."""
         self._lock = threading.Lock()
-        priority = self._zenoh.Priority
-        self._priorities = {
-            "real_time": priority.REAL_TIME,
-            "interactive_high": priority.INTERACTIVE_HIGH,
-            "data_high": priority.DATA_HIGH,
-            "data": priority.DATA,
-            "background": priority.BACKGROUND,
-        }
 
     def _qos(self, qos: Qos) -> dict[str, Any]:
         control = self._zenoh.CongestionControl
         return {
-            "priority": self._priorities[qos.priority],
+            "priority": getattr(self._zenoh.Priority, qos.priority.upper()),
             "congestion_control": control.BLOCK if qos.block or self._lossless else control.DROP,
             "express": qos.express,
         }
+
+    def _encoded(self, full_key: str, message: msgspec.Struct) -> bytes:
+        with self._lock:
+            seq = next(self._sent[full_key])
+        return encode(message, seq=seq, sent_ns=time.time_ns())
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
         """Send one message; see Bus."""
         full_key = channel_key(channel, **ids)
         with self._lock:
-            publisher = self._publishers.get(full_key)
-            if publisher is None:
-                publisher = self._session.declare_publisher(
-                    full_key, **self._qos(CHANNELS[channel].qos)
-                )
-                self._publishers[full_key] = publisher
-        publisher.put(encode(message, seq=self._sequence.take(full_key), sent_ns=time.time_ns()))
+            publisher = self._publisher(full_key, **self._qos(CHANNELS[channel].qos))
+        publisher.put(self._encoded(full_key, message))
 
     def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
         """Receive into `mailbox`; see Bus."""
@@ -290,7 +275,7 @@ class ZenohBus(ZenohSession):
         self._session.get(
             full_key,
             self._zenoh.handlers.Callback(land, lambda: finish(None, "no answer"), indirect=False),
-            payload=encode(message, seq=self._sequence.take(full_key), sent_ns=time.time_ns()),
+            payload=self._encoded(full_key, message),
             timeout=timeout_s,
             **self._qos(CHANNELS[channel].qos),
         )

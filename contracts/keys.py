@@ -43,114 +43,121 @@ REQUEST = Qos("interactive_high", block=True, express=True)
 
 
 class Channel(NamedTuple):
-    """One row of the table; `rate_hz` is the usual rate, None where it is on demand."""
+    """What a channel says, how often and what for; `reply` is the answer to a question.
 
-    key: str
-    kind: type[msgspec.Struct]
-    reply: type[msgspec.Struct] | None
-    rate_hz: float | None
-    qos: Qos
-    purpose: str
-
-
-class _Row(NamedTuple):
-    """What a channel says, how often and what for; `reply` is the answer to a question."""
+    `rate_hz` is the usual rate, None where it is on demand. Key and quality of service are those
+    of the group in which it stands.
+    """
 
     kind: type[msgspec.Struct]
     rate_hz: float | None
     purpose: str
     reply: type[msgspec.Struct] | None = None
+    key: str = ""
+    qos: Qos = LIVE
 
 
 _VEHICLE, _RUN = "vehicle/{vehicle}", "run/{run}"
 _WORKER = f"{_RUN}/worker/{{process}}"
 
-_TABLE: dict[tuple[str, Qos], dict[str, _Row]] = {
+_TABLE: dict[tuple[str, Qos], dict[str, Channel]] = {
     # What the vehicle sends.
     (f"{_VEHICLE}/telemetry", LIVE): {
-        "gnss": _Row(drive.GnssFix, 10, "antenna position"),
-        "imu": _Row(drive.ImuSample, 100, "specific force and rates"),
-        "speed": _Row(drive.SpeedSample, 50, "wheel speed"),
-        "heading": _Row(drive.HeadingSample, 10, "measured yaw"),
-        "steering": _Row(drive.SteeringSample, 50, "steering"),
-        "control": _Row(drive.ControlCommand, 50, "ADS commands"),
-        "plan": _Row(drive.PlannedTrajectory, 10, "ADS plan"),
-        "status": _Row(drive.VehicleStatus, 10, "mode and gear"),
-        "objects": _Row(drive.RoadUsers, 10, "detected road users"),
-        "signals": _Row(drive.SignalState, 1, "signal colours"),
-        "end": _Row(drive.DriveEnd, None, "the drive is over"),
+        "gnss": Channel(drive.GnssFix, 10, "antenna position"),
+        "imu": Channel(drive.ImuSample, 100, "specific force and rates"),
+        "speed": Channel(drive.SpeedSample, 50, "wheel speed"),
+        "heading": Channel(drive.HeadingSample, 10, "measured yaw"),
+        "steering": Channel(drive.SteeringSample, 50, "steering"),
+        "control": Channel(drive.ControlCommand, 50, "ADS commands"),
+        "plan": Channel(drive.PlannedTrajectory, 10, "ADS plan"),
+        "status": Channel(drive.VehicleStatus, 10, "mode and gear"),
+        "objects": Channel(drive.RoadUsers, 10, "detected road users"),
+        "signals": Channel(drive.SignalState, 1, "signal colours"),
+        "end": Channel(drive.DriveEnd, None, "the drive is over"),
     },
     # What is derived from it.
     (_VEHICLE, LIVE): {
-        "state": _Row(drive.VehicleState, 50, "estimated state"),
-        "route": _Row(drive.RouteToGoal, 1, "where the ADS goes"),
+        "state": Channel(drive.VehicleState, 50, "estimated state"),
+        "route": Channel(drive.RouteToGoal, 1, "where the ADS goes"),
     },
     # Questions to the vehicle's process.
     (_VEHICLE, REQUEST): {
-        "info": _Row(drive.InfoRequest, None, "what the vehicle is", drive.VehicleInfo),
-        "advance": _Row(drive.AdvanceRequest, None, "lock step: go on until", drive.AdvanceReply),
+        "info": Channel(drive.InfoRequest, None, "what the vehicle is", drive.VehicleInfo),
+        "advance": Channel(
+            drive.AdvanceRequest, None, "lock step: go on until", drive.AdvanceReply
+        ),
     },
     # Work.
     (_WORKER, REQUEST): {
-        "job": _Row(runner.JobRequest, 2, "simulate futures", runner.JobAnswer),
-        "place": _Row(
+        "job": Channel(runner.JobRequest, 2, "simulate futures", runner.JobAnswer),
+        "place": Channel(
             placement.PlaceRequest, None, "find places for scenarios", placement.WorldPlaces
         ),
-        "prepare": _Row(simulation.PrepareRequest, None, "load a World", simulation.PrepareReply),
-        "use_world": _Row(
+        "prepare": Channel(
+            simulation.PrepareRequest, None, "load a World", simulation.PrepareReply
+        ),
+        "use_world": Channel(
             simulation.ActiveWorld, None, "the mirror's World", simulation.ActiveWorld
         ),
-        "use_vehicle": _Row(tuning.UseVehicle, None, "parameters from now on", tuning.UseVehicle),
-        "tune": _Row(tuning.TuneRequest, None, "lock step: weigh what was sent", tuning.TuneReply),
-        "use_roles": _Row(roles.UseRoles, None, "the mirror's roles", roles.UseRoles),
+        "use_vehicle": Channel(
+            tuning.UseVehicle, None, "parameters from now on", tuning.UseVehicle
+        ),
+        "tune": Channel(
+            tuning.TuneRequest, None, "lock step: weigh what was sent", tuning.TuneReply
+        ),
+        "use_roles": Channel(roles.UseRoles, None, "the mirror's roles", roles.UseRoles),
     },
     (f"{_RUN}/builder/{{process}}", REQUEST): {
-        "build": _Row(simulation.BuildRequest, None, "build a World", simulation.BuildReply),
+        "build": Channel(simulation.BuildRequest, None, "build a World", simulation.BuildReply),
     },
     (_RUN, REQUEST): {
-        "set": _Row(tuning.SetRequest, None, "change a running drive", tuning.SetReply),
+        "set": Channel(tuning.SetRequest, None, "change a running drive", tuning.SetReply),
     },
     # What those who watch receive.
     (_RUN, RESULT): {
-        "round": _Row(simulation.RoundView, 2, "one round of futures"),
-        "comparison": _Row(simulation.Comparison, 8, "nominal future against reality"),
-        "plan_comparison": _Row(simulation.PlanComparison, 2, "the car's plan against ours"),
-        "disagreement": _Row(side_by_side.Disagreement, None, "human and ADS disagree"),
-        "mirror": _Row(simulation.MirrorSample, 10, "twin, shadow, ghost and their gap"),
-        "gap": _Row(gap.GapSample, 4, "model against reality"),
-        "gap_alarm": _Row(gap.GapAlarm, None, "a gap beyond limits"),
-        "verdict": _Row(gap.Verdict, None, "which of the two is wrong"),
-        "identification": _Row(tuning.Identification, 0.2, "what the driving says of the vehicle"),
-        "parameter": _Row(tuning.ParameterChange, None, "a parameter that counts from now on"),
-        "active_world": _Row(simulation.ActiveWorld, None, "which World counts"),
-        "world": _Row(simulation.WorldNotice, None, "a World is ready"),
-        "event": _Row(simulation.Event, None, "worth telling"),
-        "run_end": _Row(simulation.RunEnd, None, "write and leave"),
+        "round": Channel(simulation.RoundView, 2, "one round of futures"),
+        "comparison": Channel(simulation.Comparison, 8, "nominal future against reality"),
+        "plan_comparison": Channel(simulation.PlanComparison, 2, "the car's plan against ours"),
+        "disagreement": Channel(side_by_side.Disagreement, None, "human and ADS disagree"),
+        "mirror": Channel(simulation.MirrorSample, 10, "twin, shadow, ghost and their gap"),
+        "gap": Channel(gap.GapSample, 4, "model against reality"),
+        "gap_alarm": Channel(gap.GapAlarm, None, "a gap beyond limits"),
+        "verdict": Channel(gap.Verdict, None, "which of the two is wrong"),
+        "identification": Channel(
+            tuning.Identification, 0.2, "what the driving says of the vehicle"
+        ),
+        "parameter": Channel(tuning.ParameterChange, None, "a parameter that counts from now on"),
+        "active_world": Channel(simulation.ActiveWorld, None, "which World counts"),
+        "world": Channel(simulation.WorldNotice, None, "a World is ready"),
+        "event": Channel(simulation.Event, None, "worth telling"),
+        "run_end": Channel(simulation.RunEnd, None, "write and leave"),
     },
     (_RUN, WATCH): {
-        "worker_status": _Row(simulation.WorkerStatus, 2, "health of the workers"),
-        "progress": _Row(simulation.Progress, 5, "one line"),
+        "worker_status": Channel(simulation.WorkerStatus, 2, "health of the workers"),
+        "progress": Channel(simulation.Progress, 5, "one line"),
     },
     # The vehicles beside the car, and what goes towards a real vehicle: through a gateway that
     # bounds it, off unless switched on twice.
     (_RUN, LIVE): {
-        "other_vehicles": _Row(roles.OtherVehicles, 50, "states of the vehicles beside the car"),
-        "authority": _Row(towards_vehicle.Authority, 20, "the orchestrator is in charge"),
-        "vehicle_command": _Row(towards_vehicle.VehicleCommand, 50, "what the vehicle shall do"),
-        "virtual_objects": _Row(drive.RoadUsers, 10, "road users that are simulated"),
+        "other_vehicles": Channel(roles.OtherVehicles, 50, "states of the vehicles beside the car"),
+        "authority": Channel(towards_vehicle.Authority, 20, "the orchestrator is in charge"),
+        "vehicle_command": Channel(towards_vehicle.VehicleCommand, 50, "what the vehicle shall do"),
+        "virtual_objects": Channel(drive.RoadUsers, 10, "road users that are simulated"),
     },
     # A driving stack in another process as planner under test.
     (_WORKER, LIVE): {
-        "planner_scene": _Row(
+        "planner_scene": Channel(
             planner_link.PlannerScene, None, "futures at one instant: what to do?"
         ),
-        "planned_motions": _Row(planner_link.PlannedMotions, None, "what a driving stack would do"),
+        "planned_motions": Channel(
+            planner_link.PlannedMotions, None, "what a driving stack would do"
+        ),
     },
 }
 CHANNELS: dict[str, Channel] = {
-    name: Channel(f"{PREFIX}/{place}/{name}", row.kind, row.reply, row.rate_hz, qos, row.purpose)
-    for (place, qos), rows in _TABLE.items()
-    for name, row in rows.items()
+    name: channel._replace(key=f"{PREFIX}/{place}/{name}", qos=qos)
+    for (place, qos), channels in _TABLE.items()
+    for name, channel in channels.items()
 }
 """All channels by name."""
 

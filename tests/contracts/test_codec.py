@@ -28,6 +28,20 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from tests.contracts.messages import messages, same
 
+COVERS = (
+    "foretwin.contracts.arrays",
+    "foretwin.contracts.drive",
+    "foretwin.contracts.gap",
+    "foretwin.contracts.planner_link",
+    "foretwin.contracts.provenance",
+    "foretwin.contracts.side_by_side",
+    "foretwin.contracts.signals",
+    "foretwin.contracts.simulation",
+    "foretwin.contracts.towards_vehicle",
+    "foretwin.contracts.tuning",
+    "foretwin.contracts.world",
+)
+
 KINDS = {channel.kind for channel in CHANNELS.values()}
 KINDS |= {channel.reply for channel in CHANNELS.values() if channel.reply is not None}
 KINDS |= {World, VehicleParameters}

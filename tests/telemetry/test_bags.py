@@ -37,6 +37,13 @@ from tests.telemetry import drive_messages
 from tests.telemetry.autoware_messages import ros_from_signals, transform_message
 from tests.telemetry.test_foreign_mcap import START_NS, ForeignFile, fix, velocity
 
+COVERS = (
+    "foretwin.telemetry.logs.ros_bag",
+    "foretwin.telemetry.logs.ros_log",
+    "foretwin.telemetry.logs.write_bag",
+    "foretwin.telemetry.logs.map_origin",
+)
+
 MS = 10**6
 
 

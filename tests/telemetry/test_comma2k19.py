@@ -9,6 +9,8 @@ import pytest
 
 from foretwin.telemetry.logs import LogError, open_log
 
+COVERS = ("foretwin.telemetry.logs.comma2k19",)
+
 
 def save(path: Path, array: object) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)

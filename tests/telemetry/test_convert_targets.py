@@ -20,6 +20,8 @@ from foretwin.telemetry.logs.write_mcap import create
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 from tests.telemetry.test_drive_mcap import assert_same
 
+COVERS = ("foretwin.telemetry.logs.write_csv",)
+
 NAMES: dict[Target, str] = {"mcap": "out.mcap", "ros1": "out.bag", "ros2": "out", "csv": "out.csv"}
 
 

@@ -23,6 +23,13 @@ from foretwin.telemetry.ros_messages.table import messages_from
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples
 from tests.telemetry.own_recordings import message_from, read_drive
 
+COVERS = (
+    "foretwin.telemetry.logs.write_mcap",
+    "foretwin.telemetry.logs.mcap_records",
+    "foretwin.telemetry.ros_messages.table",
+    "foretwin.telemetry.ros_messages.sensors",
+)
+
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 
 

@@ -23,6 +23,11 @@ from tests.telemetry.position_track import (
     yaw,
 )
 
+COVERS = (
+    "foretwin.telemetry.estimator.measured",
+    "foretwin.telemetry.estimator.position_gate",
+)
+
 
 def test_wild_positions_are_skipped_and_counted() -> None:
     samples = along(circle, 10.0)

@@ -24,6 +24,11 @@ from foretwin.telemetry.ros_messages.parts import (
 )
 from foretwin.telemetry.ros_messages.table import messages_from
 
+COVERS = (
+    "foretwin.telemetry.logs.foreign_ros",
+    "foretwin.telemetry.logs.ros_recording",
+)
+
 START_NS = 1_772_359_200_000_000_000
 LAG_NS = 30_000_000
 

@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from foretwin.telemetry.logs import Log, LogError, open_log
 from foretwin.telemetry.logs.nmea import CHECKSUM_WRONG, Sentence, sentence_of
 
+COVERS = ("foretwin.telemetry.logs.nmea",)
+
 NOON_NS = 1_772_366_400 * 10**9
 """2026-03-01T12:00:00Z."""
 

@@ -22,6 +22,11 @@ from foretwin.telemetry.logs import LogError, open_road_users
 from foretwin.telemetry.logs.road_users import RoadUserTrack
 from foretwin.telemetry.logs.write_mcap import create
 
+COVERS = (
+    "foretwin.telemetry.logs.road_users",
+    "foretwin.telemetry.logs.mcity",
+)
+
 HERE = LocalFrame(GeoPoint(42.300947, -83.698649))
 START_S = 1_688_680_000.0
 

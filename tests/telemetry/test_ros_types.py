@@ -13,6 +13,8 @@ from foretwin.telemetry.ros_messages import parts as ros_parts
 from foretwin.telemetry.ros_messages.parts import ros_type, time_from, typestore
 from tests.telemetry.ros_strategies import messages
 
+COVERS = ("foretwin.telemetry.ros_messages.parts",)
+
 KINDS = (
     ros_parts.NAV_SAT_FIX,
     ros_parts.IMU,

@@ -10,6 +10,15 @@ import pytest
 
 from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
 
+COVERS = (
+    "foretwin.telemetry.logs",
+    "foretwin.telemetry.logs.geojson",
+    "foretwin.telemetry.logs.gpx",
+    "foretwin.telemetry.logs.smartloc",
+    "foretwin.telemetry.logs.route_line",
+    "foretwin.telemetry.logs.opening",
+)
+
 GPX = """<?xml version="1.0"?>
 <gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1">
 <rte><rtept lat="52.0" lon="13.0"/><rtept lat="52.1" lon="13.1"/></rte>

@@ -25,6 +25,11 @@ from tests.viewer import scene
 from tests.viewer.conftest import RUN, ViewerRun, wait_until
 from tests.viewer.readback import Recorded
 
+COVERS = (
+    "foretwin.viewer.__main__",
+    "foretwin.viewer.live_viewer",
+)
+
 StartViewer = Callable[..., ViewerRun]
 
 

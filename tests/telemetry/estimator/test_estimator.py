@@ -23,6 +23,12 @@ from tests.telemetry.position_track import (
 )
 from tests.telemetry.standin_drive import whole_drive
 
+COVERS = (
+    "foretwin.telemetry.estimator.motion_track",
+    "foretwin.telemetry.estimator.reported_state",
+    "foretwin.telemetry.estimator.local_place",
+)
+
 
 def test_positions_alone_give_the_motion_on_a_circle() -> None:
     states = states_of(along(circle, 12.0))

@@ -28,6 +28,14 @@ from tests.telemetry.ros2.gateway_ground import (
     steering,
 )
 
+COVERS = (
+    "foretwin.telemetry.ros2.introduction",
+    "foretwin.telemetry.ros2.inwards",
+    "foretwin.telemetry.ros2.outwards",
+    "foretwin.telemetry.ros2.sender",
+    "foretwin.telemetry.ros2.told",
+)
+
 S = 10**9
 TOWARDS = ("/control/cmd", "/perception/objects", "/clock")
 

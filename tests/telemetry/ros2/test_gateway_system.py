@@ -36,6 +36,11 @@ from tests.telemetry.ros2.gateway_ground import (
     steering,
 )
 
+COVERS = (
+    "foretwin.telemetry.ros2.__main__",
+    "foretwin.contracts.foreign_bus",
+)
+
 ATTEMPTS = 5
 ROOT = Path(__file__).resolve().parents[3]
 ODOMETRY_HASH = "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"

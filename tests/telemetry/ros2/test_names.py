@@ -22,6 +22,8 @@ from foretwin.telemetry.ros2.names import (
 )
 from foretwin.telemetry.ros_messages.parts import types_beside_ros
 
+COVERS = ("foretwin.telemetry.ros2.attachment",)
+
 IMU = "sensor_msgs/msg/Imu"
 IMU_HASH = "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"

@@ -47,6 +47,15 @@ from tests.telemetry.autoware_messages import (
     transform_message,
 )
 
+COVERS = (
+    "foretwin.telemetry.ros_messages.commands",
+    "foretwin.telemetry.ros_messages.motion",
+    "foretwin.telemetry.ros_messages.shapes",
+    "foretwin.telemetry.ros_messages.status",
+    "foretwin.telemetry.ros_messages.transforms",
+    "foretwin.telemetry.ros_messages.foreign",
+)
+
 FRAME = LocalFrame(GeoPoint(52.5121, 13.3925, 34.0))
 AT = drive_messages.START_NS
 KINDS = ("car", "lorry", "bus", "motorcycle", "bicycle", "pedestrian", "unknown")
