@@ -35,16 +35,16 @@ _GONE = 1e-3
 """Scale of who is not there: a static box cannot be taken away."""
 
 
-def box_of(who: str, size_m: tuple[float, float, float, float] = CAR_SIZE_M) -> rr.Boxes3D:
+def box_of(role: str, size_m: tuple[float, float, float, float] = CAR_SIZE_M) -> rr.Boxes3D:
     """Return the box of a vehicle in its role, about base_link."""
     length, width, height, overhang = size_m
-    colour, margin_m = CARS[who]
+    colour, margin_m = CARS[role]
     return rr.Boxes3D(
         half_sizes=[[length / 2 + margin_m, width / 2 + margin_m, height / 2 + margin_m]],
         centers=[[length / 2 - overhang, 0.0, height / 2 + 0.05]],
         colors=[colour],
         radii=0.04,
-        fill_mode="solid" if who == "real" else "majorwireframe",
+        fill_mode="solid" if role == "real" else "majorwireframe",
     )
 
 

@@ -194,8 +194,8 @@ def factor_of(path: Path, field: str, column: Column) -> float:
 
 def _known_unit(path: Path, given: Column | TimeSection, valid: Collection[str]) -> str:
     if given.unit is None or given.unit not in valid:
-        told = "no unit" if given.unit is None else f"unknown unit {given.unit!r}"
-        raise LogError(f"{path}: column {given.column!r}: {told}; valid: {', '.join(valid)}")
+        problem = "no unit" if given.unit is None else f"unknown unit {given.unit!r}"
+        raise LogError(f"{path}: column {given.column!r}: {problem}; valid: {', '.join(valid)}")
     return given.unit
 
 

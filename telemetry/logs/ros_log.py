@@ -45,10 +45,12 @@ def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
     recording = mcap_recording(path)
     metadata = recording.contents.metadata
     frame, info = metadata.get(FRAME_METADATA), metadata.get(INFO_METADATA)
-    told = _Told(None if frame is None else frame["json"], None if info is None else info["json"])
+    own = _OwnMetadata(
+        None if frame is None else frame["json"], None if info is None else info["json"]
+    )
     if FORMAT_METADATA in metadata:
-        return _open_own(recording, told)
-    return open_foreign(recording, declared_of(path, declaration), frame=told.frame())
+        return _open_own(recording, own)
+    return open_foreign(recording, declared_of(path, declaration), frame=own.frame())
 
 
 def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
@@ -64,10 +66,10 @@ def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
     decode = decoder(recording, known)
     for record in recording.chosen(known, Counter()):
         texts[record.topic] = decode(record).data
-    return _open_own(recording, _Told(texts.get(FRAME_TOPIC), texts.get(INFO_TOPIC)))
+    return _open_own(recording, _OwnMetadata(texts.get(FRAME_TOPIC), texts.get(INFO_TOPIC)))
 
 
-class _Told(NamedTuple):
+class _OwnMetadata(NamedTuple):
     """What a file of ours says of itself, as JSON."""
 
     frame_json: str | None
@@ -79,9 +81,9 @@ class _Told(NamedTuple):
         return msgspec.json.decode(self.frame_json, type=LocalFrame)
 
 
-def _open_own(recording: RosRecording, told: _Told) -> Log:
+def _open_own(recording: RosRecording, own: _OwnMetadata) -> Log:
     path, contents = recording.path, recording.contents
-    frame = told.frame()
+    frame = own.frame()
     topics = {
         topic
         for topic in contents.counts
@@ -91,8 +93,8 @@ def _open_own(recording: RosRecording, told: _Told) -> Log:
     channels = sorted({topic.removeprefix(TOPIC_PREFIX).removesuffix("_json") for topic in topics})
     if not channels:
         raise LogError(f"{path}: holds no telemetry")
-    if told.info_json is not None:
-        info = msgspec.json.decode(told.info_json, type=drive.VehicleInfo)
+    if own.info_json is not None:
+        info = msgspec.json.decode(own.info_json, type=drive.VehicleInfo)
         info = msgspec.structs.replace(info, end_stamp_ns=contents.last_ns)
     else:
         info = drive.VehicleInfo(

@@ -50,11 +50,11 @@ class BagWriter:
         """Write one message; raises ValueError for what `messages_from` refuses."""
         stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if self._info is not None:
-            self._tell(INFO_TOPIC, self._info, stamp_ns)
+            self._describe(INFO_TOPIC, self._info, stamp_ns)
             self._info = None
         if self._frame is None and (origin := position_of(message)) is not None:
             self._frame = LocalFrame(origin)
-            self._tell(FRAME_TOPIC, self._frame, stamp_ns)
+            self._describe(FRAME_TOPIC, self._frame, stamp_ns)
         for topic, kind, data in messages_from(channel, message, self._frame):
             self._write(topic, kind, data, stamp_ns)
         self.counts[channel] += 1
@@ -67,14 +67,14 @@ class BagWriter:
         """Give the bag up."""
         self._writer.abort()
 
-    def _tell(self, topic: str, what: msgspec.Struct, stamp_ns: int) -> None:
+    def _describe(self, topic: str, what: msgspec.Struct, stamp_ns: int) -> None:
         data = typestore().serialize_cdr(parts.json_string(what), STRING)
         self._write(topic, STRING, bytes(data), stamp_ns)
 
     def _write(self, topic: str, kind: str, data: bytes, stamp_ns: int) -> None:
         if topic not in self._connections:
-            told = _ros1_definition(kind) if self._ros1 else _ros2_definition(kind)
-            self._connections[topic] = self._writer.add_connection(topic, kind, **told)
+            definition = _ros1_definition(kind) if self._ros1 else _ros2_definition(kind)
+            self._connections[topic] = self._writer.add_connection(topic, kind, **definition)
         if self._ros1:
             data = bytes(typestore().cdr_to_ros1(data, kind))
         self._writer.write(self._connections[topic], stamp_ns, data)

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
-from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
 from foretwin.telemetry.ros2.virtual_objects import LIVES_NS, UnfitError
@@ -94,16 +94,19 @@ class MirroredObjects:
         rear_overhang_m: float,
     ) -> RoadUser:
         ahead_m = 0.5 * length_m - rear_overhang_m
-        along = np.array([np.cos(base.yaw_rad), np.sin(base.yaw_rad)])
-        xy_m = np.array([base.x_m, base.y_m]) + ahead_m * along
-        lat_deg, lon_deg = geo_from_local(self._frame, xy_m).tolist()
-        yaw = geo_from_local_yaw(self._frame, np.array([base.yaw_rad]), xy_m[None])
+        at = geo_pose(
+            self._frame,
+            base.x_m + ahead_m * float(np.cos(base.yaw_rad)),
+            base.y_m + ahead_m * float(np.sin(base.yaw_rad)),
+            base.yaw_rad,
+            alt_m=self._alt_m,
+        )
         return RoadUser(
             user_id=user_id,
             kind=kind_by_length(length_m),
             virtual=True,
-            position=GeoPoint(lat_deg, lon_deg, self._alt_m),
-            yaw_rad=float(yaw[0]),
+            position=at.position,
+            yaw_rad=at.yaw_rad,
             speed_mps=base.speed_mps,
             length_m=length_m,
             width_m=width_m,

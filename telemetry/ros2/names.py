@@ -126,26 +126,14 @@ def qos_text(qos: QosProfile) -> str:
 
 def token(entity: Entity) -> str:
     """Return the liveliness token of an entity."""
-    parts = [
-        _TOKEN_ROOT,
-        str(entity.domain),
-        entity.session,
-        str(entity.node_id),
-        str(entity.entity_id),
-        entity.entity,
-        "%",
-        _mangled(entity.namespace),
-        entity.node,
-    ]
-    if entity.topic is not None:
-        assert entity.kind is not None
-        parts += [
-            _mangled(check_topic(entity.topic)),
-            dds_type(entity.kind),
-            entity.type_hash or type_hash(entity.kind),
-            entity.qos or qos_text(QosProfile()),
-        ]
-    return "/".join(parts)
+    at = f"{_TOKEN_ROOT}/{entity.domain}/{entity.session}/{entity.node_id}/{entity.entity_id}"
+    node = f"{at}/{entity.entity}/%/{_mangled(entity.namespace)}/{entity.node}"
+    if entity.topic is None:
+        return node
+    assert entity.kind is not None
+    topic, kind = _mangled(check_topic(entity.topic)), dds_type(entity.kind)
+    digest, qos = entity.type_hash or type_hash(entity.kind), entity.qos or qos_text(QosProfile())
+    return f"{node}/{topic}/{kind}/{digest}/{qos}"
 
 
 def _mangled(name: str) -> str:

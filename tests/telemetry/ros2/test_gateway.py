@@ -33,7 +33,7 @@ COVERS = (
     "foretwin.telemetry.ros2.inwards",
     "foretwin.telemetry.ros2.outwards",
     "foretwin.telemetry.ros2.sender",
-    "foretwin.telemetry.ros2.told",
+    "foretwin.telemetry.ros2.diagnostics",
 )
 
 S = 10**9
