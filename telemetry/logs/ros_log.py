@@ -44,9 +44,8 @@ def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
     """
     recording = mcap_recording(path)
     metadata = recording.contents.metadata
-    frame, info = metadata.get(FRAME_METADATA), metadata.get(INFO_METADATA)
     own = _OwnMetadata(
-        None if frame is None else frame["json"], None if info is None else info["json"]
+        *(metadata.get(name, {}).get("json") for name in (FRAME_METADATA, INFO_METADATA))
     )
     if FORMAT_METADATA in metadata:
         return _open_own(recording, own)

@@ -70,7 +70,7 @@ class Gateway:
         self.introduction = Introduction(mapping, self.inwards, vehicle_id=vehicle_id)
         self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id)
         self.gate = VehicleGate(
-            mapping.towards_vehicle.limits(),
+            mapping.towards_vehicle,
             config_on=mapping.towards_vehicle.enabled,
             flag_on=flag_on,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -27,6 +28,12 @@ class Mirrored(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def __bool__(self) -> bool:
         return self.own_twin or bool(self.vehicles)
+
+
+class _Size(NamedTuple):
+    length_m: float
+    width_m: float
+    rear_overhang_m: float
 
 
 class MirroredObjects:
@@ -67,33 +74,16 @@ class MirroredObjects:
     def _there(self, sample: MirrorSample) -> Iterator[RoadUser]:
         if self._wanted.own_twin and sample.role in ("all", "twin"):
             assert self._car is not None
-            yield self._user(
-                OWN_TWIN,
-                sample.twin,
-                length_m=self._car.length_m.value,
-                width_m=self._car.width_m.value,
-                rear_overhang_m=self._car.rear_overhang_m.value,
-            )
+            car = self._car
+            size = _Size(car.length_m.value, car.width_m.value, car.rear_overhang_m.value)
+            yield self._user(OWN_TWIN, sample.twin, size)
         for one in sample.others:
             if one.vehicle_id in self._wanted.vehicles and one.role in ("twin", "shadow"):
-                yield self._user(
-                    f"mirrored {one.vehicle_id}",
-                    one.shown,
-                    length_m=one.length_m,
-                    width_m=one.width_m,
-                    rear_overhang_m=one.rear_overhang_m,
-                )
+                size = _Size(one.length_m, one.width_m, one.rear_overhang_m)
+                yield self._user(f"mirrored {one.vehicle_id}", one.shown, size)
 
-    def _user(
-        self,
-        user_id: str,
-        base: PlaneState,
-        *,
-        length_m: float,
-        width_m: float,
-        rear_overhang_m: float,
-    ) -> RoadUser:
-        ahead_m = 0.5 * length_m - rear_overhang_m
+    def _user(self, user_id: str, base: PlaneState, size: _Size) -> RoadUser:
+        ahead_m = 0.5 * size.length_m - size.rear_overhang_m
         at = geo_pose(
             self._frame,
             base.x_m + ahead_m * float(np.cos(base.yaw_rad)),
@@ -103,13 +93,13 @@ class MirroredObjects:
         )
         return RoadUser(
             user_id=user_id,
-            kind=kind_by_length(length_m),
+            kind=kind_by_length(size.length_m),
             virtual=True,
             position=at.position,
             yaw_rad=at.yaw_rad,
             speed_mps=base.speed_mps,
-            length_m=length_m,
-            width_m=width_m,
+            length_m=size.length_m,
+            width_m=size.width_m,
         )
 
 

@@ -36,7 +36,7 @@ class CommandLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     def validate(self) -> CommandLimits:
         """Return self; raises ValueError naming the first limit that is not positive and finite."""
-        for name in self.__struct_fields__:
+        for name in CommandLimits.__struct_fields__:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} = {value}: positive and finite")

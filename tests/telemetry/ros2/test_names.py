@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from foretwin.telemetry.ros2.attachment import Attachment, pack, unpack
 from foretwin.telemetry.ros2.names import (
     Entity,
-    QosProfile,
     bridge_key,
     parse_rmw_key,
     qos_text,
@@ -72,7 +71,6 @@ def test_a_token_of_a_subscription() -> None:
         node="listener",
         topic="/chatter",
         kind="std_msgs/msg/String",
-        type_hash=STRING_HASH,
     )
     text = token(entity)
     assert text == (
@@ -101,9 +99,8 @@ def test_other_keys_are_no_topics(key: str) -> None:
 
 
 def test_qos_leaves_defaults_empty() -> None:
-    assert qos_text(QosProfile()) == "::,10:,:,:,,"
-    assert qos_text(QosProfile(reliable=False, depth=5)) == "2::,5:,:,:,,"
-    assert qos_text(QosProfile(transient_local=True, depth=1)) == ":1:,1:,:,:,,"
+    assert qos_text(transient_local=False) == "::,10:,:,:,,"
+    assert qos_text(transient_local=True) == ":1:,10:,:,:,,"
 
 
 def labelled(attachment: Attachment) -> bytes:
