@@ -112,8 +112,7 @@ def test_edits_between_and_beyond_junctions_change_no_id(
 
 def _without(osm: OsmMap, lat_deg: float, lon_deg: float, radius_m: float) -> OsmMap:
     """Return a map without the ways that come within a radius of a place."""
-    nodes = np.array(list(osm.locations), dtype=np.int64)
-    lat_lon = np.array(list(osm.locations.values()))
+    nodes, lat_lon = osm.locations.ids, osm.locations.lat_lon_deg
     place = local_from_geo(osm.frame, lat_deg, lon_deg)
     xy_m = local_from_geo(osm.frame, lat_lon[:, 0], lat_lon[:, 1])
     near = set(nodes[np.hypot(*(xy_m - place).T) < radius_m].tolist())

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from foretwin.world_gen.osm.map_cells import CellNodes, CellWays, pack
+from foretwin.world_gen.osm.map_cells import PackedNodes, PackedWays, pack
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 FORMAT_VERSION = 2
@@ -45,7 +45,7 @@ class TableWriter:
         )
         self._db.execute("BEGIN")
 
-    def add(self, cell: int, kind: int, content: CellWays | CellNodes | str) -> None:
+    def add(self, cell: int, kind: int, content: PackedWays | PackedNodes | str) -> None:
         """Append a piece of a cell."""
         self._db.execute("INSERT INTO piece VALUES (?, ?, ?)", (cell, kind, pack(content)))
 

@@ -13,11 +13,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.world_gen.osm.osm_map import OsmMember, OsmRelation
+from foretwin.world_gen.osm.osm_map import BoolArray, IntArray, OsmMember, OsmRelation
 
-IntArray = npt.NDArray[np.int64]
 OPL_OPTIONS = "opl,add_metadata=false"
 NO_POSITION = 2**31 - 1
 """Stands for a coordinate that the file does not give, in units of 1e-7 degrees."""
@@ -31,6 +29,16 @@ class NodePositions(NamedTuple):
     ids: IntArray
     lat_1e7: IntArray
     lon_1e7: IntArray
+
+    @staticmethod
+    def joined(parts: Iterable[NodePositions]) -> NodePositions:
+        """Return the nodes of all parts, one after the other."""
+        none = (np.empty(0, dtype=np.int64),) * 3
+        return NodePositions(*map(np.concatenate, zip(none, *parts, strict=True)))
+
+    def rows(self, which: IntArray | BoolArray) -> NodePositions:
+        """Return chosen nodes."""
+        return NodePositions(*(column[which] for column in self))
 
 
 class NodeObjects(NamedTuple):
@@ -67,26 +75,6 @@ class TagReader:
         if known is None:
             known = self._known[text] = _tags(text)
         return known
-
-
-class WantedTags(dict[str, Mapping[str, str] | None]):
-    """The tags of each T field that has one of the wanted keys, None for those that have none."""
-
-    def __init__(self, keys: Iterable[str], tags_of: TagReader) -> None:
-        super().__init__()
-        self._keys = frozenset(keys)
-        self._words = tuple(f"{key}=" for key in self._keys)
-        self._tags_of = tags_of
-
-    def __missing__(self, text: str) -> Mapping[str, str] | None:
-        found = None
-        for word in self._words:
-            if word in text:
-                tags = self._tags_of(text)
-                found = None if self._keys.isdisjoint(tags) else tags
-                break
-        self[text] = found
-        return found
 
 
 def _tags(text: str) -> dict[str, str]:

@@ -91,12 +91,10 @@ class OplStream:
         code = self._process.wait()
         for thread in self._threads:
             thread.join()
-        first, _, rest = self._said.partition(b"\n")
         if code != 0:
-            reason = (rest if first.startswith(b"{") else self._said).decode(errors="replace")
+            reason = self._said.decode(errors="replace")
             raise unreadable(self.path, RuntimeError(reason or f"decoder ended with {code}"))
-        said = json.loads(first)
-        self.header = MapHeader.of(said["generator"], said["bounds"])
+        self.header = MapHeader.of(**json.loads(self._said))
 
     def _feed(self) -> None:
         target = _pipe(self._process.stdin)

@@ -14,7 +14,6 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.provenance import Quantity
 from foretwin.world_gen.osm.driving_side import driving_side
-from foretwin.world_gen.osm.node_locations import NodeLocations
 from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
 from foretwin.world_gen.roads.road_tags import (
@@ -47,7 +46,7 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
     kept = [(way, path) for way, path in zip(ways, paths, strict=True) if len(path) >= 2]
     flat = np.fromiter(chain.from_iterable(path for _, path in kept), dtype=np.int64)
     ids, row, uses = np.unique(flat, return_inverse=True, return_counts=True)
-    lat_lon = _positions(osm, ids)
+    lat_lon = osm.locations.of(ids)
     xy_m = local_from_geo(osm.frame, lat_lon[:, 0], lat_lon[:, 1])
     edges = _edges(kept, flat.tolist(), xy_m[row], uses[row] > 1)
     at = dict(zip(ids.tolist(), xy_m.tolist(), strict=True))
@@ -69,13 +68,6 @@ def _without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
     if not any(map(operator.eq, nodes, nodes[1:])):
         return nodes
     return nodes[:1] + tuple(b for a, b in pairwise(nodes) if a != b)
-
-
-def _positions(osm: OsmMap, ids: npt.NDArray[np.int64]) -> Array:
-    """Return (N, 2) degrees of nodes."""
-    if isinstance(osm.locations, NodeLocations):
-        return osm.locations.of(ids)
-    return np.array([osm.locations[node] for node in ids.tolist()], dtype=np.float64)
 
 
 class _Meaning(NamedTuple):

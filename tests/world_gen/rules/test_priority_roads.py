@@ -8,7 +8,7 @@ import pytest
 
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.world import World
-from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.osm_map import NodeLocations, OsmMap
 from tests.world_gen.connections.test_conflicts import conflict_of
 from tests.world_gen.drawn_maps import (
     AVENUE,
@@ -228,10 +228,14 @@ def test_lanes_that_merge_let_the_straight_one_go_first():
 def test_a_circular_place_with_signs_at_its_entries_is_driven_like_a_roundabout():
     osm = roundabout()
     ring = osm.ways[10]
-    nodes = {**osm.locations, 9: local_to_geo(osm, 25.0, 0.0)}
+    node = local_to_geo(osm, 25.0, 0.0)
+    before = osm.locations
+    at = np.searchsorted(before.ids, 9)
     osm = msgspec.structs.replace(
         osm,
-        locations=nodes,
+        locations=NodeLocations(
+            np.insert(before.ids, at, 9), np.insert(before.lat_lon_deg, at, node, axis=0)
+        ),
         ways={
             **osm.ways,
             10: ring._replace(tags={**ring.tags, "junction": "circular", "oneway": "yes"}),
