@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import left_of, turn_rad
 from foretwin.geometry.polyline_batch import Polylines
 
 MIN_STEP_M = 0.25
@@ -58,8 +58,7 @@ def without_end_kinks(lines: Polylines, at_start: Flags, at_end: Flags) -> Polyl
     """
     gap, step = lines.steps
     into = np.roll(gap, 1, axis=0)
-    cross = into[:, 0] * gap[:, 1] - into[:, 1] * gap[:, 0]
-    bend = np.abs(np.arctan2(cross, (into * gap).sum(axis=1)))
+    bend = np.abs(turn_rad(into, gap))
     keep = np.ones(len(lines.xy_m), dtype=bool)
     long = np.diff(lines.first) > 2
     second, last_but_one = lines.first[:-1] + 1, lines.first[1:] - 2
@@ -101,7 +100,7 @@ def rounded_through(lines: Polylines, radius_m: Array, before: Array, after: Arr
     gap, seg = whole.steps
     u = gap / np.maximum(seg, 1e-9)[:, None]
     into = np.roll(u, 1, axis=0)
-    bend = np.arctan2(into[:, 0] * u[:, 1] - into[:, 1] * u[:, 0], (into * u).sum(axis=1))
+    bend = turn_rad(into, u)
     bend[first[:-1]] = bend[first[1:] - 1] = 0.0
     angle = np.abs(bend)
     head, tail = first[:-1][on_before] + 1, first[1:][on_after] - 2

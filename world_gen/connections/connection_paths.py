@@ -7,7 +7,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.bends import rounded_through
-from foretwin.geometry.polyline import offset, without_repeats
+from foretwin.geometry.polyline import cross, offset, without_repeats
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.geometry.turn_curves import turn_curves
@@ -88,10 +88,9 @@ def _tightest_m(paths: list[Array]) -> Array:
     before, after = np.roll(step, 1, axis=0), step
     both = before + after
     product = np.roll(length, 1) * length * np.hypot(both[:, 0], both[:, 1])
-    cross = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
     inside = ~lines.is_last
     inside[lines.first[:-1]] = False
-    bent = np.where(inside, 2.0 * cross / np.maximum(product, 1e-12), 0.0)
+    bent = np.where(inside, 2.0 * np.abs(cross(before, after)) / np.maximum(product, 1e-12), 0.0)
     return np.asarray(1.0 / np.maximum(np.maximum.reduceat(bent, lines.first[:-1]), 1e-9))
 
 

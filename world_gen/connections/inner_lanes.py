@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import length, offset, points_at, without_repeats
+from foretwin.geometry.polyline import length, offset, points_at, turn_rad, without_repeats
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.geometry.turn_curves import turn_curves
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
@@ -129,6 +129,4 @@ def _unit(vector: Array) -> Array:
 
 def _turned_rad(line: Array) -> float:
     step = np.diff(line, axis=0)
-    a, b = step[:-1], step[1:]
-    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return float(np.abs(np.arctan2(cross, (a * b).sum(axis=1))).sum())
+    return float(np.abs(turn_rad(step[:-1], step[1:])).sum())

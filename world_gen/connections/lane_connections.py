@@ -8,7 +8,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Connection, DrivingSide, LineControl, Turn
-from foretwin.geometry.polyline import unit
+from foretwin.geometry.polyline import cross, left_of, unit
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.world_gen.connections.forks import beside_at_fork, merged_ends, merges
 from foretwin.world_gen.connections.movements import Movement
@@ -234,13 +234,9 @@ def _wide_enough(start: LaneDraft, ends: list[LaneDraft]) -> LaneDraft:
     cars = [lane for lane in ends if lane.kind == "driving"] or ends
     at = start.centerline[-1]
     ahead = unit(at - start.centerline[-2])
-    aside = [abs(_cross(ahead, lane.centerline[0] - at)) for lane in cars]
+    aside = [abs(cross(ahead, lane.centerline[0] - at)) for lane in cars]
     wide = [lane for lane, gap in zip(cars, aside, strict=True) if gap >= 2.0 * LEAST_RADIUS_M]
     return wide[0] if wide else cars[-1]
-
-
-def _cross(a: Array, b: Array) -> float:
-    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def _pairs_by_position(
@@ -248,7 +244,7 @@ def _pairs_by_position(
 ) -> list[tuple[LaneDraft, LaneDraft]]:
     """Pair each lane with the one ahead of it; where a road widens every new lane is reached."""
     ahead = unit(ends[0].centerline[1] - ends[0].centerline[0])
-    side = np.array([-ahead[1], ahead[0]])
+    side = left_of(ahead)
     at_start = np.array([lane.centerline[-1] @ side for lane in starts])
     at_end = np.array([lane.centerline[0] @ side for lane in ends])
     gaps = np.abs(at_start[:, None] - at_end[None, :])

@@ -10,7 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Choice
 from foretwin.contracts.world import LineControl, StopLine
 from foretwin.geometry.polyline import left_of
-from foretwin.geometry.polyline_batch import Polylines
+from foretwin.geometry.polyline_batch import Polylines, segments_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
@@ -93,10 +93,7 @@ def lines_at_signs(
 def _ends_across(paths: Polylines, at_m: Array, width_m: Sequence[float]) -> Array:
     """Return (L, 2, 2) the ends, left and right, of a line across each of L paths at `at_m`."""
     half_m = np.array(width_m) / 2.0
-    # A key that grows along each lane and from lane to lane finds all segments in one search.
-    room = np.concatenate([[0.0], np.cumsum(paths.length_m + 1.0)])
-    i = np.searchsorted(paths.arc_m + room[paths.line], at_m + room[:-1], side="right") - 1
-    i = np.clip(i, paths.first[:-1], paths.first[1:] - 2)
+    i = segments_at(paths, np.arange(len(paths)), at_m)
     ahead = paths.steps[0][i] / np.maximum(paths.steps[1][i], 1e-9)[:, None]
     centre = paths.xy_m[i] + ahead * (at_m - paths.arc_m[i])[:, None]
     left = left_of(ahead) * half_m[:, None]
