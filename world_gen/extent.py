@@ -70,7 +70,7 @@ class Rectangle(msgspec.Struct, frozen=True):
         )
 
     @property
-    def bounds_m(self) -> tuple[float, float, float, float] | None:
+    def bounds_m(self) -> tuple[float, float, float, float]:
         """West, south, east and north."""
         return (self.west_m, self.south_m, self.east_m, self.north_m)
 
@@ -91,12 +91,7 @@ class Rectangle(msgspec.Struct, frozen=True):
         """Return arc lengths at which a polyline (N, 2) meets the lines of the edge."""
         s = arc_lengths(xy_m)
         found: list[float] = []
-        for axis, level in (
-            (0, self.west_m),
-            (0, self.east_m),
-            (1, self.south_m),
-            (1, self.north_m),
-        ):
+        for axis, level in zip((0, 1, 0, 1), self.bounds_m, strict=True):
             gap = xy_m[:, axis] - level
             for i in np.nonzero(gap[:-1] * gap[1:] < 0.0)[0]:
                 share = gap[i] / (gap[i] - gap[i + 1])

@@ -53,9 +53,8 @@ def merged_ends(
     at = merging.index(movement)
     spare = len(ends) - sum(counts)
     if spare > 0:
-        counts[max(range(len(counts)), key=lambda i: (counts[i], -abs(merging[i].angle_rad)))] += (
-            spare
-        )
+        most = max(range(len(counts)), key=lambda i: (counts[i], -abs(merging[i].angle_rad)))
+        counts[most] += spare
     if spare >= 0:
         first = sum(counts[:at])
         return ends[first : first + counts[at]]

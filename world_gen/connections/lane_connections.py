@@ -162,26 +162,21 @@ def _starting_lanes(
     turn = movement.turn
     far: Turn = "left" if driving_side == "right" else "right"
     cars = [lane for lane in starts if lane.kind == "driving"] or starts
-    if any(lane.plan.turns_source == "tagged" for lane in starts):
-        wanted = {turn, far} if turn == "u_turn" else {turn}
-        fits = [
-            lane
-            for lane in starts
-            if wanted & set(lane.plan.turns) or (lane.plan.turns_source != "tagged")
-        ]
-        if turn == "u_turn":
-            return _outermost(fits, far)
-        if turn == "straight":
-            return fits
-        # Lanes without an arrow go straight on; beside a tagged lane those turn that have room.
+    fits, named = cars, 1
+    tagged = any(lane.plan.turns_source == "tagged" for lane in starts)
+    if tagged:
+        meant = {turn, far} if turn == "u_turn" else {turn}
+        silent = [lane.plan.turns_source != "tagged" for lane in starts]
+        fits = [n for n, ok in zip(starts, silent, strict=True) if ok or meant & set(n.plan.turns)]
         named = sum(lane.plan.turns_source == "tagged" for lane in fits)
-        return _outermost(
-            fits, turn, max(named, min(room, len(cars) + 1 - beside) if beside else 1)
-        )
     if turn == "u_turn":
-        return _outermost(cars, far)
+        return _outermost(fits, far)
     if turn != "straight":
-        return _outermost(cars, turn, max(1, min(room, len(cars) + 1 - beside) if beside else 1))
+        # Lanes without an arrow go straight on; beside a tagged lane those turn that have room.
+        with_room = min(room, len(cars) + 1 - beside) if beside else 1
+        return _outermost(fits, turn, max(named, with_room))
+    if tagged:
+        return fits
     have = {m.turn for m in ways}
     straight = list(starts)
     # The lane on the far side, from which drivers turn across the road, is the first to be lost.
@@ -215,10 +210,8 @@ def _pairs(
             *_pairs(buses, reserved, turn, driving_side, only_way),
         ]
     if turn == "u_turn":
-        return [
-            (lane, _wide_enough(lane, ends[:: 1 if driving_side == "right" else -1]))
-            for lane in starts
-        ]
+        from_inside = ends if driving_side == "right" else ends[::-1]
+        return [(lane, _wide_enough(lane, from_inside)) for lane in starts]
     if any(lane.kind != "bus" for lane in starts):
         ends = [lane for lane in ends if lane.kind == "driving"] or ends
     from_right = turn == "right" or (turn == "straight" and driving_side == "left")

@@ -195,7 +195,7 @@ class _Walk:
                 names.append(edge.name)
             marked = marked or not self._stops.isdisjoint(edge.node_ids)
         there = self._chain(edges, x_m, y_m, sum(lengths_m), names[0] if names else "", marked)
-        against = [DirectedEdge(edge, not reverse) for edge, reverse in reversed(edges)]
+        against = [item.back for item in reversed(edges)]
         lengths_m.reverse()
         name = names[-1] if names else ""
         back = self._chain(against, x_m[::-1], y_m[::-1], sum(lengths_m), name, marked)
@@ -210,15 +210,12 @@ class _Walk:
         name: str,
         marked: bool,
     ) -> Chain:
-        first, first_reverse = edges[0]
-        last, last_reverse = edges[-1]
-        outward, inward = first.forward, first.backward
-        if first_reverse:
-            outward, inward = inward, outward
-        a, b = first.index, last.index
+        first, last = edges[0], edges[-1]
+        outward, inward = first.allowed, first.back.allowed
+        a, b = first.edge.index, last.edge.index
         return Chain(
-            first.end_node if first_reverse else first.start_node,
-            last.start_node if last_reverse else last.end_node,
+            first.start_node,
+            last.end_node,
             tuple(edges),
             x_m,
             y_m,
@@ -234,11 +231,7 @@ class _Walk:
     def _marks(
         self, edges: list[DirectedEdge], x_m: array[float], y_m: array[float]
     ) -> Iterator[Mark]:
-        ids = [
-            node
-            for edge, reverse in edges
-            for node in (edge.node_ids[::-1] if reverse else edge.node_ids)
-        ]
+        ids = [node for item in edges for node in item.node_ids]
         along_m = 0.0
         x0, y0 = x_m[0], y_m[0]
         for node, x, y in zip(ids, x_m, y_m, strict=True):

@@ -25,11 +25,8 @@ def lights_of(
     found = {node for node in core if node in node_tags and _is_light(node_tags[node], 0.0)}
     found.update(mark.node for chain in inside for mark in chain.marks if _is_light(mark.tags, 0.0))
     for chain in incoming:
-        if not chain.marks:
-            continue
-        for mark in facing(chain, SIGNALS_WITHIN_M, "traffic_signals"):
-            if _is_light(mark.tags, mark.distance_m):
-                found.add(mark.node)
+        met = facing(chain, SIGNALS_WITHIN_M, "traffic_signals")
+        found.update(mark.node for mark in met if _is_light(mark.tags, mark.distance_m))
     return frozenset(found)
 
 
@@ -55,23 +52,21 @@ def control_of(
     inner += [mark.tags for chain in inside for mark in chain.marks]
     if not inner and all(not chain.marks for chain in incoming):
         return "uncontrolled"
-    stops = [_sign(chain, "stop") for chain in incoming]
-    all_way = any(
-        tags.get("highway") == "stop" and tags.get("stop") == "all" for tags in inner
-    ) or any(tags.get("stop") == "all" for tags in stops if tags is not None)
-    if all_way or (len(incoming) >= 3 and all(tags is not None for tags in stops)):
+    stops = [tags for chain in incoming if (tags := _sign(chain, "stop")) is not None]
+    inner_stops = [tags for tags in inner if tags.get("highway") == "stop"]
+    all_way = any(tags.get("stop") == "all" for tags in (*inner_stops, *stops))
+    if all_way or len(stops) == len(incoming) >= 3:
         return "all_way_stop"
-    at_inner = {tags.get("highway") for tags in inner}
-    if "stop" in at_inner or any(tags is not None for tags in stops):
+    if inner_stops or stops:
         return "stop"
-    if "give_way" in at_inner or any(_sign(chain, "give_way") is not None for chain in incoming):
+    if any(tags.get("highway") == "give_way" for tags in inner) or any(
+        _sign(chain, "give_way") is not None for chain in incoming
+    ):
         return "give_way"
     return "uncontrolled"
 
 
 def _sign(chain: Chain, word: str) -> Tags | None:
-    if not chain.marks:
-        return None
     return next((mark.tags for mark in facing(chain, SIGNS_WITHIN_M, word)), None)
 
 

@@ -83,10 +83,9 @@ def surroundings(
     area = in_map(extent, frame, graph.frame)
     wanted = set(index.car_edges_in(area))
     for junction in made_for:
-        wanted.update(i for i in junction.inner if _drivable(graph.edges[i]))
-        wanted.update(
-            leg.edge.index for arm in junction.arms for leg in arm.outward if _drivable(leg.edge)
-        )
+        legs = (leg.edge for arm in junction.arms for leg in arm.outward)
+        near = (*(graph.edges[i] for i in junction.inner), *legs)
+        wanted.update(edge.index for edge in near if edge.drivable)
     edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
     sections = _sections(index, edges)
     clusters = _clusters(index, made_for, edges, extent)
@@ -94,7 +93,7 @@ def surroundings(
     inner = {i for junction in whole.values() for i in junction.inner}
     ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
     shifts = transition_shifts(clusters, edges, sections)
-    heads = {(leg.edge.index, leg.reverse): heading_out(leg) for c in clusters for leg in c.legs}
+    heads = {leg.key: heading_out(leg) for c in clusters for leg in c.legs}
     return Surroundings(
         frame=frame,
         junctions=tuple(whole.values()),
@@ -109,10 +108,6 @@ def surroundings(
         ring_edges=ring_edges,
         notes=restriction_notes(index.restrictions, [c.inner for c in clusters], edges),
     )
-
-
-def _drivable(edge: RoadEdge) -> bool:
-    return edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
 
 
 _SAY_NOTHING_OF_LANES = frozenset(
@@ -230,7 +225,7 @@ def _clusters(
 def _drawn(junction: Junction, edges: Mapping[int, RoadEdge]) -> bool:
     """Return whether all roads of a junction that cars may use are among `edges`."""
     legs = (leg.edge for arm in junction.arms for leg in arm.outward)
-    return all(edge.index in edges for edge in legs if _drivable(edge))
+    return all(edge.index in edges for edge in legs if edge.drivable)
 
 
 def _groups_of(

@@ -18,6 +18,7 @@ from foretwin.world_gen.lanes.cross_section import CrossSection, LanePlan
 from foretwin.world_gen.lanes.places import places_led_through, without_dead_places
 from foretwin.world_gen.lanes.reference_lines import Stretch, reference_lines
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.road_tags import in_tunnel, on_bridge
 
 Role = Literal["approach", "exit", "ring", "other"]
 
@@ -86,23 +87,19 @@ class LaneSet(msgspec.Struct, frozen=True):
 
     def ending(self, toward: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
         """Return the lane of a plan that ends where `toward` ends; None where it was left out."""
-        return self.ends.get((toward.edge.index, toward.reverse, plan.number))
+        return self.ends.get((*toward.key, plan.number))
 
     def beginning(self, away: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
         """Return the lane of a plan that begins where `away` begins; None where it was left out."""
-        return self.begins.get((away.edge.index, away.reverse, plan.number))
+        return self.begins.get((*away.key, plan.number))
 
     def incoming(self, toward: DirectedEdge, plans: tuple[LanePlan, ...]) -> list[LaneDraft]:
         """Return the lanes that end where `toward` ends, from the left."""
-        index, reverse = toward.edge.index, toward.reverse
-        found = [self.ends.get((index, reverse, plan.number)) for plan in plans]
-        return [lane for lane in found if lane is not None]
+        return [lane for plan in plans if (lane := self.ending(toward, plan)) is not None]
 
     def outgoing(self, away: DirectedEdge, plans: tuple[LanePlan, ...]) -> list[LaneDraft]:
         """Return the lanes that begin where `away` begins, from the left."""
-        index, reverse = away.edge.index, away.reverse
-        found = [self.begins.get((index, reverse, plan.number)) for plan in plans]
-        return [lane for lane in found if lane is not None]
+        return [lane for plan in plans if (lane := self.beginning(away, plan)) is not None]
 
 
 def build_lanes(around: Surroundings) -> LaneSet:
@@ -115,11 +112,7 @@ def build_lanes(around: Surroundings) -> LaneSet:
     lines = Polylines.of([stretch.line for stretch in stretches])
     references = iter(Polylines(np.round(lines.xy_m, 3), lines.first).split())
     curves = iter(_offsets(lines, stretches, sections))
-    legs = {
-        (leg.edge.index, leg.reverse): (cluster.key, leg)
-        for cluster in around.clusters
-        for leg in cluster.legs
-    }
+    legs = {leg.key: (cluster.key, leg) for cluster in around.clusters for leg in cluster.legs}
     places = {key: place for key, (place, _) in legs.items()}
     lanes: dict[str, LaneDraft] = {}
     roads: list[Road] = []
@@ -165,8 +158,8 @@ def build_lanes(around: Surroundings) -> LaneSet:
                 from_place=places.get((index, False)) if stretch.first else None,
                 to_place=places.get((index, True)) if stretch.last else None,
                 layer=edge.layer,
-                bridge=edge.tags.get("bridge", "no") != "no",
-                tunnel=edge.tags.get("tunnel", "no") not in ("no", "building_passage"),
+                bridge=on_bridge(edge.tags),
+                tunnel=in_tunnel(edge.tags),
             )
         )
     led_through = places_led_through(
@@ -179,14 +172,8 @@ def build_lanes(around: Surroundings) -> LaneSet:
 
 
 def _lane_count_source(edge: RoadEdge) -> Provenance:
-    counts = [
-        count.source
-        for count, driven in (
-            (edge.lanes_forward, edge.forward),
-            (edge.lanes_backward, edge.backward),
-        )
-        if driven
-    ]
+    sides = (edge.lanes_forward, edge.forward), (edge.lanes_backward, edge.backward)
+    counts = [count.source for count, driven in sides if driven]
     return next((s for s in ("default", "inferred") if s in counts), "tagged")
 
 
@@ -254,12 +241,10 @@ def _join_neighbours(mine: list[LaneDraft]) -> None:
 
 def join_straight_on(cluster: Cluster, around: Surroundings, lanes: LaneSet) -> bool:
     """Join lanes that meet exactly where one road goes on; false where they do not."""
-    if not cluster.plain or any(
-        around.trims_m[leg.edge.index, leg.reverse] for leg in cluster.legs
-    ):
+    if not cluster.plain or any(around.trims_m[leg.key] for leg in cluster.legs):
         return False
     for leg, other in (cluster.legs, cluster.legs[::-1]):
-        toward = DirectedEdge(leg.edge, not leg.reverse)
+        toward = leg.back
         before, behind = around.section(leg), around.section(other)
         # Plans are paired, not lanes: a lane too short to be drawn must not shift its neighbours.
         for mine, its in (

@@ -50,9 +50,7 @@ def dot(a: tuple[float, float], b: tuple[float, float]) -> float:
 
 def opposed(leg: DirectedEdge, other: DirectedEdge) -> bool:
     """Return whether two one-way roads leave a place side by side, as carriageways of a street."""
-    if leg.edge.index == other.edge.index or any(
-        d.edge.forward == d.edge.backward for d in (leg, other)
-    ):
+    if leg.edge.index == other.edge.index or not (leg.edge.one_way and other.edge.one_way):
         return False
     return any(
         dot(heading_out(leg, look_m), heading_out(other, look_m)) > _BESIDE_COS

@@ -58,7 +58,7 @@ def _of_side(
     bus_width_m: float,
 ) -> list[LanePlan]:
     tags = edge.tags
-    one_way = edge.forward != edge.backward
+    one_way = edge.one_way
     kerb_of_forward = side == driving_side
     # Along a one-way street both kerbs belong to its direction.
     reverse = edge.backward if one_way else not kerb_of_forward

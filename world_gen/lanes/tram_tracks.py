@@ -14,7 +14,7 @@ from foretwin.world_gen.extent import stretches_inside
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.beside_roads import BesideRoads, in_frame
-from foretwin.world_gen.roads.road_tags import road_layer, speed_limit
+from foretwin.world_gen.roads.road_tags import in_tunnel, on_bridge, road_layer, speed_limit
 
 TRAM_WIDTH_M = 2.65
 """Width of a usual tram (BOStrab: no wider)."""
@@ -95,7 +95,7 @@ def _lay(
             right_m=-TRAM_WIDTH_M / 2,
             lane_ids=(f"{road}.f0",),
             layer=road_layer(tags),
-            bridge=tags.get("bridge", "no") != "no",
-            tunnel=tags.get("tunnel", "no") not in ("no", "building_passage"),
+            bridge=on_bridge(tags),
+            tunnel=in_tunnel(tags),
         )
     )

@@ -72,7 +72,7 @@ def trims(
             else:
                 values = np.maximum(areas[cluster.key], turning[k])
             for leg, value in zip(cluster.legs, values.tolist(), strict=True):
-                found[leg.edge.index, leg.reverse] = min(value, MAX_TRIM_M)
+                found[leg.key] = min(value, MAX_TRIM_M)
     for index, edge in edges.items():
         start, end = found.get((index, False), 0.0), found.get((index, True), 0.0)
         room = 0.8 * edge.length_m
@@ -90,10 +90,8 @@ def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection], head
     into = [s.reach_m(not leg.reverse) for s, leg in zip(mine, legs, strict=True)]
     out = [s.reach_m(leg.reverse) for s, leg in zip(mine, legs, strict=True)]
     return _Legs(
-        heads=np.array([heads[leg.edge.index, leg.reverse] for leg in legs]).reshape(*shape, 2),
-        starts_m=np.array([leg.edge.xy_m[-1 if leg.reverse else 0] for leg in legs]).reshape(
-            *shape, 2
-        ),
+        heads=np.array([heads[leg.key] for leg in legs]).reshape(*shape, 2),
+        starts_m=np.array([leg.xy_m[0] for leg in legs]).reshape(*shape, 2),
         half_m=np.array([section.half_width_m for section in mine]).reshape(shape),
         into_m=np.array(into).reshape(*shape, 2),
         out_m=np.array(out).reshape(*shape, 2),
@@ -227,12 +225,5 @@ def _overlaps(
     each = np.searchsorted(part, np.arange(len(parts)))
     first_m, last_m = np.minimum.reduceat(at_m, each), np.maximum.reduceat(at_m, each)
     order = np.lexsort((first_m, leg))
-    return list(
-        zip(
-            leg[order].tolist(),
-            near_m[order].tolist(),
-            first_m[order].tolist(),
-            last_m[order].tolist(),
-            strict=True,
-        )
-    )
+    columns = (column[order].tolist() for column in (leg, near_m, first_m, last_m))
+    return list(zip(*columns, strict=True))

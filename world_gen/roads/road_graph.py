@@ -39,12 +39,32 @@ class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     layer: int
     tags: Mapping[str, str]
 
+    @property
+    def one_way(self) -> bool:
+        """Whether cars may drive it one way round alone."""
+        return self.forward != self.backward
+
+    @property
+    def drivable(self) -> bool:
+        """Whether it is a road for cars that is open to them and no mere point."""
+        return self.car and (self.forward or self.backward) and self.length_m > 0.05
+
 
 class DirectedEdge(NamedTuple):
     """An edge with the direction in which it is driven."""
 
     edge: RoadEdge
     reverse: bool
+
+    @property
+    def key(self) -> tuple[int, bool]:
+        """(edge index, reverse): what stands for it in tables."""
+        return self.edge.index, self.reverse
+
+    @property
+    def back(self) -> DirectedEdge:
+        """The same edge in the other direction."""
+        return DirectedEdge(self.edge, not self.reverse)
 
     @property
     def start_node(self) -> int:
@@ -60,6 +80,11 @@ class DirectedEdge(NamedTuple):
     def xy_m(self) -> Array:
         """Geometry (N, 2) in driving order."""
         return self.edge.xy_m[::-1] if self.reverse else self.edge.xy_m
+
+    @property
+    def node_ids(self) -> tuple[int, ...]:
+        """OSM ids of the nodes (N,) in driving order."""
+        return self.edge.node_ids[::-1] if self.reverse else self.edge.node_ids
 
     @property
     def allowed(self) -> bool:

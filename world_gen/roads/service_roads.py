@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import msgspec
 
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.roads.road_tags import ONEWAY
 
 
 def with_service_roads(graph: RoadGraph) -> RoadGraph:
@@ -50,6 +51,5 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
 def _opened(edge: RoadEdge) -> RoadEdge:
     if edge.forward or edge.backward:
         return msgspec.structs.replace(edge, car=True)
-    against = edge.tags.get("oneway") in ("-1", "reverse")
-    along = edge.tags.get("oneway") in ("yes", "true", "1")
-    return msgspec.structs.replace(edge, car=True, forward=not against, backward=not along)
+    forward, backward = ONEWAY.get(edge.tags.get("oneway", ""), (True, True))
+    return msgspec.structs.replace(edge, car=True, forward=forward, backward=backward)

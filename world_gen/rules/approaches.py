@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 import msgspec
 
@@ -74,10 +75,10 @@ class Approach(msgspec.Struct, kw_only=True):
     @property
     def key(self) -> tuple[int, bool]:
         """(edge index, reverse) of the road as it is driven toward the junction."""
-        return self.toward.edge.index, self.toward.reverse
+        return self.toward.key
 
 
-class _ApproachDraft(msgspec.Struct, frozen=True, kw_only=True):
+class _ApproachDraft(NamedTuple):
     """What is known of an approach before the junction's roads are compared."""
 
     cluster: Cluster
@@ -107,15 +108,11 @@ def approaches(
     for connection in connections:
         if connection.cluster.whole and connection.movement.inside:
             toward = connection.movement.toward
-            met = inside.setdefault((toward.edge.index, toward.reverse), [])
+            met = inside.setdefault(toward.key, [])
             met.extend(lights_inside(connection.movement.inside, node_tags))
     shared = shared_signs(connections, signs, around.driving_side)
-    plain_from = {
-        leg.start_node: cluster
-        for cluster in around.clusters
-        if cluster.plain
-        for leg in cluster.legs
-    }
+    plain = [cluster for cluster in around.clusters if cluster.plain]
+    plain_from = {leg.start_node: cluster for cluster in plain for leg in cluster.legs}
     whole = {id(junction) for junction in around.junctions}
     drafts: dict[str, list[_ApproachDraft]] = {}
     behind: dict[str, list[tuple[int, DirectedEdge]]] = {}
@@ -125,7 +122,7 @@ def approaches(
             continue
         signalled = cluster.whole and not cluster.ring and junction.summary.control == "signals"
         for leg in cluster.legs:
-            toward = DirectedEdge(leg.edge, not leg.reverse)
+            toward = leg.back
             if not toward.allowed:
                 passed_out = lights_behind(leg, node_tags, LIGHT_NEAR_M) if signalled else []
                 lights_out = [(n, leg) for n in passed_out if n not in junction_lights]
@@ -140,7 +137,7 @@ def approaches(
             sign = own_sign(met, toward, cluster, around.edges)
             if (on_ring and not lights) or (past_ring and sign is None):
                 continue
-            passed = inside.get((toward.edge.index, toward.reverse), [])
+            passed = inside.get(toward.key, [])
             lights = lights or passed
             if signalled and not lights:
                 # A light on a crossing that the finder took for one of walkers alone.
@@ -152,14 +149,7 @@ def approaches(
                     and m.node not in junction_lights
                 ]
             drafts.setdefault(junction.summary.id, []).append(
-                _ApproachDraft(
-                    cluster=cluster,
-                    toward=toward,
-                    met=met,
-                    lights=lights,
-                    sign=sign,
-                    sign_inside=shared.get((toward.edge.index, toward.reverse)),
-                )
+                _ApproachDraft(cluster, toward, met, lights, sign, shared.get(toward.key))
             )
     found: list[Approach] = []
     for items in drafts.values():
@@ -235,7 +225,7 @@ def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approa
             standing = Standing(Rank.MINOR, "roundabout", source)  # type: ignore[arg-type]
         approach = _approach(d, standing, control == "signals", lights_for_all)
         if ahead is not None:
-            approach.opposite = (ahead.edge.index, ahead.reverse)
+            approach.opposite = ahead.key
         found.append(approach)
     return found
 

@@ -126,8 +126,7 @@ def lights_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[M
     """Return the lights met between a junction's nodes, in driving order."""
     found = []
     for part in inside:
-        nodes = part.edge.node_ids[::-1] if part.reverse else part.edge.node_ids
-        for node in nodes:
+        for node in part.node_ids:
             tags = node_tags.get(node)
             # Who drives along the nodes meets what faces forward.
             if tags and is_light(tags) and faces(tags, not part.reverse) is not False:
@@ -137,11 +136,9 @@ def lights_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[M
 
 def lights_behind(leg: DirectedEdge, node_tags: NodeTags, within_m: float) -> list[int]:
     """Return the lights on a road out of a junction, no farther than `within_m` from it."""
-    nodes = leg.edge.node_ids[::-1] if leg.reverse else leg.edge.node_ids
-    along = arc_lengths(leg.xy_m)
     return [
         node
-        for node, at in zip(nodes, along, strict=False)
+        for node, at in zip(leg.node_ids, arc_lengths(leg.xy_m), strict=False)
         if is_light(node_tags.get(node, {})) and 0.1 < at <= within_m
     ]
 

@@ -87,8 +87,7 @@ def _control(
     by_road = {approach.key: approach for approach in found}
     for c in connections:
         c.control = controls.get(c.start.id, "none")
-        toward = c.movement.toward
-        approach = by_road.get((toward.edge.index, toward.reverse))
+        approach = by_road.get(c.movement.toward.key)
         if approach is None or not c.movement.inside:
             continue
         sign = next((sign.rule for sign in signs.get(c.id, ())), None)

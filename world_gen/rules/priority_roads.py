@@ -65,7 +65,7 @@ def opposites(
     """
     # A junction has few roads: plain floats are faster here than arrays.
     out = [outward(road) for road in roads]
-    out_only = [leg for leg in legs if not DirectedEdge(leg.edge, not leg.reverse).allowed]
+    out_only = [leg for leg in legs if not leg.back.allowed]
     ways_out = [heading_out(leg, LOOK_M) for leg in out_only]
     found: list[tuple[int | None, bool]] = []
     for x, y in out:
@@ -79,7 +79,7 @@ def opposites(
 
 def outward(toward: DirectedEdge) -> tuple[float, float]:
     """Return the unit direction in which a road in leaves the junction."""
-    return heading_out(DirectedEdge(toward.edge, not toward.reverse), LOOK_M)
+    return heading_out(toward.back, LOOK_M)
 
 
 def importance(edge: RoadEdge) -> float:

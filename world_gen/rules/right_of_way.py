@@ -164,7 +164,7 @@ def _ways(
     ways = []
     for c, heading, exit_heading, bend_rad, length_m in rows:
         toward = c.movement.toward
-        mine = by_road.get((toward.edge.index, toward.reverse))
+        mine = by_road.get(toward.key)
         junction = c.cluster.junction
         name = junction.summary.id if junction is not None else ""
         kind = junction.summary.kind if junction is not None else "other"
@@ -177,7 +177,7 @@ def _ways(
                 heading=heading,
                 bend_rad=bend_rad,
                 length_m=length_m,
-                road=(toward.edge.index, toward.reverse),
+                road=toward.key,
                 opposite=None if mine is None else mine.opposite,
                 on_ring=c.start.role == "ring",
                 standing=plain if mine is None or mine.signed_inside else mine.standing,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import compress
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts.signals import SignalGroup
 from foretwin.contracts.world import Crossing
@@ -114,31 +115,15 @@ def walk_groups(
     for group in groups:
         by_junction.setdefault(group.approach.junction_id, []).append(group)
     for name, mine in by_junction.items():
-        against: dict[int, set[str]] = {}
-        for cluster in around.clusters:
-            if cluster.junction is None or cluster.junction.summary.id != name:
-                continue
-            for leg in cluster.legs:
-                nodes = leg.edge.node_ids[::-1] if leg.reverse else leg.edge.node_ids
-                for node in nodes:
-                    if node in lit:
-                        at = leg.edge.xy_m[leg.edge.node_ids.index(node)]
-                        if math.hypot(*(at - leg.xy_m[0])) <= CROSSING_WITHIN_M:
-                            against.setdefault(node, set())
-            for index in sorted(cluster.inner):
-                edge = around.edges.get(index)
-                for node in edge.node_ids if edge is not None else ():
-                    if node in lit:
-                        against.setdefault(node, set())
+        signalled = lit.keys() & set(_nodes_at(name, around))
+        against: dict[int, set[str]] = {node: set() for node in signalled}
         for group in mine:
             for c in group.connections:
                 way = [c.movement.toward, *c.movement.inside]
                 if c.turn == "straight":
                     way.append(c.movement.away)
-                for part in way:
-                    for node in part.edge.node_ids:
-                        if node in against:
-                            against[node].add(group.id)
+                for node in against.keys() & {node for part in way for node in part.edge.node_ids}:
+                    against[node].add(group.id)
         found[name] = [
             WalkGroup(
                 id=f"{name}:g{len(mine) + i}", crossing=lit[node], against=frozenset(against[node])
@@ -146,3 +131,15 @@ def walk_groups(
             for i, node in enumerate(sorted(against))
         ]
     return found
+
+
+def _nodes_at(junction_id: str, around: Surroundings) -> Iterator[int]:
+    """Yield the nodes of the roads in a junction, and those of its legs that are near."""
+    for cluster in around.clusters:
+        if cluster.junction is None or cluster.junction.summary.id != junction_id:
+            continue
+        for leg in cluster.legs:
+            away_m = np.hypot(*(leg.xy_m - leg.xy_m[0]).T)
+            yield from compress(leg.node_ids, away_m <= CROSSING_WITHIN_M)
+        for index in cluster.inner & around.edges.keys():
+            yield from around.edges[index].node_ids

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -120,12 +121,7 @@ def _plan(
 
 def _within(groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]) -> list[Between]:
     names = sorted(group.id for group in groups)
-    return [
-        found
-        for i, a in enumerate(names)
-        for b in names[i + 1 :]
-        if (found := pairs.get((a, b))) is not None
-    ]
+    return [pairs[pair] for pair in combinations(names, 2) if pair in pairs]
 
 
 def _phases(

@@ -75,7 +75,7 @@ def shared_signs(
     for c in connections:
         if not c.cluster.whole or c.turn == "u_turn":
             continue
-        road = c.movement.toward.edge.index, c.movement.toward.reverse
+        road = c.movement.toward.key
         mine = {sign.node: sign for sign in signs.get(c.id, ())}
         known = passed.get(road)
         passed[road] = mine if known is None else {n: s for n, s in known.items() if n in mine}
@@ -119,16 +119,14 @@ def _met(
         first, last = run[0].start_node, run[-1].end_node
         gone_m = 0.0
         for part in run:
-            xy_m = part.xy_m
-            nodes = part.edge.node_ids[::-1] if part.reverse else part.edge.node_ids
-            along_m = arc_lengths(xy_m)
-            for node, place_m, at_m in zip(nodes, xy_m, (gone_m + along_m).tolist(), strict=True):
+            along_m = arc_lengths(part.xy_m)
+            rows = zip(part.node_ids, part.xy_m, (gone_m + along_m).tolist(), strict=True)
+            for node, place_m, at_m in rows:
                 if node not in node_tags or not sign_of(node_tags[node]):
                     continue
                 facing = faces(node_tags[node], not part.reverse)
                 if facing is None and node not in (first, last):
-                    one_way = part.edge.forward != part.edge.backward
-                    facing = one_way or at_m >= total_m / 2.0
+                    facing = part.edge.one_way or at_m >= total_m / 2.0
                 if facing:
                     yield node, part, place_m
             gone_m += float(along_m[-1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def _line_back_m(approach: Approach, around: Surroundings) -> float:
     """Return how far before the ends of its lanes an approach's line lies."""
     if approach.line_m is None:
         return LINE_SETBACK_M
-    trim = around.trims_m.get((approach.toward.edge.index, not approach.toward.reverse), 0.0)
+    trim = around.trims_m.get(approach.toward.back.key, 0.0)
     return max(LINE_SETBACK_M, approach.line_m - trim)
 
 
@@ -102,10 +103,4 @@ def _ends_across(paths: Polylines, at_m: Array, width_m: Sequence[float]) -> Arr
 
 def line_controls(lines: Sequence[StopLine]) -> dict[str, LineControl]:
     """Return the control of each lane that has a stop line."""
-    known: dict[str, LineControl] = {
-        "signal": "signal",
-        "stop": "stop",
-        "give_way": "give_way",
-        "none": "none",
-    }
-    return {line.lane_id: known[line.control.value] for line in lines}
+    return {line.lane_id: cast(LineControl, line.control.value) for line in lines}
