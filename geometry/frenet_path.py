@@ -102,7 +102,8 @@ class FrenetPath:
 
     def __reduce__(self) -> tuple[object, tuple[object, ...]]:
         """Travel to another process as what the path was made of."""
-        return _path_of, self._given
+        *given, before_m = self._given
+        return functools.partial(FrenetPath, before_m=before_m), tuple(given)
 
     @property
     def node_poses(self) -> Array:
@@ -223,10 +224,6 @@ def _between(table: Array, place: NodePlace) -> Array:
     steps *= place.share
     steps += found[:half]
     return np.asarray(steps)
-
-
-def _path_of(xy_m: Array, speed_limit_mps: Array | None, before_m: float) -> FrenetPath:
-    return FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
 
 
 def _prolonged(at: Array, arc: Array, values: Array) -> Array:

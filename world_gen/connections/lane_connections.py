@@ -14,8 +14,8 @@ from foretwin.world_gen.connections.forks import beside_at_fork, merged_ends, me
 from foretwin.world_gen.connections.movements import Movement
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.cross_section import LanePlan
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
+from foretwin.world_gen.lanes.lane_plans import LanePlan
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 _UNDRAWN = np.zeros((0, 2))

@@ -249,26 +249,20 @@ def _ring_kind(edge: RoadEdge) -> str | None:
 def _rings(edges: list[RoadEdge]) -> Iterator[Ring]:
     """Yield the connected groups of ring edges of one kind, by their smallest node id."""
     for kind in sorted(RING_TAGS):
-        of_kind = [edge for edge in edges if edge.tags["junction"] == kind]
         touching: dict[int, list[RoadEdge]] = {}
-        for edge in of_kind:
-            touching.setdefault(edge.start_node, []).append(edge)
-            touching.setdefault(edge.end_node, []).append(edge)
-        seen: set[int] = set()
-        for first in sorted(touching):
-            if first in seen:
-                continue
-            seen.add(first)
+        for edge in edges:
+            if edge.tags["junction"] == kind:
+                touching.setdefault(edge.start_node, []).append(edge)
+                touching.setdefault(edge.end_node, []).append(edge)
+        while touching:
             group: dict[int, RoadEdge] = {}
-            nodes = {first}
-            waiting = [first]
+            nodes: set[int] = set()
+            waiting = {min(touching)}
             while waiting:
-                for edge in touching[waiting.pop()]:
+                node = waiting.pop()
+                nodes.add(node)
+                for edge in touching.pop(node):
                     group[edge.index] = edge
-                    for node in (edge.start_node, edge.end_node):
-                        if node not in seen:
-                            seen.add(node)
-                            nodes.add(node)
-                            waiting.append(node)
+                    waiting |= {edge.start_node, edge.end_node} - nodes
             members = tuple(group[index] for index in sorted(group))
             yield Ring(kind=kind, nodes=frozenset(nodes), edges=members)

@@ -17,7 +17,8 @@ from foretwin.world_gen.extent import Extent
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex
 from foretwin.world_gen.lanes.cluster import Cluster
-from foretwin.world_gen.lanes.cross_section import CrossSection, cross_section
+from foretwin.world_gen.lanes.cross_section import cross_section
+from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
@@ -117,8 +118,7 @@ _SAY_NOTHING_OF_LANES = frozenset(
 
 def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, CrossSection]:
     """Return cross-sections by edge index; ways whose tags say the same share theirs."""
-    of_way: dict[tuple[int, bool, bool, bool], CrossSection] = {}
-    of_tags: dict[object, CrossSection] = {}
+    known: dict[object, CrossSection] = {}
     found: dict[int, CrossSection] = {}
     for i, edge in edges.items():
         # A centre lane for turns is driven toward the junction, where there is one.
@@ -127,39 +127,19 @@ def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, Cross
             and edge.start_node in index.junction_of_node
             and edge.end_node not in index.junction_of_node
         )
-        key = (edge.way_id, edge.forward, edge.backward, centre_reverse)
-        section = of_way.get(key)
-        if section is None:
-            section = of_way[key] = _section(
-                edge, index.graph.driving_side, of_tags, centre_reverse=centre_reverse
+        driven = (edge.forward, edge.backward, centre_reverse)
+        way = (edge.way_id, *driven)
+        if way not in known:
+            tags = (kv for kv in edge.tags.items() if kv[0] not in _SAY_NOTHING_OF_LANES)
+            lanes = (edge.lanes_forward, edge.lanes_backward)
+            alike = (edge.road_class, *driven, *lanes, frozenset(tags))
+            known[way] = known.get(alike) or cross_section(
+                edge, index.graph.driving_side, centre_reverse=centre_reverse
             )
-        found[i] = section
+            if not known[way].notes:  # these name the way
+                known[alike] = known[way]
+        found[i] = known[way]
     return found
-
-
-def _section(
-    edge: RoadEdge,
-    driving_side: DrivingSide,
-    of_tags: dict[object, CrossSection],
-    *,
-    centre_reverse: bool,
-) -> CrossSection:
-    lanes = (edge.lanes_forward, edge.lanes_backward)
-    tags = frozenset(item for item in edge.tags.items() if item[0] not in _SAY_NOTHING_OF_LANES)
-    key = (
-        edge.road_class,
-        edge.forward,
-        edge.backward,
-        centre_reverse,
-        *((count.value, count.source) for count in lanes),
-        tags,
-    )
-    section = of_tags.get(key)
-    if section is None:
-        section = cross_section(edge, driving_side, centre_reverse=centre_reverse)
-        if not section.notes:  # these name the way
-            of_tags[key] = section
-    return section
 
 
 def _in_frame(

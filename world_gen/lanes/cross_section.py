@@ -8,9 +8,7 @@ import msgspec
 
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import DrivingSide
-from foretwin.world_gen.lanes.lane_plans import CrossSection as CrossSection
-from foretwin.world_gen.lanes.lane_plans import LanePlan as LanePlan
-from foretwin.world_gen.lanes.lane_plans import metres as metres
+from foretwin.world_gen.lanes.lane_plans import CrossSection, LanePlan, metres
 from foretwin.world_gen.lanes.lane_tags import (
     BUS_WIDTH_M,
     DEFAULT_WIDTH_M,
@@ -124,29 +122,21 @@ def _placement_shift(
 ) -> float:
     """Return how far the carriageway's centre lies to the left of the way, from `placement`."""
     tags = edge.tags
-    for reverse, key in (
-        (False, "placement:forward"),
-        (True, "placement:backward"),
-        (False, "placement"),
-    ):
+    for key in ("placement:forward", "placement:backward", "placement"):
+        reverse = key == "placement:backward"
         text = tags.get(key)
         if text is None or (key == "placement" and not edge.forward) or text == TRANSITION:
             continue
         found = _PLACEMENT.match(text.strip())
         number = int(found[2]) - 1 if found else -1
-        place = next(
-            (
-                i
-                for i, lane in enumerate(ordered)
-                if lane.reverse == reverse and lane.number == number >= 0
-            ),
-            None,
-        )
-        if found is None or place is None:
+        meant = [
+            i for i, lane in enumerate(ordered) if (lane.reverse, lane.number) == (reverse, number)
+        ]
+        if found is None or number < 0 or not meant:
             notes.append(f"way {edge.way_id}: {key}={text} names no lane of this road")
             continue
-        begin = _width(ordered[:place])
-        width = ordered[place].width_m.value
+        begin = _width(ordered[: meant[0]])
+        width = ordered[meant[0]].width_m.value
         share = {"left_of": 0.0, "middle_of": 0.5, "right_of": 1.0}[found[1]]
         share = 1.0 - share if reverse else share
         # The way lies `begin + share * width` right of the left edge.

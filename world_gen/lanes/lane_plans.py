@@ -124,6 +124,12 @@ def metres(text: str | None) -> float | None:
     return value * 0.3048 if found[2] in ("ft", "'") else value
 
 
+def tagged_width(text: str | None, least_m: float, most_m: float) -> Quantity | None:
+    """Return a tagged width in metres; None where there is none that a lane can have."""
+    value = metres(text)
+    return Quantity(value, "tagged") if value is not None and least_m <= value <= most_m else None
+
+
 def of_side(tags: Mapping[str, str], key: str, side: str, suffix: str = "") -> str | None:
     """Return a tag of the left or right side of a road: of it, of both sides, or of the road."""
     for name in (f"{key}:{side}{suffix}", f"{key}:both{suffix}", f"{key}{suffix}"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from foretwin.world_gen.lanes.cross_section import CrossSection
+from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 _PARTED_M = 25.0

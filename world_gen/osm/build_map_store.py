@@ -7,6 +7,7 @@ taken in batches, their nodes looked up, and each is put into the cells that it 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -52,8 +53,7 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
 
     Returns the map's SHA-256. Raises `MapError` where the map cannot be read or has no roads.
     """
-    table, nodes = TableWriter(target), NodeSpool(part)
-    try:
+    with closing(TableWriter(target)) as table, closing(NodeSpool(part)) as nodes:
         with (
             OplStream(map_file, progress) as stream,
             (part / "ways.opl").open("wb") as ways,
@@ -76,22 +76,17 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
             batches.add(lines)
         _place_relations(table, part / "relations.opl", batches, nodes.notes)
         box = batches.road_box(map_file)
-        declared = stream.header.bounds
         centre = centre_of(box)
         meta = MapMeta(
             sha256=stream.sha256,
             attribution=stream.header.attribution,
-            bounds=declared or box,
+            bounds=stream.header.bounds or box,
             origin=(centre.lat_deg, centre.lon_deg) if reach_deg(box) <= WIDEST_FRAME_DEG else None,
             ways=batches.count,
             nodes=nodes.count,
             notes=tuple(dict.fromkeys(nodes.notes))[:MOST_NOTES],
         )
-    except BaseException:
-        table.abandon()
-        nodes.close()
-        raise
-    table.finish(meta)
+        table.finish(meta)
     return meta.sha256
 
 

@@ -54,14 +54,13 @@ class TableWriter:
         self._db.executemany("INSERT OR REPLACE INTO member_way VALUES (?, ?)", rows)
 
     def finish(self, meta: MapMeta) -> None:
-        """Close the file."""
+        """Write what holds for the whole map."""
         self._db.execute("INSERT INTO meta VALUES (?)", (msgspec.msgpack.encode(meta),))
         self._db.execute("CREATE INDEX piece_by_cell ON piece (cell)")
         self._db.execute("COMMIT")
-        self._db.close()
 
-    def abandon(self) -> None:
-        """Close an index that will not be used."""
+    def close(self) -> None:
+        """Close the file, which is of no use unless it is finished."""
         self._db.close()
 
 

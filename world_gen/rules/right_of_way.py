@@ -59,7 +59,7 @@ class Yielding(NamedTuple):
 class ConnectionFacts(msgspec.Struct, kw_only=True):
     """What the rules ask about one connection."""
 
-    id: str
+    draft: ConnectionDraft
     turn_weight: int
     """0 straight, 1 a turn to the near side, 2 across oncoming traffic, 3 a U-turn."""
     on_the_spot: bool
@@ -73,7 +73,6 @@ class ConnectionFacts(msgspec.Struct, kw_only=True):
     """The road into the junction that lies straight ahead."""
     on_ring: bool
     standing: Standing
-    signalled: bool
     sign: Standing | None
     """A sign inside the junction, on a slip road or in a median, from `sign_m` on."""
     sign_m: float
@@ -81,7 +80,6 @@ class ConnectionFacts(msgspec.Struct, kw_only=True):
     """Two who pass the same sign do not wait for each other by it."""
     slip: bool
     """Turns to the near side; a sign inside is not that of its whole road, but a slip road's."""
-    centerline: Array
     on_main: bool
     """Has run along the main road between the two mouths of a staggered junction."""
     mini: bool
@@ -117,17 +115,17 @@ def right_of_way(
             standing = own, other
         answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side)
         loser, winner = (i, j) if answer.first_waits else (j, i)
-        conflicting[i].append(b.id)
-        conflicting[j].append(a.id)
-        waiting[loser].append(ways[winner].id)
+        conflicting[i].append(b.draft.id)
+        conflicting[j].append(a.draft.id)
+        waiting[loser].append(connections[winner].id)
         conflicts.append(
             Conflict(
-                first_id=a.id,
-                second_id=b.id,
+                first_id=a.draft.id,
+                second_id=b.draft.id,
                 kind="merging" if merging else "crossing",
                 point=point,
                 area=area,
-                yields_id=ways[loser].id,
+                yields_id=connections[loser].id,
                 rule=answer.rule,
                 source=answer.source,
             )
@@ -171,7 +169,7 @@ def _ways(
         sign = next(iter(signs.get(c.id, ())), None)
         ways.append(
             ConnectionFacts(
-                id=c.id,
+                draft=c,
                 turn_weight=weight.get(c.turn, 2),
                 on_the_spot=c.turn == "u_turn" and not c.movement.inside,
                 heading=heading,
@@ -181,12 +179,10 @@ def _ways(
                 opposite=None if mine is None else mine.opposite,
                 on_ring=c.start.role == "ring",
                 standing=plain if mine is None or mine.signed_inside else mine.standing,
-                signalled=c.control == "signal",
                 sign=None if sign is None else Standing(Rank.MINOR, sign.rule, "tagged"),
                 sign_m=math.inf if sign is None else sign.at_m,
                 sign_node=None if sign is None else sign.node,
                 slip=c.turn == near and not (mine is not None and mine.signed_inside),
-                centerline=c.centerline,
                 on_main=kind == "staggered" and _runs_along_main(c, tops, classes, name),
                 fast=toward.edge.road_class in _FAST,
                 mini=kind == "mini_roundabout",
@@ -233,7 +229,7 @@ def _answer(
     oncoming = a.opposite == b.road and b.opposite == a.road
     if oncoming and a.turn_weight == b.turn_weight == 0 and crossing:
         oncoming = False  # two bent roads that cross at a sharp angle
-    if oncoming and a.signalled and b.signalled:
+    if oncoming and a.draft.control == b.draft.control == "signal":
         return _across(a, b)
     first, second = standing
     a_slips, b_slips = (
@@ -261,7 +257,7 @@ def _standing_at(way: ConnectionFacts, area: Array, point: Array, merging: bool)
     """Return the standing with which a path comes to the ground that it shares with another."""
     if way.sign is None or way.standing.rank < way.sign.rank:
         return way.standing
-    xy = way.centerline
+    xy = way.draft.centerline
     gaps = np.hypot(*(area[:, None] - xy[None]).transpose(2, 0, 1))
     reached_m = float(arc_lengths(xy)[gaps.argmin(axis=1)].min())
     # Where paths merge their middles may meet well behind the first ground that they share.
@@ -281,7 +277,7 @@ def _passes(mover: ConnectionFacts, waiting: ConnectionFacts, driving_side: Driv
 def _across(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
     if a.turn_weight != b.turn_weight:
         return Yielding(a.turn_weight > b.turn_weight, "turn_across", "inferred")
-    return Yielding(a.id > b.id, "turn_across" if a.turn_weight else "order", "default")
+    return Yielding(a.draft.id > b.draft.id, "turn_across" if a.turn_weight else "order", "default")
 
 
 def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
@@ -291,4 +287,4 @@ def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
         return Yielding(a.bend_rad > b.bend_rad, "merge_order", "inferred")
     if abs(a.length_m - b.length_m) > 0.05:
         return Yielding(a.length_m > b.length_m, "merge_order", "default")
-    return Yielding(a.id > b.id, "merge_order", "default")
+    return Yielding(a.draft.id > b.draft.id, "merge_order", "default")

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.provenance import Quantity
-from foretwin.world_gen.lanes.cross_section import cross_section, metres
+from foretwin.world_gen.lanes.cross_section import cross_section
+from foretwin.world_gen.lanes.lane_plans import metres
 from tests.world_gen.road_edges import road as _road
 
 
