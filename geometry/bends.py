@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of, turn_rad
+from foretwin.geometry.polyline import Flags, left_of, turn_rad
 from foretwin.geometry.polyline_batch import Polylines
 
 MIN_STEP_M = 0.25
@@ -21,7 +21,6 @@ _STEP_RAD, _STEP_M = math.radians(16.0), 12.0
 """Two chords of an arc turn no farther, and are no longer."""
 
 
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 _KINK_RAD, _STUB_M = math.radians(15.0), 1.5
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import cross, left_of, turn_rad
+from foretwin.geometry.polyline import Flags, cross, left_of, turn_rad
 from foretwin.geometry.polyline_batch import Polylines
 
 WANTED_RADIUS_M = 4.5
@@ -20,7 +20,6 @@ LEAD_M = 0.4
 _STEP_RAD, _STEP_M = math.radians(8.0), 0.5
 _REPEAT_M = 0.02
 _TIGHTNESS = 8.0
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 class Turns(NamedTuple):

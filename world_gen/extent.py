@@ -12,9 +12,8 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
-from foretwin.geometry.polyline import arc_lengths, points_at
+from foretwin.geometry.polyline import Flags, arc_lengths, points_at
 
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 MIN_PIECE_M = 0.5
 """Shorter pieces of road at the World's edge are left out."""
 

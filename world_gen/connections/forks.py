@@ -55,13 +55,6 @@ def merged_ends(
     if spare > 0:
         most = max(range(len(counts)), key=lambda i: (counts[i], -abs(merging[i].angle_rad)))
         counts[most] += spare
-    if spare >= 0:
-        first = sum(counts[:at])
-        return ends[first : first + counts[at]]
     mine = min(counts[at], len(ends))
-    if at == 0:
-        return ends[:mine]
-    if at == len(merging) - 1:
-        return ends[-mine:]
     first = min(sum(counts[:at]), len(ends) - mine)
     return ends[first : first + mine]

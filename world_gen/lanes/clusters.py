@@ -217,11 +217,7 @@ def _groups_of(
     }
     if junction.summary.kind in RING_KINDS and on_ring:
         # Where a street parts into entry and exit before the ring, nobody has to stop.
-        return [
-            _ClusterNodes(
-                frozenset([n]), frozenset(), junction, whole and n in on_ring, n in on_ring
-            )
-            for n in sorted(junction.nodes)
-        ]
+        places = ((frozenset([n]), n in on_ring) for n in sorted(junction.nodes))
+        return [_ClusterNodes(n, frozenset(), junction, whole and on, on) for n, on in places]
     nodes = frozenset(node for node in junction.nodes if node in leaving)
     return [_ClusterNodes(nodes, frozenset(junction.inner), junction, whole)] if nodes else []

@@ -10,14 +10,13 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import Flags
 from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
 from foretwin.geometry.turn_curves import LEAD_M, WANTED_RADIUS_M
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.lanes.legs import Heads, heading_out, is_ring_edge, lateral_positions
 from foretwin.world_gen.roads.road_graph import RoadEdge
-
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 CORNER_M = 3.5
 """Room between the kerb of the other road and a lane's end: makes turns wider than 4 m radius."""

@@ -28,11 +28,11 @@ from foretwin.world_gen.osm.node_spool import NodeSpool
 from foretwin.world_gen.osm.opl import (
     NodeObjects,
     NodePositions,
-    TagReader,
     WayLines,
     read_nodes,
     read_relations,
     sections,
+    tag_reader,
     way_lines,
     way_nodes,
 )
@@ -104,7 +104,7 @@ def _add_tagged(table: TableWriter, found: NodeObjects) -> None:
 
 
 def _add_relations(section: bytes, write: Callable[[bytes], object]) -> IntArray:
-    tags_of = TagReader()
+    tags_of = tag_reader()
     members: list[int] = []
     for line in section.split(b"\n"):
         found = read_relations(line, is_kept_relation, tags_of) if b"type=" in line else {}
@@ -221,7 +221,7 @@ def _by_cell(cells: IntArray, held: IntArray) -> Iterator[tuple[int, IntArray]]:
 
 
 def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: list[str]) -> None:
-    tags_of = TagReader()
+    tags_of = tag_reader()
     with path.open("rb") as file:
         while lines := file.readlines(LINES_BYTES):
             of_cell: dict[int, list[str]] = {}
@@ -241,4 +241,4 @@ def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: l
                         of_cell.setdefault(cell, []).append(line.decode())
             for cell, texts in sorted(of_cell.items()):
                 table.add(cell, RELATIONS, "".join(texts))
-            tags_of = TagReader()
+            tags_of = tag_reader()

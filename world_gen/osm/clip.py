@@ -18,7 +18,7 @@ from foretwin.world_gen.osm.map_cells import (
     unpack_nodes,
 )
 from foretwin.world_gen.osm.map_tables import NODES, NOTES, RELATIONS, WAYS, TableReader
-from foretwin.world_gen.osm.opl import NodePositions, TagReader, WayNodes, read_relations
+from foretwin.world_gen.osm.opl import NodePositions, TagsOf, WayNodes, read_relations, tag_reader
 from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap, OsmRelation
 from foretwin.world_gen.osm.read_osm import is_kept_relation
 
@@ -43,7 +43,7 @@ def clip_map(
 
     A relation comes with any of its ways; with a building come all of its outlines.
     """
-    tags_of = TagReader()
+    tags_of = tag_reader()
     cells = _read(tables, (r for area in areas for r in cell_ranges(area)), tags_of)
     ways = cells.ways.rows(np.flatnonzero(touches(cells.ways.boxes(), areas)))
     known = set(ways.ids.tolist())
@@ -95,9 +95,7 @@ def find_node(tables: TableReader, node: int) -> tuple[float, float] | None:
     return None
 
 
-def _read(
-    tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagReader
-) -> _CellContents:
+def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagsOf) -> _CellContents:
     ways: list[WayTable] = []
     nodes: list[NodePositions] = []
     node_texts: list[str] = []
@@ -132,7 +130,7 @@ def _joined(parts: Sequence[WayTable]) -> WayTable:
 
 
 def _with_outlines(
-    tables: TableReader, ways: WayTable, relations: Mapping[int, OsmRelation], tags_of: TagReader
+    tables: TableReader, ways: WayTable, relations: Mapping[int, OsmRelation], tags_of: TagsOf
 ) -> WayTable:
     """Add the ways that the relations name and that lie beyond the boxes."""
     named = {m.ref for relation in relations.values() for m in relation.members if m.kind == "w"}

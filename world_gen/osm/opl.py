@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -63,21 +64,18 @@ class WayNodes(NamedTuple):
     counts: IntArray
 
 
-class TagReader:
-    """Turns the tags of OPL into dictionaries, which objects with the same tags share."""
+TagsOf = Callable[[str], Mapping[str, str]]
+"""Returns the tags of a T field without its letter."""
 
-    def __init__(self) -> None:
-        self._known: dict[str, dict[str, str]] = {"": {}}
 
-    def __call__(self, text: str) -> dict[str, str]:
-        """Return the tags of a T field without its letter."""
-        known = self._known.get(text)
-        if known is None:
-            known = self._known[text] = _tags(text)
-        return known
+def tag_reader() -> TagsOf:
+    """Return what makes dictionaries of tags as OPL, which objects with the same tags share."""
+    return cache(_tags)
 
 
 def _tags(text: str) -> dict[str, str]:
+    if not text:
+        return {}
     escaped = text.count("%")
     if escaped and escaped == 2 * text.count("%20%"):  # spaces alone: by far the most frequent
         text, escaped = text.replace("%20%", " "), 0
@@ -174,7 +172,7 @@ def way_nodes(node_texts: Sequence[str]) -> WayNodes:
 
 
 def read_relations(
-    section: bytes, keeps: Callable[[Mapping[str, str]], bool], tags_of: TagReader
+    section: bytes, keeps: Callable[[Mapping[str, str]], bool], tags_of: TagsOf
 ) -> dict[int, OsmRelation]:
     """Read lines such as `r20 Ttype=restriction Mw10@from,n1@via,w11@to` that `keeps` accepts."""
     found = {}

@@ -16,12 +16,12 @@ from foretwin.world_gen.osm.map_file import HEAD_BYTES, MapHeader, file_fault, f
 from foretwin.world_gen.osm.opl import (
     OPL_OPTIONS,
     NodePositions,
-    TagReader,
     WayLines,
     any_key,
     read_nodes,
     read_relations,
     sections,
+    tag_reader,
     way_lines,
     way_nodes,
 )
@@ -86,7 +86,7 @@ def _as_opl(data: bytes, form: str) -> tuple[MapHeader, bytes]:
 
 def _objects(text: bytes) -> MapObjects:
     """Return the ways for drivers, the outlines that kept relations name, and their nodes."""
-    tags_of = TagReader()
+    tags_of = tag_reader()
     # Most texts of tags come again and again.
     is_wanted_node, is_wanted_way = cache(WANTED_NODES.search), cache(WANTED_WAYS.search)
     positions: list[NodePositions] = []

@@ -218,14 +218,13 @@ def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approa
     lights_for_all = control == "signals" and kind not in RING_KINDS and _for_all(drafts)
     found = []
     for d, entry, standing in zip(drafts, entries, ranks, strict=True):
-        ahead = None if entry.opposite is None else drafts[entry.opposite].toward
         entering = d.cluster.ring and not is_ring_edge(d.toward.edge)
         if (entering and ring_has_way) or kind == "mini_roundabout":
             source = "tagged" if d.sign or kind != "circular" else "inferred"
             standing = Standing(Rank.MINOR, "roundabout", source)  # type: ignore[arg-type]
         approach = _approach(d, standing, control == "signals", lights_for_all)
-        if ahead is not None:
-            approach.opposite = ahead.key
+        if entry.opposite is not None:
+            approach.opposite = drafts[entry.opposite].toward.key
         found.append(approach)
     return found
 

@@ -130,16 +130,13 @@ def _heads(
 
 def _plan(node: int, crossing: Crossing | None) -> SignalPlan:
     drive = SignalGroup(id=f"n{node}:g0", connection_ids=())
-    walk = (
-        [SignalGroup(id=f"n{node}:g1", connection_ids=(), crossing_ids=(crossing.id,))]
-        if crossing
-        else []
-    )
+    crossed = () if crossing is None else (crossing.id,)
+    walk = SignalGroup(id=f"n{node}:g1", connection_ids=(), crossing_ids=crossed)
     return SignalPlan(
-        groups=(drive, *walk),
+        groups=(drive, walk) if crossed else (drive,),
         phases=(
             SignalPhase(green_s=DRIVING_S, green_group_ids=(drive.id,)),
-            SignalPhase(green_s=WALKING_S, green_group_ids=tuple(group.id for group in walk)),
+            SignalPhase(green_s=WALKING_S, green_group_ids=(walk.id,) if crossed else ()),
         ),
         amber_s=AMBER_S,
         all_red_s=ALL_RED_S,
