@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from foretwin.geometry.frenet_path import FrenetPath
 
+COVERS = ("foretwin.geometry.compiled",)
+
 ARC = np.linspace(0.0, 1.5 * math.pi, 200)
 CIRCLE = FrenetPath(20.0 * np.stack([np.sin(ARC), 1.0 - np.cos(ARC)], axis=1))
 

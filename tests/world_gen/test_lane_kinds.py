@@ -10,6 +10,8 @@ from foretwin.world_gen.lanes.cross_section import cross_section
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, world_of
 from tests.world_gen.road_edges import road
 
+COVERS = ("foretwin.world_gen.lanes.tram_tracks",)
+
 
 def _kinds(tags, *, forward=1, backward=1, side="right") -> list[str]:
     """Return kind and direction of lanes from left to right along the way."""

@@ -8,6 +8,13 @@ import pytest
 from foretwin.contracts.world import World
 from tests.world_gen.drawn_maps import STREET, drawn_map, world_of
 
+COVERS = (
+    "foretwin.world_gen.lanes.lane_curves",
+    "foretwin.world_gen.lanes.places",
+    "foretwin.world_gen.lanes.reference_lines",
+    "foretwin.world_gen.lanes.transitions",
+)
+
 WIDE = {"highway": "secondary", "name": "Street"}
 ONE_WAY = WIDE | {"oneway": "yes", "lanes": "2"}
 

@@ -21,6 +21,8 @@ from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.sketch import Sketch
 from tests.world_gen.test_real_maps import MAPS
 
+COVERS = ("foretwin.world_gen.junctions.map_index",)
+
 EDITS = st.lists(
     st.tuples(
         st.sampled_from(["far crossing", "shape node", "cut way", "side road", "building", "name"]),

@@ -9,6 +9,15 @@ import pytest
 
 from tests.world_gen.sketch import MANCHESTER, Sketch, off_centre_m, only, star
 
+COVERS = (
+    "foretwin.world_gen.junctions.chains",
+    "foretwin.world_gen.junctions.grouping",
+    "foretwin.world_gen.junctions.intersections",
+    "foretwin.world_gen.junctions.junction_arms",
+    "foretwin.world_gen.junctions.junction_clusters",
+    "foretwin.world_gen.junctions.slip_roads",
+)
+
 
 def dual_carriageway(sketch: Sketch, gap_m: float = 14.0) -> None:
     """An east-west street of two carriageways; nodes 11..13 eastward, 21..23 westward."""

@@ -11,6 +11,12 @@ from foretwin.world_gen.lanes.cross_section import cross_section
 from foretwin.world_gen.lanes.lane_plans import metres
 from tests.world_gen.road_edges import road as _road
 
+COVERS = (
+    "foretwin.world_gen.lanes.lane_plans",
+    "foretwin.world_gen.lanes.lane_tags",
+    "foretwin.world_gen.lanes.side_lanes",
+)
+
 
 def test_two_way_road_keeps_right_around_its_way():
     section = cross_section(_road(), "right")

@@ -25,6 +25,15 @@ from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.large_map import write_large_map
 from tests.world_gen.sketch import Sketch, star
 
+COVERS = (
+    "foretwin.world_gen.osm.build_map_store",
+    "foretwin.world_gen.osm.clip",
+    "foretwin.world_gen.osm.map_cells",
+    "foretwin.world_gen.osm.map_tables",
+    "foretwin.world_gen.osm.node_spool",
+    "foretwin.world_gen.osm.opl_stream",
+)
+
 EVERYWHERE = LatLonBounds(-90.0, -180.0, 90.0, 180.0)
 
 

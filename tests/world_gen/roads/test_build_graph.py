@@ -12,6 +12,8 @@ from foretwin.world_gen.osm.osm_map import MapError
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.sketch import MANCHESTER, Sketch
 
+COVERS = ("foretwin.world_gen.roads.road_graph",)
+
 
 @pytest.fixture
 def crossing() -> Sketch:

@@ -14,6 +14,8 @@ from foretwin.world_gen.roads.road_tags import (
     speed_limit,
 )
 
+COVERS = ("foretwin.world_gen.osm.driving_side",)
+
 
 @pytest.mark.parametrize(
     ("tags", "expected"),

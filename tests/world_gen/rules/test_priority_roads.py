@@ -22,6 +22,11 @@ from tests.world_gen.drawn_maps import (
 from tests.world_gen.junction_truth import worlds_of
 from tests.world_gen.truth_sheet import true_maps
 
+COVERS = (
+    "foretwin.world_gen.rules.approaches",
+    "foretwin.world_gen.rules.right_of_way",
+)
+
 MAIN = {"highway": "tertiary", "name": "Street"}
 
 

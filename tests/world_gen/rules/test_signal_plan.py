@@ -14,6 +14,8 @@ from foretwin.world_gen.rules.signal_plan import share_green
 from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, crossing, drawn_map, world_of
 from tests.world_gen.plan_checks import check_plans, plan_of
 
+COVERS = ("foretwin.world_gen.rules.signal_groups",)
+
 LIGHT = {"highway": "traffic_signals"}
 
 

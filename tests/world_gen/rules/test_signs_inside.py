@@ -20,6 +20,11 @@ from tests.world_gen.slip_roads import (
     slip_world,
 )
 
+COVERS = (
+    "foretwin.world_gen.rules.junction_rules",
+    "foretwin.world_gen.rules.stop_lines",
+)
+
 GIVE_WAY = {"highway": "give_way"}
 
 
