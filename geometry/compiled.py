@@ -55,9 +55,14 @@ def kernel(returns: Any, *arguments: Any) -> Callable[[_Function], _Function]:
 
 @kernel(types.void, IN_ROWS, IN, TABLE, TABLE, REAL, WHOLE, OUT_ROWS)
 def locate(
-    xy: Array, near_arc_m: Array, nodes: Array, segments: Array,
-    first_arc_m: float, either: int, found: Array,
-) -> None:  # fmt: skip
+    xy: Array,
+    near_arc_m: Array,
+    nodes: Array,
+    segments: Array,
+    first_arc_m: float,
+    either: int,
+    found: Array,
+) -> None:
     """Fill `found` (2, S): arc length and offset of positions (2, S), as `FrenetPath.locate`."""
     last = nodes.shape[1] - 1
     for car in range(xy.shape[1]):

@@ -217,9 +217,11 @@ def test_a_gigabyte_needs_less_than_one_of_memory(tmp_path: Path) -> None:
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     ("name", "every"),
-    [("osm-badhersfeld/badhersfeld.osm.xml.gz", 400),
-     ("osm-liechtenstein/liechtenstein-latest.osm.pbf", 700)],
-)  # fmt: skip
+    [
+        ("osm-badhersfeld/badhersfeld.osm.xml.gz", 400),
+        ("osm-liechtenstein/liechtenstein-latest.osm.pbf", 700),
+    ],
+)
 def test_worlds_of_a_clip_are_those_of_the_whole_map(
     data_dir: Path, tmp_path: Path, name: str, every: int
 ) -> None:

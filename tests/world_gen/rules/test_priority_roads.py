@@ -180,9 +180,15 @@ def test_a_stop_sign_on_the_very_node_is_for_the_lesser_road():
 
 def test_a_sign_on_a_node_of_a_dual_carriageway_is_not_for_those_who_drive_through():
     nodes = {
-        0: (0.0, 0.0), 6: (0.0, 14.0), 1: (90.0, 0.0), 3: (-90.0, 0.0), 4: (0.0, -90.0),
-        2: (0.0, 104.0), 7: (90.0, 14.0), 8: (-90.0, 14.0),
-    }  # fmt: skip
+        0: (0.0, 0.0),
+        6: (0.0, 14.0),
+        1: (90.0, 0.0),
+        3: (-90.0, 0.0),
+        4: (0.0, -90.0),
+        2: (0.0, 104.0),
+        7: (90.0, 14.0),
+        8: (-90.0, 14.0),
+    }
     one_way = {**MAIN, "oneway": "yes"}
     ways = [
         (11, [3, 0, 1], one_way),

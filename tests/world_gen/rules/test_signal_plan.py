@@ -23,9 +23,11 @@ def with_turn_lanes(*letters: str) -> OsmMap:
     """Return a crossing whose roads in from these sides have a lane for left turns alone."""
     ends = {"E": 1, "N": 2, "W": 3, "S": 4}
     wide: Mapping[str, str] = {
-        "lanes": "3", "lanes:forward": "2", "lanes:backward": "1",
+        "lanes": "3",
+        "lanes:forward": "2",
+        "lanes:backward": "1",
         "turn:lanes:forward": "left|through;right",
-    }  # fmt: skip
+    }
     ways = [
         (
             10 + end,
