@@ -199,8 +199,8 @@ def _arms(junction: Junction, around: Surroundings) -> tuple[Arm, ...]:
         for leg in arm.outward:
             section = around.sections.get(leg.edge.index)
             if section is not None:
-                lanes_out += len(section.driven(reverse=leg.reverse))
-                lanes_in += len(section.driven(reverse=not leg.reverse))
+                lanes_out += len(section.along(reverse=leg.reverse).driven)
+                lanes_in += len(section.along(reverse=not leg.reverse).driven)
         arms.append(
             Arm(
                 id=f"a{i}",

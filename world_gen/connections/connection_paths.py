@@ -124,7 +124,7 @@ def _along_path(
     """Return a path that follows the inner edges on the driver's side of them."""
     points = [begin, begin + 2.0 * heading]
     for part in connection.movement.inside:
-        lanes = around.section(part).driven(reverse=part.reverse)
+        lanes = around.lanes_along(part).driven
         middle = lanes[len(lanes) // 2].left_m if lanes else 0.0
         line = offset(without_repeats(part.xy_m), -middle if part.reverse else middle)
         keep = line[1:-1] if len(line) > 3 else (line[:1] + line[-1:]) / 2.0

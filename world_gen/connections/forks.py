@@ -21,7 +21,7 @@ def beside_at_fork(cluster: Cluster, ways: list[Movement], around: Surroundings)
     soft = all(abs(m.angle_rad) < _FORK_RAD for m in ways)
     if len(ahead) != 1 or not soft or any(_two_way(leg) for leg in cluster.legs):
         return 0
-    return len(around.section(ahead[0]).driven(reverse=ahead[0].reverse))
+    return len(around.lanes_along(ahead[0]).driven)
 
 
 def _two_way(leg: DirectedEdge) -> bool:
@@ -49,7 +49,7 @@ def merged_ends(
 
     Lanes to spare go to the road with most lanes, the one that goes on.
     """
-    counts = [len(around.section(m.toward).driven(reverse=m.toward.reverse)) for m in merging]
+    counts = [len(around.lanes_along(m.toward).driven) for m in merging]
     at = merging.index(movement)
     spare = len(ends) - sum(counts)
     if spare > 0:

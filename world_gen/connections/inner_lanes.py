@@ -84,7 +84,7 @@ def _poses_inside(
     """Return where a path enters and leaves its lanes inside; `starts` are its movement's lanes."""
     found: list[_Pose] = []
     for part in c.movement.inside:
-        plans = around.section(part).driven(reverse=part.reverse)
+        plans = around.lanes_along(part).driven
         if part.edge.length_m < _LONG_EDGE_M or not plans:
             continue
         left_m = _driver_left_m(plans, _lane_inside(c, starts, len(plans)))

@@ -75,7 +75,7 @@ def connect(
         toward = mine[0].toward
         plans = _plans(cluster, toward, around)
         starts = lanes.incoming(toward, plans)
-        middle = lanes.incoming(toward, around.section(toward).turning(reverse=toward.reverse))
+        middle = lanes.incoming(toward, around.lanes_along(toward).turning)
         named = _by_tags(mine, starts)
         beside = beside_at_fork(cluster, named, around)
         for unnamed, movement in zip(mine, named, strict=True):
@@ -111,10 +111,8 @@ def connect(
 
 def _plans(cluster: Cluster, edge: DirectedEdge, around: Surroundings) -> tuple[LanePlan, ...]:
     """Return the lanes that lead into a cluster, or out of it, along an edge, from the left."""
-    section = around.section(edge)
-    if cluster.plain:
-        return section.abreast(reverse=edge.reverse)
-    return section.driven(reverse=edge.reverse)
+    along = around.lanes_along(edge)
+    return along.abreast if cluster.plain else along.driven
 
 
 def _by_tags(ways: list[Movement], starts: list[LaneDraft]) -> list[Movement]:

@@ -18,7 +18,7 @@ from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.cross_section import cross_section
-from foretwin.world_gen.lanes.lane_plans import CrossSection
+from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
 from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
@@ -54,6 +54,10 @@ class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
     def inner_edges(self) -> frozenset[int]:
         """Indices of the edges inside whole junctions."""
         return frozenset(i for junction in self.junctions for i in junction.inner)
+
+    def lanes_along(self, edge: DirectedEdge) -> LanesAlong:
+        """Return the lanes that are driven as an edge is."""
+        return self.sections[edge.edge.index].along(reverse=edge.reverse)
 
     def section(self, edge: DirectedEdge) -> CrossSection:
         """Return the cross-section of a directed edge's road."""

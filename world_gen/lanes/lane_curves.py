@@ -245,11 +245,11 @@ def join_straight_on(cluster: Cluster, around: Surroundings, lanes: LaneSet) -> 
         return False
     for leg, other in (cluster.legs, cluster.legs[::-1]):
         toward = leg.back
-        before, behind = around.section(leg), around.section(other)
+        before, behind = around.lanes_along(toward), around.lanes_along(other)
         # Plans are paired, not lanes: a lane too short to be drawn must not shift its neighbours.
         for mine, its in (
-            (before.abreast(reverse=toward.reverse), behind.abreast(reverse=other.reverse)),
-            (before.cycled(reverse=toward.reverse), behind.cycled(reverse=other.reverse)),
+            (before.abreast, behind.abreast),
+            (before.cycled, behind.cycled),
         ):
             for a, b in zip(mine, its, strict=False):
                 start, end = lanes.ending(toward, a), lanes.beginning(other, b)

@@ -86,8 +86,8 @@ def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection], head
     legs = [leg for cluster in clusters for leg in cluster.legs]
     mine = [sections[leg.edge.index] for leg in legs]
     shape = (len(clusters), len(clusters[0].legs))
-    into = [s.reach_m(not leg.reverse) for s, leg in zip(mine, legs, strict=True)]
-    out = [s.reach_m(leg.reverse) for s, leg in zip(mine, legs, strict=True)]
+    into = [s.along(reverse=not leg.reverse).reach_m for s, leg in zip(mine, legs, strict=True)]
+    out = [s.along(reverse=leg.reverse).reach_m for s, leg in zip(mine, legs, strict=True)]
     return _Legs(
         heads=np.array([heads[leg.key] for leg in legs]).reshape(*shape, 2),
         starts_m=np.array([leg.xy_m[0] for leg in legs]).reshape(*shape, 2),

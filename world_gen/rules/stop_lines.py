@@ -41,7 +41,7 @@ def stop_lines(
 def entering(approach: Approach, around: Surroundings, lanes: LaneSet) -> list[LaneDraft]:
     """Return the lanes of an approach from the left."""
     toward = approach.toward
-    return lanes.incoming(toward, around.section(toward).driven(reverse=toward.reverse))
+    return lanes.incoming(toward, around.lanes_along(toward).driven)
 
 
 def _line_back_m(approach: Approach, around: Surroundings) -> float:
