@@ -61,10 +61,7 @@ def without_end_kinks(lines: Polylines, at_start: Flags, at_end: Flags) -> Polyl
     keep = np.ones(len(lines.xy_m), dtype=bool)
     long = np.diff(lines.first) > 2
     second, last_but_one = lines.first[:-1] + 1, lines.first[1:] - 2
-    for at, flags, stub_m in (
-        (second, at_start, np.roll(step, 1)),
-        (last_but_one, at_end, step),
-    ):
+    for at, flags, stub_m in ((second, at_start, np.roll(step, 1)), (last_but_one, at_end, step)):
         rows = np.nonzero(flags & long)[0]
         kinks = at[rows]
         keep[kinks[(bend[kinks] > _KINK_RAD) & (stub_m[kinks] < _STUB_M)]] = False

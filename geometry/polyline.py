@@ -121,11 +121,7 @@ def rays_between(into: Array, out: Array, otherwise: Array) -> tuple[Array, Arra
 
 
 def offset(
-    xy_m: Array,
-    left_m: float,
-    *,
-    before: Array | None = None,
-    after: Array | None = None,
+    xy_m: Array, left_m: float, *, before: Array | None = None, after: Array | None = None
 ) -> Array:
     """Return the polyline shifted to its left by `left_m` (negative: to its right).
 

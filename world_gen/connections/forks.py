@@ -40,10 +40,7 @@ def merges(cluster: Cluster, ways: tuple[Movement, ...]) -> list[Movement]:
 
 
 def merged_ends(
-    movement: Movement,
-    merging: list[Movement],
-    ends: list[LaneDraft],
-    around: Surroundings,
+    movement: Movement, merging: list[Movement], ends: list[LaneDraft], around: Surroundings
 ) -> list[LaneDraft]:
     """Return the lanes that are for one of the roads that merge, each of them on its side.
 

@@ -45,10 +45,7 @@ def roads_of(cluster: JunctionCluster, roads: CarRoads, graph: RoadGraph) -> Clu
         if node not in [chain.end for chain in chains]:
             return ClusterRoads(inside=(), leaving=chains)
     points = [graph.node_xy_m[node] for node in sorted(nodes)]
-    centre = (
-        sum([x for x, _ in points]) / len(points),
-        sum([y for _, y in points]) / len(points),
-    )
+    centre = (sum([x for x, _ in points]) / len(points), sum([y for _, y in points]) / len(points))
     reach_m = max([math.dist(point, centre) for point in points]) + INSIDE_M
     inside: dict[tuple[int, int], Chain] = {}
     leaving: list[Chain] = []

@@ -86,12 +86,7 @@ def slip_ends(roads: CarRoads) -> dict[int, frozenset[int]]:
 
 
 def _attach_both(
-    slip: Chain,
-    onward: Chain,
-    back: Chain,
-    straight_on: bool,
-    grouping: Grouping,
-    roads: CarRoads,
+    slip: Chain, onward: Chain, back: Chain, straight_on: bool, grouping: Grouping, roads: CarRoads
 ) -> None:
     """Give the corner between two roads both ends of a slip road."""
     if straight_on:

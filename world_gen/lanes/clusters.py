@@ -75,10 +75,7 @@ def world_frame(junction: Junction) -> LocalFrame:
 
 
 def surroundings(
-    index: MapIndex,
-    frame: LocalFrame,
-    extent: Extent,
-    made_for: tuple[Junction, ...],
+    index: MapIndex, frame: LocalFrame, extent: Extent, made_for: tuple[Junction, ...]
 ) -> Surroundings:
     """Collect the roads within `extent` of the frame's origin and cluster their nodes.
 

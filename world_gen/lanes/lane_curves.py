@@ -247,10 +247,7 @@ def join_straight_on(cluster: Cluster, around: Surroundings, lanes: LaneSet) -> 
         toward = leg.back
         before, behind = around.lanes_along(toward), around.lanes_along(other)
         # Plans are paired, not lanes: a lane too short to be drawn must not shift its neighbours.
-        for mine, its in (
-            (before.abreast, behind.abreast),
-            (before.cycled, behind.cycled),
-        ):
+        for mine, its in ((before.abreast, behind.abreast), (before.cycled, behind.cycled)):
             for a, b in zip(mine, its, strict=False):
                 start, end = lanes.ending(toward, a), lanes.beginning(other, b)
                 if start is not None and end is not None and a.kind in (b.kind, "bus"):

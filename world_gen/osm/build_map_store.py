@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from foretwin.world_gen.osm import opl
 from foretwin.world_gen.osm.map_assembly import (
     NO_WAYS,
     UNITS_PER_DEG,
@@ -25,17 +26,6 @@ from foretwin.world_gen.osm.map_assembly import (
 from foretwin.world_gen.osm.map_cells import Boxes, WayTable, pack_nodes, place
 from foretwin.world_gen.osm.map_tables import NODES, NOTES, RELATIONS, WAYS, MapMeta, TableWriter
 from foretwin.world_gen.osm.node_spool import NodeSpool
-from foretwin.world_gen.osm.opl import (
-    NodeObjects,
-    NodePositions,
-    WayLines,
-    read_nodes,
-    read_relations,
-    sections,
-    tag_reader,
-    way_lines,
-    way_nodes,
-)
 from foretwin.world_gen.osm.opl_stream import OplStream, Progress
 from foretwin.world_gen.osm.osm_map import BoolArray, IntArray, LatLonBounds, MapError, rows_of
 from foretwin.world_gen.osm.read_osm import WANTED_NODES, WANTED_WAYS, is_kept_relation
@@ -61,9 +51,9 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
         ):
             members: list[IntArray] = []
             for block in stream.blocks():
-                for letter, section in sections(block):
+                for letter, section in opl.sections(block):
                     if letter == "n":
-                        found = read_nodes(section, WANTED_NODES.search)
+                        found = opl.read_nodes(section, WANTED_NODES.search)
                         nodes.add(found.positions)
                         _add_tagged(table, found)
                     elif letter == "w":
@@ -93,7 +83,7 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
 _NONE: IntArray = np.empty(0, dtype=np.int64)
 
 
-def _add_tagged(table: TableWriter, found: NodeObjects) -> None:
+def _add_tagged(table: TableWriter, found: opl.NodeObjects) -> None:
     if not found.tag_texts:
         return
     tagged = np.isin(found.positions.ids, np.array(list(found.tag_texts)))
@@ -104,23 +94,23 @@ def _add_tagged(table: TableWriter, found: NodeObjects) -> None:
 
 
 def _add_relations(section: bytes, write: Callable[[bytes], object]) -> IntArray:
-    tags_of = tag_reader()
+    tags_of = opl.tag_reader()
     members: list[int] = []
     for line in section.split(b"\n"):
-        found = read_relations(line, is_kept_relation, tags_of) if b"type=" in line else {}
+        found = opl.read_relations(line, is_kept_relation, tags_of) if b"type=" in line else {}
         for relation in found.values():
             write(line + b"\n")
             members.extend(member.ref for member in relation.members if member.kind == "w")
     return np.array(members, dtype=np.int64)
 
 
-def _batches(path: Path, members: IntArray) -> Iterator[WayLines]:
+def _batches(path: Path, members: IntArray) -> Iterator[opl.WayLines]:
     """Yield the ways that matter, as many at a time as fit into a batch."""
     wanted = set(members.tolist())
-    batch, size = WayLines([], [], []), 0
+    batch, size = opl.WayLines([], [], []), 0
     with path.open("rb") as file:
         while lines := file.readlines(LINES_BYTES):
-            some = way_lines(b"".join(lines))
+            some = opl.way_lines(b"".join(lines))
             for way, tags, nodes in zip(*some, strict=True):
                 if way in wanted or WANTED_WAYS.search(tags):
                     batch.ids.append(way)
@@ -129,7 +119,7 @@ def _batches(path: Path, members: IntArray) -> Iterator[WayLines]:
                     size += len(tags) + len(nodes)
             if size >= BATCH_BYTES:
                 yield batch
-                batch, size = WayLines([], [], []), 0
+                batch, size = opl.WayLines([], [], []), 0
     if batch.ids:
         yield batch
 
@@ -144,11 +134,11 @@ class _WayBatches:
         self.count = 0
         self._table = table
         self._nodes = nodes
-        self._road_extremes: list[NodePositions] = []
+        self._road_extremes: list[opl.NodePositions] = []
 
-    def add(self, lines: WayLines) -> None:
+    def add(self, lines: opl.WayLines) -> None:
         """Look up the nodes of a batch and put its ways into their cells."""
-        nodes = way_nodes(lines.node_texts)
+        nodes = opl.way_nodes(lines.node_texts)
         positions = self._nodes.find(nodes.nodes)
         is_road = np.array([_is_road(text) for text in lines.tag_texts], dtype=bool)
         sound = sound_ways(lines.ids, is_road, nodes, positions)
@@ -176,7 +166,7 @@ class _WayBatches:
         self.member_placed[rows[named]] = True
         self._table.add_members(zip(ways.ids[named].tolist(), cells[named].tolist(), strict=True))
 
-    def _note(self, notes: Sequence[WayNote], positions: NodePositions) -> None:
+    def _note(self, notes: Sequence[WayNote], positions: opl.NodePositions) -> None:
         """Put what is said of a way where its first known node is."""
         for text, row in notes:
             if row is not None:
@@ -188,7 +178,7 @@ class _WayBatches:
 
     def road_box(self, map_file: Path) -> LatLonBounds:
         """Return the box around all roads."""
-        lat_lon = np.stack(NodePositions.joined(self._road_extremes)[1:], axis=-1)
+        lat_lon = np.stack(opl.NodePositions.joined(self._road_extremes)[1:], axis=-1)
         if not len(lat_lon):
             raise MapError(
                 f"{map_file}: the map holds no roads (no way with a highway tag and positions)"
@@ -200,7 +190,7 @@ def _is_road(tag_text: str) -> bool:
     return tag_text.startswith("highway=") or ",highway=" in tag_text
 
 
-def _extremes(nodes: NodePositions) -> NodePositions:
+def _extremes(nodes: opl.NodePositions) -> opl.NodePositions:
     """Return the few positions that set a box, whether or not it crosses the antimeridian."""
     _, lat, lon = nodes
     if not len(lat):
@@ -221,12 +211,12 @@ def _by_cell(cells: IntArray, held: IntArray) -> Iterator[tuple[int, IntArray]]:
 
 
 def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: list[str]) -> None:
-    tags_of = tag_reader()
+    tags_of = opl.tag_reader()
     with path.open("rb") as file:
         while lines := file.readlines(LINES_BYTES):
             of_cell: dict[int, list[str]] = {}
             for line in lines:
-                (relation,) = read_relations(line, is_kept_relation, tags_of).values()
+                (relation,) = opl.read_relations(line, is_kept_relation, tags_of).values()
                 refs = np.array([m.ref for m in relation.members if m.kind == "w"], dtype=np.int64)
                 rows = np.searchsorted(ways.members, refs)
                 rows = rows[ways.member_placed[rows]]
@@ -241,4 +231,4 @@ def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: l
                         of_cell.setdefault(cell, []).append(line.decode())
             for cell, texts in sorted(of_cell.items()):
                 table.add(cell, RELATIONS, "".join(texts))
-            tags_of = tag_reader()
+            tags_of = opl.tag_reader()

@@ -11,20 +11,9 @@ from pathlib import Path
 
 import osmium
 
+from foretwin.world_gen.osm import opl
 from foretwin.world_gen.osm.map_assembly import MapObjects, assemble_map, sorted_positions
 from foretwin.world_gen.osm.map_file import HEAD_BYTES, MapHeader, file_fault, format_of, unreadable
-from foretwin.world_gen.osm.opl import (
-    OPL_OPTIONS,
-    NodePositions,
-    WayLines,
-    any_key,
-    read_nodes,
-    read_relations,
-    sections,
-    tag_reader,
-    way_lines,
-    way_nodes,
-)
 from foretwin.world_gen.osm.opl_filter import decode
 from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation
 
@@ -43,7 +32,7 @@ NODE_KEYS = (
     "kerb",
     "driving_side",
 )
-WANTED_WAYS, WANTED_NODES = any_key(WAY_KEYS), any_key(NODE_KEYS)
+WANTED_WAYS, WANTED_NODES = opl.any_key(WAY_KEYS), opl.any_key(NODE_KEYS)
 DECODE_ERRORS = (RuntimeError, ValueError, IndexError, MemoryError, osmium.InvalidLocationError)
 """All that osmium raises for a file that is damaged."""
 
@@ -80,31 +69,31 @@ def read_map(path: Path) -> OsmMap:
 def _as_opl(data: bytes, form: str) -> tuple[MapHeader, bytes]:
     with tempfile.TemporaryDirectory(prefix="foretwin-map-") as folder:
         path = Path(folder) / "map.opl"
-        said = decode(osmium.io.FileBuffer(data, form), osmium.io.File(path, OPL_OPTIONS))
+        said = decode(osmium.io.FileBuffer(data, form), osmium.io.File(path, opl.OPL_OPTIONS))
         return MapHeader.of(**said), path.read_bytes()
 
 
 def _objects(text: bytes) -> MapObjects:
     """Return the ways for drivers, the outlines that kept relations name, and their nodes."""
-    tags_of = tag_reader()
+    tags_of = opl.tag_reader()
     # Most texts of tags come again and again.
     is_wanted_node, is_wanted_way = cache(WANTED_NODES.search), cache(WANTED_WAYS.search)
-    positions: list[NodePositions] = []
+    positions: list[opl.NodePositions] = []
     node_tags: dict[int, Mapping[str, str]] = {}
-    ways = WayLines([], [], [])
+    ways = opl.WayLines([], [], [])
     relations: dict[int, OsmRelation] = {}
-    for letter, section in sections(text):
+    for letter, section in opl.sections(text):
         if letter == "n":
-            nodes = read_nodes(section, is_wanted_node)
+            nodes = opl.read_nodes(section, is_wanted_node)
             positions.append(nodes.positions)
             node_tags.update((node, tags_of(tags)) for node, tags in nodes.tag_texts.items())
         elif letter == "w":
-            more = way_lines(section)
+            more = opl.way_lines(section)
             ways.ids.extend(more.ids)
             ways.tag_texts.extend(more.tag_texts)
             ways.node_texts.extend(more.node_texts)
         else:
-            relations.update(read_relations(section, is_kept_relation, tags_of))
+            relations.update(opl.read_relations(section, is_kept_relation, tags_of))
     # Outlines of buildings with courtyards carry their tags on the relation alone.
     members = {m.ref for r in relations.values() for m in r.members if m.kind == "w"}
     kept = [w in members or is_wanted_way(t) for w, t in zip(ways.ids, ways.tag_texts, strict=True)]
@@ -112,7 +101,7 @@ def _objects(text: bytes) -> MapObjects:
     return MapObjects(
         way_ids=list(compress(ways.ids, kept)),
         way_tags=[tags_of(tags) for tags in compress(ways.tag_texts, kept)],
-        way_nodes=way_nodes(list(compress(ways.node_texts, kept))),
+        way_nodes=opl.way_nodes(list(compress(ways.node_texts, kept))),
         positions=sorted_positions(positions, notes),
         node_tags=node_tags,
         relations=dict(sorted(relations.items())),

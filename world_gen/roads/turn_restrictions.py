@@ -98,9 +98,7 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
 
 
 def restriction_notes(
-    restrictions: TurnRestrictions,
-    inner: Sequence[frozenset[int]],
-    edges: Mapping[int, RoadEdge],
+    restrictions: TurnRestrictions, inner: Sequence[frozenset[int]], edges: Mapping[int, RoadEdge]
 ) -> tuple[str, ...]:
     """Return a line for each restriction over ways that do not lie within one place.
 
