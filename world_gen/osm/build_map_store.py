@@ -15,7 +15,6 @@ import numpy as np
 from foretwin.world_gen.osm import opl
 from foretwin.world_gen.osm.map_assembly import (
     NO_WAYS,
-    UNITS_PER_DEG,
     WayNote,
     bounds_of,
     centre_of,
@@ -27,7 +26,7 @@ from foretwin.world_gen.osm.map_cells import Boxes, WayTable, pack_nodes, place
 from foretwin.world_gen.osm.map_tables import NODES, NOTES, RELATIONS, WAYS, MapMeta, TableWriter
 from foretwin.world_gen.osm.node_spool import NodeSpool
 from foretwin.world_gen.osm.opl_stream import OplStream, Progress
-from foretwin.world_gen.osm.osm_map import BoolArray, IntArray, LatLonBounds, MapError, rows_of
+from foretwin.world_gen.osm.osm_map import BoolArray, IntArray, LatLonBounds, NoRoadsError, rows_of
 from foretwin.world_gen.osm.read_osm import WANTED_NODES, WANTED_WAYS, is_kept_relation
 
 BATCH_BYTES = 24 << 20
@@ -100,7 +99,7 @@ def _add_relations(section: bytes, write: Callable[[bytes], object]) -> IntArray
         found = opl.read_relations(line, is_kept_relation, tags_of) if b"type=" in line else {}
         for relation in found.values():
             write(line + b"\n")
-            members.extend(member.ref for member in relation.members if member.kind == "w")
+            members.extend(relation.way_ids)
     return np.array(members, dtype=np.int64)
 
 
@@ -178,12 +177,10 @@ class _WayBatches:
 
     def road_box(self, map_file: Path) -> LatLonBounds:
         """Return the box around all roads."""
-        lat_lon = np.stack(opl.NodePositions.joined(self._road_extremes)[1:], axis=-1)
-        if not len(lat_lon):
-            raise MapError(
-                f"{map_file}: the map holds no roads (no way with a highway tag and positions)"
-            )
-        return bounds_of(str(map_file), lat_lon / UNITS_PER_DEG, widest_deg=360.0)
+        lat_lon_deg = opl.NodePositions.joined(self._road_extremes).lat_lon_deg
+        if not len(lat_lon_deg):
+            raise NoRoadsError(str(map_file))
+        return bounds_of(str(map_file), lat_lon_deg, widest_deg=360.0)
 
 
 def _is_road(tag_text: str) -> bool:
@@ -195,7 +192,7 @@ def _extremes(nodes: opl.NodePositions) -> opl.NodePositions:
     _, lat, lon = nodes
     if not len(lat):
         return nodes
-    beyond = np.where(lon < 0, lon + 360 * UNITS_PER_DEG, lon)
+    beyond = np.where(lon < 0, lon + 360 * opl.UNITS_PER_DEG, lon)
     rows = [np.argmin(lat), np.argmax(lat), np.argmin(lon), np.argmax(lon)]
     rows += [np.argmin(beyond), np.argmax(beyond)]
     return nodes.rows(np.array(rows))
@@ -217,8 +214,7 @@ def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: l
             of_cell: dict[int, list[str]] = {}
             for line in lines:
                 (relation,) = opl.read_relations(line, is_kept_relation, tags_of).values()
-                refs = np.array([m.ref for m in relation.members if m.kind == "w"], dtype=np.int64)
-                rows = np.searchsorted(ways.members, refs)
+                rows = np.searchsorted(ways.members, np.array(relation.way_ids, dtype=np.int64))
                 rows = rows[ways.member_placed[rows]]
                 if not len(rows):
                     notes.append(f"relation {relation.id}: {NO_WAYS}")

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.frames import LocalFrame
-from foretwin.world_gen.osm.map_assembly import UNITS_PER_DEG, MapObjects, assemble_map
+from foretwin.world_gen.osm import opl
+from foretwin.world_gen.osm.map_assembly import MapObjects, assemble_map
 from foretwin.world_gen.osm.map_cells import (
     Boxes,
     WayTable,
@@ -18,14 +19,13 @@ from foretwin.world_gen.osm.map_cells import (
     unpack_nodes,
 )
 from foretwin.world_gen.osm.map_tables import NODES, NOTES, RELATIONS, WAYS, TableReader
-from foretwin.world_gen.osm.opl import NodePositions, TagsOf, WayNodes, read_relations, tag_reader
 from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap, OsmRelation
 from foretwin.world_gen.osm.read_osm import is_kept_relation
 
 
 class _CellContents(NamedTuple):
     ways: WayTable
-    nodes: NodePositions
+    nodes: opl.NodePositions
     node_texts: list[str]
     relations: dict[int, OsmRelation]
     note_places: dict[str, tuple[float, float]]
@@ -43,14 +43,14 @@ def clip_map(
 
     A relation comes with any of its ways; with a building come all of its outlines.
     """
-    tags_of = tag_reader()
+    tags_of = opl.tag_reader()
     cells = _read(tables, (r for area in areas for r in cell_ranges(area)), tags_of)
     ways = cells.ways.rows(np.flatnonzero(touches(cells.ways.boxes(), areas)))
     known = set(ways.ids.tolist())
     relations = {
         key: relation
         for key, relation in sorted(cells.relations.items())
-        if any(m.kind == "w" and m.ref in known for m in relation.members)
+        if not known.isdisjoint(relation.way_ids)
     }
     ways = _with_outlines(tables, ways, relations, tags_of)
     inside = touches(Boxes.at(cells.nodes), areas) | np.isin(cells.nodes.ids, ways.nodes.ids)
@@ -58,12 +58,12 @@ def clip_map(
         int(cells.nodes.ids[i]): tags_of(cells.node_texts[i])
         for i in sorted(np.flatnonzero(inside).tolist(), key=cells.nodes.ids.__getitem__)
     }
-    positions = NodePositions.joined([ways.nodes, cells.nodes.rows(inside)])
+    positions = opl.NodePositions.joined([ways.nodes, cells.nodes.rows(inside)])
     _, first = np.unique(positions.ids, return_index=True)
     objects = MapObjects(
         way_ids=ways.ids.tolist(),
         way_tags=[tags_of(text) for text in ways.tag_texts],
-        way_nodes=WayNodes(ways.nodes.ids, ways.counts),
+        way_nodes=opl.WayNodes(ways.nodes.ids, ways.counts),
         positions=positions.rows(first),
         node_tags=node_tags,
         relations=relations,
@@ -90,14 +90,15 @@ def find_node(tables: TableReader, node: int) -> tuple[float, float] | None:
         nodes = WayTable.unpacked(body).nodes
         found = np.flatnonzero(nodes.ids == node)
         if len(found):
-            lat, lon = nodes.lat_1e7[found[0]], nodes.lon_1e7[found[0]]
-            return float(lat) / UNITS_PER_DEG, float(lon) / UNITS_PER_DEG
+            return nodes.at(found[0])
     return None
 
 
-def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagsOf) -> _CellContents:
+def _read(
+    tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: opl.TagsOf
+) -> _CellContents:
     ways: list[WayTable] = []
-    nodes: list[NodePositions] = []
+    nodes: list[opl.NodePositions] = []
     node_texts: list[str] = []
     relations: dict[int, OsmRelation] = {}
     note_places: dict[str, tuple[float, float]] = {}
@@ -110,11 +111,11 @@ def _read(tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: TagsO
             node_texts.extend(texts)
         elif kind == RELATIONS:
             text = unpack(body, str).encode()
-            relations.update(read_relations(text, is_kept_relation, tags_of))
+            relations.update(opl.read_relations(text, is_kept_relation, tags_of))
         elif kind == NOTES:
             lat, lon, words = unpack(body, str).split(" ", 2)
-            note_places[words] = (int(lat) / UNITS_PER_DEG, int(lon) / UNITS_PER_DEG)
-    positions = NodePositions.joined(nodes)
+            note_places[words] = (int(lat) / opl.UNITS_PER_DEG, int(lon) / opl.UNITS_PER_DEG)
+    positions = opl.NodePositions.joined(nodes)
     return _CellContents(_joined(ways), positions, node_texts, relations, note_places)
 
 
@@ -123,17 +124,17 @@ def _joined(parts: Sequence[WayTable]) -> WayTable:
     none = np.empty(0, dtype=np.int64)
     ids = np.concatenate([none, *(part.ids for part in parts)])
     counts = np.concatenate([none, *(part.counts for part in parts)])
-    nodes = NodePositions.joined(part.nodes for part in parts)
+    nodes = opl.NodePositions.joined(part.nodes for part in parts)
     texts = [text for part in parts for text in part.tag_texts]
     _, first = np.unique(ids, return_index=True)
     return WayTable(ids, counts, nodes, texts).rows(np.sort(first))
 
 
 def _with_outlines(
-    tables: TableReader, ways: WayTable, relations: Mapping[int, OsmRelation], tags_of: TagsOf
+    tables: TableReader, ways: WayTable, relations: Mapping[int, OsmRelation], tags_of: opl.TagsOf
 ) -> WayTable:
     """Add the ways that the relations name and that lie beyond the boxes."""
-    named = {m.ref for relation in relations.values() for m in relation.members if m.kind == "w"}
+    named = {way for relation in relations.values() for way in relation.way_ids}
     missing = np.array(sorted(named - set(ways.ids.tolist())), dtype=np.int64)
     if not len(missing):
         return ways

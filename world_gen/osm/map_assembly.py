@@ -12,7 +12,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.world_gen.osm.opl import NO_POSITION, NodePositions, WayNodes
+from foretwin.world_gen.osm.opl import NO_POSITION, UNITS_PER_DEG, NodePositions, WayNodes
 from foretwin.world_gen.osm.osm_map import (
     BoolArray,
     IntArray,
@@ -26,7 +26,6 @@ from foretwin.world_gen.osm.osm_map import (
     rows_of,
 )
 
-UNITS_PER_DEG = 10_000_000
 LONGEST_WAY_DEG = 2.0
 """A way that reaches farther has a node in the wrong place: no street spans 200 km."""
 WIDEST_MAP_DEG = 60.0
@@ -72,8 +71,7 @@ def assemble_map(
     note_places = dict(objects.note_places)
     for text, row in sound.notes:
         if row is not None:
-            lat, lon = table.lat_1e7[row], table.lon_1e7[row]
-            note_places[text] = (float(lat) / UNITS_PER_DEG, float(lon) / UNITS_PER_DEG)
+            note_places[text] = table.at(row)
     nodes = tuple(sound.nodes.nodes.tolist())
     cuts = [0, *np.cumsum(sound.nodes.counts).tolist()]
     ids = np.array(objects.way_ids, dtype=np.int64)[sound.picked]
@@ -89,7 +87,7 @@ def assemble_map(
     }
     relations = {}
     for key, relation in objects.relations.items():
-        if any(m.kind == "w" and m.ref in ways for m in relation.members):
+        if any(way in ways for way in relation.way_ids):
             relations[key] = relation
         else:
             notes.append(f"relation {key}: {NO_WAYS}")
@@ -99,13 +97,11 @@ def assemble_map(
         table.ids, np.array(list(objects.node_tags), dtype=np.int64)
     )
     used[tagged_rows[tagged_placed]] = True
-    lat_lon = np.stack([table.lat_1e7[used], table.lon_1e7[used]], axis=-1) / UNITS_PER_DEG
-    locations = NodeLocations(table.ids[used], lat_lon)
+    kept = table.rows(used)
+    locations = NodeLocations(kept.ids, kept.lat_lon_deg)
     road_nodes = [node for way in ways.values() if "highway" in way.tags for node in way.nodes]
     if not road_nodes:
-        raise NoRoadsError(
-            f"{file}: the map holds no roads (no way with a highway tag and positions)"
-        )
+        raise NoRoadsError(file)
     if frame is None or bounds is None:
         box = bounds_of(file, locations.of(road_nodes))
         bounds = bounds or box

@@ -15,9 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.world_gen.osm.osm_map import BoolArray, IntArray, OsmMember, OsmRelation
 
 OPL_OPTIONS = "opl,add_metadata=false"
+UNITS_PER_DEG = 10_000_000
 NO_POSITION = 2**31 - 1
 """Stands for a coordinate that the file does not give, in units of 1e-7 degrees."""
 _ESCAPE = re.compile("%([0-9a-f]+)%")
@@ -36,6 +38,15 @@ class NodePositions(NamedTuple):
         """Return the nodes of all parts, one after the other."""
         none = (np.empty(0, dtype=np.int64),) * 3
         return NodePositions(*map(np.concatenate, zip(none, *parts, strict=True)))
+
+    @property
+    def lat_lon_deg(self) -> Array:
+        """Latitudes and longitudes (N, 2) in degrees."""
+        return np.stack([self.lat_1e7, self.lon_1e7], axis=-1) / UNITS_PER_DEG
+
+    def at(self, row: int) -> tuple[float, float]:
+        """Return latitude and longitude of a node in degrees."""
+        return float(self.lat_1e7[row]) / UNITS_PER_DEG, float(self.lon_1e7[row]) / UNITS_PER_DEG
 
     def rows(self, which: IntArray | BoolArray) -> NodePositions:
         """Return chosen nodes."""

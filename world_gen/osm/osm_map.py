@@ -25,6 +25,11 @@ class MapError(UserError):
 class NoRoadsError(MapError):
     """A map, or what was clipped of one, without a single road."""
 
+    def __init__(self, file: str) -> None:
+        super().__init__(
+            f"{file}: the map holds no roads (no way with a highway tag and positions)"
+        )
+
 
 class OsmWay(NamedTuple):
     """One way: its id, its nodes in order, its tags."""
@@ -48,6 +53,11 @@ class OsmRelation(msgspec.Struct, frozen=True):
     id: int
     members: tuple[OsmMember, ...]
     tags: Mapping[str, str]
+
+    @property
+    def way_ids(self) -> list[int]:
+        """Ids of the members that are ways."""
+        return [member.ref for member in self.members if member.kind == "w"]
 
 
 class LatLonBounds(NamedTuple):

@@ -95,7 +95,7 @@ def _objects(text: bytes) -> MapObjects:
         else:
             relations.update(opl.read_relations(section, is_kept_relation, tags_of))
     # Outlines of buildings with courtyards carry their tags on the relation alone.
-    members = {m.ref for r in relations.values() for m in r.members if m.kind == "w"}
+    members = {way for relation in relations.values() for way in relation.way_ids}
     kept = [w in members or is_wanted_way(t) for w, t in zip(ways.ids, ways.tag_texts, strict=True)]
     notes: list[str] = []
     return MapObjects(

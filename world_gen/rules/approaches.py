@@ -107,8 +107,7 @@ def approaches(
     inside: dict[tuple[int, bool], list[Met]] = {}
     for connection in connections:
         if connection.cluster.whole and connection.movement.inside:
-            toward = connection.movement.toward
-            met = inside.setdefault(toward.key, [])
+            met = inside.setdefault(connection.movement.toward.key, [])
             met.extend(lights_inside(connection.movement.inside, node_tags))
     shared = shared_signs(connections, signs, around.driving_side)
     plain = [cluster for cluster in around.clusters if cluster.plain]
@@ -137,17 +136,11 @@ def approaches(
             sign = own_sign(met, toward, cluster, around.edges)
             if (on_ring and not lights) or (past_ring and sign is None):
                 continue
-            passed = inside.get(toward.key, [])
-            lights = lights or passed
+            lights = lights or inside.get(toward.key, [])
             if signalled and not lights:
                 # A light on a crossing that the finder took for one of walkers alone.
-                lights = [
-                    m
-                    for m in met
-                    if is_light(m.tags)
-                    and m.distance_m <= LIGHT_NEAR_M
-                    and m.node not in junction_lights
-                ]
+                near = [m for m in met if is_light(m.tags) and m.distance_m <= LIGHT_NEAR_M]
+                lights = [m for m in near if m.node not in junction_lights]
             drafts.setdefault(junction.summary.id, []).append(
                 _ApproachDraft(cluster, toward, met, lights, sign, shared.get(toward.key))
             )
@@ -187,12 +180,8 @@ def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approa
     words: list[YieldRule | None] = [
         sign_of(d.sign.tags) if d.sign else d.sign_inside for d in drafts
     ]
-    at_node = {
-        sign_of(m.tags)
-        for d in drafts
-        for m in d.met
-        if m.distance_m <= 0.1 and sign_of(m.tags) and not d.cluster.ring
-    }
+    off_ring = [m for d in drafts if not d.cluster.ring for m in d.met]
+    at_node = {sign_of(m.tags) for m in off_ring if m.distance_m <= 0.1} - {None}
     clusters = {d.cluster.key: d.cluster for d in drafts}.values()
     ahead_of = opposites([d.toward for d in drafts], [leg for c in clusters for leg in c.legs])
     entries = [
