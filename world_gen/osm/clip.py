@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -23,14 +22,6 @@ from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap, OsmRelation
 from foretwin.world_gen.osm.read_osm import is_kept_relation
 
 
-class _CellContents(NamedTuple):
-    ways: WayTable
-    nodes: opl.NodePositions
-    node_texts: list[str]
-    relations: dict[int, OsmRelation]
-    note_places: dict[str, tuple[float, float]]
-
-
 def clip_map(
     tables: TableReader,
     areas: Sequence[LatLonBounds],
@@ -44,31 +35,34 @@ def clip_map(
     A relation comes with any of its ways; with a building come all of its outlines.
     """
     tags_of = opl.tag_reader()
-    cells = _read(tables, (r for area in areas for r in cell_ranges(area)), tags_of)
-    ways = cells.ways.rows(np.flatnonzero(touches(cells.ways.boxes(), areas)))
+    pieces = tables.pieces(row for area in areas for row in cell_ranges(area))
+    ways = _joined([WayTable.unpacked(body) for body in pieces[WAYS]])
+    ways = ways.rows(np.flatnonzero(touches(ways.boxes(), areas)))
     known = set(ways.ids.tolist())
-    relations = {
-        key: relation
-        for key, relation in sorted(cells.relations.items())
-        if not known.isdisjoint(relation.way_ids)
-    }
-    ways = _with_outlines(tables, ways, relations, tags_of)
-    inside = touches(Boxes.at(cells.nodes), areas) | np.isin(cells.nodes.ids, ways.nodes.ids)
-    node_tags: dict[int, Mapping[str, str]] = {
-        int(cells.nodes.ids[i]): tags_of(cells.node_texts[i])
-        for i in sorted(np.flatnonzero(inside).tolist(), key=cells.nodes.ids.__getitem__)
-    }
-    positions = opl.NodePositions.joined([ways.nodes, cells.nodes.rows(inside)])
+    text = "".join(unpack(body, str) for body in pieces[RELATIONS]).encode()
+    in_cells = opl.read_relations(text, is_kept_relation, tags_of)
+    relations = {k: r for k, r in sorted(in_cells.items()) if not known.isdisjoint(r.way_ids)}
+    ways = _with_outlines(tables, ways, relations)
+    tagged = [unpack_nodes(body) for body in pieces[NODES]]
+    nodes = opl.NodePositions.joined(positions for positions, _ in tagged)
+    texts = [text for _, of_cell in tagged for text in of_cell]
+    inside = touches(Boxes.at(nodes), areas) | np.isin(nodes.ids, ways.nodes.ids)
+    rows = sorted(np.flatnonzero(inside).tolist(), key=nodes.ids.__getitem__)
+    positions = opl.NodePositions.joined([ways.nodes, nodes.rows(inside)])
     _, first = np.unique(positions.ids, return_index=True)
+    note_places = {}
+    for body in pieces[NOTES]:
+        lat, lon, words = unpack(body, str).split(" ", 2)
+        note_places[words] = (int(lat) / opl.UNITS_PER_DEG, int(lon) / opl.UNITS_PER_DEG)
     objects = MapObjects(
         way_ids=ways.ids.tolist(),
         way_tags=[tags_of(text) for text in ways.tag_texts],
         way_nodes=opl.WayNodes(ways.nodes.ids, ways.counts),
         positions=positions.rows(first),
-        node_tags=node_tags,
+        node_tags={int(nodes.ids[row]): tags_of(texts[row]) for row in rows},
         relations=relations,
-        notes=list(cells.note_places),
-        note_places=cells.note_places,
+        notes=list(note_places),
+        note_places=note_places,
     )
     meta = tables.meta
     return assemble_map(
@@ -94,31 +88,6 @@ def find_node(tables: TableReader, node: int) -> tuple[float, float] | None:
     return None
 
 
-def _read(
-    tables: TableReader, ranges: Iterable[tuple[int, int]], tags_of: opl.TagsOf
-) -> _CellContents:
-    ways: list[WayTable] = []
-    nodes: list[opl.NodePositions] = []
-    node_texts: list[str] = []
-    relations: dict[int, OsmRelation] = {}
-    note_places: dict[str, tuple[float, float]] = {}
-    for kind, body in tables.pieces(ranges):
-        if kind == WAYS:
-            ways.append(WayTable.unpacked(body))
-        elif kind == NODES:
-            positions, texts = unpack_nodes(body)
-            nodes.append(positions)
-            node_texts.extend(texts)
-        elif kind == RELATIONS:
-            text = unpack(body, str).encode()
-            relations.update(opl.read_relations(text, is_kept_relation, tags_of))
-        elif kind == NOTES:
-            lat, lon, words = unpack(body, str).split(" ", 2)
-            note_places[words] = (int(lat) / opl.UNITS_PER_DEG, int(lon) / opl.UNITS_PER_DEG)
-    positions = opl.NodePositions.joined(nodes)
-    return _CellContents(_joined(ways), positions, node_texts, relations, note_places)
-
-
 def _joined(parts: Sequence[WayTable]) -> WayTable:
     """Join ways of several cells, each way once: a way stands in every cell that it touches."""
     none = np.empty(0, dtype=np.int64)
@@ -131,7 +100,7 @@ def _joined(parts: Sequence[WayTable]) -> WayTable:
 
 
 def _with_outlines(
-    tables: TableReader, ways: WayTable, relations: Mapping[int, OsmRelation], tags_of: opl.TagsOf
+    tables: TableReader, ways: WayTable, relations: Mapping[int, OsmRelation]
 ) -> WayTable:
     """Add the ways that the relations name and that lie beyond the boxes."""
     named = {way for relation in relations.values() for way in relation.way_ids}
@@ -139,6 +108,7 @@ def _with_outlines(
     if not len(missing):
         return ways
     cells = tables.cells_of(missing.tolist())
-    beyond = _read(tables, [(cell, cell) for cell in sorted(cells)], tags_of).ways
+    pieces = tables.pieces((cell, cell) for cell in cells)
+    beyond = _joined([WayTable.unpacked(body) for body in pieces[WAYS]])
     beyond = beyond.rows(np.flatnonzero(np.isin(beyond.ids, missing)))
     return _joined([ways, beyond])

@@ -13,7 +13,7 @@ from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 FORMAT_VERSION = 2
 """Counts changes of the format and of what is kept; part of an index's name."""
-WAYS, NODES, RELATIONS, NOTES = range(4)
+KINDS = WAYS, NODES, RELATIONS, NOTES = range(4)
 _SCHEMA = """
 CREATE TABLE meta (body BLOB NOT NULL);
 CREATE TABLE piece (cell INTEGER NOT NULL, kind INTEGER NOT NULL, body BLOB NOT NULL);
@@ -73,19 +73,20 @@ class TableReader:
         (body,) = self._db.execute("SELECT body FROM meta").fetchone()
         self.meta = msgspec.msgpack.decode(body, type=MapMeta)
 
-    def pieces(self, ranges: Iterable[tuple[int, int]]) -> Iterator[tuple[int, bytes]]:
-        """Yield kind and body of all pieces of ranges of cells, each once."""
+    def pieces(self, ranges: Iterable[tuple[int, int]]) -> list[list[bytes]]:
+        """Return by kind the bodies of all pieces of ranges of cells, each once."""
         merged: list[list[int]] = []
         for first, last in sorted(ranges):
             if merged and first <= merged[-1][1] + 1:
                 merged[-1][1] = max(merged[-1][1], last)
             else:
                 merged.append([first, last])
-        for first, last in merged:
-            yield from self._db.execute(
-                "SELECT kind, body FROM piece WHERE cell BETWEEN ? AND ? ORDER BY cell, rowid",
-                (first, last),
-            )
+        bodies: list[list[bytes]] = [[] for _ in KINDS]
+        select = "SELECT kind, body FROM piece WHERE cell BETWEEN ? AND ? ORDER BY cell, rowid"
+        for cells in merged:
+            for kind, body in self._db.execute(select, cells):
+                bodies[kind].append(body)
+        return bodies
 
     def all_of(self, kind: int) -> Iterator[bytes]:
         """Yield the bodies of all pieces of one kind."""
