@@ -12,7 +12,7 @@ from foretwin.geometry.polyline import Flags, left_of, turn_rad
 from foretwin.geometry.polyline_batch import Polylines
 
 MIN_STEP_M = 0.25
-"""Nodes of a way closer than this to the one before say nothing about where it leads."""
+"""Nodes of a way closer than this to the one before give no direction."""
 _SHARE = 0.45
 _DEVIATION_M, _WIDEST_DEVIATION_M = 0.35, 2.5
 _SOFTEST_RAD, _SHARPEST_RAD = math.radians(3.0), math.radians(150.0)

@@ -2,7 +2,7 @@
 
 A numpy call costs as much for 64 cars as for one: at 50 ticks a second, some 150 calls took
 longer than the physics. Here is nothing but arithmetic on arrays that others own; what it means
-is told where it is called. All is compiled at import, for one signature and no other: no drive
+stands where it is called. All is compiled at import, for one signature and no other: no drive
 waits for a compiler.
 """
 

@@ -25,7 +25,7 @@ _TIGHTNESS = 8.0
 class Turns(NamedTuple):
     """Paths from lane to lane, and the radius in metres of the tightest arc of each, (K,).
 
-    A radius of 0 says that there is no room for any: the path is then no more than a chord.
+    A radius of 0 means that there is no room for any: the path is then no more than a chord.
     """
 
     lines: Polylines

@@ -66,7 +66,7 @@ def build_region(
     """Build one World of all that lies within `bounds`, in a frame about their middle.
 
     Every junction whose roads all reach into the bounds gets the same treatment as the one
-    that `build_world` is asked for. Pass an `index` made with all junctions of the map; for
+    that `build_world` is made for. Pass an `index` made with all junctions of the map; for
     `ground` see there. Raises `MapError` where the bounds hold no road for cars.
     """
     index = index or index_map(osm, graph, find_intersections(osm, graph))

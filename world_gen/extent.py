@@ -25,7 +25,7 @@ class Disc(msgspec.Struct, frozen=True, dict=True):
 
     @property
     def bounds_m(self) -> tuple[float, float, float, float] | None:
-        """None: a disc is told by its radius alone."""
+        """None: a disc has its radius alone."""
         return None
 
     @cached_property

@@ -22,14 +22,14 @@ LEAST_AREA_M2 = 0.3
 BESIDE_M = 1.0
 """Neighbouring lanes are drawn no nearer where neither driver leaves the own one."""
 PATH_TOLERANCE_M = 0.03
-"""Paths have a point each metre; where they meet is told to within this."""
+"""Paths have a point each metre; where they meet is known to within this."""
 Indices = NDArray[np.int64]
 
 
 class Meetings(msgspec.Struct, frozen=True, kw_only=True):
     """M pairs of connections, by their indices (M,), `first` before `second`.
 
-    `merging` (M,) tells that both end in one lane; `points` (M, 2) is where their middles cross
+    `merging` (M,) is whether both end in one lane; `points` (M, 2) is where their middles cross
     or come nearest, each of `areas` (N, 2) a counter-clockwise outline. `first_m` and
     `second_m` (M,) are how far along each path the point lies, `apart_m` (M,)
     how far the middles stay from each other.
@@ -60,7 +60,7 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
     near = (a < b) & (junction[a] == junction[b]) & (start[a] != start[b])
     near &= (end[a] != start[b]) & (end[b] != start[a])
     a, b = a[near], b[near]
-    # Most neighbours do not touch: prepared geometries tell that in a tenth of the time.
+    # Most neighbours do not touch: prepared geometries find that in a tenth of the time.
     shapely.prepare(swept)
     near = end[a] == end[b]
     near[~near] = shapely.intersects(swept[a[~near]], swept[b[~near]])
@@ -98,7 +98,7 @@ def _on_one_level(
 ) -> NDArray[np.bool_]:
     """Return (M,) whether the paths share a node of the map or run at one level somewhere.
 
-    A bridge often begins at the very node of a junction, so levels alone do not tell.
+    A bridge often begins at the very node of a junction, so levels alone do not decide.
     """
     layer = np.array([c.start.edge.layer for c in connections])
     alike: NDArray[np.bool_] = layer[a] == layer[b]

@@ -83,7 +83,7 @@ def connect(
             ends = lanes.outgoing(away, _plans(cluster, away, around))
             if not starts or not ends:
                 continue
-            # Where a road merely goes on its lanes do, whatever their arrows say of what follows.
+            # Where a road merely goes on its lanes do, whatever their arrows mean for what follows.
             chosen = starts if cluster.plain else []
             chosen = chosen or [lane for lane in middle if movement.turn in lane.turns]
             chosen = chosen or _starting_lanes(
@@ -116,7 +116,7 @@ def _plans(cluster: Cluster, edge: DirectedEdge, around: Surroundings) -> tuple[
 
 
 def _by_tags(ways: list[Movement], starts: list[LaneDraft]) -> list[Movement]:
-    """Let turn lanes correct the names of turns, which angles alone cannot tell at forks.
+    """Let turn lanes correct the names of turns, which angles alone do not determine at forks.
 
     As many movements as there are tagged turns take them in order from the left; else a turn
     that no lane names takes the name of a tagged one that no other movement took up.

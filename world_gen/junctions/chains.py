@@ -30,7 +30,7 @@ class Mark(NamedTuple):
 class Chain(NamedTuple):
     """A road from one branching to the next, over the places where only its tags change.
 
-    `outward` and `inward` tell whether cars may leave and reach `start` by it, as far as its
+    `outward` and `inward` are whether cars may leave and reach `start` by it, as far as its
     first edge goes; `one_way` that they may use it one way round alone. `key` is the same for
     both directions of one chain. `x_m` and `y_m` are its points from `start` to `end`, those
     between two edges twice; `marks` its lights and signs in that order, those at its ends too.

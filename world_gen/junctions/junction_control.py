@@ -1,4 +1,4 @@
-"""Who tells drivers at a junction when to go: lights, signs, or the general rules."""
+"""How a junction is controlled: lights, signs, or the general rules."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def map_key(self) -> str:
-        """The map's SHA-256, and which roads count as car roads beyond what it says."""
+        """The map's SHA-256, and which roads count as car roads beyond its tags."""
         edges = (self.graph.edges[i] for i in self.car_edges)
         added = [
             f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"

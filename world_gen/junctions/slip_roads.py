@@ -15,7 +15,7 @@ FLARE_WIDTH_M = 70.0
 THINNEST_CORNER_RAD = math.radians(18.0)
 SMOOTH_RAD, STRAIGHT_RAD = math.radians(60.0), math.radians(12.0)
 _LOOK_M = 15.0
-"""How far along a road its direction is told."""
+"""How far along a road its direction is taken."""
 
 
 def add_slips(grouping: Grouping, roads: CarRoads) -> None:

@@ -12,7 +12,7 @@ class Cluster(msgspec.Struct, frozen=True, kw_only=True):
     """Graph nodes where lanes end and begin: one junction, one node of a ring, or a lone node.
 
     `legs` leave the cluster outward; `inner` edges lie within and have no lanes of their own.
-    `whole` tells that it belongs to a junction that lies whole in the World: such a junction
+    `whole` means that it belongs to a junction that lies whole in the World: such a junction
     gets stop lines, control and right of way.
     """
 

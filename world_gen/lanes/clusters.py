@@ -112,13 +112,13 @@ def surroundings(
     )
 
 
-_SAY_NOTHING_OF_LANES = frozenset(
+_WITHOUT_EFFECT_ON_LANES = frozenset(
     {"name", "ref", "maxspeed", "surface", "lit", "smoothness", "source", "wikidata", "note"}
 )
 
 
 def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, CrossSection]:
-    """Return cross-sections by edge index; ways whose tags say the same share theirs."""
+    """Return cross-sections by edge index; ways with the same tags share theirs."""
     known: dict[object, CrossSection] = {}
     found: dict[int, CrossSection] = {}
     for i, edge in edges.items():
@@ -131,7 +131,7 @@ def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, Cross
         driven = (edge.forward, edge.backward, centre_reverse)
         way = (edge.way_id, *driven)
         if way not in known:
-            tags = (kv for kv in edge.tags.items() if kv[0] not in _SAY_NOTHING_OF_LANES)
+            tags = (kv for kv in edge.tags.items() if kv[0] not in _WITHOUT_EFFECT_ON_LANES)
             lanes = (edge.lanes_forward, edge.lanes_backward)
             alike = (edge.road_class, *driven, *lanes, frozenset(tags))
             known[way] = known.get(alike) or cross_section(
@@ -217,7 +217,7 @@ def _groups_of(
         node for node in junction.nodes if any(is_ring_edge(d.edge) for d in leaving.get(node, ()))
     }
     if junction.summary.kind in RING_KINDS and on_ring:
-        # Where a street parts into entry and exit before the ring, nobody has to stop.
+        # Where a street parts into entry and exit before the ring, no car has to stop.
         places = ((frozenset([n]), n in on_ring) for n in sorted(junction.nodes))
         return [_ClusterNodes(n, frozenset(), junction, whole and on, on) for n, on in places]
     nodes = frozenset(node for node in junction.nodes if node in leaving)

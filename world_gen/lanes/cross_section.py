@@ -30,7 +30,7 @@ def cross_section(
 ) -> CrossSection:
     """Return the lanes of a road by its tags, by its class where tags are missing.
 
-    The way lies in the middle of the lanes that the map counts, unless `placement` says
+    The way lies in the middle of the lanes that the map counts, unless `placement` is
     otherwise; lanes for bicycles and parking lie outside. A lane in the middle from which both
     directions turn becomes one lane, driven along the way, or against it with `centre_reverse`.
     """

@@ -68,7 +68,7 @@ class CrossSection(msgspec.Struct, frozen=True, kw_only=True, dict=True):
 
     @cached_property
     def _by_direction(self) -> tuple[LanesAlong, LanesAlong]:
-        """Along the nodes and against them: thousands of roads ask the few sections of a town."""
+        """Along the nodes and against them: thousands of roads share the few sections of a town."""
         return _along(self.lanes, False), _along(self.lanes, True)
 
 

@@ -53,7 +53,7 @@ class Direction:
         self.designated = [i for i, word in enumerate(self.bicycle) if word == "designated"]
 
     def text(self, key: str) -> str | None:
-        """Return a tag of this direction; the tag without a direction speaks for one-ways."""
+        """Return a tag of this direction; the tag without a direction holds for one-ways."""
         tags = self.edge.tags
         return tags.get(f"{key}:{self.word}") or (None if self.both else tags.get(key))
 
@@ -103,8 +103,8 @@ def lanes_of_direction(
     widths = tags.fitted("width:lanes")
     changes = tags.fitted("change:lanes", default=tags.text("change"))
     kinds = _kinds(tags, driving_side)
-    said = "oneway" in edge.tags or "junction" in edge.tags
-    source: Provenance = "tagged" if said else "inferred"
+    tagged = "oneway" in edge.tags or "junction" in edge.tags
+    source: Provenance = "tagged" if tagged else "inferred"
     letter = "b" if reverse else "f"
     lanes = []
     for i in range(count):

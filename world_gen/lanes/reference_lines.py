@@ -27,7 +27,7 @@ _NOWHERE = np.array([np.nan, np.nan])
 class Stretch(NamedTuple):
     """A stretch of one edge along which lanes run side by side.
 
-    `first` and `last` tell whether it reaches the edge's own start and end, or the World's edge
+    `first` and `last` are whether it reaches the edge's own start and end, or the World's edge
     cut it. `before` and `after` (2,) are the directions in which a road that merely goes on
     continues beyond them, along the nodes; NaN where it does not.
     """

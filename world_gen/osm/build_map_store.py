@@ -166,7 +166,7 @@ class _WayBatches:
         self._table.add_members(zip(ways.ids[named].tolist(), cells[named].tolist(), strict=True))
 
     def _note(self, notes: Sequence[WayNote], positions: opl.NodePositions) -> None:
-        """Put what is said of a way where its first known node is."""
+        """Put notes on a way where its first known node is."""
         for text, row in notes:
             if row is not None:
                 at = positions.rows(np.array([row]))

@@ -78,7 +78,7 @@ def clip_map(
 def find_node(tables: TableReader, node: int) -> tuple[float, float] | None:
     """Return latitude and longitude of a node of a way; None where no way has it.
 
-    Nothing says in which cell a node lies: all are looked through, one after another.
+    No table has the cell of a node: all are looked through, one after another.
     """
     for body in tables.all_of(WAYS):
         nodes = WayTable.unpacked(body).nodes

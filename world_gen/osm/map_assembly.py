@@ -137,8 +137,8 @@ def sorted_positions(chunks: Sequence[NodePositions], notes: list[str]) -> NodeP
         return found
     for node, lat, lon in zip(*(column.tolist() for column in found.rows(~there)), strict=True):
         place = f"{lat / UNITS_PER_DEG:g}, {lon / UNITS_PER_DEG:g}"
-        said = "has no position" if lat == NO_POSITION else f"{place} is not on Earth"
-        notes.append(f"node {node}: {said}; left out")
+        fault = "has no position" if lat == NO_POSITION else f"{place} is not on Earth"
+        notes.append(f"node {node}: {fault}; left out")
     return found.rows(there)
 
 
@@ -150,7 +150,7 @@ def on_earth(nodes: NodePositions) -> BoolArray:
 
 
 class WayNote(NamedTuple):
-    """What is said of a way, and which of the positions is its first; None where it has none."""
+    """A note on a way, and which of the positions is its first; None where it has none."""
 
     text: str
     row: int | None
@@ -284,7 +284,7 @@ def bounds_of(file: str, lat_lon_deg: Array, *, widest_deg: float = WIDEST_MAP_D
 
 
 def reach_deg(box: LatLonBounds) -> float:
-    """Return the longer side of a box; near a pole its width in degrees says nothing."""
+    """Return the longer side of a box; near a pole its width in degrees means nothing."""
     near_pole = max(abs(box.south), abs(box.north)) > 89.0
     return max(0.0 if near_pole else (box.east - box.west) % 360.0, box.north - box.south)
 

@@ -1,4 +1,4 @@
-"""The packings a map file comes in, and what its header says."""
+"""The packings a map file comes in, and what its header holds."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class MapMeta(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class TableWriter:
-    """Writes a new index; nobody else sees the file until it is complete."""
+    """Writes a new index; no other process sees the file until it is complete."""
 
     def __init__(self, path: Path) -> None:
         self._db = sqlite3.connect(path, isolation_level=None)

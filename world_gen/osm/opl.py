@@ -114,7 +114,7 @@ def any_key(keys: Iterable[str]) -> re.Pattern[str]:
 
 
 def read_nodes(section: bytes, wanted: Callable[[str], object]) -> NodeObjects:
-    """Read lines such as `n1 Thighway=stop x8.5 y53.25`; `wanted` tells by their tags."""
+    """Read lines such as `n1 Thighway=stop x8.5 y53.25`; `wanted` decides by their tags."""
     section, texts = _without_tags(section, wanted)
     if b" x " in section or b" y\n" in section:
         section = section.replace(b" x ", b" x999 ").replace(b" y\n", b" y999\n")

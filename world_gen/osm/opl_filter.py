@@ -1,8 +1,8 @@
 """Decode a map to OPL: from memory, or as a process from standard input to standard output.
 
 For large maps a process of its own, since osmium keeps Python waiting while it decodes, and since
-the process bounds what it holds by how fast its output is taken. It knows nothing of this package:
-run by its path.
+the process bounds what it holds by how fast its output is taken. It imports nothing of this
+package: run by its path.
 """
 
 from __future__ import annotations

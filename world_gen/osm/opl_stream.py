@@ -40,11 +40,11 @@ class OplStream(contextlib.ExitStack):
             except OSError as error:
                 raise file_fault(path, error) from None
             self._file.seek(0)
-            self._said = opened.enter_context(tempfile.TemporaryFile())
+            self._complaint = opened.enter_context(tempfile.TemporaryFile())
             script = str(Path(__file__).with_name("opl_filter.py"))
             command = [sys.executable, "-P", script, form, OPL_OPTIONS]
             pipe = subprocess.PIPE
-            process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._said)
+            process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._complaint)
             self._process = opened.enter_context(process)
             self._feeder = threading.Thread(target=self._feed, daemon=True)
             self._feeder.start()
@@ -70,17 +70,17 @@ class OplStream(contextlib.ExitStack):
                 left += block
         code = self._process.wait()
         self._feeder.join()
-        self._said.seek(0)
-        said = self._said.read()
+        self._complaint.seek(0)
+        answer = self._complaint.read()
         if code != 0:
-            reason = said.decode(errors="replace") or f"decoder ended with {code}"
+            reason = answer.decode(errors="replace") or f"decoder ended with {code}"
             raise unreadable(self.path, RuntimeError(reason))
-        self.header = MapHeader.of(**json.loads(said))
+        self.header = MapHeader.of(**json.loads(answer))
 
     def _feed(self) -> None:
         target = _pipe(self._process.stdin)
         done = 0
-        # A decoder that gives up closes the pipe; what it said tells why.
+        # A decoder that gives up closes the pipe; its standard error has the reason.
         with contextlib.suppress(BrokenPipeError), target:
             while data := self._file.read(_FEED_BYTES):
                 self._sha256.update(data)

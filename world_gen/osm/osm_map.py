@@ -110,7 +110,7 @@ class OsmMap(msgspec.Struct, frozen=True, kw_only=True):
     `locations` holds (lat, lon) of every node of a kept way; `node_tags` the tags of tagged nodes;
     `ways` those with highway, railway, building, building:part, area:highway, barrier tags or in
     a kept relation; `relations` multipolygon buildings and turn restrictions. `frame` is centred
-    on the highways; all world_gen geometry of this map starts in it. `notes` say what the reader
+    on the highways; all world_gen geometry of this map starts in it. `notes` are what the reader
     left out or mended, each beginning with the object: `way 10: ...`.
     """
 
@@ -145,7 +145,7 @@ class OsmMap(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def boxes_deg(lat_lon_deg: Array, first: IntArray) -> Array:
-    """Return (L, 4) south, west, north and east of lines of points as `OsmMap.points_of` tells."""
+    """Return (L, 4) south, west, north and east of lines of points as of `OsmMap.points_of`."""
     if len(first) < 2:
         return np.zeros((0, 4))
     low, high = (f.reduceat(lat_lon_deg, first[:-1], axis=0) for f in (np.minimum, np.maximum))

@@ -69,8 +69,8 @@ def read_map(path: Path) -> OsmMap:
 def _as_opl(data: bytes, form: str) -> tuple[MapHeader, bytes]:
     with tempfile.TemporaryDirectory(prefix="foretwin-map-") as folder:
         path = Path(folder) / "map.opl"
-        said = decode(osmium.io.FileBuffer(data, form), osmium.io.File(path, opl.OPL_OPTIONS))
-        return MapHeader.of(**said), path.read_bytes()
+        header = decode(osmium.io.FileBuffer(data, form), osmium.io.File(path, opl.OPL_OPTIONS))
+        return MapHeader.of(**header), path.read_bytes()
 
 
 def _objects(text: bytes) -> MapObjects:

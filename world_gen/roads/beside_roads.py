@@ -1,4 +1,4 @@
-"""What a map tells of beside its roads: sidewalks, crossings drawn as ways, tracks, islands."""
+"""What a map has beside its roads: sidewalks, crossings drawn as ways, tracks, islands."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def beside_roads(osm: OsmMap) -> BesideRoads:
 
 
 class BesideIndex:
-    """What lies beside a map's roads, collected once and told place by place."""
+    """What lies beside a map's roads, collected once and looked up place by place."""
 
     def __init__(self, osm: OsmMap) -> None:
         self._osm = osm

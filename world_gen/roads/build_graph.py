@@ -83,7 +83,7 @@ class _Meaning(NamedTuple):
 def _meaning(
     tags: Mapping[str, str], known: dict[frozenset[tuple[str, str]], _Meaning]
 ) -> _Meaning:
-    """Return what tags mean; most ways of a town say the same but for their names."""
+    """Return what tags mean; most ways of a town have the same but for their names."""
     key = frozenset(item for item in tags.items() if not item[0].startswith(_SAYS_NOTHING))
     found = known.get(key)
     if found is None:
@@ -113,7 +113,7 @@ def _edges(
     cuts = np.nonzero(cut_here)[0]
     of_way = np.searchsorted(cuts, first).tolist()
     at = cuts.tolist()
-    # One sum from each cut to the next; those from one way to another are never asked for.
+    # One sum from each cut to the next; those from one way to another are not used.
     lengths = np.add.reduceat(steps, cuts[:-1]).tolist() if len(cuts) > 1 else []
     edges: list[RoadEdge] = []
     known: dict[frozenset[tuple[str, str]], _Meaning] = {}

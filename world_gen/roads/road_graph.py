@@ -16,7 +16,7 @@ from foretwin.contracts.world import DrivingSide
 class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     """A stretch of one way between two graph nodes; `xy_m` (N, 2) in the map's frame.
 
-    `forward` and `backward` say whether cars may drive along and against the node order.
+    `forward` and `backward` are whether cars may drive along and against the node order.
     `car` is true for public car roads; pedestrian streets, service roads, tracks and the like
     are kept with `car` false, since a recorded drive may use them, but no junction counts them.
     """

@@ -96,7 +96,7 @@ def directions(tags: Mapping[str, str]) -> Directions:
 
 
 class LaneCounts(NamedTuple):
-    """Lanes along and against the order of the nodes; 0 where nobody may drive."""
+    """Lanes along and against the order of the nodes; 0 where no car may drive."""
 
     forward: Quantity
     backward: Quantity

@@ -30,7 +30,7 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
 
     They are open to the car that is to use them even where the public may not drive.
 
-    Junctions and Worlds found in it know the places where they meet a street; edges keep their
+    Junctions and Worlds found in it have the places where they meet a street; edges keep their
     indices, so what was found in one graph holds in the other.
     """
     added = {index for index in edges if not graph.edges[index].car}

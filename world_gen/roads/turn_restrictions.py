@@ -47,7 +47,7 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
                 continue
             meant = after.edge.way_id in rule.to_ways
             if meant and rule.from_way == after.edge.way_id:
-                # A way that goes on beyond the node: only the word tells straight on from back.
+                # A way that goes on beyond the node: only the word parts straight on from back.
                 meant = meant and turns_back == rule.u_turn
             if meant != rule.only:
                 return False

@@ -50,7 +50,7 @@ class Approach(msgspec.Struct, kw_only=True):
 
     `line_m` is where vehicles stop, metres along the leg from its node; None: where lanes end.
     `signal_nodes` are the map's nodes whose light governs it, the first one met first.
-    `standing` tells how the road ranks where no light says who goes.
+    `standing` is how the road ranks where no light decides.
     """
 
     cluster: Cluster
@@ -156,7 +156,7 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
     """Name the junction's other lights with the heads that show the same.
 
     Lights on the way through go with the nearest road in; those on a one-way road out stop
-    nobody there, but go with the road in that leads straight to them.
+    no car there, but go with the road in that leads straight to them.
     """
     junction = mine[0].cluster.junction
     lit = [approach for approach in mine if approach.control.value == "signal"]

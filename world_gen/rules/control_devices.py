@@ -69,7 +69,7 @@ def met_toward(
 ) -> list[Met]:
     """Walk outward along the leg, on through nodes where the road merely goes on.
 
-    A node that does not say which way it faces counts for the nearer junction. `passed`
+    A node without a tagged direction counts for the nearer junction. `passed`
     is that of `passed_on`.
     """
     found: list[tuple[Met, bool]] = []
@@ -103,7 +103,7 @@ def met_toward(
 def own_sign(
     met: Sequence[Met], toward: DirectedEdge, cluster: Cluster, edges: Mapping[int, RoadEdge]
 ) -> Met | None:
-    """Return the nearest sign on a road; one on a node that others come to as well cannot tell."""
+    """Return the nearest sign on a road; one on a node that others come to as well is no clue."""
     signs = (m for m in met if sign_of(m.tags) and m.distance_m <= LOOK_BACK_M)
     for sign in sorted(signs, key=lambda m: m.distance_m):
         if sign.distance_m > 0.1 or cluster.ring or _comes_alone(toward, cluster, edges):
@@ -146,7 +146,7 @@ def lights_behind(leg: DirectedEdge, node_tags: NodeTags, within_m: float) -> li
 def faces(tags: Mapping[str, str], against_outward: bool) -> bool | None:
     """Return whether a sign or light is for those who drive along (true) the way's nodes.
 
-    `against_outward` is whether traffic in question runs along the nodes. None: it does not say.
+    `against_outward` is whether traffic in question runs along the nodes. None: it is not tagged.
     """
     for key in ("traffic_signals:direction", "stop:direction", "give_way:direction", "direction"):
         word = tags.get(key)

@@ -22,7 +22,7 @@ from foretwin.world_gen.rules.stop_lines import line_controls, lines_at_signs, s
 
 
 class TrafficControl(NamedTuple):
-    """What tells drivers when to go.
+    """Control devices and conflicts of a World.
 
     `plans` are by junction id, `crossing_plans` those of lights away from junctions.
     """
@@ -45,7 +45,7 @@ def junction_rules(
     """Return the rules of every whole junction, and of every light away from one.
 
     `junction_lights` are the nodes of the lights of all junctions of the map.
-    Connections learn their control, their signal group and their conflicts.
+    Control, signal group and conflicts are entered into the connections.
     """
     signs = signs_inside(connections, node_tags, around)
     found = approaches(around, node_tags, connections, junction_lights, signs)
@@ -91,11 +91,11 @@ def _control(
         if approach is None or not c.movement.inside:
             continue
         sign = next((sign.rule for sign in signs.get(c.id, ())), None)
-        told = approach.control
+        own = approach.control
         if c.turn == near:
             slips = not lights_inside(c.movement.inside, node_tags)
         else:
-            slips = told.value == "none" or (told.value != "signal" and told.source != "tagged")
+            slips = own.value == "none" or (own.value != "signal" and own.source != "tagged")
         if slips and sign is not None:
             c.control = "stop" if sign == "stop" else "give_way"
         elif slips and c.turn == near and approach.lit_inside:

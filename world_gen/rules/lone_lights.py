@@ -49,7 +49,7 @@ def lone_lights(
     """Return what governs the lanes at each light that belongs to no junction.
 
     `known` are the map's nodes of the lights at junctions.
-    Where the light does not say whom it faces it stops both directions; its plan lets cars drive
+    A light without a tagged direction stops both; its plan lets cars drive
     for most of the time, and those on foot after them.
     """
     taken = set(known)

@@ -1,12 +1,12 @@
 """Who waits where the paths of two connections meet: exactly one of them, by the rules of the road.
 
-Rules stand in the order in which they are asked:
+Rules stand in the order in which they apply:
 
 1. A U-turn on the spot waits for everyone (StVO §9 (5); UVC 11-602); one by way of a road through
    the median is two left turns.
 2. Who enters a roundabout waits for those on it (StVO §8 (1a); Highway Code 185; UVC 11-402); at a
    mini-roundabout for those who pass the driver's own entry. A ring tagged `junction=circular`
-   has no such right unless signs at its entries say so (Code de la route R415-10): then rule 5.
+   has no such right unless signs at its entries give it (Code de la route R415-10): then rule 5.
 3. Lanes of one road: who turns across a lane beside waits (§7 (5), §9 (1)); where lanes merge, who
    comes from the lane that ends (§7 (4)).
 4. Under lights of both, who turns across oncoming traffic waits (§37 (2) 1, §9 (3), (4); Highway
@@ -49,7 +49,7 @@ _FAST = ("motorway", "motorway_link", "trunk", "trunk_link")
 
 
 class Yielding(NamedTuple):
-    """Whether the first of a pair waits, by which rule, and who said so."""
+    """Whether the first of a pair waits, by which rule, and where that is from."""
 
     first_waits: bool
     rule: YieldRule
@@ -57,7 +57,7 @@ class Yielding(NamedTuple):
 
 
 class ConnectionFacts(msgspec.Struct, kw_only=True):
-    """What the rules ask about one connection."""
+    """What the rules need of one connection."""
 
     draft: ConnectionDraft
     turn_weight: int
@@ -93,7 +93,7 @@ def right_of_way(
     signs: SignsInside,
     driving_side: DrivingSide,
 ) -> tuple[tuple[Conflict, ...], Meetings]:
-    """Return every conflict with its answer, and fill what the connections say of them.
+    """Return every conflict with its answer, and enter them into the connections.
 
     Each of `connections` belongs to a junction that lies whole in the World.
     """
@@ -105,8 +105,8 @@ def right_of_way(
     conflicts = []
     conflicting: list[list[str]] = [[] for _ in ways]
     waiting: list[list[str]] = [[] for _ in ways]
-    told = (column.tolist() for column in (met.first, met.second, met.merging, met.apart_m, angle))
-    rows = zip(*told, met.points, met.areas, strict=True)
+    values = (met.first, met.second, met.merging, met.apart_m, angle)
+    rows = zip(*(column.tolist() for column in values), met.points, met.areas, strict=True)
     for i, j, merging, apart_m, from_first, point, area in rows:
         a, b = ways[i], ways[j]
         standing = a.standing, b.standing
@@ -157,8 +157,8 @@ def _ways(
     ahead = np.arctan2(gap[:, 1], gap[:, 0])
     start, end = ahead[paths.first[:-1]], ahead[paths.first[1:] - 2]
     bend = np.abs(wrap_angle(end - start))
-    told = (column.tolist() for column in (start, end, bend, paths.length_m))
-    rows = zip(connections, *told, strict=True)
+    columns = (column.tolist() for column in (start, end, bend, paths.length_m))
+    rows = zip(connections, *columns, strict=True)
     ways = []
     for c, heading, exit_heading, bend_rad, length_m in rows:
         toward = c.movement.toward
@@ -212,7 +212,7 @@ def _answer(
 ) -> Yielding:
     """Return who of two waits; `angle` turns a's first heading into b's, positive to the left.
 
-    `crossing` tells that the middles of their paths cross.
+    `crossing` is whether the middles of their paths cross.
     """
     if a.on_the_spot != b.on_the_spot:
         return Yielding(a.on_the_spot, "u_turn", "inferred")
@@ -241,8 +241,8 @@ def _answer(
         return Yielding(False, second.rule, second.source)
     if first.rank != second.rank:
         loser, winner = sorted((first, second))
-        told = loser if loser.rank < Rank.PLAIN else winner
-        return Yielding(loser is first, told.rule, told.source)
+        decisive = loser if loser.rank < Rank.PLAIN else winner
+        return Yielding(loser is first, decisive.rule, decisive.source)
     if a.on_main != b.on_main and first.rank < Rank.PLAIN:
         return Yielding(b.on_main, first.rule if b.on_main else second.rule, "inferred")
     if oncoming:

@@ -44,7 +44,7 @@ def lane_groups(
     lanes: LaneSet,
     connections: Sequence[ConnectionDraft],
 ) -> list[LaneGroup]:
-    """Return the groups of all signalled approaches; connections learn their group.
+    """Return the groups of all signalled approaches; it is entered into the connections.
 
     Lanes that the map tags for the turn across oncoming traffic alone have lights of their own.
     Groups of a junction are numbered in the order of their ways, so that every World that holds

@@ -1,6 +1,6 @@
 """A fixed-time plan for each signalised junction: phases, greens, amber and clearing times.
 
-The map does not know the real plan. This one is a default after RiLSA 2015: a cycle of 90 s, of
+The map does not have the real plan. This one is a default after RiLSA 2015: a cycle of 90 s, of
 120 s with more than three phases (2.7.3: at most 120 s), amber 3 s up to 50 km/h, 4 s at 60, 5 s
 at 70 (2.4), at least 5 s of green (2.7.4), all red for as long as the last car needs to clear the
 ground it shares with the first one of the next phase (2.5): clearing 6 m of car and the way there

@@ -23,7 +23,7 @@ _BESIDE_M = 1.0
 class SignInside(NamedTuple):
     """A sign that a connection passes, `at_m` along its path.
 
-    `on_path` tells that the path keeps to the sign's road there, and cuts no corner.
+    `on_path` means that the path keeps to the sign's road there, and cuts no corner.
     """
 
     node: int
@@ -111,8 +111,8 @@ def _met(
 ) -> Iterator[tuple[int, DirectedEdge, Array]]:
     """Yield the signs that face who drives along `inside`: node, road and place (2,).
 
-    One that does not say whom it faces counts on a one-way road, and on another for those who
-    come to the nearer of the two nodes at which roads meet; on such a node it cannot tell.
+    One without a tagged direction counts on a one-way road, and on another for those who
+    come to the nearer of the two nodes at which roads meet; on such a node it does not count.
     """
     for run in _runs(inside, ends):
         total_m = sum(part.edge.length_m for part in run)
