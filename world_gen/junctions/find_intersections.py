@@ -125,9 +125,7 @@ def _junction(
 def _centre_xy_m(cluster: JunctionCluster, graph: RoadGraph) -> tuple[float, float]:
     """Return the mean of the core nodes, of a ring the middle of its line."""
     if cluster.ring is None:
-        points = [graph.node_xy_m[node] for node in sorted(cluster.core)]
-        x_m, y_m = sum([x for x, _ in points]), sum([y for _, y in points])
-        return x_m / len(points), y_m / len(points)
+        return graph.middle_of(cluster.core)
     middles, lengths = [], []
     for edge in cluster.ring.edges:
         middles.append((edge.xy_m[1:] + edge.xy_m[:-1]) / 2.0)

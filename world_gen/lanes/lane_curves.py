@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
@@ -117,13 +118,16 @@ def build_lanes(around: Surroundings) -> LaneSet:
     lanes: dict[str, LaneDraft] = {}
     roads: list[Road] = []
     borders: dict[str, tuple[Array, Array]] = {}
-    names: set[str] = set()
+    names: Counter[str] = Counter()
     begins: dict[tuple[int, bool, int], LaneDraft] = {}
     ends: dict[tuple[int, bool, int], LaneDraft] = {}
     roles = _roles(around)
     for stretch, section in zip(stretches, sections, strict=True):
         index, edge = stretch.edge, around.edges[stretch.edge]
-        road = _road_id(edge, names)
+        # A name that the same map always gives; pieces and twins of an edge are counted.
+        name = f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
+        names[name] += 1
+        road = name if names[name] == 1 else f"{name}#{names[name]}"
         borders[road] = (_line(next(curves)), _line(next(curves)))
         mine: list[LaneDraft] = []
         for plan in section.lanes:
@@ -198,16 +202,6 @@ def _offsets(
 def _line(points: Array) -> Array:
     """Return an edge of a carriageway as a line, even where a bend shrinks it to a point."""
     return points if len(points) > 1 else np.repeat(points, 2, axis=0)
-
-
-def _road_id(edge: RoadEdge, taken: set[str]) -> str:
-    """Return a name that the same map always gives; pieces and twins of an edge are counted."""
-    name = first = f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
-    twin = 2
-    while name in taken:
-        name, twin = f"{first}#{twin}", twin + 1
-    taken.add(name)
-    return name
 
 
 def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import msgspec
@@ -106,6 +106,12 @@ class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
     node_xy_m: Mapping[int, tuple[float, float]]
     leaving: Mapping[int, tuple[DirectedEdge, ...]]
     """Directed edges that start at a node, in a fixed order."""
+
+    def middle_of(self, nodes: Iterable[int]) -> tuple[float, float]:
+        """Return the mean of the places of nodes."""
+        points = [self.node_xy_m[node] for node in sorted(nodes)]
+        x_m, y_m = sum([x for x, _ in points]), sum([y for _, y in points])
+        return x_m / len(points), y_m / len(points)
 
     def at_node(self, node: int) -> tuple[DirectedEdge, ...]:
         """Return the directed edges that start at `node`, allowed or not."""

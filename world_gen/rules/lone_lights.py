@@ -97,7 +97,7 @@ def _line(
     if "crossing" in tags[node]:
         at_m -= BEFORE_CROSSING_M
     back_m = length(lane.centerline) - at_m
-    (line,) = lines_across([lane], [back_m], [Choice("signal", "tagged")], f"light{node}")
+    (line,) = lines_across([(lane, back_m, Choice("signal", "tagged"))], f"light{node}")
     return line
 
 

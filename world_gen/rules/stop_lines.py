@@ -29,13 +29,13 @@ def stop_lines(
     All lanes of a road stop at one line: where the map has the sign or light, before a crossing
     that waiting cars would block, else where lanes end.
     """
-    mine = [
-        (lane, _line_back_m(approach, around), approach.control)
-        for approach in found
-        for lane in entering(approach, around, lanes)
-    ]
-    drawn, back_m = [lane for lane, _, _ in mine], [away_m for _, away_m, _ in mine]
-    return lines_across(drawn, back_m, [control for _, _, control in mine])
+    return lines_across(
+        [
+            (lane, _line_back_m(approach, around), approach.control)
+            for approach in found
+            for lane in entering(approach, around, lanes)
+        ]
+    )
 
 
 def entering(approach: Approach, around: Surroundings, lanes: LaneSet) -> list[LaneDraft]:
@@ -53,19 +53,17 @@ def _line_back_m(approach: Approach, around: Surroundings) -> float:
 
 
 def lines_across(
-    lanes: Sequence[LaneDraft],
-    back_m: Sequence[float],
-    controls: Sequence[Choice],
-    name: str = "stop",
+    stopped: Sequence[tuple[LaneDraft, float, Choice]], name: str = "stop"
 ) -> tuple[StopLine, ...]:
-    """Return a line across each lane, so many metres before its end but within the lane."""
-    paths = Polylines.of([lane.centerline for lane in lanes])
-    total = paths.length_m
-    at_m = np.maximum(total - np.array(back_m), np.minimum(0.5, 0.5 * total))
-    ends = _ends_across(paths, at_m, [lane.width_m.value for lane in lanes])
+    """Return a line across each lane, so many metres before its end but within the lane, and with
+    its control."""
+    paths = Polylines.of([lane.centerline for lane, _, _ in stopped])
+    total, back_m = paths.length_m, np.array([away_m for _, away_m, _ in stopped])
+    at_m = np.maximum(total - back_m, np.minimum(0.5, 0.5 * total))
+    ends = _ends_across(paths, at_m, [lane.width_m.value for lane, _, _ in stopped])
     return tuple(
         StopLine(id=f"{lane.id}:{name}", lane_id=lane.id, ends=mine, control=control)
-        for lane, mine, control in zip(lanes, ends, controls, strict=True)
+        for (lane, _, control), mine in zip(stopped, ends, strict=True)
     )
 
 
