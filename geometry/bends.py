@@ -32,11 +32,11 @@ class Rounded(NamedTuple):
     after: Array
 
 
-def thinned(lines: Polylines, min_step_m: float = MIN_STEP_M) -> Polylines:
-    """Return the lines without points nearer than `min_step_m` to the one before; ends stay."""
+def thinned(lines: Polylines) -> Polylines:
+    """Return the lines without points nearer than `MIN_STEP_M` to the one before; ends stay."""
     for _ in range(12):
         near = np.zeros(len(lines.xy_m), dtype=bool)
-        near[1:] = lines.steps[1][:-1] < min_step_m
+        near[1:] = lines.steps[1][:-1] < MIN_STEP_M
         first, last = lines.first[:-1], lines.first[1:] - 1
         near[first] = False
         # In place of a line's end its neighbour goes.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import compress
 from typing import NamedTuple
 
 import msgspec
@@ -147,8 +148,6 @@ def _in_frame(
     edges: list[RoadEdge], frame: LocalFrame, map_frame: LocalFrame
 ) -> dict[int, RoadEdge]:
     """Return edges in the World's frame by index, without those that are but a point."""
-    if not edges:
-        return {}
     lines = Polylines.of([edge.xy_m for edge in edges])
     moved = Polylines(target_from_source_m(frame, map_frame, lines.xy_m), lines.first)
     step_m = np.maximum.reduceat(moved.steps[1] * ~moved.is_last, moved.first[:-1]).tolist()
@@ -175,10 +174,9 @@ def _clusters(
         for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
             leaving.setdefault(directed.start_node, []).append(directed)
     known = list(leaving)
-    at = [leaving[node][0].xy_m[0] for node in known]
+    at = np.array([leaving[node][0].xy_m[0] for node in known]).reshape(-1, 2)
     near: set[int] = {node for junction in made_for for node in junction.nodes}
-    if known:
-        near.update(n for n, ok in zip(known, extent.holds(np.array(at)), strict=True) if ok)
+    near.update(compress(known, extent.holds(at)))
     others = {j.summary.id: j for j in made_for}
     for node in sorted(near):
         if found := index.junction_of_node.get(node):

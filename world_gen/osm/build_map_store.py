@@ -142,8 +142,6 @@ class _WayBatches:
         is_road = np.array([_is_road(text) for text in lines.tag_texts], dtype=bool)
         sound = sound_ways(lines.ids, is_road, nodes, positions)
         self._note(sound.notes, positions)
-        if not len(sound.picked):
-            return
         ways = WayTable(
             np.array(lines.ids, dtype=np.int64)[sound.picked],
             sound.nodes.counts,

@@ -209,8 +209,6 @@ def _faulty(
 ) -> BoolArray:
     """Return per way whether it has gaps, fewer than two nodes, no length or too much of it."""
     faulty: BoolArray = counts < 2
-    if not len(rows):
-        return faulty
     filled = np.flatnonzero(counts > 0)
     begins = (np.cumsum(counts) - counts)[filled]
     reach = np.zeros(len(filled), dtype=np.int64)

@@ -97,8 +97,6 @@ class WayTable(msgspec.Struct, frozen=True, dict=True):
 
     def boxes(self) -> Boxes:
         """Return the box around each way."""
-        if not len(self.ids):
-            return Boxes(*(np.empty(0, dtype=np.int64),) * 4)
         edges = ((least, of) for least in (np.minimum, np.maximum) for of in self.nodes[1:])
         return Boxes(*(least.reduceat(of, self._begins) for least, of in edges))
 

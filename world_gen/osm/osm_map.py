@@ -146,7 +146,5 @@ class OsmMap(msgspec.Struct, frozen=True, kw_only=True):
 
 def boxes_deg(lat_lon_deg: Array, first: IntArray) -> Array:
     """Return (L, 4) south, west, north and east of lines of points as of `OsmMap.points_of`."""
-    if len(first) < 2:
-        return np.zeros((0, 4))
     low, high = (f.reduceat(lat_lon_deg, first[:-1], axis=0) for f in (np.minimum, np.maximum))
     return np.concatenate([low, high], axis=1)
