@@ -12,7 +12,6 @@ from tests.world_gen.sketch import MANCHESTER, Sketch, off_centre_m, only, star
 COVERS = (
     "foretwin.world_gen.junctions.chains",
     "foretwin.world_gen.junctions.grouping",
-    "foretwin.world_gen.junctions.intersections",
     "foretwin.world_gen.junctions.junction_arms",
     "foretwin.world_gen.junctions.junction_clusters",
     "foretwin.world_gen.junctions.slip_roads",

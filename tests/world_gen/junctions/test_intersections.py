@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from foretwin.world_gen.junctions.find_intersections import find_intersections
-from foretwin.world_gen.junctions.route_junctions import junctions_on_route
+from foretwin.world_gen.junctions.intersections import junctions_on_route
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 from tests.world_gen.sketch import Sketch
