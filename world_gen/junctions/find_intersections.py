@@ -15,7 +15,7 @@ from foretwin.world_gen.junctions.grouping import JunctionCluster
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.junction_arms import ArmChains, ClusterRoads, approaches, roads_of
 from foretwin.world_gen.junctions.junction_clusters import cluster_branchings
-from foretwin.world_gen.junctions.junction_control import control_of, lights_of
+from foretwin.world_gen.junctions.junction_control import control_of
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 
@@ -92,15 +92,8 @@ def _junction(
     lat_deg, lon_deg = lat_lon_deg
     core = frozenset(cluster.core)
     incoming = tuple([chain for item in arms for chain in item.chains if chain.inward])
-    lights = lights_of(core, around.inside, incoming, osm.node_tags)
-    control = control_of(
-        core,
-        around.inside,
-        incoming,
-        osm.node_tags,
-        lights=bool(lights),
-        ring=kind in ("roundabout", "mini_roundabout"),
-    )
+    ring = kind in ("roundabout", "mini_roundabout")
+    control, lights = control_of(core, around.inside, incoming, osm.node_tags, ring=ring)
     return Junction(
         summary=IntersectionSummary(
             id=f"n{min(cluster.core)}",

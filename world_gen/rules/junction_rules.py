@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 from foretwin.contracts.signals import Signal, SignalPlan
@@ -56,7 +57,9 @@ def junction_rules(
     conflicts, met = right_of_way(ruled, found, signs, around.driving_side)
     groups = lane_groups(found, around, lanes, ruled)
     walks = walk_groups(groups, crossings, around)
-    heads = signal_heads(groups, {line.lane_id: line for line in lines}, around)
+    heads = signal_heads(
+        list(chain(*groups.values())), {line.lane_id: line for line in lines}, around
+    )
     known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
     lone = lone_lights(around, node_tags, lanes, crossings, known)
     return TrafficControl(

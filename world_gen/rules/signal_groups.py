@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import compress
 
 import msgspec
@@ -43,8 +43,8 @@ def lane_groups(
     around: Surroundings,
     lanes: LaneSet,
     connections: Sequence[ConnectionDraft],
-) -> list[LaneGroup]:
-    """Return the groups of all signalled approaches; it is entered into the connections.
+) -> dict[str, list[LaneGroup]]:
+    """Return by junction the groups of signalled approaches; connections get the name of theirs.
 
     Lanes that the map tags for the turn across oncoming traffic alone have lights of their own.
     Groups of a junction are numbered in the order of their ways, so that every World that holds
@@ -86,7 +86,7 @@ def lane_groups(
         if known is not None and c.control == "signal":
             known.connections.append(c)
             c.signal_group_id = known.id
-    return [group for groups in by_junction.values() for group in groups]
+    return by_junction
 
 
 class WalkGroup(msgspec.Struct, frozen=True, kw_only=True):
@@ -102,19 +102,16 @@ class WalkGroup(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def walk_groups(
-    groups: Sequence[LaneGroup], crossings: Sequence[Crossing], around: Surroundings
+    groups: Mapping[str, Sequence[LaneGroup]], crossings: Sequence[Crossing], around: Surroundings
 ) -> dict[str, list[WalkGroup]]:
-    """Return the groups of signalled crossings by junction.
+    """Return the groups of signalled crossings by junction; `groups` are those of its lanes.
 
     Who enters by the crossed road may not drive meanwhile, nor who leaves by it straight on;
     who turns into it waits for those on foot (StVO §9 (3), RiLSA 2015 2.3.1).
     """
     lit = {c.osm_node: c for c in crossings if c.kind.value == "traffic_signals" and c.osm_node}
     found: dict[str, list[WalkGroup]] = {}
-    by_junction: dict[str, list[LaneGroup]] = {}
-    for group in groups:
-        by_junction.setdefault(group.approach.junction_id, []).append(group)
-    for name, mine in by_junction.items():
+    for name, mine in groups.items():
         signalled = lit.keys() & set(_nodes_at(name, around))
         against: dict[int, set[str]] = {node: set() for node in signalled}
         for group in mine:

@@ -45,14 +45,14 @@ class Between(NamedTuple):
 
 
 def signal_plans(
-    groups: Sequence[LaneGroup],
+    groups: Mapping[str, Sequence[LaneGroup]],
     walks: Mapping[str, Sequence[WalkGroup]],
     connections: Sequence[ConnectionDraft],
     conflicts: Sequence[Conflict],
     met: Meetings,
 ) -> dict[str, SignalPlan]:
     """Return a plan for each junction with groups, by its id; `met` are the conflicts' places."""
-    of = {c.id: g for g in groups for c in g.connections}
+    of = {c.id: g for mine in groups.values() for g in mine for c in g.connections}
     pairs: dict[tuple[str, str], Between] = {}
     rows = zip(conflicts, met.first_m.tolist(), met.second_m.tolist(), strict=True)
     for conflict, first_m, second_m in rows:
@@ -64,10 +64,7 @@ def signal_plans(
         old = pairs.get(key, Between(False, False, 0.0))
         clear_s = max(_clear_s(first_m, second_m), _clear_s(second_m, first_m), old.clear_s)
         pairs[key] = Between(old.crossing or not waits, old.waiting or waits, clear_s)
-    by_junction: dict[str, list[LaneGroup]] = {}
-    for group in groups:
-        by_junction.setdefault(group.approach.junction_id, []).append(group)
-    return {name: _plan(mine, walks.get(name, ()), pairs) for name, mine in by_junction.items()}
+    return {name: _plan(mine, walks.get(name, ()), pairs) for name, mine in groups.items()}
 
 
 def oncoming(a: LaneGroup, b: LaneGroup) -> bool:
