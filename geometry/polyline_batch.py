@@ -166,11 +166,8 @@ def offset(
         out[last] = np.where(np.isnan(after), out[last], after)
     normal, stretch = rays_between(into, out, at_start[lines.line])
     shift = left_m[lines.line]
-    shifted = np.where(
-        (np.abs(shift) < 1e-9)[:, None],
-        lines.xy_m,
-        lines.xy_m + normal * (shift * stretch)[:, None],
-    )
+    moved = lines.xy_m + normal * (shift * stretch)[:, None]
+    shifted = np.where((np.abs(shift) < 1e-9)[:, None], lines.xy_m, moved)
     return _without_backward_runs(Polylines(shifted, lines.first), lines)
 
 

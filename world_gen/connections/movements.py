@@ -49,11 +49,8 @@ def movements(
         toward = leg.back
         if not toward.allowed:
             continue
-        marked = any(
-            "u_turn" in lane.turns
-            for lane in around.section(toward).lanes
-            if lane.reverse == toward.reverse
-        )
+        lanes = around.section(toward).lanes
+        marked = any("u_turn" in lane.turns for lane in lanes if lane.reverse == toward.reverse)
         ways = _ways_through(cluster, toward, inner, restrictions, back=marked)
         # Who has no other way out of a street may turn back.
         ways = [

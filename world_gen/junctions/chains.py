@@ -114,12 +114,8 @@ def car_roads(osm: OsmMap, graph: RoadGraph) -> CarRoads:
         if outward or node in on_ring:
             leaving[node] = outward
     highway = {node: tags["highway"] for node, tags in osm.node_tags.items() if "highway" in tags}
-    mini = {node for node, word in highway.items() if word == "mini_roundabout"}
-    ends = {
-        node
-        for node, outward in leaving.items()
-        if len(outward) != 2 or node in on_ring or node in mini
-    }
+    round_about = on_ring | {node for node, word in highway.items() if word == "mini_roundabout"}
+    ends = {node for node, out in leaving.items() if len(out) != 2 or node in round_about}
     stops = frozenset(node for node, word in highway.items() if word in STOPS)
     walk = _Walk(edges, leaving, ends, osm.node_tags, stops)
     return CarRoads(

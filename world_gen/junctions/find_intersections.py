@@ -45,12 +45,9 @@ def find_intersections(osm: OsmMap, graph: RoadGraph) -> tuple[Junction, ...]:
         return ()
     centres = np.array([_centre_xy_m(place.cluster, graph) for place in places])
     degrees = geo_from_local(graph.frame, centres).tolist()
-    found = [
-        _junction(place, centre, lat_lon, osm, graph)
-        for place, centre, lat_lon in zip(places, centres, degrees, strict=True)
-    ]
-    found.sort(key=lambda junction: junction.summary.id)
-    return tuple(found)
+    rows = zip(places, centres, degrees, strict=True)
+    found = (_junction(*row, osm, graph) for row in rows)
+    return tuple(sorted(found, key=lambda junction: junction.summary.id))
 
 
 class _JunctionDraft(NamedTuple):

@@ -35,11 +35,8 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
     def map_key(self) -> str:
         """The map's SHA-256, and which roads count as car roads beyond its tags."""
         edges = (self.graph.edges[i] for i in self.car_edges)
-        added = [
-            f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
-            for edge in edges
-            if edge.road_class in OTHER_CLASSES
-        ]
+        others = (edge for edge in edges if edge.road_class in OTHER_CLASSES)
+        added = [f"w{edge.way_id}.{edge.start_node}.{edge.end_node}" for edge in others]
         return self.osm.sha256 if not added else f"{self.osm.sha256} with {' '.join(added)}"
 
     def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:

@@ -189,12 +189,8 @@ def _clusters(
     groups.extend(_ClusterNodes(frozenset([n])) for n in sorted(near - taken))
     clusters = []
     for group in groups:
-        legs = tuple(
-            d
-            for node in sorted(group.nodes)
-            for d in leaving.get(node, ())
-            if d.edge.index not in group.inner
-        )
+        out = (d for node in sorted(group.nodes) for d in leaving.get(node, ()))
+        legs = tuple(d for d in out if d.edge.index not in group.inner)
         if len(legs) >= 2:
             clusters.append(Cluster(key=str(min(group.nodes)), legs=legs, **group._asdict()))
     return tuple(clusters)

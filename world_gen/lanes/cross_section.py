@@ -46,11 +46,10 @@ def cross_section(
     centre = _centre(edge, driving_side, centre_reverse, notes) if ahead and against else []
     with_bicycles = frozenset(p.reverse for p in (*ahead, *against) if p.kind == "bicycle")
     beside = side_lanes(edge, driving_side, with_bicycles, BUS_WIDTH_M)
-    ordered = (
-        [*reversed(against), *centre, *ahead]
-        if driving_side == "right"
-        else [*ahead, *centre, *reversed(against)]
-    )
+    first, last = against[::-1], ahead
+    if driving_side == "left":
+        first, last = last, first
+    ordered = [*first, *centre, *last]
     ordered = _fit_total_width(edge, ordered)
     total = _width(ordered)
     left = total / 2 + _placement_shift(edge, ordered, total, notes)

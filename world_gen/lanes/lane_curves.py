@@ -166,11 +166,8 @@ def build_lanes(around: Surroundings) -> LaneSet:
                 tunnel=in_tunnel(edge.tags),
             )
         )
-    led_through = places_led_through(
-        legs,
-        {(edge, reverse) for edge, reverse, _ in begins},
-        {(edge, reverse) for edge, reverse, _ in ends},
-    )
+    driven = ({(edge, reverse) for edge, reverse, _ in keys} for keys in (begins, ends))
+    led_through = places_led_through(legs, *driven)
     known = tuple(without_dead_places(roads, led_through))
     return LaneSet(lanes, known, borders, begins, ends, tuple(notes))
 
@@ -187,10 +184,7 @@ def _offsets(
     """Return for each stretch its left and right edge and its lanes' middles, along the nodes."""
     if not stretches:
         return []
-    left_m = [
-        (section.left_m, section.right_m, *(plan.left_m for plan in section.lanes))
-        for section in sections
-    ]
+    left_m = [(s.left_m, s.right_m, *(plan.left_m for plan in s.lanes)) for s in sections]
     row = np.repeat(np.arange(len(stretches)), [len(mine) for mine in left_m])
     before = np.array([stretch.before for stretch in stretches])[row]
     after = np.array([stretch.after for stretch in stretches])[row]
@@ -225,7 +219,7 @@ def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:
 
 
 def _join_neighbours(mine: list[LaneDraft]) -> None:
-    """Tell lanes that cars drive the same way side by side of each other."""
+    """Link lanes that cars drive the same way side by side."""
     of_number = {(lane.plan.reverse, lane.plan.number): lane for lane in mine if lane.plan.counted}
     for (reverse, number), lane in of_number.items():
         right = of_number.get((reverse, number + 1))

@@ -77,10 +77,8 @@ def opposed(leg: DirectedEdge, other: DirectedEdge) -> bool:
     """Return whether two one-way roads leave a place side by side, as carriageways of a street."""
     if leg.edge.index == other.edge.index or not (leg.edge.one_way and other.edge.one_way):
         return False
-    return any(
-        dot(heading_out(leg, look_m), heading_out(other, look_m)) > _BESIDE_COS
-        for look_m in (8.0, _PARTED_M)
-    )
+    heads = ((heading_out(leg, m), heading_out(other, m)) for m in (8.0, _PARTED_M))
+    return any(dot(mine, its) > _BESIDE_COS for mine, its in heads)
 
 
 def lateral_positions(

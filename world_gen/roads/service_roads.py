@@ -17,12 +17,8 @@ def with_service_roads(graph: RoadGraph) -> RoadGraph:
 
 def open_service_roads(edges: Iterable[RoadEdge]) -> tuple[int, ...]:
     """Return the indices, ascending, of those edges that are service roads open to cars."""
-    found = {
-        edge.index
-        for edge in edges
-        if edge.road_class == "service" and not edge.car and (edge.forward or edge.backward)
-    }
-    return tuple(sorted(found))
+    service = (edge for edge in edges if edge.road_class == "service" and not edge.car)
+    return tuple(sorted({edge.index for edge in service if edge.forward or edge.backward}))
 
 
 def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:

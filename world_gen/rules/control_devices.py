@@ -51,11 +51,8 @@ def passed_on(edges: Mapping[int, RoadEdge], node_tags: NodeTags) -> dict[int, P
     found = {}
     rows = zip(edges.items(), paths.first[:-1].tolist(), paths.length_m.tolist(), strict=True)
     for (index, edge), first, length_m in rows:
-        tagged = tuple(
-            (node, float(paths.arc_m[first + i]))
-            for i, node in enumerate(edge.node_ids)
-            if node in node_tags
-        )
+        nodes = enumerate(edge.node_ids, first)
+        tagged = tuple((node, float(paths.arc_m[i])) for i, node in nodes if node in node_tags)
         found[index] = Passed(length_m, tagged)
     return found
 

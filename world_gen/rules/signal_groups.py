@@ -67,14 +67,9 @@ def lane_groups(
         groups = by_junction.setdefault(approach.junction_id, [])
         for part in (rest, own):
             if part:
-                groups.append(
-                    LaneGroup(
-                        id="",
-                        approach=approach,
-                        lanes=tuple(part),
-                        turning=part is own and bool(rest),
-                    )
-                )
+                turning = part is own and bool(rest)
+                group = LaneGroup(id="", approach=approach, lanes=tuple(part), turning=turning)
+                groups.append(group)
     of_lane: dict[str, LaneGroup] = {}
     for name, groups in by_junction.items():
         groups.sort(key=LaneGroup.order)

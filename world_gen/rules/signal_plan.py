@@ -129,11 +129,8 @@ def _phases(
     Where two roads that face each other both have lanes of their own for the turn across, these
     go in a phase of theirs; else who turns across waits.
     """
-    protected = {
-        g.id
-        for g in groups
-        if g.turning and any(other.turning and oncoming(g, other) for other in groups)
-    }
+    turning = [group for group in groups if group.turning]
+    protected = {g.id for g in turning if any(oncoming(g, other) for other in turning)}
 
     def together(a: LaneGroup, b: LaneGroup) -> bool:
         between = pairs.get((a.id, b.id) if a.id < b.id else (b.id, a.id))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -81,15 +82,9 @@ def shared_signs(
         passed[road] = mine if known is None else {n: s for n, s in known.items() if n in mine}
         if c.turn == driving_side:
             near.add(road)
-    return {
-        road: min(mine.values(), key=_place).rule
-        for road, mine in passed.items()
-        if road in near and mine
-    }
-
-
-def _place(sign: SignInside) -> float:
-    return sign.at_m
+    first = attrgetter("at_m")
+    shared = {road: mine for road, mine in passed.items() if road in near and mine}
+    return {road: min(mine.values(), key=first).rule for road, mine in shared.items()}
 
 
 def _is_signed(part: DirectedEdge, node_tags: NodeTags) -> bool:
