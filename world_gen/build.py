@@ -81,10 +81,8 @@ def build_region(
 def _rectangle(bounds: LatLonBounds, frame: LocalFrame) -> Rectangle:
     """Return the largest rectangle of the frame within bounds in degrees."""
     south, north, west, east = bounds.south, bounds.north, bounds.west, bounds.east
-    corners = local_from_geo(
-        frame, np.array([south, south, north, north]), np.array([west, east, west, east])
-    )
-    (sw, se, nw, ne) = np.round(corners, 3).tolist()
+    lat, lon = np.array([south, south, north, north]), np.array([west, east, west, east])
+    sw, se, nw, ne = np.round(local_from_geo(frame, lat, lon), 3).tolist()
     return Rectangle(max(sw[0], nw[0]), max(sw[1], se[1]), min(se[0], ne[0]), min(nw[1], ne[1]))
 
 

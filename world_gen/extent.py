@@ -64,9 +64,8 @@ class Rectangle(msgspec.Struct, frozen=True):
     @property
     def radius_m(self) -> float:
         """Distance of the farthest corner from the origin."""
-        return math.hypot(
-            max(abs(self.west_m), abs(self.east_m)), max(abs(self.south_m), abs(self.north_m))
-        )
+        west_m, south_m, east_m, north_m = map(abs, self.bounds_m)
+        return math.hypot(max(west_m, east_m), max(south_m, north_m))
 
     @property
     def bounds_m(self) -> tuple[float, float, float, float]:
@@ -80,11 +79,9 @@ class Rectangle(msgspec.Struct, frozen=True):
 
     def holds(self, xy_m: Array) -> Flags:
         """Return for points (N, 2) whether they lie inside, as (N,) of bool."""
-        x, y = xy_m[:, 0], xy_m[:, 1]
-        inside: Flags = (
-            (x >= self.west_m) & (x <= self.east_m) & (y >= self.south_m) & (y <= self.north_m)
-        )
-        return inside
+        west_m, south_m, east_m, north_m = self.bounds_m
+        low, high = xy_m >= (west_m, south_m), xy_m <= (east_m, north_m)
+        return np.asarray((low & high).all(axis=1))
 
     def crossings(self, xy_m: Array) -> list[float]:
         """Return arc lengths at which a polyline (N, 2) meets the lines of the edge."""

@@ -93,10 +93,9 @@ def assemble_map(
             notes.append(f"relation {key}: {NO_WAYS}")
     used = np.zeros(len(table.ids), dtype=bool)
     used[sound.rows] = True
-    tagged_rows, tagged_placed = rows_of(
-        table.ids, np.array(list(objects.node_tags), dtype=np.int64)
-    )
-    used[tagged_rows[tagged_placed]] = True
+    tagged = np.array(list(objects.node_tags), dtype=np.int64)
+    rows, placed = rows_of(table.ids, tagged)
+    used[rows[placed]] = True
     kept = table.rows(used)
     locations = NodeLocations(kept.ids, kept.lat_lon_deg)
     road_nodes = [node for way in ways.values() if "highway" in way.tags for node in way.nodes]

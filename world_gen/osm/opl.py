@@ -155,11 +155,8 @@ def _missing_decimals(section: bytes) -> IntArray:
     ends[0::2] = starts[1::2] - 1
     ends[1::2] = np.flatnonzero(letters == ord("\n"))
     decimals = np.zeros(len(starts), dtype=np.int64)
-    of = (
-        np.arange(len(starts))
-        if len(points) == len(starts)
-        else np.searchsorted(starts, points) - 1
-    )
+    all_have = len(points) == len(starts)
+    of = np.arange(len(starts)) if all_have else np.searchsorted(starts, points) - 1
     decimals[of] = ends[of] - points - 1
     scales: IntArray = (10 ** (7 - np.arange(8, dtype=np.int64)))[decimals]
     return scales

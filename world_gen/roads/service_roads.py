@@ -34,9 +34,8 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
         return graph
     changed = tuple(_opened(edge) if edge.index in added else edge for edge in graph.edges)
     leaving = dict(graph.leaving)
-    ends = {
-        node for index in added for node in (changed[index].start_node, changed[index].end_node)
-    }
+    opened = [changed[index] for index in added]
+    ends = {node for edge in opened for node in (edge.start_node, edge.end_node)}
     for node in ends:
         leaving[node] = tuple(
             DirectedEdge(changed[item.edge.index], item.reverse) for item in graph.leaving[node]

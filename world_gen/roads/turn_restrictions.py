@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 _KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehicle", "restriction")
@@ -79,22 +79,23 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
         exempt = {part.strip() for part in tags.get("except", "").split(";")}
         if not word.startswith(("no_", "only_")) or exempt & _CARS:
             continue
-        role = {
-            name: [m for m in relation.members if m.role == name] for name in ("from", "to", "via")
-        }
         only = word.startswith("only_")
-        via_ways = tuple(m.ref for m in role["via"] if m.kind == "w")
-        via_nodes = [m.ref for m in role["via"] if m.kind == "n"]
-        ends = frozenset(m.ref for m in role["to"] if m.kind == "w")
+        via_ways = tuple(_members(relation, "via", "w"))
+        via_nodes = _members(relation, "via", "n")
+        ends = frozenset(_members(relation, "to", "w"))
         if not ends:
             continue
-        for start in (m.ref for m in role["from"] if m.kind == "w"):
+        for start in _members(relation, "from", "w"):
             rule = TurnRule(relation.id, start, via_ways, ends, only, word.endswith("u_turn"))
             if via_ways:
                 over_ways.append(rule)
             for node in via_nodes:
                 at_node.setdefault(node, []).append(rule)
     return TurnRestrictions({k: tuple(v) for k, v in at_node.items()}, tuple(over_ways))
+
+
+def _members(relation: OsmRelation, role: str, kind: str) -> list[int]:
+    return [m.ref for m in relation.members if m.role == role and m.kind == kind]
 
 
 def restriction_notes(

@@ -196,10 +196,7 @@ def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approa
     elif at_node and not any(words):
         # A sign on the very node belongs to the lesser roads there.
         word: YieldRule = "stop" if "stop" in at_node else "give_way"
-        ranks = [
-            Standing(rank.rank, word, "inferred") if rank.rank <= Rank.MINOR else rank
-            for rank in ranks
-        ]
+        ranks = [Standing(r.rank, word, "inferred") if r.rank <= Rank.MINOR else r for r in ranks]
     ring_has_way = kind == "roundabout" or (
         kind == "circular" and any(d.cluster.ring and d.sign for d in drafts)
     )

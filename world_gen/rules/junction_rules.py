@@ -57,9 +57,8 @@ def junction_rules(
     conflicts, met = right_of_way(ruled, found, signs, around.driving_side)
     groups = lane_groups(found, around, lanes, ruled)
     walks = walk_groups(groups, crossings, around)
-    heads = signal_heads(
-        list(chain(*groups.values())), {line.lane_id: line for line in lines}, around
-    )
+    line_of = {line.lane_id: line for line in lines}
+    heads = signal_heads(list(chain(*groups.values())), line_of, around)
     known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
     lone = lone_lights(around, node_tags, lanes, crossings, known)
     return TrafficControl(

@@ -232,9 +232,8 @@ def _answer(
     if oncoming and a.draft.control == b.draft.control == "signal":
         return _across(a, b)
     first, second = standing
-    a_slips, b_slips = (
-        way.slip and way.sign is at for way, at in zip((a, b), standing, strict=True)
-    )
+    sides = zip((a, b), standing, strict=True)
+    a_slips, b_slips = (way.slip and way.sign is at for way, at in sides)
     if a_slips and second is not b.sign:
         return Yielding(True, first.rule, first.source)
     if b_slips and first is not a.sign:

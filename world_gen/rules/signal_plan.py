@@ -159,9 +159,8 @@ def _amber_s(groups: Sequence[LaneGroup]) -> float:
 
 
 def _walking_s(walk: WalkGroup) -> float:
-    return math.ceil(
-        float(np.hypot(*(walk.crossing.line[1] - walk.crossing.line[0]))) / _WALKING_MPS
-    )
+    begin, end = walk.crossing.line
+    return math.ceil(float(np.hypot(*(end - begin))) / _WALKING_MPS)
 
 
 def share_green(weights: Sequence[float], least_s: Sequence[float], total_s: float) -> list[float]:
