@@ -68,10 +68,9 @@ def paths_along_inner_lanes(
         pieces.setdefault(i, []).append(piece)
         if radius_m < LEAST_RADIUS_M or _turned_rad(piece) > _MOST_TURN_RAD:
             refused.add(i)
+    kept = {i: pieces[i] for i in pieces.keys() - refused}
     return {
-        i: np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
-        for i, parts in pieces.items()
-        if i not in refused
+        i: np.concatenate([first, *(p[1:] for p in rest)]) for i, (first, *rest) in kept.items()
     }
 
 

@@ -17,6 +17,7 @@ from foretwin.world_gen.osm.map_cells import (
     unpack,
     unpack_nodes,
 )
+from foretwin.world_gen.osm.map_file import MapHeader
 from foretwin.world_gen.osm.map_tables import NODES, NOTES, RELATIONS, WAYS, TableReader
 from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap, OsmRelation
 from foretwin.world_gen.osm.read_osm import is_kept_relation
@@ -64,15 +65,8 @@ def clip_map(
         notes=list(note_places),
         note_places=note_places,
     )
-    meta = tables.meta
-    return assemble_map(
-        objects,
-        file=file,
-        sha256=meta.sha256,
-        attribution=meta.attribution,
-        bounds=box,
-        frame=frame,
-    )
+    header = MapHeader(tables.meta.attribution, box)
+    return assemble_map(objects, header, file=file, sha256=tables.meta.sha256, frame=frame)
 
 
 def find_node(tables: TableReader, node: int) -> tuple[float, float] | None:

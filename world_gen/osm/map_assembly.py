@@ -12,6 +12,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame
+from foretwin.world_gen.osm.map_file import MapHeader
 from foretwin.world_gen.osm.opl import NO_POSITION, UNITS_PER_DEG, NodePositions, WayNodes
 from foretwin.world_gen.osm.osm_map import (
     BoolArray,
@@ -52,14 +53,13 @@ class MapObjects(msgspec.Struct, kw_only=True):
 
 def assemble_map(
     objects: MapObjects,
+    header: MapHeader,
     *,
     file: str,
     sha256: str,
-    attribution: str,
-    bounds: LatLonBounds | None,
     frame: LocalFrame | None = None,
 ) -> OsmMap:
-    """Return the map; `frame` and `bounds` are those of its roads unless given.
+    """Return the map; its frame and bounds are those of its roads unless given.
 
     Raises `NoRoadsError` where there is no road with positions, `MapError` where roads lie all
     over the Earth.
@@ -101,6 +101,7 @@ def assemble_map(
     road_nodes = [node for way in ways.values() if "highway" in way.tags for node in way.nodes]
     if not road_nodes:
         raise NoRoadsError(file)
+    bounds = header.bounds
     if frame is None or bounds is None:
         box = bounds_of(file, locations.of(road_nodes))
         bounds = bounds or box
@@ -108,7 +109,7 @@ def assemble_map(
     return OsmMap(
         file=file,
         sha256=sha256,
-        attribution=attribution,
+        attribution=header.attribution,
         bounds=bounds,
         frame=frame,
         locations=locations,

@@ -136,11 +136,9 @@ class OsmMap(msgspec.Struct, frozen=True, kw_only=True):
 
     def notes_within(self, bounds: LatLonBounds) -> tuple[str, ...]:
         """Return the notes about places in a box, the same whether or not the map is a clip."""
-        near = (
-            note
-            for note, (lat, lon) in self.note_places.items()
-            if bounds.south <= lat <= bounds.north and bounds.west <= lon <= bounds.east
-        )
+        south, west, north, east = bounds
+        places = self.note_places.items()
+        near = (n for n, (lat, lon) in places if south <= lat <= north and west <= lon <= east)
         return tuple(sorted(near))
 
 

@@ -57,13 +57,8 @@ def read_map(path: Path) -> OsmMap:
         header, text = _as_opl(data, form)
     except DECODE_ERRORS as error:
         raise unreadable(path, error) from error
-    return assemble_map(
-        _objects(text),
-        file=str(path),
-        sha256=hashlib.sha256(data).hexdigest(),
-        attribution=header.attribution,
-        bounds=header.bounds,
-    )
+    digest = hashlib.sha256(data).hexdigest()
+    return assemble_map(_objects(text), header, file=str(path), sha256=digest)
 
 
 def _as_opl(data: bytes, form: str) -> tuple[MapHeader, bytes]:

@@ -265,10 +265,6 @@ def _word(standing: Standing) -> Choice:
 
 def _before_crossing(met: list[Met]) -> float | None:
     """Return where cars wait for a light before the crossing that they would else block."""
-    at = [
-        m.distance_m
-        for m in met
-        if (m.tags.get("highway") == "crossing" or "crossing" in m.tags)
-        and 1.0 < m.distance_m <= _CROSSING_NEAR_M
-    ]
+    crossings = [m for m in met if m.tags.get("highway") == "crossing" or "crossing" in m.tags]
+    at = [m.distance_m for m in crossings if 1.0 < m.distance_m <= _CROSSING_NEAR_M]
     return max(at) + BEFORE_CROSSING_M if at else None

@@ -133,11 +133,9 @@ def lights_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[M
 
 def lights_behind(leg: DirectedEdge, node_tags: NodeTags, within_m: float) -> list[int]:
     """Return the lights on a road out of a junction, no farther than `within_m` from it."""
-    return [
-        node
-        for node, at in zip(leg.node_ids, arc_lengths(leg.xy_m), strict=False)
-        if is_light(node_tags.get(node, {})) and 0.1 < at <= within_m
-    ]
+    places = zip(leg.node_ids, arc_lengths(leg.xy_m), strict=False)
+    near = [node for node, at_m in places if 0.1 < at_m <= within_m]
+    return [node for node in near if is_light(node_tags.get(node, {}))]
 
 
 def faces(tags: Mapping[str, str], against_outward: bool) -> bool | None:

@@ -56,13 +56,8 @@ def lane_groups(
         mine = entering(approach, around, lanes)
         if approach.control.value != "signal" or not mine:
             continue
-        own = [
-            lane
-            for lane in mine
-            if lane.plan.turns_source == "tagged"
-            and across in lane.turns
-            and set(lane.turns) <= {across, "u_turn"}
-        ]
+        tagged = [lane for lane in mine if lane.plan.turns_source == "tagged"]
+        own = [n for n in tagged if across in n.turns and set(n.turns) <= {across, "u_turn"}]
         rest = [lane for lane in mine if lane not in own]
         groups = by_junction.setdefault(approach.junction_id, [])
         for part in (rest, own):
