@@ -69,9 +69,7 @@ def paths_along_inner_lanes(
         if radius_m < LEAST_RADIUS_M or _turned_rad(piece) > _MOST_TURN_RAD:
             refused.add(i)
     kept = {i: pieces[i] for i in pieces.keys() - refused}
-    return {
-        i: np.concatenate([first, *(p[1:] for p in rest)]) for i, (first, *rest) in kept.items()
-    }
+    return {i: np.concatenate([mine[0], *(p[1:] for p in mine[1:])]) for i, mine in kept.items()}
 
 
 def _poses_inside(

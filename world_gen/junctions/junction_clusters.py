@@ -120,9 +120,8 @@ def _in_island(chain: Chain, roads: CarRoads) -> bool:
 def _one_signal(chain: Chain, roads: CarRoads, node_tags: Mapping[int, Tags]) -> bool:
     """Tell whether both ends of a chain are signalled and nothing stops a driver in between."""
     ends = (chain.start, chain.end)
-    if any(
-        mark.node not in ends and mark.tags["highway"] == "traffic_signals" for mark in chain.marks
-    ):
+    between = (mark for mark in chain.marks if mark.node not in ends)
+    if any(mark.tags["highway"] == "traffic_signals" for mark in between):
         return False
     return all(_has_signal(node, chain, roads, node_tags) for node in ends)
 
@@ -176,9 +175,6 @@ def _add_flares(grouping: Grouping, roads: CarRoads) -> None:
             and target.ring
         ]
         for (a, target), (b, other) in combinations(to_ring, 2):
-            if (
-                other is target
-                and a.outward != b.outward
-                and grouping.attach(target, own, (a.key, b.key))
-            ):
+            parting = other is target and a.outward != b.outward
+            if parting and grouping.attach(target, own, (a.key, b.key)):
                 break

@@ -54,9 +54,8 @@ def _signs(inner: list[Tags], incoming: tuple[Chain, ...]) -> Control:
         return "all_way_stop"
     if inner_stops or stops:
         return "stop"
-    if any(tags.get("highway") == "give_way" for tags in inner) or any(
-        _sign(chain, "give_way") is not None for chain in incoming
-    ):
+    signed = any(_sign(chain, "give_way") is not None for chain in incoming)
+    if signed or any(tags.get("highway") == "give_way" for tags in inner):
         return "give_way"
     return "uncontrolled"
 

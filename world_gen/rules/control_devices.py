@@ -81,12 +81,9 @@ def met_toward(
         gone += length_m
         cluster = plain_from.get(current.end_node)
         meets_another = cluster is None
-        if (
-            gone > 2.0 * LOOK_BACK_M
-            or cluster is None
-            or cluster.whole
-            or current.end_node in junction_nodes
-        ):
+        if cluster is None or cluster.whole or current.end_node in junction_nodes:
+            break
+        if gone > 2.0 * LOOK_BACK_M:
             break
         onward = [d for d in cluster.legs if d.edge.index != current.edge.index]
         if not onward:
