@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from functools import cache
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ from foretwin.world_gen.roads.road_tags import (
     speed_limit,
 )
 
-_SAYS_NOTHING = ("name", "ref", "wiki", "note", "description", "addr:", "alt_name")
+_UNUSED = ("name", "ref", "wiki", "note", "description", "addr:", "alt_name")
 """Keys that begin so have no meaning for how a road is driven."""
 
 
@@ -80,22 +80,11 @@ class _Meaning(NamedTuple):
     car: bool
 
 
-def _meaning(
-    tags: Mapping[str, str], known: dict[frozenset[tuple[str, str]], _Meaning]
-) -> _Meaning:
-    """Return what tags mean; most ways of a town have the same but for their names."""
-    key = frozenset(item for item in tags.items() if not item[0].startswith(_SAYS_NOTHING))
-    found = known.get(key)
-    if found is None:
-        allowed = directions(tags)
-        found = known[key] = _Meaning(
-            allowed,
-            lane_counts(tags, allowed),
-            speed_limit(tags),
-            road_layer(tags),
-            is_car_road(tags) and open_to_cars(tags),
-        )
-    return found
+def _meaning(items: frozenset[tuple[str, str]]) -> _Meaning:
+    tags = dict(items)
+    allowed = directions(tags)
+    car = is_car_road(tags) and open_to_cars(tags)
+    return _Meaning(allowed, lane_counts(tags, allowed), speed_limit(tags), road_layer(tags), car)
 
 
 def _edges(
@@ -116,10 +105,10 @@ def _edges(
     # One sum from each cut to the next; those from one way to another are not used.
     lengths = np.add.reduceat(steps, cuts[:-1]).tolist() if len(cuts) > 1 else []
     edges: list[RoadEdge] = []
-    known: dict[frozenset[tuple[str, str]], _Meaning] = {}
+    meaning = cache(_meaning)  # most ways of a town have the same tags but for their names
     for i, (way, _) in enumerate(ways):
         tags = way.tags
-        means = _meaning(tags, known)
+        means = meaning(frozenset(kv for kv in tags.items() if not kv[0].startswith(_UNUSED)))
         name = tags.get("name") or tags.get("ref", "")
         for k in range(of_way[i], of_way[i + 1] - 1):
             begin, end = at[k], at[k + 1]

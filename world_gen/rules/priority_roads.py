@@ -109,13 +109,13 @@ def standings(entries: list[Entry], arms: int, driving_side: DrivingSide) -> lis
     """
     found: list[Standing | None] = [_by_tags(entry) for entry in entries]
     _yards(entries, found)
-    if any(entry.sign for entry in entries):
-        for i, entry in enumerate(entries):
-            j = entry.opposite
-            if found[i] is not None or j is None or entries[j].sign is None:
-                continue
-            if importance(entry.edge) <= importance(entries[j].edge) and _others(found, i, j):
-                found[i] = Standing(Rank.MINOR, entries[j].sign or "give_way", "inferred")
+    for i, entry in enumerate(entries):
+        j = entry.opposite
+        sign = None if j is None else entries[j].sign
+        if found[i] is not None or j is None or sign is None:
+            continue
+        if importance(entry.edge) <= importance(entries[j].edge) and _others(found, i, j):
+            found[i] = Standing(Rank.MINOR, sign, "inferred")
     _lesser(entries, found)
     if not any(found):
         _through(entries, found, arms, driving_side)
