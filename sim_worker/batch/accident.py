@@ -26,7 +26,7 @@ from foretwin.sim_worker.batch.accident_bodies import (
     accident_bodies,
     ground_forces,
 )
-from foretwin.sim_worker.batch.accident_model import AccidentBatch, Crush, Impact
+from foretwin.sim_worker.batch.accident_model import AccidentBatch, ContactLaw, Crush
 from foretwin.sim_worker.batch.collision_detection import Indices, Touches
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
@@ -78,7 +78,7 @@ def run_accidents(
     kinds: Sequence[RoadUserKind],
     friction_factor: Array | float = 1.0,
     user_decel_mps2: Array | float = 0.0,
-    impact: Impact | None = None,
+    impact: ContactLaw | None = None,
     ground: bool = True,
     duration_s: float = ACCIDENT_S,
     step_s: float = 0.05,
@@ -111,7 +111,7 @@ def run_accidents(
         bodies,
         poses[:, apart],
         velocities[:, apart],
-        impact=Impact() if impact is None else impact,
+        impact=ContactLaw() if impact is None else impact,
         ground=ground,
         steps=round(steps),
         step_s=step_s,
@@ -133,7 +133,7 @@ def _run(
     poses: Array,
     velocities: Array,
     *,
-    impact: Impact,
+    impact: ContactLaw,
     ground: bool,
     steps: int,
     step_s: float,

@@ -29,7 +29,7 @@ _OFF_CENTRE = 0.1
 """Where the compiled model has a position of 0, it would never look at those of a simulation."""
 
 
-class Impact(NamedTuple):
+class ContactLaw(NamedTuple):
     """How two road users bounce off and rub each other.
 
     `restitution`: separating over closing speed along the normal. Brach and Brach, Vehicle
@@ -82,7 +82,7 @@ def _rebound(damping: float, crush: Crush) -> float:
 class AccidentBatch:
     """A simulations of two bodies each; belongs to one thread."""
 
-    def __init__(self, bodies: Bodies, impact: Impact, *, threads: int) -> None:
+    def __init__(self, bodies: Bodies, impact: ContactLaw, *, threads: int) -> None:
         self.count = bodies.mass_kg.shape[1]
         self._impact = impact
         self._batch = mujoco_batch.Batch(_model(), self.count, nthread=threads, persistent=True)

@@ -24,7 +24,7 @@ from foretwin.contracts.world import World
 from foretwin.geometry.polyline import offset
 from foretwin.geometry.rectangles import Rectangles, corners
 from foretwin.sim_worker.futures.case_picture_runs import Run
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.world_gen.export.picture_ground import draw_ground
 from foretwin.world_gen.export.picture_marks import scale_bar
 from foretwin.world_gen.export.picture_style import LANE_EDGE, LINE_COLOUR, View, view_around
@@ -36,7 +36,7 @@ _GHOST_EVERY_S = 1.0
 
 def draw_case(
     axes: Axes,
-    played: Cast,
+    played: StagedCase,
     world: World,
     heedless: Run,
     planned: Run | None,
@@ -87,7 +87,7 @@ def draw_case(
     scale_bar(axes, view)
 
 
-def told(played: Cast, heedless: Run, planned: Run | None, planner: str) -> str:
+def told(played: StagedCase, heedless: Run, planned: Run | None, planner: str) -> str:
     """Say in one line each who is how fast, what is planned, and what the planner makes of it."""
     moving = [f"ego {3.6 * played.ego_speed_mps:.0f} km/h{' backwards' if played.reverse else ''}"]
     moving += [
@@ -113,7 +113,7 @@ def told(played: Cast, heedless: Run, planned: Run | None, planner: str) -> str:
 
 def write_case_picture(
     path: Path,
-    played: Cast,
+    played: StagedCase,
     scenario: Scenario,
     world: World,
     heedless: Run,
@@ -162,7 +162,7 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _faults(played: Cast) -> str:
+def _faults(played: StagedCase) -> str:
     """Name the faults of the case that are not none."""
     said = [
         f"{_words(field)} {value:.2g}"
@@ -216,7 +216,7 @@ def draw_lanes(axes: Axes, world: World, view: View) -> None:
             axes.plot(*stop.ends.T, color=colour, linewidth=1.8, solid_capstyle="butt", zorder=6.0)
 
 
-def _draw_paths(axes: Axes, played: Cast, heedless: Run) -> None:
+def _draw_paths(axes: Axes, played: StagedCase, heedless: Run) -> None:
     ways = [(played.ego_xy_m, EGO)]
     ways += [(a.xy_m, OTHERS) for a in played.actors if a.speed_mps > 0.0]
     for xy, colour in ways:

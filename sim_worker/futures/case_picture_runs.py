@@ -18,7 +18,7 @@ from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.impact import Moving, ego_box, ego_rectangles, rectangles
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 STEP_S = 0.1
@@ -49,7 +49,7 @@ class Run(NamedTuple):
         return tuple(_at(box, instant) for box in self.others)
 
 
-def heedless_run(played: Cast, vehicle: VehicleParameters, *, horizon_s: float) -> Run:
+def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: float) -> Run:
     """Drive a case as planned: the ego keeps its speed, and so does everybody who is heedless.
 
     It ends with the planned impact, where one is planned.
@@ -70,7 +70,7 @@ def heedless_run(played: Cast, vehicle: VehicleParameters, *, horizon_s: float) 
 
 
 def planned_run(
-    played: Cast,
+    played: StagedCase,
     scenario: Scenario,
     world: World,
     vehicle: VehicleParameters,
@@ -90,7 +90,7 @@ def planned_run(
     return _result_run(result, played, vehicle)
 
 
-def _job(played: Cast, scenario: Scenario, world: World, planner: str) -> Job:
+def _job(played: StagedCase, scenario: Scenario, world: World, planner: str) -> Job:
     future = Future(
         index=0, name=scenario.id, planner=planner, scenario_id=scenario.id,
         values=dict(played.values), place=played.place.name,
@@ -109,7 +109,7 @@ def _job(played: Cast, scenario: Scenario, world: World, planner: str) -> Job:
     )  # fmt: skip
 
 
-def _result_run(result: FuturesResult, played: Cast, vehicle: VehicleParameters) -> Run:
+def _result_run(result: FuturesResult, played: StagedCase, vehicle: VehicleParameters) -> Run:
     states = result.trajectory.states[0].astype(np.float64)
     time = result.trajectory.time_s
     outcome, users = result.outcome, result.road_users

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.play import Play
-from foretwin.sim_worker.futures.scene import Scene
+from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.planner_interface import (
     Planner,
     PlannerOutput,
@@ -44,7 +44,7 @@ class DriveRecord(NamedTuple):
     remarks: tuple[str, ...]
 
 
-def drive(scene: Scene, stage: Stage, *, ticks: int) -> DriveRecord:
+def drive(scene: JobScene, stage: Stage, *, ticks: int) -> DriveRecord:
     """Seed the stage with the scene's starts and drive for a number of control ticks."""
     loop = _Loop(scene, stage, ticks)
     for tick in range(ticks):
@@ -53,7 +53,7 @@ def drive(scene: Scene, stage: Stage, *, ticks: int) -> DriveRecord:
 
 
 class _Loop:
-    def __init__(self, scene: Scene, stage: Stage, ticks: int) -> None:
+    def __init__(self, scene: JobScene, stage: Stage, ticks: int) -> None:
         self._play = Play(scene, stage)
         self._scene, self._stage = scene, stage
         count = len(scene.starts)

@@ -28,7 +28,7 @@ from foretwin.sim_worker.futures.driven_line import (
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.impact import Moving, ego_box
 from foretwin.sim_worker.scenarios.places import Unplaced
-from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor
+from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
 from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
@@ -58,7 +58,7 @@ class _Ego(NamedTuple):
     start_m: float | None
 
 
-def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | Unplaced]:
+def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, StagedCase | Unplaced]:
     """Return the cases of the rows that name their place, met where the car really drives.
 
     A function of the job, as what it leads to: the drives of one job are driven together, and kept
@@ -68,7 +68,7 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | 
     bent = {
         row: case
         for row, case in played.items()
-        if isinstance(case, Cast) and math.isfinite(case.impact_time_s) and _bends(case)
+        if isinstance(case, StagedCase) and math.isfinite(case.impact_time_s) and _bends(case)
     }
     if not bent:
         return played
@@ -78,7 +78,7 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | 
         future = job.futures[row]
         groups.setdefault((future.scenario_id, future.place, _ego(case)), []).append(row)
     scenarios = {scenario.id: scenario for scenario in job.scenarios}
-    on_time: dict[int, Cast] = {}
+    on_time: dict[int, StagedCase] = {}
     for (scenario_id, place, ego), rows in groups.items():
         line = lines[ego]
         cases = [job.futures[row].values for row in rows]
@@ -91,7 +91,7 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | 
             played[row] = _unplanned(bent[row])
             meant = bent[row].impact_with
             if (
-                isinstance(met, Cast)
+                isinstance(met, StagedCase)
                 and met.impact_with == meant
                 and drives_as_cast(met, line, bent[row].place.ego.path)
             ):
@@ -102,9 +102,9 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | 
 
 
 def _off_m(
-    cases: Mapping[int, Cast],
+    cases: Mapping[int, StagedCase],
     lines: Mapping[_Ego, DrivenLine],
-    bent: Mapping[int, Cast],
+    bent: Mapping[int, StagedCase],
     stage: Stage,
 ) -> dict[int, float]:
     """Return how far from their plans impacts are, as it was driven, by row."""
@@ -139,7 +139,7 @@ def _off_m(
     return off
 
 
-def off_plan_m(case: Cast, state: Array, vehicle: VehicleParameters) -> float:
+def off_plan_m(case: StagedCase, state: Array, vehicle: VehicleParameters) -> float:
     """Return how far the point of the ego that is to be hit is from where that is planned, with
     base_link in a state (8,)."""
     box = ego_box(vehicle, reverse=case.reverse)
@@ -151,7 +151,7 @@ def off_plan_m(case: Cast, state: Array, vehicle: VehicleParameters) -> float:
     return math.hypot(x, y)
 
 
-def _ego(case: Cast) -> _Ego:
+def _ego(case: StagedCase) -> _Ego:
     path = case.place.ego.path
     bends = path.arc_m[(np.abs(path.curvature_pm) > _STRAIGHT_PM) & (path.arc_m > 0.0)]
     in_time = case.ego_arc_m < bends.min(initial=np.inf) - _RUN_UP_M
@@ -160,7 +160,7 @@ def _ego(case: Cast) -> _Ego:
     return _Ego(case.ego_speed_mps, shift, case.reverse, start)
 
 
-def _bends(case: Cast) -> bool:
+def _bends(case: StagedCase) -> bool:
     """Return whether the ego's path bends before the impact."""
     path = case.place.ego.path
     until = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
@@ -169,10 +169,10 @@ def _bends(case: Cast) -> bool:
 
 
 def _lines(
-    job: Job, bent: Mapping[int, Cast], stage: Stage, maker: SceneMaker
+    job: Job, bent: Mapping[int, StagedCase], stage: Stage, maker: SceneMaker
 ) -> dict[_Ego, DrivenLine]:
     """Return the line of each ego, all driven side by side."""
-    first: dict[_Ego, Cast] = {}
+    first: dict[_Ego, StagedCase] = {}
     for case in bent.values():
         ego = _ego(case)
         if ego not in first or case.ego_arc_m < first[ego].ego_arc_m:
@@ -198,7 +198,9 @@ def _lines(
     return lines
 
 
-def _drive_alone(job: Job, cases: list[Cast], stage: Stage, maker: SceneMaker, ticks: int) -> Array:
+def _drive_alone(
+    job: Job, cases: list[StagedCase], stage: Stage, maker: SceneMaker, ticks: int
+) -> Array:
     """Return states (S, T, 8) of egos that nobody meets."""
     futures = tuple(
         Future(
@@ -225,7 +227,7 @@ def _drive_alone(job: Job, cases: list[Cast], stage: Stage, maker: SceneMaker, t
     return drive(scene._replace(limit_share=None), stage, ticks=ticks).states
 
 
-def _on_time(case: Cast, line: DrivenLine, way: Way) -> Cast:
+def _on_time(case: StagedCase, line: DrivenLine, way: Way) -> StagedCase:
     """Return a case, on the ego's path `way` again, in which those who come meet the ego when it
     really is there."""
     met_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
@@ -240,7 +242,7 @@ def _on_time(case: Cast, line: DrivenLine, way: Way) -> Cast:
     )
 
 
-def _from_line(actor: CastActor, later_s: float, line: DrivenLine, way: Way) -> CastActor:
+def _from_line(actor: StagedActor, later_s: float, line: DrivenLine, way: Way) -> StagedActor:
     if actor.relation not in ALONG:
         return actor._replace(start_arc_m=actor.start_arc_m - actor.speed_mps * later_s)
     if actor.way != way.name:
@@ -250,7 +252,7 @@ def _from_line(actor: CastActor, later_s: float, line: DrivenLine, way: Way) -> 
     return actor._replace(xy_m=way.xy_m, start_arc_m=float(place.arc_m[0]))
 
 
-def _unplanned(case: Cast) -> Cast:
+def _unplanned(case: StagedCase) -> StagedCase:
     return case._replace(
         impact_time_s=math.nan, impact_point_m=np.full(2, math.nan), impact_share=math.nan,
         impact_with="",

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
-from foretwin.sim_worker.futures.scene import Scene
+from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.road_users.crowd import EgoBoxes
 from foretwin.sim_worker.road_users.perception import Lead
@@ -30,7 +30,7 @@ class Play:
     """
 
     def __init__(
-        self, scene: Scene, stage: Stage, *, decide_every_s: float = DECIDE_EVERY_S
+        self, scene: JobScene, stage: Stage, *, decide_every_s: float = DECIDE_EVERY_S
     ) -> None:
         """Seed the stage with the scene's starts."""
         self.scene, self.stage = scene, stage
@@ -49,7 +49,7 @@ class Play:
         self._tick_reach_m = _MAX_PACE_MPS * stage.control_dt_s
         self._red = np.full((1, 0), np.inf)
 
-    def restart(self, rows: Rows, scene: Scene, *, looked: bool) -> None:
+    def restart(self, rows: Rows, scene: JobScene, *, looked: bool) -> None:
         """Begin `rows` anew, as `scene` has them; the others go on.
 
         Traffic and sight of both were `begun` from one. `looked` says that planners have looked
@@ -169,6 +169,6 @@ class Play:
         )
 
 
-def _steering_delay_s(scene: Scene, stage: Stage) -> Array:
+def _steering_delay_s(scene: JobScene, stage: Stage) -> Array:
     delay_s = stage.vehicle.steering_delay_s.value
     return scene.numbers.applied("vehicle.steering_delay_s", delay_s)

@@ -40,10 +40,10 @@ from foretwin.sim_worker.futures.ego_dry_run import staged_cases
 from foretwin.sim_worker.futures.measuring import measure
 from foretwin.sim_worker.futures.outcomes import judge, with_collisions
 from foretwin.sim_worker.futures.planned_impacts import planned_impacts
-from foretwin.sim_worker.futures.scene import Scene, SceneMaker
+from foretwin.sim_worker.futures.scene import JobScene, SceneMaker
 from foretwin.sim_worker.road_users.cast import KIND_NAMES
 from foretwin.sim_worker.scenarios.places import Unplaced
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 
 
 def run_job(
@@ -125,8 +125,8 @@ def check_job(job: Job, stage: Stage) -> None:
 
 
 def _placed(
-    job: Job, staged: Mapping[int, Cast | Unplaced]
-) -> tuple[Job, dict[int, Cast], tuple[tuple[int, str], ...]]:
+    job: Job, staged: Mapping[int, StagedCase | Unplaced]
+) -> tuple[Job, dict[int, StagedCase], tuple[tuple[int, str], ...]]:
     """Return the job of those futures that can be played, their cases, and why others cannot."""
     unplaced = {
         job.futures[row].index: case.reason
@@ -135,7 +135,9 @@ def _placed(
     }
     rows = [row for row, future in enumerate(job.futures) if future.index not in unplaced]
     cases = {
-        place: case for place, row in enumerate(rows) if isinstance(case := staged.get(row), Cast)
+        place: case
+        for place, row in enumerate(rows)
+        if isinstance(case := staged.get(row), StagedCase)
     }
     if unplaced:
         starts = None if job.starts is None else job.starts[rows]
@@ -197,7 +199,7 @@ def _ticks(job: Job, stage: Stage) -> tuple[int, int]:
     return round(instants) * round(every), round(every)
 
 
-def _sizes(scene: Scene) -> Array:
+def _sizes(scene: JobScene) -> Array:
     """Return (S, R, 2) length and width of road users."""
     if scene.casts is None:
         return np.zeros((len(scene.starts), 0, 2))
@@ -205,7 +207,7 @@ def _sizes(scene: Scene) -> Array:
     return np.stack([crowd.length_m, crowd.width_m], axis=-1)
 
 
-def _tracks(scene: Scene, record: DriveRecord, sizes: Array, every: int) -> RoadUserTracks:
+def _tracks(scene: JobScene, record: DriveRecord, sizes: Array, every: int) -> RoadUserTracks:
     count, _, most, _ = record.users.shape
     kinds = np.zeros((count, most), np.int32) if scene.casts is None else scene.casts.kinds
     absent = np.isnan(record.users[:, ::every, :, 0])
@@ -218,7 +220,7 @@ def _tracks(scene: Scene, record: DriveRecord, sizes: Array, every: int) -> Road
     )
 
 
-def _accidents(job: Job, scene: Scene, stage: Stage, touches: Touches) -> Accidents:
+def _accidents(job: Job, scene: JobScene, stage: Stage, touches: Touches) -> Accidents:
     assert scene.casts is not None or not len(touches.future)
     kinds = (
         []

@@ -20,7 +20,7 @@ from foretwin.sim_worker.futures.number_columns import NumberColumns, number_col
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
 from foretwin.sim_worker.planners.registry import drives_backwards
-from foretwin.sim_worker.road_users.cast import Casting, Player, casting
+from foretwin.sim_worker.road_users.cast import Player, RoadUserArrays, casting
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
@@ -28,7 +28,7 @@ from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.scenarios.live import LiveScenarios
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.scenarios.seen import SeenActors
 from foretwin.sim_worker.scenarios.staged import StagedScenarios, staged_players, staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
@@ -47,7 +47,7 @@ class Aims(NamedTuple):
     offset_m: Array
 
 
-class Scene(NamedTuple):
+class JobScene(NamedTuple):
     """All that S futures of a job begin with; `casts` is None where nobody else is on the road.
 
     `limit_share` (M,) at the path's nodes is how far limits lie below that at the start.
@@ -60,7 +60,7 @@ class Scene(NamedTuple):
     planners: tuple[str, ...]
     numbers: NumberColumns
     limit_share: Array | None
-    casts: Casting | None
+    casts: RoadUserArrays | None
     traffic: Traffic | None
     sight: Sight | None
     rules: PathRules
@@ -125,9 +125,9 @@ class SceneMaker:
         vehicle: VehicleParameters,
         *,
         tick_s: float,
-        staged: Mapping[int, Cast | Unplaced] | None = None,
+        staged: Mapping[int, StagedCase | Unplaced] | None = None,
         start_arc_m: Array | None = None,
-    ) -> Scene:
+    ) -> JobScene:
         """Return the scene of a job on this World.
 
         `staged` are the cases of the rows that name their place, if they are known already;
@@ -145,7 +145,7 @@ class SceneMaker:
         if job.starts is None:
             starts = np.repeat(local_state(job.state, self.world.frame, vehicle)[None], count, 0)
             for row, played in staged.items():
-                if isinstance(played, Cast):
+                if isinstance(played, StagedCase):
                     starts[row] = staged_start(played, vehicle)
         else:
             starts = np.array(job.starts, dtype=np.float64)
@@ -153,7 +153,7 @@ class SceneMaker:
         if staged and start_arc_m is None:
             start_arc_m = place.arc_m
             for row, played in staged.items():
-                if isinstance(played, Cast):
+                if isinstance(played, StagedCase):
                     start_arc_m[row] = played.ego_arc_m
         if start_arc_m is not None:
             # Ways may be long, and cross themselves.
@@ -207,7 +207,7 @@ class SceneMaker:
                 tick_s=tick_s,
             )
         heard = {state.group_id: LiveColour(0.0, state.colour) for state in job.signals}
-        return Scene(
+        return JobScene(
             path=path,
             starts=starts,
             start_arc_m=place.arc_m,
@@ -226,14 +226,16 @@ class SceneMaker:
             left_out=tuple(left_out),
         )
 
-    def staged_cases(self, job: Job, vehicle: VehicleParameters) -> dict[int, Cast | Unplaced]:
+    def staged_cases(
+        self, job: Job, vehicle: VehicleParameters
+    ) -> dict[int, StagedCase | Unplaced]:
         """Return the cases of the rows that name their place, on its path as it is."""
         known = {scenario.id: scenario for scenario in job.scenarios}
         rows: dict[tuple[str, str], list[int]] = {}
         for row, future in enumerate(job.futures):
             if future.place and future.scenario_id:
                 rows.setdefault((future.scenario_id, future.place), []).append(row)
-        found: dict[int, Cast | Unplaced] = {}
+        found: dict[int, StagedCase | Unplaced] = {}
         for (_, place), mine in rows.items():
             scenario = _scenario_of(job.futures[mine[0]], known)
             assert scenario is not None

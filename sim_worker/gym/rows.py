@@ -13,12 +13,12 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.batch.collision_detection import touched
 from foretwin.sim_worker.futures.play import Play, Rows
-from foretwin.sim_worker.futures.scene import Aims, Scene
+from foretwin.sim_worker.futures.scene import Aims, JobScene
 from foretwin.sim_worker.gym.episodes import Episodes
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
-from foretwin.sim_worker.road_users.cast import Casting
+from foretwin.sim_worker.road_users.cast import RoadUserArrays
 from foretwin.world_gen.rules.signal_state import cycle_s
 
 Flags = npt.NDArray[np.bool_]
@@ -109,7 +109,7 @@ class EpisodeRows:
         return np.asarray(self.ticks * self.stage.control_dt_s, dtype=np.float64)
 
     @property
-    def scene(self) -> Scene:
+    def scene(self) -> JobScene:
         """The scene as it is now."""
         assert self._play is not None, "nothing has begun"
         return self._play.scene
@@ -202,14 +202,14 @@ class EpisodeRows:
         return np.asarray(off)
 
 
-def scene_of(pool: Scene, cases: Rows) -> Scene:
+def scene_of(pool: JobScene, cases: Rows) -> JobScene:
     """Return the scene of (S,) futures of another one, each as it begins there."""
     casts = pool.casts
     traffic = sight = None
     if casts is not None and pool.traffic is not None and pool.sight is not None:
         traffic = pool.traffic.begun(cases)
         sight = pool.sight.begun(cases, traffic)
-        casts = Casting(
+        casts = RoadUserArrays(
             traffic.crowd, casts.paths, casts.kinds[cases], casts.hidden_by[cases],
             casts.walks[cases],
         )  # fmt: skip
@@ -226,7 +226,7 @@ def scene_of(pool: Scene, cases: Rows) -> Scene:
     )
 
 
-def _playable(pool: Scene) -> Rows:
+def _playable(pool: JobScene) -> Rows:
     """Return which futures can be played as episodes, forwards; UserError where none can."""
     place = pool.path.locate(pool.starts[:, :2], near_arc_m=pool.start_arc_m)
     beside = np.abs(place.offset_m) > _BEGINS_WITHIN_M

@@ -41,7 +41,7 @@ class Player(NamedTuple):
     size_m: tuple[float, float] | None = None
 
 
-class Casting(NamedTuple):
+class RoadUserArrays(NamedTuple):
     """The crowd of a job, and what else is known of it: (S, R) where nothing else is said.
 
     `paths` are all that anybody drives on, the ego's first; `replay` has where those are who come
@@ -61,7 +61,7 @@ def casting(
     *,
     ego_path: FrenetPath,
     replayed: Sequence[RecordedRoadUser] = (),
-) -> Casting:
+) -> RoadUserArrays:
     """Lay the road users of S futures out as arrays; places without one are not present.
 
     Those `replayed` come first in each; their `path_of` counts on after the paths.
@@ -110,7 +110,7 @@ def casting(
         brakes_by_mps2=brakes_by,
     )
     replay = Replay(replayed) if replayed else None
-    return Casting(crowd, tuple(paths.values()), kinds, hidden, walks, replay)
+    return RoadUserArrays(crowd, tuple(paths.values()), kinds, hidden, walks, replay)
 
 
 class _Row(NamedTuple):

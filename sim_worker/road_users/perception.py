@@ -11,7 +11,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.planner_interface import SeenUsers
-from foretwin.sim_worker.road_users.path_table import PathProjection, Place
+from foretwin.sim_worker.road_users.path_table import PathPlace, PathProjection
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
@@ -116,7 +116,7 @@ class Sight:
             node, share, speed, poses = (
                 np.stack([past[k] for past in self._past])[self._late, rows] for k in range(4)
             )
-        on_arc, offset, turned = self._along.at(Place(node, share))
+        on_arc, offset, turned = self._along.at(PathPlace(node, share))
         if self._beside_m is not None:
             offset = offset + self._beside_m * np.cos(turned)
         unseen = self._unseen(tick, poses, eyes_xy_m)

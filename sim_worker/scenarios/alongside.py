@@ -21,7 +21,7 @@ from foretwin.sim_worker.scenarios.impact import (
     front_point,
     gap_m,
 )
-from foretwin.sim_worker.scenarios.roles import CastActor, Meeting, Staging
+from foretwin.sim_worker.scenarios.roles import PlannedMeeting, StagedActor, Staging
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
 
@@ -40,7 +40,7 @@ class Touched(NamedTuple):
     share: float
 
 
-def along(part: ActorPart, staging: Staging, meetings: dict[str, Meeting]) -> CastActor:
+def along(part: ActorPart, staging: Staging, meetings: dict[str, PlannedMeeting]) -> StagedActor:
     """Return an actor on the ego's path or beside it; who hides another stands before its way."""
     place, box = staging.place, staging.box
     traits, gap = KINDS[part.kind], staging.number(part, "gap_m")
@@ -84,7 +84,7 @@ def _out_of_the_way(part: ActorPart, staging: Staging, arc_m: float, beside_m: f
 _ASIDE_STEPS, _ASIDE_STEP_M = 10, 0.3
 
 
-def beside_bay(part: ActorPart, staging: Staging, way: Way) -> CastActor:
+def beside_bay(part: ActorPart, staging: Staging, way: Way) -> StagedActor:
     """Return a car in the bay behind the ego's or ahead of it."""
     away = (staging.box.length_m + KINDS[part.kind].length_m) / 2.0 + staging.number(part, "gap_m")
     arc = way.entry_m + (away if part.relation == "ahead" else -away)
@@ -118,7 +118,7 @@ def _with_room(traits: KindTraits, room_m: float) -> KindTraits:
     )
 
 
-def _played(actor: CastActor, staging: Staging, *, room_m: float = 0.0) -> _OnPath:
+def _played(actor: StagedActor, staging: Staging, *, room_m: float = 0.0) -> _OnPath:
     after = actor.acts_after_s if actor.conduct == "stops" else math.inf
     path = staging.place.ego.path
     moving = Moving(path, actor.speed_mps, actor.lateral_m, after, actor.decel_mps2)
@@ -131,7 +131,7 @@ def _played(actor: CastActor, staging: Staging, *, room_m: float = 0.0) -> _OnPa
     return _OnPath(moving, touch)
 
 
-def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
+def stands_in_the_way(actor: StagedActor, staging: Staging) -> bool:
     """Return whether the ego touches somebody beside its path, with whatever side.
 
     One that backs into a bay goes no farther than its way, and needs room for being off it.
@@ -160,7 +160,7 @@ def backs_into_a_house(staging: Staging) -> bool:
     return any(walls.meet(shapely.Polygon(outline)) for outline in corners(wider))
 
 
-def stands_in_a_house(actor: CastActor, staging: Staging) -> bool:
+def stands_in_a_house(actor: StagedActor, staging: Staging) -> bool:
     """Return whether somebody parked would stand in a building."""
     walls, way = staging.place.walls, staging.place.way_named(actor.way)
     arc, half = actor.start_on(way), actor.traits.length_m / 2.0
@@ -170,7 +170,7 @@ def stands_in_a_house(actor: CastActor, staging: Staging) -> bool:
     )  # fmt: skip
 
 
-def run_into(actor: CastActor, staging: Staging) -> Touched | None:
+def run_into(actor: StagedActor, staging: Staging) -> Touched | None:
     """Return the first touch of who drives ahead, if the ego's front makes it."""
     moving, touch = _played(actor, staging)
     if not np.isfinite(touch.time_s[0]):

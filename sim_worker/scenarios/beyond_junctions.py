@@ -15,7 +15,7 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import Lane
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths, points_at
-from foretwin.sim_worker.scenarios.places import Place
+from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.relations import ways_over
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
@@ -36,7 +36,7 @@ _BAY_LENGTH_M = 6.0
 _BEND_RAD = math.radians(6.0)
 
 
-def other_places(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], str]:
+def other_places(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[ScenarioPlace], str]:
     """Return the places of a scenario that needs no junction, and why there is none if so."""
     setting = scenario.where.setting
     if setting == "parking_bay":
@@ -83,8 +83,8 @@ def _least_radius_m(way: Way) -> float:
     return 1.0 / max(float(np.abs(curvature).max()), 1e-6)
 
 
-def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> Place:
-    return Place(
+def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> ScenarioPlace:
+    return ScenarioPlace(
         scenario_id=scenario.id,
         world_id=network.world.id,
         junction_id=network.world.intersection.id,
@@ -145,7 +145,7 @@ def _onward(lane: Lane, among: dict[str, Lane], network: RoadNetwork) -> list[st
     return [nearest] if apart[nearest] <= _JOINT_M else []
 
 
-def _bays(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], str]:
+def _bays(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[ScenarioPlace], str]:
     """Return a bay at the near side of each lane that is straight, long and clear enough."""
     reasons = {lane.id: _no_bay(lane, network) for lane in network.world.lanes}
     fitting = [lane for lane in network.world.lanes if not reasons[lane.id]]
@@ -202,7 +202,7 @@ class _Bay:
         arc, left = np.broadcast_arrays(np.atleast_1d(arc_m), np.atleast_1d(left_m))
         return self._path.point_at(arc, left)
 
-    def place(self, scenario: Scenario, network: RoadNetwork) -> Place:
+    def place(self, scenario: Scenario, network: RoadNetwork) -> ScenarioPlace:
         """Return the place: base_link backs along the ego's way to a metre behind the middle."""
         stop_m = self._middle_m - 1.3
         turn = np.linspace(0.0, self._angle_rad, 9)

@@ -21,9 +21,9 @@ from foretwin.sim_worker.road_users.cast import Player
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S
 from foretwin.sim_worker.scenarios.placement import passage_on_path, places_on_passage
-from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
-from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor
+from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
 from foretwin.sim_worker.scenarios.staged import player_on
 from foretwin.sim_worker.scenarios.ways import Way
 
@@ -35,15 +35,15 @@ class LiveScenarios:
 
     def __init__(self, network: RoadNetwork) -> None:
         self._network = network
-        self._places: dict[tuple[Scenario, str], tuple[Place, ...]] = {}
-        self._casts: dict[tuple[object, ...], Cast | Unplaced] = {}
+        self._places: dict[tuple[Scenario, str], tuple[ScenarioPlace, ...]] = {}
+        self._casts: dict[tuple[object, ...], StagedCase | Unplaced] = {}
 
     def on(self, path: FrenetPath, from_arc_m: float, vehicle: VehicleParameters) -> PathScenarios:
         """Return the scenarios on a path, for a car at `from_arc_m` of it."""
         found = passage_on_path(self._network, path, from_arc_m)
         return PathScenarios(self, path, vehicle, found)
 
-    def places(self, scenario: Scenario, passage: Passage) -> tuple[Place, ...]:
+    def places(self, scenario: Scenario, passage: Passage) -> tuple[ScenarioPlace, ...]:
         """Return where a scenario can take place on a passage, none where it does not apply."""
         key = (scenario, passage.name)
         if key not in self._places:
@@ -54,9 +54,9 @@ class LiveScenarios:
         self,
         scenario: Scenario,
         values: Mapping[str, float],
-        place: Place,
+        place: ScenarioPlace,
         vehicle: VehicleParameters,
-    ) -> Cast | Unplaced:
+    ) -> StagedCase | Unplaced:
         """Return a case at a place with nobody early or late, as if it began there."""
         punctual = {name: 0.0 if name.endswith(_LATE) else v for name, v in values.items()}
         key = (scenario, place.name, vehicle, *punctual.items())
@@ -115,7 +115,9 @@ class PathScenarios(NamedTuple):
             for actor in played.actors
         )
 
-    def _beside(self, actor: CastActor, played: Cast, place: Place, ego_arc_m: float) -> Player:
+    def _beside(
+        self, actor: StagedActor, played: StagedCase, place: ScenarioPlace, ego_arc_m: float
+    ) -> Player:
         """Return who moves along the ego's path; what is parked stays where it stands."""
         arc = actor.start_on(place.ego)
         if actor.relation == "parked":
@@ -126,5 +128,5 @@ class PathScenarios(NamedTuple):
         return player_on(actor, self.path, arc)
 
 
-def _coming(actor: CastActor, way: Way, later_s: float) -> Player:
+def _coming(actor: StagedActor, way: Way, later_s: float) -> Player:
     return player_on(actor, way.path, actor.start_on(way) - actor.speed_mps * later_s)

@@ -19,14 +19,14 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.sim_worker.scenarios.openscenario_entities import actor_object, ego_object
 from foretwin.sim_worker.scenarios.openscenario_motion import (
-    Motion,
+    EntityMotion,
     actor_motion,
     after,
     ego_motion,
     maneuver_group,
     starts,
 )
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.world_gen.export.opendrive import write_opendrive
 from foretwin.world_gen.export.opendrive_elements import number
 from foretwin.world_gen.export.xml_text import in_comment, legal
@@ -35,7 +35,7 @@ UNSAID = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 
 
 def write_openscenario(
-    played: Cast,
+    played: StagedCase,
     scenario: Scenario,
     world: World,
     path: Path,
@@ -60,7 +60,7 @@ def write_openscenario(
 
 
 def openscenario_element(
-    played: Cast,
+    played: StagedCase,
     scenario: Scenario,
     world: World,
     *,
@@ -99,7 +99,7 @@ def openscenario_element(
 
 
 def _header(
-    played: Cast, scenario: Scenario, world: World, written_at: datetime.datetime
+    played: StagedCase, scenario: Scenario, world: World, written_at: datetime.datetime
 ) -> etree._Element:
     place = played.place
     header = etree.Element(
@@ -137,7 +137,7 @@ def _header(
     return header
 
 
-def _friction_factor(played: Cast) -> float:
+def _friction_factor(played: StagedCase) -> float:
     """Return what the case's numbers make of the ground's friction: all that OpenSCENARIO takes."""
     factor = 1.0
     for name, row in FUTURE_NUMBERS.items():
@@ -146,7 +146,7 @@ def _friction_factor(played: Cast) -> float:
     return factor
 
 
-def _storyboard(played: Cast, motions: list[Motion]) -> etree._Element:
+def _storyboard(played: StagedCase, motions: list[EntityMotion]) -> etree._Element:
     board = etree.Element("Storyboard")
     init = etree.SubElement(etree.SubElement(board, "Init"), "Actions")
     if _friction_factor(played) != 1.0:

@@ -10,7 +10,7 @@ from lxml import etree
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.scenario import EGO
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.scenarios.roles import CastActor
+from foretwin.sim_worker.scenarios.roles import StagedActor
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.world_gen.export.opendrive_elements import number
 from foretwin.world_gen.export.xml_text import legal
@@ -69,7 +69,7 @@ def ego_object(vehicle: VehicleParameters) -> etree._Element:
     return _object(entity, {"vehicle": vehicle.name})
 
 
-def actor_object(actor: CastActor) -> etree._Element:
+def actor_object(actor: StagedActor) -> etree._Element:
     """Return another road user with the size and limits of its kind."""
     traits = actor.traits
     said = {"kind": actor.kind, "conduct": actor.conduct, "size and limits": traits.source}

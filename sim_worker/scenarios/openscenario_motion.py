@@ -14,7 +14,7 @@ from foretwin.contracts.scenario import EGO
 from foretwin.geometry.frenet_path import FrenetPath, PathPose
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.scenarios.openscenario_entities import reference_behind_centre_m
-from foretwin.sim_worker.scenarios.roles import Cast, CastActor
+from foretwin.sim_worker.scenarios.roles import StagedActor, StagedCase
 from foretwin.world_gen.export.opendrive_elements import number
 
 _STEP_S, _SPACING_M = 0.1, 0.5
@@ -23,7 +23,7 @@ _BEYOND_M = 20.0
 """Paths that are not timed go on so far, for whoever drives them faster."""
 
 
-class Motion(NamedTuple):
+class EntityMotion(NamedTuple):
     """One entity's start and way: `pose` of its reference points (N, 2) and headings (N,).
 
     At `time_s` (N,) it is there: `timed`, or because of its speed. `speed` is a number or, as
@@ -46,7 +46,7 @@ class Motion(NamedTuple):
         return len(self.time_s) > 1
 
 
-def ego_motion(played: Cast, *, horizon_s: float) -> Motion:
+def ego_motion(played: StagedCase, *, horizon_s: float) -> EntityMotion:
     """Return the ego's motion along its path.
 
     It is timed backwards, as speeds have no sign there, and where the path has kinks, along which
@@ -58,16 +58,16 @@ def ego_motion(played: Cast, *, horizon_s: float) -> Motion:
     drift_m = np.abs(arc_lengths(pose.xy_m) - along)[1:]
     if not played.reverse and float(drift_m.max()) <= _MOST_DRIFT_M:
         name = f"{EGO}_speed_mps"
-        return Motion(EGO, pose, along / speed, False, f"${name}", {name: speed})
+        return EntityMotion(EGO, pose, along / speed, False, f"${name}", {name: speed})
     time = _instants(horizon_s)
     pose = path.pose_at(played.ego_arc_m + speed * time, played.ego_lateral_m)
     if not played.reverse:
-        return Motion(EGO, pose, time, True, number(speed), {})
+        return EntityMotion(EGO, pose, time, True, number(speed), {})
     pose = pose._replace(yaw_rad=pose.yaw_rad + math.pi)
-    return Motion(EGO, pose, time, True, number(-speed), {})
+    return EntityMotion(EGO, pose, time, True, number(-speed), {})
 
 
-def actor_motion(actor: CastActor, *, horizon_s: float) -> Motion:
+def actor_motion(actor: StagedActor, *, horizon_s: float) -> EntityMotion:
     """Return another road user's motion as its conduct has it, were nobody to react."""
     path, speed = FrenetPath(actor.xy_m), actor.speed_mps
     behind = reference_behind_centre_m(actor.kind)
@@ -80,14 +80,14 @@ def actor_motion(actor: CastActor, *, horizon_s: float) -> Motion:
         time = _instants(horizon_s)
     pose = _reference(path.pose_at(actor.start_arc_m + speed * time, actor.lateral_m), behind)
     if not stops:
-        return Motion(actor.name, pose, time, True, number(speed), {})
+        return EntityMotion(actor.name, pose, time, True, number(speed), {})
     numbers = {
         f"{actor.name}_speed_mps": speed,
         f"{actor.name}_acts_after_s": actor.acts_after_s,
         f"{actor.name}_decel_mps2": actor.decel_mps2,
     }
     said, brakes_after, brakes_by = (f"${name}" for name in numbers)
-    return Motion(actor.name, pose, time, False, said, numbers, brakes_after, brakes_by)
+    return EntityMotion(actor.name, pose, time, False, said, numbers, brakes_after, brakes_by)
 
 
 def _instants(horizon_s: float) -> Array:
@@ -103,7 +103,7 @@ def _reference(centre: PathPose, behind_m: float) -> PathPose:
     return centre._replace(xy_m=centre.xy_m - behind_m * forward)
 
 
-def starts(motion: Motion) -> etree._Element:
+def starts(motion: EntityMotion) -> etree._Element:
     """Return the actions that put an entity at its start, with its speed."""
     private = etree.Element("Private", entityRef=motion.name)
     teleport = etree.SubElement(etree.SubElement(private, "PrivateAction"), "TeleportAction")
@@ -112,7 +112,7 @@ def starts(motion: Motion) -> etree._Element:
     return private
 
 
-def maneuver_group(motion: Motion) -> etree._Element:
+def maneuver_group(motion: EntityMotion) -> etree._Element:
     """Return what an entity does: follow its trajectory and, if it stops, brake."""
     group = etree.Element("ManeuverGroup", name=f"{motion.name} group", maximumExecutionCount="1")
     actors = etree.SubElement(group, "Actors", selectTriggeringEntities="false")
@@ -157,7 +157,7 @@ def _speed(action: etree._Element, target: str, *, by_mps2: str = "") -> None:
     etree.SubElement(aim, "AbsoluteTargetSpeed", value=target)
 
 
-def _trajectory(action: etree._Element, motion: Motion) -> None:
+def _trajectory(action: etree._Element, motion: EntityMotion) -> None:
     reference = etree.SubElement(action, "TrajectoryRef")
     trajectory = etree.SubElement(
         reference, "Trajectory", name=f"{motion.name} trajectory", closed="false"

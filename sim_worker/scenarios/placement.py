@@ -17,7 +17,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.scenarios.beyond_junctions import other_places
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
-from foretwin.sim_worker.scenarios.places import Place, Placement, Unplaced
+from foretwin.sim_worker.scenarios.places import Placement, ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.relations import ways_of
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
 from foretwin.sim_worker.scenarios.ways import Way, unlike_its_turn
@@ -102,12 +102,12 @@ def _cast_ones(
     case: Values,
     vehicle: VehicleParameters,
     junction_id: str,
-    candidates: Iterator[Place],
+    candidates: Iterator[ScenarioPlace],
     nobody: str,
     most: int | None,
 ) -> Placement:
     """Return the candidates on which the case can be cast, or why there is none."""
-    found: list[Place] = []
+    found: list[ScenarioPlace] = []
     failure: Unplaced | None = None
     for place in candidates:
         played = cast(scenario, case, place, vehicle=vehicle)
@@ -144,7 +144,7 @@ def _nobody(scenario: Scenario) -> str:
 
 def _places_of(
     scenario: Scenario, network: RoadNetwork, passage: Passage, ego: Way
-) -> Iterator[Place]:
+) -> Iterator[ScenarioPlace]:
     """Yield a place for each way of the first other road user, with all ways of the rest."""
     along = ("ahead", "behind", "beside", "parked")
     ways = [
@@ -159,7 +159,7 @@ def _places_of(
         chosen = tuple(
             (way,) if i == first and way is not None else each for i, each in enumerate(ways)
         )
-        yield Place(
+        yield ScenarioPlace(
             scenario_id=scenario.id,
             world_id=network.world.id,
             junction_id=passage.junction_id,
@@ -180,7 +180,7 @@ def _any_turn(scenario: Scenario) -> bool:
 
 def places_on_passage(
     scenario: Scenario, network: RoadNetwork, passage: Passage
-) -> tuple[Place, ...]:
+) -> tuple[ScenarioPlace, ...]:
     """Return the places of a scenario for an ego that takes a passage; none where it is not for."""
     if scenario.where.setting != "junction":
         return ()

@@ -9,7 +9,7 @@ from foretwin.sim_worker.scenarios.walls import Walls
 from foretwin.sim_worker.scenarios.ways import Way
 
 
-class Place(NamedTuple):
+class ScenarioPlace(NamedTuple):
     """Where a scenario can take place: the ego's way, and by which ways the others may come.
 
     `actor_ways` has one entry for each actor of the scenario: the ways it may take, the likeliest
@@ -56,5 +56,5 @@ class Unplaced(NamedTuple):
 class Placement(NamedTuple):
     """Every place of a scenario in a World, and the reason for each junction without one."""
 
-    places: tuple[Place, ...]
+    places: tuple[ScenarioPlace, ...]
     unplaced: tuple[Unplaced, ...]

@@ -12,7 +12,7 @@ from foretwin.contracts.scenario import ActorPart, Conduct, Relation, Scenario
 from foretwin.geometry.polyline import length
 from foretwin.sim_worker.scenarios.drawing import Values
 from foretwin.sim_worker.scenarios.impact import EgoBox, Impact, Moving
-from foretwin.sim_worker.scenarios.places import Place
+from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
 
@@ -20,7 +20,7 @@ ALONG: tuple[Relation, ...] = ("ahead", "behind", "beside", "parked")
 """Relations of those who have no way of their own: they are on the ego's path or beside it."""
 
 
-class CastActor(NamedTuple):
+class StagedActor(NamedTuple):
     """Another road user of a case.
 
     `xy_m` (N, 2) is its own path; its box's centre starts at `start_arc_m` of it, `lateral_m` to
@@ -52,7 +52,7 @@ class CastActor(NamedTuple):
         return KINDS[self.kind]
 
 
-class Cast(NamedTuple):
+class StagedCase(NamedTuple):
     """Everybody's start in one case, in the World's frame.
 
     The ego's base_link starts at `ego_arc_m` of `ego_xy_m` (N, 2), `ego_lateral_m` to its left;
@@ -62,9 +62,9 @@ class Cast(NamedTuple):
     """
 
     scenario_id: str
-    place: Place
+    place: ScenarioPlace
     values: Values
-    actors: tuple[CastActor, ...]
+    actors: tuple[StagedActor, ...]
     ego_xy_m: Array
     ego_speed_limit_mps: Array
     ego_arc_m: float
@@ -79,7 +79,7 @@ class Cast(NamedTuple):
     """How far beyond the World's lanes the ego or an actor starts, on a road prolonged."""
 
 
-class Meeting(NamedTuple):
+class PlannedMeeting(NamedTuple):
     """Where the ego and an actor meet, and by which way the actor comes."""
 
     impact: Impact
@@ -91,7 +91,7 @@ class Staging(NamedTuple):
 
     scenario: Scenario
     values: Values
-    place: Place
+    place: ScenarioPlace
     ego: Moving
     box: EgoBox
     start_m: float = 0.0
@@ -102,14 +102,14 @@ class Staging(NamedTuple):
 
     def actor(
         self, part: ActorPart, xy_m: Array, start_arc_m: float, lateral_m: float, way: str
-    ) -> CastActor:
+    ) -> StagedActor:
         """Return an actor that starts on a path, led straight back where it starts before it."""
         if start_arc_m < _LEAST_ARC_M:
             more = _LEAST_ARC_M - start_arc_m
             back = (xy_m[0] - xy_m[1]) / max(float(np.hypot(*(xy_m[0] - xy_m[1]))), 1e-9)
             xy_m = np.concatenate([(xy_m[0] + more * back)[None], xy_m])
             start_arc_m = _LEAST_ARC_M
-        return CastActor(
+        return StagedActor(
             name=part.name,
             kind=part.kind,
             relation=part.relation,

@@ -18,9 +18,9 @@ from foretwin.sim_worker.road_users.cast import Player
 from foretwin.sim_worker.scenarios.beyond_junctions import other_places
 from foretwin.sim_worker.scenarios.casting import cast_all
 from foretwin.sim_worker.scenarios.placement import places_on_passage
-from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.sim_worker.scenarios.roles import Cast, CastActor
+from foretwin.sim_worker.scenarios.roles import StagedActor, StagedCase
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_velocity
 
@@ -32,12 +32,12 @@ class StagedScenarios:
 
     def __init__(self, network: RoadNetwork) -> None:
         self._network = network
-        self._places: dict[tuple[str, str], Place | None] = {}
-        self._casts: dict[_Case, Cast | Unplaced] = {}
+        self._places: dict[tuple[str, str], ScenarioPlace | None] = {}
+        self._casts: dict[_Case, StagedCase | Unplaced] = {}
         self._ways: dict[int, Way | None] = {}
         """Those that cases were cast on: as long as they are kept, no other has their identity."""
 
-    def place(self, scenario: Scenario, name: str) -> Place | None:
+    def place(self, scenario: Scenario, name: str) -> ScenarioPlace | None:
         """Return the place of that name, None where the scenario has none so named."""
         key = (scenario.id, name)
         if key not in self._places:
@@ -53,7 +53,7 @@ class StagedScenarios:
         *,
         ego_way: Way | None = None,
         ego_arc_m: float | None = None,
-    ) -> tuple[Cast | Unplaced, ...]:
+    ) -> tuple[StagedCase | Unplaced, ...]:
         """Return cases of a scenario at a place, each begun where the case has the ego begin.
 
         `ego_way` is the line that the ego really drives, in place of the place's own; with
@@ -80,7 +80,7 @@ class StagedScenarios:
         return tuple(self._casts[key] for key in keys)
 
 
-def _named(scenario: Scenario, network: RoadNetwork, name: str) -> Place | None:
+def _named(scenario: Scenario, network: RoadNetwork, name: str) -> ScenarioPlace | None:
     if scenario.where.setting != "junction":
         found, _ = other_places(scenario, network)
         return next((place for place in found if place.name == name), None)
@@ -94,7 +94,7 @@ def _named(scenario: Scenario, network: RoadNetwork, name: str) -> Place | None:
     return None
 
 
-def staged_players(played: Cast, path: FrenetPath) -> tuple[Player, ...]:
+def staged_players(played: StagedCase, path: FrenetPath) -> tuple[Player, ...]:
     """Return the road users of a case; `path` is the ego's way, shared by all that go along it."""
     ego = played.place.ego
     players = []
@@ -104,7 +104,7 @@ def staged_players(played: Cast, path: FrenetPath) -> tuple[Player, ...]:
     return tuple(players)
 
 
-def player_on(actor: CastActor, path: FrenetPath, start_arc_m: float) -> Player:
+def player_on(actor: StagedActor, path: FrenetPath, start_arc_m: float) -> Player:
     """Return an actor of a case as one that starts at `start_arc_m` of a path."""
     return Player(
         name=actor.name,
@@ -120,7 +120,7 @@ def player_on(actor: CastActor, path: FrenetPath, start_arc_m: float) -> Player:
     )
 
 
-def staged_start(played: Cast, vehicle: VehicleParameters) -> Array:
+def staged_start(played: StagedCase, vehicle: VehicleParameters) -> Array:
     """Return (8,) the ego's state as a case begins: in steady motion along its path.
 
     Backwards it moves against its heading.

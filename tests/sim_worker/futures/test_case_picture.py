@@ -10,7 +10,7 @@ import pytest
 from foretwin.geometry.rectangles import clearance
 from foretwin.sim_worker.futures.case_picture import told, write_case_picture
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
-from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
@@ -22,11 +22,11 @@ VEHICLE = load_vehicle()
 WORLD = cross()
 
 
-def first_case(id_: str) -> Cast:
+def first_case(id_: str) -> StagedCase:
     scenario = catalogue()[id_]
     place = places(scenario, WORLD, vehicle=VEHICLE, most=1).places[0]
     found = cast(scenario, draw_cases(scenario)[0], place, vehicle=VEHICLE)
-    assert isinstance(found, Cast)
+    assert isinstance(found, StagedCase)
     return found
 
 

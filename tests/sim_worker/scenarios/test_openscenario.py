@@ -14,7 +14,7 @@ from lxml import etree
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import overlapping, separations
-from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import openscenario_element, write_openscenario
 from foretwin.sim_worker.scenarios.openscenario_entities import AXLES
@@ -36,7 +36,7 @@ WORLDS = {
 }  # fmt: skip
 
 
-def cases_in(id_: str, world: World, *, most: int = 1) -> list[Cast]:
+def cases_in(id_: str, world: World, *, most: int = 1) -> list[StagedCase]:
     """Return cases of a scenario at its first place in a World, evenly chosen of all."""
     scenario = catalogue()[id_]
     cases = draw_cases(scenario)
@@ -45,10 +45,10 @@ def cases_in(id_: str, world: World, *, most: int = 1) -> list[Cast]:
         for place in places(scenario, world, vehicle=VEHICLE, most=1).places
         for values in cases[:: -(-len(cases) // most)]
     )
-    return [played for played in found if isinstance(played, Cast)]
+    return [played for played in found if isinstance(played, StagedCase)]
 
 
-def written(played: Cast, world: World, file: Path) -> ScenarioFile:
+def written(played: StagedCase, world: World, file: Path) -> ScenarioFile:
     write_openscenario(played, catalogue()[played.scenario_id], world, file, vehicle=VEHICLE)
     return ScenarioFile.read(file)
 
@@ -65,14 +65,14 @@ def first_touch(file: ScenarioFile, *, tick_s: float = 0.002) -> tuple[str, floa
     return min(found, key=lambda item: item[1])
 
 
-def off_m(file: ScenarioFile, played: Cast) -> float:
+def off_m(file: ScenarioFile, played: StagedCase) -> float:
     """Return how far apart, or how deep in each other, boxes are as their impact is planned."""
     time = np.array([played.impact_time_s])
     ego, other = (file.entities[name].boxes(time) for name in ("ego", played.impact_with))
     return abs(float(separations(ego, other).max()))
 
 
-def may_be_off_m(played: Cast) -> float:
+def may_be_off_m(played: StagedCase) -> float:
     """Who brakes has its rear axle's speed, not its box's, which differ in bends."""
     return 0.4 if any(actor.conduct == "stops" for actor in played.actors) else 0.1
 
