@@ -16,10 +16,10 @@ from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.collision_detection import ego_rectangles
 from foretwin.sim_worker.futures.run_job import run_job
-from foretwin.sim_worker.scenarios.impact import Moving, ego_box, ego_rectangles, rectangles
+from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.roles import StagedCase
-from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
 STEP_S = 0.1
 
@@ -56,16 +56,13 @@ def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: f
     """
     end_s = played.impact_time_s if played.impact_with else horizon_s
     time = np.linspace(0.0, end_s, max(2, math.ceil(end_s / STEP_S) + 1))
-    ego = Moving(FrenetPath(played.ego_xy_m), played.ego_speed_mps, played.ego_lateral_m)
-    box = ego_box(vehicle, reverse=played.reverse)
+    path, reverse = FrenetPath(played.ego_xy_m), played.reverse
+    ego = ego_box(vehicle, path, played.ego_speed_mps, played.ego_lateral_m, reverse=reverse)
     others = []
     for actor in played.actors:
-        brakes = actor.acts_after_s if actor.conduct == "stops" else math.inf
-        path = FrenetPath(actor.xy_m)
-        moving = Moving(path, actor.speed_mps, actor.lateral_m, brakes, actor.decel_mps2)
-        arc = actor.start_arc_m + moving.travelled_m(time)
-        others.append(rectangles(moving, actor.traits, arc))
-    boxes = ego_rectangles(ego, box, played.ego_arc_m + ego.travelled_m(time))
+        moving = actor.moving(FrenetPath(actor.xy_m))
+        others.append(moving.rectangles(actor.start_arc_m + moving.travelled_m(time)))
+    boxes = ego.rectangles(played.ego_arc_m + ego.travelled_m(time))
     return _run(time, boxes, tuple(others), played.impact_time_s, played.impact_with)
 
 
@@ -118,17 +115,11 @@ def _result_run(result: FuturesResult, played: StagedCase, vehicle: VehicleParam
         hit = ("", "a road user", "a building or an island")[int(outcome.collision_with[0])]
         # What follows is the accident's business.
         end = max(2, math.ceil(hit_s / STEP_S - 1e-6) + 1)
-    yaw = states[:end, 2]
-    ahead = box_centre_from_base_m(vehicle) * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
-    ego = Rectangles(states[:end, :2] + ahead, yaw, vehicle.length_m.value, vehicle.width_m.value)
-    poses = users.poses[0, :end].astype(np.float64)
+    ego = ego_rectangles(vehicle, states[:end])
+    poses, sizes = users.poses[0, :end].astype(np.float64), users.size_m[0].tolist()
     others = tuple(
-        Rectangles(
-            poses[:, r, :2], poses[:, r, 2], float(users.size_m[0, r, 0]),
-            float(users.size_m[0, r, 1]),
-        )
-        for r in range(len(played.actors))
-    )  # fmt: skip
+        Rectangles(poses[:, r, :2], poses[:, r, 2], *sizes[r]) for r in range(len(played.actors))
+    )
     return _run(time[:end], ego, others, hit_s, hit)
 
 

@@ -26,12 +26,11 @@ from foretwin.sim_worker.futures.driven_line import (
     time_at,
 )
 from foretwin.sim_worker.futures.scene import SceneMaker
-from foretwin.sim_worker.scenarios.impact import Moving, ego_box
+from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
-from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
+from foretwin.sim_worker.scenarios.staged import staged_start
 from foretwin.sim_worker.scenarios.ways import Way
-from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
 _FORWARDS, _BACKWARDS = "constant_speed", "reverse_pursuit"
 _STRAIGHT_PM = 1e-3
@@ -119,17 +118,14 @@ def _off_m(
         first = max(math.ceil((from_s + case.impact_time_s - _WATCHED_S) / tick_s), 0)
         ticks = first + np.arange(round((_WATCHED_S + _AFTER_S / 2.0) / tick_s))
         ticks = np.minimum(ticks, len(line.states) - 1)
-        player = next(
-            p for p in staged_players(case, case.place.ego.path) if p.name == case.impact_with
-        )
+        actor = next(a for a in case.actors if a.name == case.impact_with)
+        way = case.place.way_named(actor.way)
+        box = actor.moving(way.path)
         since_s = np.asarray(ticks * tick_s - from_s, dtype=np.float64)
-        stops_s = player.acts_after_s if player.conduct == "stops" else math.inf
-        moving = Moving(player.path, player.speed_mps, 0.0, stops_s, player.decel_mps2)
-        arc = player.start_arc_m + moving.travelled_m(since_s)
-        pose = player.path.pose_at(arc, player.lateral_m)
+        at = box.rectangles(actor.start_on(way) + box.travelled_m(since_s))
         states.append(line.states[ticks])
-        users.append(np.column_stack([pose.xy_m, pose.yaw_rad])[:, None])
-        sizes.append([(KINDS[player.kind].length_m, KINDS[player.kind].width_m)])
+        users.append(np.column_stack([at.centre_m, at.yaw_rad])[:, None])
+        sizes.append([(box.length_m, box.width_m)])
     touches = first_touches(
         stage.vehicle, np.stack(states), np.stack(users), np.array(sizes), tick_s=tick_s
     )
@@ -142,7 +138,7 @@ def _off_m(
 def off_plan_m(case: StagedCase, state: Array, vehicle: VehicleParameters) -> float:
     """Return how far the point of the ego that is to be hit is from where that is planned, with
     base_link in a state (8,)."""
-    box = ego_box(vehicle, reverse=case.reverse)
+    box = ego_box(vehicle, case.place.ego.path, 0.0, reverse=case.reverse)
     yaw = float(state[2]) + (math.pi if case.reverse else 0.0)
     cos, sin = math.cos(yaw), math.sin(yaw)
     left = case.place.near_sign * (case.impact_share - 0.5) * box.width_m

@@ -21,7 +21,7 @@ from foretwin.sim_worker.scenarios.alongside import (
     stands_in_the_way,
 )
 from foretwin.sim_worker.scenarios.drawing import Values
-from foretwin.sim_worker.scenarios.impact import Moving, ego_box
+from foretwin.sim_worker.scenarios.impact import MovingBox, ego_box
 from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S, incoming, meet
 from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.roles import (
@@ -90,8 +90,9 @@ def _cast(
     wished_mps = values[f"{EGO}.speed_mps"]
     speed = wished_mps if ego_speed_mps is None else ego_speed_mps
     speed = max(speed, min(LEAST_START_MPS, wished_mps) or LEAST_START_MPS)
-    ego = Moving(place.ego.path, speed, values[f"{EGO}.lateral_shift_m"])
-    staging = Staging(scenario, values, place, ego, ego_box(vehicle, reverse=place.reverse))
+    shift = values[f"{EGO}.lateral_shift_m"]
+    ego = ego_box(vehicle, place.ego.path, speed, shift, reverse=place.reverse)
+    staging = Staging(scenario, values, place, ego)
     meetings: dict[str, PlannedMeeting] = {}
     for part, ways in zip(scenario.actors, place.actor_ways, strict=True):
         if part.relation in ALONG:
@@ -141,7 +142,7 @@ def _start_arc(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
     drives through so fast.
     """
     scenario, place, ego = staging.scenario, staging.place, staging.ego
-    end, time_s = place.ego.entry_m - staging.box.front_m, scenario.lead_time_s
+    end, time_s = place.ego.entry_m - staging.ego.front_m, scenario.lead_time_s
     for part in scenario.actors:
         if part.name in meetings:
             end = meetings[part.name].impact.ego_arc_m
@@ -149,12 +150,12 @@ def _start_arc(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
         if part.relation == "ahead" and not place.reverse:
             time_s = closing_time_s(part, staging) or time_s
             break
-    room_s = (end - place.ego.first_m - staging.box.length_m) / ego.speed_mps
+    room_s = (end - place.ego.first_m - staging.ego.length_m) / ego.speed_mps
     start = end - ego.speed_mps * min(time_s, max(room_s, 2 * LEAST_TIME_S))
     return _past_bend(ego, start, end - 2 * LEAST_TIME_S * ego.speed_mps)
 
 
-def _past_bend(ego: Moving, start_m: float, latest_m: float) -> float:
+def _past_bend(ego: MovingBox, start_m: float, latest_m: float) -> float:
     """Return where a bend ends in which nobody can begin at that speed; else the start itself."""
     arcs = np.arange(start_m, latest_m, 1.0)
     curvature = ego.path.at_nodes(ego.path.curvature_pm, arcs)

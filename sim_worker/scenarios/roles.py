@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,10 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.scenario import ActorPart, Conduct, Relation, Scenario
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import length
 from foretwin.sim_worker.scenarios.drawing import Values
-from foretwin.sim_worker.scenarios.impact import EgoBox, Impact, Moving
+from foretwin.sim_worker.scenarios.impact import Impact, MovingBox
 from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
@@ -45,6 +47,19 @@ class StagedActor(NamedTuple):
     def start_on(self, way: Way) -> float:
         """Return where it starts on the way that it takes; its own path may begin before that."""
         return self.start_arc_m - (length(self.xy_m) - length(way.xy_m))
+
+    def moving(self, path: FrenetPath) -> MovingBox:
+        """Return it as it moves on a path unless something intervenes."""
+        size, brakes = self.traits, self.acts_after_s if self.conduct == "stops" else math.inf
+        return MovingBox(
+            path,
+            self.speed_mps,
+            size.length_m,
+            size.width_m,
+            self.lateral_m,
+            brakes,
+            self.decel_mps2,
+        )
 
     @property
     def traits(self) -> KindTraits:
@@ -92,8 +107,7 @@ class Staging(NamedTuple):
     scenario: Scenario
     values: Values
     place: ScenarioPlace
-    ego: Moving
-    box: EgoBox
+    ego: MovingBox
     start_m: float = 0.0
 
     def number(self, part: ActorPart, field: str) -> float:
