@@ -13,6 +13,12 @@ Array = npt.NDArray[np.float64]
 Array32 = npt.NDArray[np.float32]
 """Float32 array, for trajectories on the wire."""
 
+Flags = npt.NDArray[np.bool_]
+"""Boolean array."""
+
+Indices = npt.NDArray[np.intp]
+"""Array of places in another one."""
+
 _FLOAT64 = np.dtype("<f8")
 _WIRE_TYPES = ("<f8", "<f4", "<i8", "<i4", "|u1", "|b1")
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
-import numpy.typing as npt
-
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 
@@ -28,7 +25,7 @@ class SeenUsers(NamedTuple):
     size_m: Array
     arc_m: Array
     offset_m: Array
-    walks: npt.NDArray[np.bool_]
+    walks: Flags
     turned_rad: Array
 
 
@@ -43,7 +40,7 @@ class SharedGround(NamedTuple):
     enter_arc_m: Array
     leave_arc_m: Array
     point_m: Array
-    waits: npt.NDArray[np.bool_]
+    waits: Flags
     their_yaw_rad: Array | None = None
 
 
@@ -122,7 +119,7 @@ class RemembersWithinJob(Protocol):
         """Return what drives the `count` cars of one job."""
 
 
-def rows_of(view: PlannerView, rows: npt.NDArray[np.intp]) -> PlannerView:
+def rows_of(view: PlannerView, rows: Indices) -> PlannerView:
     """Return what a planner sees that drives only some of the cars."""
     users = view.users
     if users is not None:

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
@@ -27,7 +26,7 @@ from foretwin.sim_worker.batch.accident_bodies import (
     ground_forces,
 )
 from foretwin.sim_worker.batch.accident_model import AccidentBatch, ContactLaw, Crush
-from foretwin.sim_worker.batch.collision_detection import Indices, Touches
+from foretwin.sim_worker.batch.collision_detection import Touches
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
 _STIFF, _STIFF_LOOK_S = Crush(400.0, 0.0005), 0.01
@@ -68,7 +67,7 @@ class Accidents(NamedTuple):
     ego_states: Array
     user_poses: Array
     user_velocities: Array
-    valid: npt.NDArray[np.bool_]
+    valid: Flags
 
 
 def run_accidents(
@@ -175,7 +174,7 @@ def _ground(bodies: Bodies, batch: AccidentBatch) -> GroundForces:
     return ground_forces(bodies, np.stack([ahead, aside], axis=-1))
 
 
-def _may_touch(bodies: Bodies, batch: AccidentBatch, *, within_s: float) -> npt.NDArray[np.bool_]:
+def _may_touch(bodies: Bodies, batch: AccidentBatch, *, within_s: float) -> Flags:
     """(A,) bool: whether the two cannot be ruled out to meet before the next look."""
     poses, velocities = batch.poses, batch.velocities
     yaw = poses[..., 2]

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.collision_detection import Touches
@@ -63,11 +62,11 @@ class Bodies(NamedTuple):
     stiffness_npr: Array
     load_n: Array
     friction: Array
-    slides: npt.NDArray[np.bool_]
+    slides: Flags
     brake_n: Array
     tire_angle_rad: Array
 
-    def only(self, accidents: npt.NDArray[np.intp]) -> Bodies:
+    def only(self, accidents: Indices) -> Bodies:
         """Return those of some accidents."""
         return Bodies._make(part[..., accidents] for part in self)
 

@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.sim_worker.batch.accident_bodies import Bodies, GroundForces
 from foretwin.sim_worker.vehicle.planar import set_physics_options
 
@@ -150,9 +149,7 @@ class AccidentBatch:
         limits = np.maximum(forces.limit_n.transpose(2, 1, 0), _TINY_N)
         self._range[..., 0], self._range[..., 1] = -limits, limits
 
-    def advance(
-        self, which: npt.NDArray[np.bool_], duration_s: float, longest_step_s: float
-    ) -> Array:
+    def advance(self, which: Flags, duration_s: float, longest_step_s: float) -> Array:
         """Step the simulations `which` (A,); return (2, N, 3) impulses of their contact.
 
         Force times time on either body in the frame of the poses, and its moment about the centre

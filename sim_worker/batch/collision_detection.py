@@ -10,9 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.rectangles import (
@@ -24,8 +23,6 @@ from foretwin.geometry.rectangles import (
 )
 from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
-
-Indices = npt.NDArray[np.intp]
 
 _SEARCH_STEP_S = 0.01
 _PRECISION_S = 1e-5
@@ -54,7 +51,7 @@ class Touches(NamedTuple):
     user_size_m: Array
     point_m: Array
     normal: Array
-    from_start: npt.NDArray[np.bool_]
+    from_start: Flags
 
 
 _NOBODY = Touches(
@@ -105,7 +102,7 @@ def first_touches(
 
 def touched(
     vehicle: VehicleParameters, states: Array, users: Array, user_size_m: Array, *, tick_s: float
-) -> npt.NDArray[np.bool_]:
+) -> Flags:
     """Return which of S futures `first_touches` finds a touch in: (S,) bool, without details."""
     motion = _Motion(
         vehicle, states, users, user_size_m,
@@ -168,7 +165,7 @@ class _Motion:
             Rectangles(pose[..., :2], pose[..., 2], self.size_m[:, 0], self.size_m[:, 1]),
         )
 
-    def overlapping(self, share: Array) -> npt.NDArray[np.bool_]:
+    def overlapping(self, share: Array) -> Flags:
         return overlapping(*self.rectangles(share))
 
     def may_touch(self) -> Indices:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.play import Play
 from foretwin.sim_worker.futures.scene import JobScene
@@ -21,9 +20,6 @@ from foretwin.sim_worker.planner_interface import (
     rows_of,
 )
 from foretwin.sim_worker.planners.registry import load_planner
-
-Flags = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.intp]
 
 
 class DriveRecord(NamedTuple):
@@ -125,7 +121,7 @@ class _Planners:
         self.failed: Flags = np.zeros(len(names), dtype=bool)
         self.any_failed = False
         self.reasons = [""] * len(names)
-        self._groups: list[tuple[str, Planner, Rows]] = []
+        self._groups: list[tuple[str, Planner, Indices]] = []
         for kind in sorted(set(names)):
             rows = np.flatnonzero([name == kind for name in names])
             planner = load_planner(kind)
@@ -144,7 +140,7 @@ class _Planners:
             accel[rows], angle[rows] = self._ask(name, planner, rows, rows_of(shown, rows))
         return PlannerOutput(accel, angle)
 
-    def _ask(self, name: str, planner: Planner, rows: Rows, view: PlannerView) -> PlannerOutput:
+    def _ask(self, name: str, planner: Planner, rows: Indices, view: PlannerView) -> PlannerOutput:
         if self.any_failed and self.failed[rows].all():
             return PlannerOutput(np.zeros(len(rows)), np.zeros(len(rows)))
         try:
@@ -176,7 +172,7 @@ class _Planners:
                     found[rows[place]] = said
         return found
 
-    def _fail(self, name: str, rows: Rows, reason: str, time_s: float) -> None:
+    def _fail(self, name: str, rows: Indices, reason: str, time_s: float) -> None:
         for row in rows[~self.failed[rows]]:
             self.reasons[row] = f"planner {name!r} at {time_s:g} s: {' '.join(reason.split())}"
         self.failed[rows] = True

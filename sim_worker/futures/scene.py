@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.scenario import Scenario
@@ -71,7 +70,7 @@ class JobScene(NamedTuple):
     """(S,) why a future's scenario does not happen in it, in words; empty where it does."""
 
     @property
-    def backwards(self) -> npt.NDArray[np.bool_]:
+    def backwards(self) -> Flags:
         """(S,) whose planner drives in reverse."""
         return np.array([drives_backwards(name) for name in self.planners])
 

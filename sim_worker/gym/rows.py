@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.batch.collision_detection import touched
-from foretwin.sim_worker.futures.play import Play, Rows
+from foretwin.sim_worker.futures.play import Play
 from foretwin.sim_worker.futures.scene import Aims, JobScene
 from foretwin.sim_worker.gym.episodes import Episodes
 from foretwin.sim_worker.metrics.ground import DrivableGround
@@ -20,8 +19,6 @@ from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
 from foretwin.sim_worker.road_users.cast import RoadUserArrays
 from foretwin.world_gen.rules.signal_state import cycle_s
-
-Flags = npt.NDArray[np.bool_]
 
 OFF_PATH_M = 6.0
 """Who is so far beside the path has left it."""
@@ -114,7 +111,9 @@ class EpisodeRows:
         assert self._play is not None, "nothing has begun"
         return self._play.scene
 
-    def begin(self, rows: Rows, cases: Rows, lights_s: Array, *, looked: bool = False) -> None:
+    def begin(
+        self, rows: Indices, cases: Indices, lights_s: Array, *, looked: bool = False
+    ) -> None:
         """Let `rows` (K,) begin the futures `cases` (K,) of the job; at first, all have to.
 
         `lights_s` (K,) is how much later by the lights' plans each is. See `Play.restart` about
@@ -202,7 +201,7 @@ class EpisodeRows:
         return np.asarray(off)
 
 
-def scene_of(pool: JobScene, cases: Rows) -> JobScene:
+def scene_of(pool: JobScene, cases: Indices) -> JobScene:
     """Return the scene of (S,) futures of another one, each as it begins there."""
     casts = pool.casts
     traffic = sight = None
@@ -226,7 +225,7 @@ def scene_of(pool: JobScene, cases: Rows) -> JobScene:
     )
 
 
-def _playable(pool: JobScene) -> Rows:
+def _playable(pool: JobScene) -> Indices:
     """Return which futures can be played as episodes, forwards; UserError where none can."""
     place = pool.path.locate(pool.starts[:, :2], near_arc_m=pool.start_arc_m)
     beside = np.abs(place.offset_m) > _BEGINS_WITHIN_M

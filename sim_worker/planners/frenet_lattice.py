@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.sim_worker.driver_model import HOLD_MPS2, HOLD_SPEED_MPS, MAX_DECEL_MPS2
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView, SeenUsers, rows_of
 from foretwin.sim_worker.planners.lattice_choice import Planned, choose
@@ -107,7 +106,7 @@ class LatticeDriver:
         view: PlannerView,
         passed_s: Array,
         changing: Changes | None,
-    ) -> npt.NDArray[np.bool_]:
+    ) -> Flags:
         """Return (S,) who chooses anew: everybody at the same times, some in between."""
         if view.time_s > self._next_s - 1e-6:
             return np.ones(len(passed_s), dtype=bool)
@@ -115,7 +114,7 @@ class LatticeDriver:
         due |= self._lead_brakes(view) & (passed_s > _AT_ONCE_S)
         return due | self._endangered(chosen, view, passed_s, changing, ~due)
 
-    def _sees_somebody_new(self, view: PlannerView) -> npt.NDArray[np.bool_]:
+    def _sees_somebody_new(self, view: PlannerView) -> Flags:
         if view.users is None or self._seen is None:
             return np.zeros(len(view.arc_m), dtype=bool)
         new = np.isfinite(view.users.arc_m) & ~np.isfinite(self._seen.arc_m)
@@ -128,8 +127,8 @@ class LatticeDriver:
 
     def _endangered(
         self, chosen: tuple[Motions, Motions], view: PlannerView, passed_s: Array,
-        changing: Changes | None, open_: npt.NDArray[np.bool_],
-    ) -> npt.NDArray[np.bool_]:  # fmt: skip
+        changing: Changes | None, open_: Flags,
+    ) -> Flags:  # fmt: skip
         """Return (S,) of the `open_` ones whose motion leads into somebody who drives otherwise
         than when that was looked at last."""
         endangered = np.zeros(len(view.arc_m), dtype=bool)
@@ -148,9 +147,7 @@ class LatticeDriver:
         endangered[rows] = ~free
         return endangered
 
-    def _note(
-        self, view: PlannerView, due: npt.NDArray[np.bool_], changing: Changes | None
-    ) -> None:
+    def _note(self, view: PlannerView, due: Flags, changing: Changes | None) -> None:
         """Remember how others drive as motions are chosen."""
         if view.users is None:
             return
@@ -161,7 +158,7 @@ class LatticeDriver:
         else:
             self._known[0][due], self._known[1][due] = turns[due], speed[due]
 
-    def _lead_brakes(self, view: PlannerView) -> npt.NDArray[np.bool_]:
+    def _lead_brakes(self, view: PlannerView) -> Flags:
         if self._lead_mps is None:
             return np.zeros(len(view.arc_m), dtype=bool)
         least = _LEAD_BRAKES_MPS2 * (view.time_s - self._looked_s)
@@ -171,7 +168,7 @@ class LatticeDriver:
         self,
         chosen: tuple[Motions, Motions],
         view: PlannerView,
-        rows: npt.NDArray[np.intp],
+        rows: Indices,
         passed_s: Array,
         changing: Changes | None,
     ) -> tuple[Motions, Motions]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import compiled, tracking
@@ -42,7 +41,7 @@ class _Wishes(NamedTuple):
     speed_mps: Array
     accel_mps2: Array
     exponent: Array
-    stand: npt.NDArray[np.bool_] | None
+    stand: Flags | None
 
 
 class PurePursuitIdm:

@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from foretwin.contracts.arrays import Flags, Indices
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.futures import RecordedRoadUser
 from foretwin.contracts.scenario import Conduct
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.road_users.crowd import Crowd
-from foretwin.sim_worker.road_users.path_table import Indices
 from foretwin.sim_worker.road_users.replay import Replay
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
@@ -52,7 +51,7 @@ class RoadUserArrays(NamedTuple):
     paths: tuple[FrenetPath, ...]
     kinds: Indices
     hidden_by: Indices
-    walks: npt.NDArray[np.bool_]
+    walks: Flags
     replay: Replay | None = None
 
 

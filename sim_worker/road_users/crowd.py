@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.road_users.path_table import Indices
-
-Flags = npt.NDArray[np.bool_]
+from foretwin.contracts.arrays import Array, Flags, Indices
 
 
 class Crowd(NamedTuple):

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.speed_profile import speed_in_bends_mps
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
-from foretwin.sim_worker.road_users.path_table import Indices, PathTable
+from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.right_of_way import PathRules
 
 _BESIDE_M = 0.3

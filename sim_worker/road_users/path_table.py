@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
-
-Indices = npt.NDArray[np.intp]
 
 
 class OnPaths(NamedTuple):

@@ -7,15 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.planner_interface import SeenUsers
 from foretwin.sim_worker.road_users.path_table import PathPlace, PathProjection
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
-
-Flags = npt.NDArray[np.bool_]
 
 _MARGIN_M = 0.3
 """What passes the car's side by less than this is in its way."""
@@ -47,7 +45,7 @@ class Sight:
         vehicle: VehicleParameters,
         faults: PerceptionFaults,
         *,
-        hidden_by: npt.NDArray[np.intp],
+        hidden_by: Indices,
         walks: Flags,
         tick_s: float,
         kept: int | None = None,
@@ -79,7 +77,7 @@ class Sight:
         self._at_most_aside_m = half_diagonal + (0.5 * self._width_m + _MARGIN_M + _ROUNDING_M)
         """However it is turned, who is farther aside than this is not in the way."""
 
-    def begun(self, futures: npt.NDArray[np.intp], traffic: Traffic) -> Sight:
+    def begun(self, futures: Indices, traffic: Traffic) -> Sight:
         """Return the sight of (K,) cars that see `traffic`, begun as that of these futures did."""
         return Sight(
             traffic,
@@ -105,9 +103,7 @@ class Sight:
             for mine, theirs in zip(self._past, past, strict=True)
         ]
 
-    def look(
-        self, tick: int | npt.NDArray[np.intp], traffic: Traffic, eyes_xy_m: Array
-    ) -> SeenUsers:
+    def look(self, tick: int | Indices, traffic: Traffic, eyes_xy_m: Array) -> SeenUsers:
         """Return what is seen at a tick, or ticks (S,), from where the cars' fronts are (S, 2)."""
         self._past = [_now(traffic), *self._past[:-1]]
         node, share, speed, poses = self._past[0]
@@ -125,9 +121,7 @@ class Sight:
             poses = np.where(unseen[..., None], np.nan, poses)
         return SeenUsers(poses, speed, self._size, on_arc, offset, self._walks, turned)
 
-    def _unseen(
-        self, tick: int | npt.NDArray[np.intp], poses: Array, eyes_xy_m: Array
-    ) -> Flags | None:
+    def _unseen(self, tick: int | Indices, poses: Array, eyes_xy_m: Array) -> Flags | None:
         """(S, R) bool: who is away, lost or hidden; None where everybody is seen."""
         if self._all_there and not self._ever_lost and not self.anybody_hidden:
             return None

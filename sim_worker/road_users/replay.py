@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.futures import RecordedRoadUser
-from foretwin.sim_worker.road_users.path_table import Indices
 
 _AT_SAMPLE_S = 1e-9
 """So near to a sample's time is at it."""
@@ -26,7 +24,7 @@ class ReplayMoment(NamedTuple):
     node: Indices
     share: Array
     speed_mps: Array
-    gone: npt.NDArray[np.bool_]
+    gone: Flags
 
 
 class Replay:

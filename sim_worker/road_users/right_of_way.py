@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.world import Connection, World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths, direction_at
 from foretwin.sim_worker.planner_interface import SharedGround
-from foretwin.sim_worker.road_users.path_table import Indices
 
 _ON_PATH_M, _ON_PATH_RAD = 1.5, 0.6
 _GREEN_KEEPS = ("turn_across", "u_turn", "merge_order")

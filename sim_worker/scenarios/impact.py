@@ -12,10 +12,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths
@@ -182,7 +181,7 @@ def find_impact(
     return None
 
 
-def _meetings(front: Array, x: Array, y: Array) -> tuple[npt.NDArray[np.intp], Array, Array] | None:
+def _meetings(front: Array, x: Array, y: Array) -> tuple[Indices, Array, Array] | None:
     """Return where outline curves cross the front's: (C,) curve, and places along both in points.
 
     `front` (M, 2); `x`, `y` (N, K) for K outline points.
@@ -231,7 +230,7 @@ def first_touch(
         [np.arange(0.0, fine_from_s, _EARLY_TICK_S), np.arange(fine_from_s, until_s, _TICK_S)]
     )
 
-    def touching(time_s: Array, rows: slice | npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+    def touching(time_s: Array, rows: slice | Indices) -> Flags:
         ego_at = ego_from[rows, None] + ego.travelled_m(time_s)
         actor_at = actor_from[rows, None] + actor.travelled_m(time_s)
         return overlapping(ego.rectangles(ego_at), actor.rectangles(actor_at))
