@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,14 +40,6 @@ class Run(NamedTuple):
     """When the ego touches somebody or something, not a number where it does not."""
     collision_with: str
 
-    def ego_at(self, instant: int) -> Rectangles:
-        """Return the ego's box at an instant."""
-        return _at(self.ego, instant)
-
-    def others_at(self, instant: int) -> tuple[Rectangles, ...]:
-        """Return the other road users' boxes at an instant, in the order of the case."""
-        return tuple(_at(box, instant) for box in self.others)
-
 
 def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: float) -> Run:
     """Drive a case as planned: the ego keeps its speed, and so does everybody who is heedless.
@@ -73,13 +65,12 @@ def planned_run(
     vehicle: VehicleParameters,
     *,
     planner: str,
-    stage: Stage | None = None,
 ) -> Run:
     """Drive a case as a planner does, with all that a future of a job has.
 
-    `stage` holds the World, else one is made. Raises ValueError where the planner fails.
+    Raises ValueError where the planner fails.
     """
-    stage = stage or Stage(world, vehicle, nsim=1)
+    stage = Stage(world, vehicle, nsim=1)
     result = run_job(_job(played, scenario, world, planner), stage)
     if result.left_out[0] or not result.outcome.valid[0]:
         reason = result.left_out[0] or ", ".join(result.outcome.failures)
@@ -89,21 +80,29 @@ def planned_run(
 
 def _job(played: StagedCase, scenario: Scenario, world: World, planner: str) -> Job:
     future = Future(
-        index=0, name=scenario.id, planner=planner, scenario_id=scenario.id,
-        values=dict(played.values), place=played.place.name,
-    )  # fmt: skip
+        index=0,
+        name=scenario.id,
+        planner=planner,
+        scenario_id=scenario.id,
+        values=dict(played.values),
+        place=played.place.name,
+    )
     # Where the case begins is told by its place; the car is anywhere.
-    anywhere = VehicleState(
-        vehicle_id="ego", stamp_ns=0, position=world.frame.origin, yaw_rad=0.0, speed_mps=0.0,
-        yaw_rate_radps=0.0, accel_mps2=0.0, tire_angle_rad=0.0,
-    )  # fmt: skip
-    horizon_s = math.ceil(scenario.horizon_s / STEP_S - 1e-9) * STEP_S
+    motion = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
+    anywhere: dict[str, Any] = dict.fromkeys(motion, 0.0)
     return Job(
-        round_id=0, job_index=0, world_id=world.id, state=anywhere,
+        round_id=0,
+        job_index=0,
+        world_id=world.id,
+        state=VehicleState(vehicle_id="ego", stamp_ns=0, position=world.frame.origin, **anywhere),
         path=PathAhead(xy_m=played.ego_xy_m, speed_limit_mps=played.ego_speed_limit_mps),
-        futures=(future,), horizon_s=horizon_s, step_s=STEP_S, seed=0,
-        cruise_speed_mps=played.ego_speed_mps, scenarios=(scenario,),
-    )  # fmt: skip
+        futures=(future,),
+        horizon_s=math.ceil(scenario.horizon_s / STEP_S - 1e-9) * STEP_S,
+        step_s=STEP_S,
+        seed=0,
+        cruise_speed_mps=played.ego_speed_mps,
+        scenarios=(scenario,),
+    )
 
 
 def _result_run(result: FuturesResult, played: StagedCase, vehicle: VehicleParameters) -> Run:
@@ -132,8 +131,7 @@ def _run(
     return Run(time_s, ego, others, moment, float(gap.min()), hit_s if hit else math.nan, hit)
 
 
-def _at(box: Rectangles, instant: int) -> Rectangles:
-    return Rectangles(
-        box.centre_m[instant : instant + 1], box.yaw_rad[instant : instant + 1], box.length_m,
-        box.width_m,
-    )  # fmt: skip
+def box_at(track: Rectangles, instant: int) -> Rectangles:
+    """Return the box of a track at an instant; its arrays keep an axis of one."""
+    at = slice(instant, instant + 1)
+    return track._replace(centre_m=track.centre_m[at], yaw_rad=track.yaw_rad[at])

@@ -37,7 +37,7 @@ def test_the_heedless_run_ends_with_the_planned_impact(id_: str) -> None:
     assert run.collision_with == played.impact_with
     assert run.time_s[run.moment] == pytest.approx(played.impact_time_s)
     names = [actor.name for actor in played.actors]
-    gaps = [float(clearance(run.ego_at(run.moment), box)[0]) for box in run.others_at(run.moment)]
+    gaps = [float(clearance(run.ego, other)[run.moment]) for other in run.others]
     assert gaps[names.index(played.impact_with)] <= 0.05
     assert all(gap > 0.1 for name, gap in zip(names, gaps, strict=True)
                if name != played.impact_with)  # fmt: skip
@@ -47,9 +47,9 @@ def test_a_planner_drives_the_case_from_the_same_start() -> None:
     played, scenario = first_case("lead_stopping"), catalogue()["lead_stopping"]
     heedless = heedless_run(played, VEHICLE, horizon_s=scenario.horizon_s)
     run = planned_run(played, scenario, WORLD, VEHICLE, planner="pure_pursuit_idm")
-    np.testing.assert_allclose(run.ego_at(0).centre_m, heedless.ego_at(0).centre_m, atol=0.01)
-    for mine, theirs in zip(run.others_at(0), heedless.others_at(0), strict=True):
-        np.testing.assert_allclose(mine.centre_m, theirs.centre_m, atol=0.01)
+    np.testing.assert_allclose(run.ego.centre_m[0], heedless.ego.centre_m[0], atol=0.01)
+    for mine, theirs in zip(run.others, heedless.others, strict=True):
+        np.testing.assert_allclose(mine.centre_m[0], theirs.centre_m[0], atol=0.01)
     assert run.collision_with == ""
     assert run.clearance_m > 0.5
     assert "hits lead" in told(played, heedless, run, "pure_pursuit_idm")
