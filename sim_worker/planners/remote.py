@@ -137,9 +137,8 @@ class RemoteDriver:
                     message = item.message()
                 except ValueError:
                     message = None
-                if isinstance(message, PlannedMotions) and (message.job, message.question) == (
-                    scene.job, scene.question,
-                ):  # fmt: skip
+                asked = (scene.job, scene.question)
+                if isinstance(message, PlannedMotions) and (message.job, message.question) == asked:
                     return message
             elif left <= 0.0:
                 return None
