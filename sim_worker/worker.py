@@ -111,9 +111,13 @@ class FuturesWorker:
 
     def _cache(self, setup: WorkerSetup, vehicle: VehicleParameters) -> StageCache:
         return StageCache(
-            self._worlds_dir, vehicle, control_hz=setup.control_hz, threads=setup.threads,
-            nsim=setup.simulations, kept=setup.kept_worlds,
-        )  # fmt: skip
+            self._worlds_dir,
+            vehicle,
+            control_hz=setup.control_hz,
+            threads=setup.threads,
+            nsim=setup.simulations,
+            kept=setup.kept_worlds,
+        )
 
     def handle(self, request: Request) -> None:
         """Answer one question; never raises: what cannot be answered is refused in one line."""

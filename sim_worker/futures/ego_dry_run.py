@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -81,10 +81,10 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, StagedC
     for (scenario_id, place, ego), rows in groups.items():
         line = lines[ego]
         cases = [job.futures[row].values for row in rows]
+        scenario, way = scenarios[scenario_id], line.way
         again = maker.staged.cast(
-            scenarios[scenario_id], cases, place, stage.vehicle, ego_way=line.way,
-            ego_arc_m=ego.start_m,
-        )  # fmt: skip
+            scenario, cases, place, stage.vehicle, ego_way=way, ego_arc_m=ego.start_m
+        )
         for row, met in zip(rows, again, strict=True):
             # Where no car can drive like that, nobody can say when it meets somebody.
             played[row] = _unplanned(bent[row])
@@ -180,10 +180,8 @@ def _lines(
     )
     ticks = math.ceil((last_s + _AFTER_S) / stage.control_dt_s)
     way = first[egos[0]].place.ego
-    key = (
-        way.name, stage.vehicle.name, stage.control_dt_s, ticks,
-        *((ego, first[ego].ego_arc_m) for ego in egos),
-    )  # fmt: skip
+    starts = ((ego, first[ego].ego_arc_m) for ego in egos)
+    key = (way.name, stage.vehicle.name, stage.control_dt_s, ticks, *starts)
     if key not in maker.rehearsed:
         cases = [first[ego] for ego in egos]
         states = _drive_alone(job, cases, stage, maker, ticks)
@@ -200,21 +198,19 @@ def _drive_alone(
     """Return states (S, T, 8) of egos that nobody meets."""
     futures = tuple(
         Future(
-            index=index, name="alone", planner=_BACKWARDS if case.reverse else _FORWARDS,
+            index=index,
+            name="alone",
+            planner=_BACKWARDS if case.reverse else _FORWARDS,
             values={f"{EGO}.speed_mps": case.ego_speed_mps},
         )
         for index, case in enumerate(cases)
-    )  # fmt: skip
+    )
+    same = ("round_id", "job_index", "world_id", "state", "path", "step_s", "seed")
+    given: dict[str, Any] = {name: getattr(job, name) for name in same}
     alone = Job(
-        round_id=job.round_id,
-        job_index=job.job_index,
-        world_id=job.world_id,
-        state=job.state,
-        path=job.path,
+        **given,
         futures=futures,
         horizon_s=ticks * stage.control_dt_s,
-        step_s=job.step_s,
-        seed=job.seed,
         cruise_speed_mps=0.0,
         starts=np.stack([staged_start(case, stage.vehicle) for case in cases]),
     )
@@ -249,7 +245,7 @@ def _from_line(actor: StagedActor, later_s: float, line: DrivenLine, way: Way) -
 
 
 def _unplanned(case: StagedCase) -> StagedCase:
+    nowhere = np.full(2, math.nan)
     return case._replace(
-        impact_time_s=math.nan, impact_point_m=np.full(2, math.nan), impact_share=math.nan,
-        impact_with="",
-    )  # fmt: skip
+        impact_time_s=math.nan, impact_point_m=nowhere, impact_share=math.nan, impact_with=""
+    )

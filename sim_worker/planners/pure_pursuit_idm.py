@@ -66,6 +66,7 @@ class PurePursuitIdm:
         if heading is None:
             heading = np.array([np.cos(states[2]), np.sin(states[2])])
         accel, angle = np.empty(len(speed)), np.empty(len(speed))
+        limits = vehicle.wheelbase_m, vehicle.max_tire_angle_rad, vehicle.max_tire_rate_radps
         compiled.curve(
             states,
             heading,
@@ -75,9 +76,7 @@ class PurePursuitIdm:
             np.asarray(view.speed_factor, dtype=np.float64),
             path.with_curve_speeds(driver.LATERAL_ACCEL_MPS2, driver.COMFORT_DECEL_MPS2),
             path.first_arc_m,
-            vehicle.wheelbase_m.value,
-            vehicle.max_tire_angle_rad.value,
-            vehicle.max_tire_rate_radps.value,
+            tuple(float(part.value) for part in limits),
             _TRACKING,
             accel,
             angle,

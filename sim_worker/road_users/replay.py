@@ -46,9 +46,8 @@ class Replay:
         self._speed = np.concatenate([user.speed_mps for user in users])
         self._gone_after = np.concatenate([user.gone_after for user in users]).astype(bool)
         self._gone_after[self._begin + counts - 1] = True
-        self._first_s, self._end_s = (
-            self._time_s[self._begin], self._time_s[self._begin + counts - 1],
-        )  # fmt: skip
+        self._first_s = self._time_s[self._begin]
+        self._end_s = self._time_s[self._begin + counts - 1]
         # One search for all: everybody's times are moved behind those of the one before.
         span_s = float(self._end_s.max() - self._first_s.min()) + 1.0
         self._moved_s = np.arange(len(users)) * span_s

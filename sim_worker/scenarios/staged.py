@@ -66,11 +66,9 @@ class StagedScenarios:
             return tuple(Unplaced(own, reason, True) for _ in cases)
         if ego_way is not None:
             place = place._replace(ego=ego_way)
-        keys = [
-            (id(ego_way), ego_arc_m, scenario.id, scenario.lead_time_s, scenario.horizon_s,
-             place.name, vehicle.name, *values.items())
-            for values in cases
-        ]  # fmt: skip
+        times = (scenario.lead_time_s, scenario.horizon_s)
+        common = (id(ego_way), ego_arc_m, scenario.id, *times, place.name, vehicle.name)
+        keys = [(*common, *values.items()) for values in cases]
         new = {key: dict(c) for key, c in zip(keys, cases, strict=True) if key not in self._casts}
         played = cast_all(
             scenario, tuple(new.values()), place, vehicle=vehicle, ego_arc_m=ego_arc_m
@@ -131,7 +129,6 @@ def staged_start(played: StagedCase, vehicle: VehicleParameters) -> Array:
     yaw_rate = float(path.at_nodes(path.curvature_pm, arc)[0]) * speed
     if played.reverse:
         yaw, speed, yaw_rate = yaw + np.pi, -speed, yaw_rate
-    return np.array([
-        *pose.xy_m[0], yaw, speed, rear_slip_velocity(vehicle, speed, yaw_rate), yaw_rate,
-        kinematic_tire_angle(vehicle, speed, yaw_rate), 0.0,
-    ])  # fmt: skip
+    slip = rear_slip_velocity(vehicle, speed, yaw_rate)
+    angle = kinematic_tire_angle(vehicle, speed, yaw_rate)
+    return np.array([*pose.xy_m[0], yaw, speed, slip, yaw_rate, angle, 0.0])
