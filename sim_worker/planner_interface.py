@@ -124,16 +124,15 @@ def rows_of(view: PlannerView, rows: Indices) -> PlannerView:
     users = view.users
     if users is not None:
         users = SeenUsers._make(field[rows] for field in users)
-    return view._replace(
-        states=view.states[rows],
-        arc_m=view.arc_m[rows],
-        offset_m=view.offset_m[rows],
-        desired_offset_m=view.desired_offset_m[rows],
-        target_speed_mps=view.target_speed_mps[rows],
-        speed_factor=view.speed_factor[rows],
-        lead_gap_m=view.lead_gap_m[rows],
-        lead_speed_mps=view.lead_speed_mps[rows],
-        stop_arc_m=None if view.stop_arc_m is None else view.stop_arc_m[rows],
-        users=users,
-        heading=None if view.heading is None else view.heading[:, rows],
-    )
+    of_some = {
+        name: values[rows] for name in _BY_CAR if (values := getattr(view, name)) is not None
+    }
+    if view.heading is not None:
+        of_some["heading"] = view.heading[:, rows]
+    return view._replace(users=users, **of_some)
+
+
+_BY_CAR = (
+    *("states", "arc_m", "offset_m", "desired_offset_m", "target_speed_mps", "speed_factor"),
+    *("lead_gap_m", "lead_speed_mps", "stop_arc_m"),
+)

@@ -81,10 +81,10 @@ def _rebound(damping: float, crush: Crush) -> float:
 class AccidentBatch:
     """A simulations of two bodies each; belongs to one thread."""
 
-    def __init__(self, bodies: Bodies, impact: ContactLaw, *, threads: int) -> None:
+    def __init__(self, bodies: Bodies, impact: ContactLaw) -> None:
         self.count = bodies.mass_kg.shape[1]
         self._impact = impact
-        self._batch = mujoco_batch.Batch(_model(), self.count, nthread=threads, persistent=True)
+        self._batch = mujoco_batch.Batch(_model(), self.count, nthread=1, persistent=True)
         self._fill(bodies)
         self._qpos = self._batch.bind("qpos").reshape(self.count, 2, 3)
         self._qvel = self._batch.bind("qvel").reshape(self.count, 2, 3)

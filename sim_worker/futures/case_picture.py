@@ -107,7 +107,9 @@ def _draw_outline(axes: Axes, box: Rectangles, colour: str, **style: float) -> N
 
 def told(played: StagedCase, heedless: Run, planned: Run | None, planner: str) -> str:
     """Say in one line each who is how fast, what is planned, and what the planner makes of it."""
-    moving = [f"ego {3.6 * played.ego_speed_mps:.0f} km/h{' backwards' if played.reverse else ''}"]
+    moving = [
+        f"ego {3.6 * played.ego_speed_mps:.0f} km/h{' backwards' if played.place.reverse else ''}"
+    ]
     moving += [
         f"{_words(a.name)} {3.6 * a.speed_mps:.0f} km/h" for a in played.actors if a.speed_mps > 0.0
     ]
@@ -252,7 +254,7 @@ def _draw_paths(axes: Axes, played: StagedCase) -> None:
         "alpha": 0.7,
         "zorder": 11.0,
     }
-    axes.plot(*played.ego_xy_m.T, color=EGO, **style)
+    axes.plot(*played.place.ego.xy_m.T, color=EGO, **style)
     for actor in played.actors:
         if actor.speed_mps > 0.0:
             axes.plot(*actor.xy_m.T, color=OTHERS, **style)

@@ -48,7 +48,7 @@ def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: f
     """
     end_s = played.impact_time_s if played.impact_with else horizon_s
     time = np.linspace(0.0, end_s, max(2, math.ceil(end_s / STEP_S) + 1))
-    path, reverse = FrenetPath(played.ego_xy_m), played.reverse
+    path, reverse = FrenetPath(played.place.ego.xy_m), played.place.reverse
     ego = ego_box(vehicle, path, played.ego_speed_mps, played.ego_lateral_m, reverse=reverse)
     others = []
     for actor in played.actors:
@@ -95,7 +95,9 @@ def _job(played: StagedCase, scenario: Scenario, world: World, planner: str) -> 
         job_index=0,
         world_id=world.id,
         state=VehicleState(vehicle_id="ego", stamp_ns=0, position=world.frame.origin, **anywhere),
-        path=PathAhead(xy_m=played.ego_xy_m, speed_limit_mps=played.ego_speed_limit_mps),
+        path=PathAhead(
+            xy_m=played.place.ego.xy_m, speed_limit_mps=played.place.ego.speed_limit_mps
+        ),
         futures=(future,),
         horizon_s=math.ceil(scenario.horizon_s / STEP_S - 1e-9) * STEP_S,
         step_s=STEP_S,

@@ -138,8 +138,8 @@ def _off_m(
 def off_plan_m(case: StagedCase, state: Array, vehicle: VehicleParameters) -> float:
     """Return how far the point of the ego that is to be hit is from where that is planned, with
     base_link in a state (8,)."""
-    box = ego_box(vehicle, case.place.ego.path, 0.0, reverse=case.reverse)
-    yaw = float(state[2]) + (math.pi if case.reverse else 0.0)
+    box = ego_box(vehicle, case.place.ego.path, 0.0, reverse=case.place.reverse)
+    yaw = float(state[2]) + (math.pi if case.place.reverse else 0.0)
     cos, sin = math.cos(yaw), math.sin(yaw)
     left = case.place.near_sign * (case.impact_share - 0.5) * box.width_m
     x = float(state[0]) + box.front_m * cos - left * sin - float(case.impact_point_m[0])
@@ -153,7 +153,7 @@ def _ego(case: StagedCase) -> _Ego:
     in_time = case.ego_arc_m < bends.min(initial=np.inf) - _RUN_UP_M
     shift = case.values[f"{EGO}.lateral_shift_m"]
     start = None if in_time else case.ego_arc_m
-    return _Ego(case.ego_speed_mps, shift, case.reverse, start)
+    return _Ego(case.ego_speed_mps, shift, case.place.reverse, start)
 
 
 def _bends(case: StagedCase) -> bool:
@@ -200,7 +200,7 @@ def _drive_alone(
         Future(
             index=index,
             name="alone",
-            planner=_BACKWARDS if case.reverse else _FORWARDS,
+            planner=_BACKWARDS if case.place.reverse else _FORWARDS,
             values={f"{EGO}.speed_mps": case.ego_speed_mps},
         )
         for index, case in enumerate(cases)
@@ -227,8 +227,6 @@ def _on_time(case: StagedCase, line: DrivenLine, way: Way) -> StagedCase:
     later_s = (to_s - from_s) - case.impact_time_s
     return case._replace(
         place=case.place._replace(ego=way),
-        ego_xy_m=way.xy_m,
-        ego_speed_limit_mps=way.speed_limit_mps,
         actors=tuple(_from_line(actor, later_s, line, way) for actor in case.actors),
         impact_time_s=case.impact_time_s + later_s,
     )

@@ -25,7 +25,6 @@ _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")
 _LEAST_M = {"motorway": 120.0, "road": 60.0, "circuit": 150.0, "parking_bay": 32.0}
 _LEAST_RADIUS_M = 150.0
 """Of a motorway's lane: a bend for 80 km/h, at 0.34 g. Trunk roads through junctions bend more."""
-_ON_LANE_M = 2.5
 _JOINT_M = 1.5
 
 _BAY_RADIUS_M = 6.0
@@ -71,7 +70,7 @@ def _fits(lane: Lane, setting: str, network: RoadNetwork) -> bool:
     road = network.roads.get(lane.road_id)
     road_class = "" if road is None else road.road_class
     if setting == "motorway":
-        across = lane.left_id if network.near_sign > 0.0 else lane.right_id
+        across = network.beside(lane, near=False)
         return road_class in _CLASSES["motorway"] and across is not None
     return setting != "circuit" or road_class in _CLASSES["circuit"]
 
@@ -86,7 +85,6 @@ def _least_radius_m(way: Way) -> float:
 def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> ScenarioPlace:
     return ScenarioPlace(
         scenario_id=scenario.id,
-        world_id=network.world.id,
         junction_id=network.world.intersection.id,
         name=way.name,
         driving_side=network.driving_side,
@@ -165,7 +163,7 @@ def _no_bay(lane: Lane, network: RoadNetwork) -> str:
         return "none is for cars"
     if road is not None and road.road_class in _FAST:
         return "nobody parks at fast roads"
-    if (lane.right_id if network.near_sign > 0.0 else lane.left_id) is not None:
+    if network.beside(lane, near=True) is not None:
         return "another lane lies between"
     half = _LEAST_M["parking_bay"] / 2.0
     middle = float(arc_lengths(lane.centerline)[-1]) / 2.0

@@ -127,16 +127,12 @@ def _cast(
         if actor.name in meetings
     ]
     return StagedCase(
-        scenario.id,
         place,
         values,
         actors,
-        ego_xy_m=way.xy_m,
-        ego_speed_limit_mps=way.speed_limit_mps,
         ego_arc_m=start,
         ego_lateral_m=ego.offset_m,
         ego_speed_mps=speed,
-        reverse=place.reverse,
         impact_time_s=touched.time_s,
         impact_point_m=touched.point_m,
         impact_share=touched.share,

@@ -156,10 +156,10 @@ def _storyboard(played: StagedCase, motions: list[EntityMotion]) -> etree._Eleme
     act = make.Act(
         *(maneuver_group(motion) for motion in motions if motion.moves),
         after("0", tag="StartTrigger", name="from the beginning"),
-        name=f"{played.scenario_id} as cast",
+        name=f"{played.place.scenario_id} as cast",
     )
     return make.Storyboard(
         make.Init(make.Actions(*actions)),
-        make.Story(act, name=played.scenario_id),
+        make.Story(act, name=played.place.scenario_id),
         after("$horizon_s", tag="StopTrigger", name="end of the case"),
     )

@@ -56,16 +56,16 @@ def ego_motion(played: StagedCase, *, horizon_s: float) -> EntityMotion:
     It is timed backwards, as speeds have no sign there, and where the path has kinks, along which
     nobody moves as fast as an arc length says.
     """
-    path, speed = FrenetPath(played.ego_xy_m), played.ego_speed_mps
+    path, speed = FrenetPath(played.place.ego.xy_m), played.ego_speed_mps
     along = _spaced(speed * horizon_s)
     pose = path.pose_at(played.ego_arc_m + along, played.ego_lateral_m)
     drift_m = np.abs(arc_lengths(pose.xy_m) - along)[1:]
-    if not played.reverse and float(drift_m.max()) <= _MOST_DRIFT_M:
+    if not played.place.reverse and float(drift_m.max()) <= _MOST_DRIFT_M:
         name = f"{EGO}_speed_mps"
         return EntityMotion(EGO, pose, along / speed, False, f"${name}", {name: speed})
     time = _instants(horizon_s)
     pose = path.pose_at(played.ego_arc_m + speed * time, played.ego_lateral_m)
-    if not played.reverse:
+    if not played.place.reverse:
         return EntityMotion(EGO, pose, time, True, number(speed), {})
     pose = pose._replace(yaw_rad=pose.yaw_rad + math.pi)
     return EntityMotion(EGO, pose, time, True, number(-speed), {})

@@ -136,7 +136,6 @@ def _places_of(
             chosen[needs[0]] = (way,)
         yield ScenarioPlace(
             scenario_id=scenario.id,
-            world_id=network.world.id,
             junction_id=passage.junction_id,
             name=passage.name if way is None else f"{passage.name}/{way.name}",
             driving_side=network.driving_side,

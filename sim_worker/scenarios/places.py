@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from foretwin.contracts.world import DrivingSide
 from foretwin.sim_worker.scenarios.walls import Walls
-from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.scenarios.ways import Way, near_sign
 
 
 class ScenarioPlace(NamedTuple):
@@ -17,7 +17,6 @@ class ScenarioPlace(NamedTuple):
     """
 
     scenario_id: str
-    world_id: str
     junction_id: str
     name: str
     """The connections that the ego takes and, after a `/`, those of the first other road user."""
@@ -39,7 +38,7 @@ class ScenarioPlace(NamedTuple):
     @property
     def near_sign(self) -> float:
         """Return +1 where the near side is the right one, else -1."""
-        return 1.0 if self.driving_side == "right" else -1.0
+        return near_sign(self.driving_side)
 
 
 class Unplaced(NamedTuple):

@@ -70,22 +70,17 @@ class StagedActor(NamedTuple):
 class StagedCase(NamedTuple):
     """Everybody's start in one case, in the World's frame.
 
-    The ego's base_link starts at `ego_arc_m` of `ego_xy_m` (N, 2), `ego_lateral_m` to its left;
-    `reverse` says that it drives backwards along it. Where a touch is planned, an ego that keeps
-    its speed touches the first road user after `impact_time_s` with its front's point
-    `impact_share` at `impact_point_m` (2,); else the three are NaN.
+    The ego's base_link starts at `ego_arc_m` of its way, `ego_lateral_m` to its left. Where a touch
+    is planned, an ego that keeps its speed touches the first road user after `impact_time_s` with
+    its front's point `impact_share` at `impact_point_m` (2,); else the three are NaN.
     """
 
-    scenario_id: str
     place: ScenarioPlace
     values: Values
     actors: tuple[StagedActor, ...]
-    ego_xy_m: Array
-    ego_speed_limit_mps: Array
     ego_arc_m: float
     ego_lateral_m: float
     ego_speed_mps: float
-    reverse: bool
     impact_time_s: float
     impact_point_m: Array
     impact_share: float

@@ -127,7 +127,7 @@ def staged_start(played: StagedCase, vehicle: VehicleParameters) -> Array:
     pose = path.pose_at(arc, played.ego_lateral_m)
     yaw, speed = float(pose.yaw_rad[0]), played.ego_speed_mps
     yaw_rate = float(path.at_nodes(path.curvature_pm, arc)[0]) * speed
-    if played.reverse:
+    if played.place.reverse:
         yaw, speed, yaw_rate = yaw + np.pi, -speed, yaw_rate
     slip = rear_slip_velocity(vehicle, speed, yaw_rate)
     angle = kinematic_tire_angle(vehicle, speed, yaw_rate)

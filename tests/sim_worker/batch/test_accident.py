@@ -63,9 +63,7 @@ def touches(*meetings: Meeting) -> Touches:
 
 
 def bodies(touch: Touches, meeting: Meeting) -> tuple[Body, Body]:
-    described = accident_bodies(
-        CAR, touch, kinds=[meeting.kind], friction_factor=np.ones(1), user_decel_mps2=np.zeros(1)
-    )
+    described = accident_bodies(CAR, touch, kinds=[meeting.kind], friction_factor=np.ones(1))
     positions, velocities = cog_from_base(CAR, touch.ego_states)
     ego, other = (
         Body(mass, inertia, place[:2], motion[:3])

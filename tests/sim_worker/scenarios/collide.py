@@ -57,10 +57,10 @@ def ego_boxes(played: StagedCase, vehicle: VehicleParameters, time_s: Array) -> 
 
 def ego_pose(played: StagedCase, time_s: Array) -> tuple[Array, Array]:
     """Return base_link's places and where the car's nose points; in reverse, backwards."""
-    path = FrenetPath(played.ego_xy_m)
+    path = FrenetPath(played.place.ego.xy_m)
     arc = played.ego_arc_m + played.ego_speed_mps * time_s
     pose = path.pose_at(arc, played.ego_lateral_m)
-    return pose.xy_m, pose.yaw_rad + (np.pi if played.reverse else 0.0)
+    return pose.xy_m, pose.yaw_rad + (np.pi if played.place.reverse else 0.0)
 
 
 def front_point(played: StagedCase, vehicle: VehicleParameters, time_s: Array) -> Array:
@@ -69,7 +69,7 @@ def front_point(played: StagedCase, vehicle: VehicleParameters, time_s: Array) -
     length, rear = vehicle.length_m.value, vehicle.rear_overhang_m.value
     to_left = (played.impact_share - 0.5) * vehicle.width_m.value * played.place.near_sign
     ahead = length - rear
-    if played.reverse:
+    if played.place.reverse:
         ahead, to_left = -rear, -to_left
     forward = np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
     left = np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1)

@@ -170,7 +170,7 @@ def tile_of(scenario: Scenario, world: World, where: str) -> Tile | None:
 
 
 def whole_lap(tile: Tile, aspect: float) -> View:
-    low, high = tile.played.ego_xy_m.min(axis=0), tile.played.ego_xy_m.max(axis=0)
+    low, high = tile.played.place.ego.xy_m.min(axis=0), tile.played.place.ego.xy_m.max(axis=0)
     half_m = max(high[1] - low[1], (high[0] - low[0]) / aspect) / 2.0 + 10.0
     return view_around((low + high) / 2.0, half_m, aspect, close=False)
 

@@ -49,7 +49,7 @@ def cases_in(id_: str, world: World, *, most: int = 1) -> list[StagedCase]:
 
 
 def written(played: StagedCase, world: World, file: Path) -> ScenarioFile:
-    write_openscenario(played, catalogue()[played.scenario_id], world, file, vehicle=VEHICLE)
+    write_openscenario(played, catalogue()[played.place.scenario_id], world, file, vehicle=VEHICLE)
     return ScenarioFile.read(file)
 
 
@@ -106,7 +106,7 @@ def test_entities_are_boxes_of_their_kind_about_their_rear_axle(tmp_path: Path) 
     front = float(van.element.find("Axles/FrontAxle").get("positionX"))
     assert rear < 0.0 < front < rear + van.length_m
     assert van.speed_mps == 0.0
-    centre = FrenetPath(played.ego_xy_m).locate(van.boxes(np.zeros(1)).centre_m)
+    centre = FrenetPath(played.place.ego.xy_m).locate(van.boxes(np.zeros(1)).centre_m)
     actor = next(a for a in played.actors if a.name == "parked_van")
     assert centre.offset_m[0] == pytest.approx(actor.lateral_m, abs=0.01)
 
