@@ -82,7 +82,7 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, StagedC
         line = lines[ego]
         cases = [job.futures[row].values for row in rows]
         scenario, way = scenarios[scenario_id], line.way
-        again = maker.staged.cast(
+        again = maker.scenarios.cast(
             scenario, cases, place, stage.vehicle, ego_way=way, ego_arc_m=ego.start_m
         )
         for row, met in zip(rows, again, strict=True):

@@ -24,12 +24,12 @@ from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
 from foretwin.sim_worker.road_users.traffic import Traffic
-from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.live import KnownScenarios
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.scenarios.seen import SeenActors
-from foretwin.sim_worker.scenarios.staged import StagedScenarios, staged_players, staged_start
+from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
 from foretwin.world_gen.rules.signal_state import LiveColour, world_colours_at
 
@@ -107,9 +107,7 @@ class SceneMaker:
         self._rules = JunctionRules(world)
         self._network = RoadNetwork(world)
         self._seen = SeenActors(self._network)
-        self._live = LiveScenarios(self._network)
-        self.staged = StagedScenarios(self._network)
-        """The scenarios of this World at named places, away from any drive."""
+        self.scenarios = KnownScenarios(self._network)
         self.rehearsed: dict[tuple[object, ...], Any] = {}
         """Drives of egos alone that cases were cast on."""
 
@@ -160,7 +158,7 @@ class SceneMaker:
         numbers = number_columns(job.futures)
         aims = _aims(job, place.offset_m, numbers)
         live = any(v.scenario_id and not v.place for v in job.futures)
-        on_path = self._live.on(path, float(place.arc_m[0]), vehicle) if live else None
+        on_path = self.scenarios.on(path, float(place.arc_m[0]), vehicle) if live else None
         seen = self._seen.actors(job.road_users)
         casts: list[tuple[Player, ...]] = []
         left_out = [""] * count
@@ -239,7 +237,9 @@ class SceneMaker:
             scenario = _scenario_of(job.futures[mine[0]], known)
             assert scenario is not None
             cases = [job.futures[row].values for row in mine]
-            found.update(zip(mine, self.staged.cast(scenario, cases, place, vehicle), strict=True))
+            found.update(
+                zip(mine, self.scenarios.cast(scenario, cases, place, vehicle), strict=True)
+            )
         return found
 
 

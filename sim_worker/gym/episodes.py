@@ -76,7 +76,7 @@ def episodes_of_scenario(
     if at.reverse:
         raise UserError(f"{scenario.id} is driven backwards at {at.name}; learners drive forwards")
     drawn = _cases(scenario, values or {}, cases, cases_seed, early_or_late_s)
-    played = scenes.staged.cast(scenario, drawn, at.name, vehicle)
+    played = scenes.scenarios.cast(scenario, drawn, at.name, vehicle)
     futures: list[Future] = []
     starts: list[Array] = []
     reasons: list[str] = []

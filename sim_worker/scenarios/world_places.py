@@ -17,7 +17,7 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.live import KnownScenarios
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
@@ -44,7 +44,7 @@ def _places_recorded(
     network: RoadNetwork, asked: PlaceRequest, vehicle: VehicleParameters
 ) -> WorldPlaces:
     """Return which scenarios can happen on the ways that a recorded car took from its starts."""
-    world, known = network.world, LiveScenarios(network)
+    world, known = network.world, KnownScenarios(network)
     placed, unplaced = [], []
     for number, start in asked.starts:
         path = FrenetPath(start.path(world.frame).xy_m)
