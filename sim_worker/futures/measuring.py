@@ -78,7 +78,7 @@ def measure(
 
 def _masses(scene: JobScene) -> Array:
     """Return (S, R) masses of road users by their kinds."""
-    if scene.casts is None:
+    if scene.traffic is None:
         return np.zeros((len(scene.starts), 0))
     masses = np.array([KINDS[kind].mass_kg for kind in KIND_NAMES])
-    return masses[scene.casts.kinds]
+    return masses[scene.traffic.crowd.kinds]

@@ -222,15 +222,15 @@ def _ticks(job: Job, stage: Stage) -> tuple[int, int]:
 
 def _sizes(scene: JobScene) -> Array:
     """Return (S, R, 2) length and width of road users."""
-    if scene.casts is None:
+    if scene.traffic is None:
         return np.zeros((len(scene.starts), 0, 2))
-    crowd = scene.casts.crowd
+    crowd = scene.traffic.crowd
     return np.stack([crowd.length_m, crowd.width_m], axis=-1)
 
 
 def _tracks(scene: JobScene, record: DriveRecord, sizes: Array, every: int) -> RoadUserTracks:
     count, _, most, _ = record.users.shape
-    kinds = np.zeros((count, most), np.int32) if scene.casts is None else scene.casts.kinds
+    kinds = np.zeros((count, most)) if scene.traffic is None else scene.traffic.crowd.kinds
     absent = np.isnan(record.users[:, ::every, :, 0])
     return RoadUserTracks(
         poses=record.users[:, ::every].astype(np.float32),
@@ -242,12 +242,10 @@ def _tracks(scene: JobScene, record: DriveRecord, sizes: Array, every: int) -> R
 
 
 def _accidents(job: Job, scene: JobScene, stage: Stage, touches: Touches) -> Accidents:
-    assert scene.casts is not None or not len(touches.future)
-    kinds = (
-        []
-        if scene.casts is None
-        else [KIND_NAMES[kind] for kind in scene.casts.kinds[touches.future, touches.user]]
-    )
+    kinds = []
+    if scene.traffic is not None:
+        met = scene.traffic.crowd.kinds[touches.future, touches.user]
+        kinds = [KIND_NAMES[kind] for kind in met]
     # Without the motion after it, an accident is over once its delta-v is.
     enough_s = math.ceil(DELTA_V_WITHIN_S / job.step_s - 1e-9) * job.step_s
     return run_accidents(

@@ -19,7 +19,7 @@ from foretwin.sim_worker.futures.number_columns import NumberColumns, number_col
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
 from foretwin.sim_worker.planners.registry import drives_backwards
-from foretwin.sim_worker.road_users.cast import Player, RoadUserArrays, casting
+from foretwin.sim_worker.road_users.cast import Player, casting
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
@@ -47,7 +47,7 @@ class Aims(NamedTuple):
 
 
 class JobScene(NamedTuple):
-    """All that S futures of a job begin with; `casts` is None where nobody else is on the road.
+    """All that S futures of a job begin with; `traffic` is None where nobody else is on the road.
 
     `limit_share` (M,) at the path's nodes is how far limits lie below that at the start.
     """
@@ -59,7 +59,6 @@ class JobScene(NamedTuple):
     planners: tuple[str, ...]
     numbers: NumberColumns
     limit_share: Array | None
-    casts: RoadUserArrays | None
     traffic: Traffic | None
     sight: Sight | None
     rules: PathRules
@@ -199,8 +198,6 @@ class SceneMaker:
                     numbers.applied("perception.lost_from_s", 0.0),
                     numbers.applied("perception.lost_for_s", 0.0),
                 ),
-                hidden_by=crowd.hidden_by,
-                walks=crowd.walks,
                 tick_s=tick_s,
             )
         heard = {state.group_id: LiveColour(0.0, state.colour) for state in job.signals}
@@ -213,7 +210,6 @@ class SceneMaker:
             numbers=numbers,
             # Staged, a case says how fast the ego drives.
             limit_share=None if staged else _limit_share(path, float(place.arc_m[0])),
-            casts=crowd if traffic is not None else None,
             traffic=traffic,
             sight=sight,
             rules=rules,

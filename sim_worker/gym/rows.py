@@ -17,7 +17,6 @@ from foretwin.sim_worker.gym.episodes import Episodes
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
-from foretwin.sim_worker.road_users.cast import RoadUserArrays
 from foretwin.world_gen.rules.signal_state import cycle_s
 
 OFF_PATH_M = 6.0
@@ -179,9 +178,8 @@ class EpisodeRows:
         found = np.zeros(self.count, dtype=bool)
         if self.stage.looked:
             found |= self.stage.static_contact
-        casts = self.scene.casts
-        if casts is not None:
-            crowd = casts.crowd
+        if self.scene.traffic is not None:
+            crowd = self.scene.traffic.crowd
             found |= touched(
                 self.stage.vehicle,
                 np.stack([before, after], axis=1),
@@ -203,22 +201,16 @@ class EpisodeRows:
 
 def scene_of(pool: JobScene, cases: Indices) -> JobScene:
     """Return the scene of (S,) futures of another one, each as it begins there."""
-    casts = pool.casts
     traffic = sight = None
-    if casts is not None and pool.traffic is not None and pool.sight is not None:
+    if pool.traffic is not None and pool.sight is not None:
         traffic = pool.traffic.begun(cases)
         sight = pool.sight.begun(cases, traffic)
-        casts = RoadUserArrays(
-            traffic.crowd, casts.paths, casts.kinds[cases], casts.hidden_by[cases],
-            casts.walks[cases],
-        )  # fmt: skip
     return pool._replace(
         starts=pool.starts[cases],
         start_arc_m=pool.start_arc_m[cases],
         aims=Aims._make(column[cases] for column in pool.aims),
         planners=tuple(pool.planners[k] for k in cases),
         numbers=pool.numbers.of(cases),
-        casts=casts,
         traffic=traffic,
         sight=sight,
         left_out=(),

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Flags, Indices
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.futures import RecordedRoadUser
 from foretwin.contracts.scenario import Conduct
@@ -41,7 +40,7 @@ class Player(NamedTuple):
 
 
 class RoadUserArrays(NamedTuple):
-    """The crowd of a job, and what else is known of it: (S, R) where nothing else is said.
+    """The crowd of a job, and the paths that it moves on.
 
     `paths` are all that anybody drives on, the ego's first; `replay` has where those are who come
     first in every future, if they were recorded.
@@ -49,9 +48,6 @@ class RoadUserArrays(NamedTuple):
 
     crowd: Crowd
     paths: tuple[FrenetPath, ...]
-    kinds: Indices
-    hidden_by: Indices
-    walks: Flags
     replay: Replay | None = None
 
 
@@ -90,9 +86,11 @@ def casting(
     columns = np.moveaxis(np.array(rows)[which], -1, 0).copy()
     present, lawful, walks = columns[:3] > 0.0
     path_of, kinds = columns[3:5].astype(np.intp)
-    crowd = Crowd._make([present, lawful, *columns[5:7], path_of, *columns[7:]])
+    crowd = Crowd._make(
+        [present, lawful, *columns[5:7], path_of, *columns[7:], walks, kinds, hidden]
+    )
     replay = Replay(replayed) if replayed else None
-    return RoadUserArrays(crowd, tuple(paths.values()), kinds, hidden, walks, replay)
+    return RoadUserArrays(crowd, tuple(paths.values()), replay)
 
 
 _Row = tuple[float, ...]

@@ -45,25 +45,22 @@ class Sight:
         vehicle: VehicleParameters,
         faults: PerceptionFaults,
         *,
-        hidden_by: Indices,
-        walks: Flags,
         tick_s: float,
         kept: int | None = None,
     ) -> None:
-        """`along` projects the traffic's paths on the ego's; `hidden_by` (S, R) columns or -1.
+        """`along` projects the traffic's paths on the ego's.
 
         What was seen is remembered for as long as anybody sees late, or for `kept` ticks.
         """
         crowd = traffic.crowd
-        self._crowd, self._along, self._walks = crowd, along, walks
-        self._vehicle, self._hidden_by = vehicle, hidden_by
+        self._crowd, self._along, self._vehicle = crowd, along, vehicle
         self._length_m, self._width_m = vehicle.length_m.value, vehicle.width_m.value
         self._front_m = box_centre_from_base_m(vehicle) + self._length_m / 2.0
         self._size = np.stack([crowd.length_m, crowd.width_m], axis=-1)
         self._late = np.round(faults.delay_s / tick_s).astype(np.intp)
         self._faults, self._tick_s = faults, tick_s
-        self._hidden = np.nonzero((hidden_by >= 0) & crowd.present)
-        self._hides = hidden_by[self._hidden]
+        self._hidden = np.nonzero((crowd.hidden_by >= 0) & crowd.present)
+        self._hides = crowd.hidden_by[self._hidden]
         self.anybody_hidden = len(self._hides) > 0
         """Whether it matters where the cars' eyes are."""
         kept = kept or int(self._late.max(initial=0)) + 1
@@ -84,8 +81,6 @@ class Sight:
             self._along,
             self._vehicle,
             PerceptionFaults._make(column[futures] for column in self._faults),
-            hidden_by=self._hidden_by[futures],
-            walks=self._walks[futures],
             tick_s=self._tick_s,
             kept=len(self._past) + 1,
         )
@@ -119,7 +114,7 @@ class Sight:
         if unseen is not None:
             on_arc = np.where(unseen, np.nan, on_arc)
             poses = np.where(unseen[..., None], np.nan, poses)
-        return SeenUsers(poses, speed, self._size, on_arc, offset, self._walks, turned)
+        return SeenUsers(poses, speed, self._size, on_arc, offset, self._crowd.walks, turned)
 
     def _unseen(self, tick: int | Indices, poses: Array, eyes_xy_m: Array) -> Flags | None:
         """(S, R) bool: who is away, lost or hidden; None where everybody is seen."""

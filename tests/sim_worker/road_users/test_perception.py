@@ -30,10 +30,8 @@ def sight(*players: Player, **faults: float) -> tuple[Sight, Traffic]:
     traffic = Traffic(cast.crowd, table, rules)
     columns = {name: np.zeros(1) for name in PerceptionFaults._fields}
     columns |= {name: np.array([value]) for name, value in faults.items()}
-    eyes = Sight(
-        traffic, table.along(EGO_PATH), CAR, PerceptionFaults(**columns),
-        hidden_by=cast.hidden_by, walks=cast.walks, tick_s=0.05,
-    )  # fmt: skip
+    faulty = PerceptionFaults(**columns)
+    eyes = Sight(traffic, table.along(EGO_PATH), CAR, faulty, tick_s=0.05)
     return eyes, traffic
 
 
