@@ -19,6 +19,8 @@ from foretwin.sim_worker.vehicle.reference_points import cog_from_base
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from tests.sim_worker.rigid_impact import Body, impact
 
+COVERS = ("foretwin.sim_worker.batch.accident_bodies", "foretwin.sim_worker.batch.accident_model")
+
 CAR = load_vehicle()
 TICK_S = 0.05
 

@@ -8,17 +8,28 @@ import numpy as np
 import pytest
 
 from foretwin.geometry.rectangles import clearance
+from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.case_picture import told, write_case_picture
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
+from foretwin.sim_worker.futures.future_mix import plan_futures
+from foretwin.sim_worker.futures.future_picture import write_future_picture
+from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.places import crossroads, job
 from tests.sim_worker.scenarios.draw_sheets import SHEETS
 from tests.sim_worker.scenarios.worlds import cross
 
+COVERS = (
+    "foretwin.sim_worker.futures.case_picture_runs",
+    "foretwin.sim_worker.futures.future_picture",
+)
+
 VEHICLE = load_vehicle()
+PAIR = plan_futures(count=2, seed=0, planners=("pure_pursuit_idm",))
 WORLD = cross()
 
 
@@ -64,6 +75,16 @@ def test_a_case_is_drawn_with_the_name_of_its_map(tmp_path: Path) -> None:
         write_case_picture(file, played, scenario, WORLD, heedless, None, planner="")
     assert files[0].read_bytes() == files[1].read_bytes()
     assert b"OpenStreetMap contributors" in files[0].read_bytes()
+
+
+def test_a_future_is_drawn_as_it_was_driven_with_the_name_of_its_map(tmp_path: Path) -> None:
+    stage, question = Stage(crossroads(), VEHICLE, nsim=2), job(PAIR, horizon_s=2.0)
+    result, file = run_job(question, stage), tmp_path / "one" / "future.png"
+    write_future_picture(file, question, result, 1, crossroads(), VEHICLE)
+    first = file.read_bytes()
+    assert b"OpenStreetMap contributors" in first
+    write_future_picture(file, question, result, 0, crossroads(), VEHICLE)
+    assert file.read_bytes() != first
 
 
 def test_every_scenario_is_on_a_sheet() -> None:

@@ -29,6 +29,12 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.test_real_junctions import SMALL, worlds_of
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
 
+COVERS = (
+    "foretwin.sim_worker.futures.driven_line",
+    "foretwin.sim_worker.futures.planned_impacts",
+    "foretwin.sim_worker.scenarios.staged",
+)
+
 CAR = load_vehicle()
 NEAR_M = 0.1
 CASES = 3

@@ -23,6 +23,12 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.collide import actor_boxes, ego_boxes, first_collision
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
 
+COVERS = (
+    "foretwin.sim_worker.scenarios.alongside",
+    "foretwin.sim_worker.scenarios.meeting",
+    "foretwin.sim_worker.scenarios.roles",
+)
+
 VEHICLE = load_vehicle()
 WORLDS = {
     "cross": cross(signals=True), "left-hand cross": cross(left_hand=True, signals=True),

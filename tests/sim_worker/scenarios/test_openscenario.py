@@ -29,6 +29,11 @@ from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.judges import judges_python
 from tests.world_gen.export.read_opendrive import OpenDriveFile
 
+COVERS = (
+    "foretwin.sim_worker.scenarios.openscenario_entities",
+    "foretwin.sim_worker.scenarios.openscenario_motion",
+)
+
 VEHICLE = load_vehicle()
 WORLDS = {
     "cross": cross(signals=True), "left-hand": cross(left_hand=True, signals=True), "ring": ring(),

@@ -27,6 +27,13 @@ from tests.sim_worker.places import box
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
 from tests.world_gen.drawn_maps import drawn_map
 
+COVERS = (
+    "foretwin.sim_worker.scenarios.beyond_junctions",
+    "foretwin.sim_worker.scenarios.places",
+    "foretwin.sim_worker.scenarios.relations",
+    "foretwin.sim_worker.scenarios.walls",
+)
+
 VEHICLE = load_vehicle()
 
 
