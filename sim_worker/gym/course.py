@@ -8,14 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.futures import Job, PathAhead
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.sim_worker.futures.play import Rows
 from foretwin.sim_worker.gym.actions import Control, action_size, commands
 from foretwin.sim_worker.gym.episodes import (
     Episodes,
@@ -25,7 +24,7 @@ from foretwin.sim_worker.gym.episodes import (
 )
 from foretwin.sim_worker.gym.observation import Observation, feature_names, observe
 from foretwin.sim_worker.gym.reward import Reward, default_reward
-from foretwin.sim_worker.gym.rows import EpisodeRows, Flags, StepFacts
+from foretwin.sim_worker.gym.rows import EpisodeRows, StepFacts
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 CASE = "case"
@@ -139,7 +138,7 @@ class Course:
             drawn = case
         return Begun(int(playable[drawn]), lights_s)
 
-    def begin(self, rows: Rows, begun: Sequence[Begun], *, looked: bool = False) -> None:
+    def begin(self, rows: Indices, begun: Sequence[Begun], *, looked: bool = False) -> None:
         """Let some rows begin; see `EpisodeRows.begin`."""
         cases, lights_s = zip(*begun, strict=True)
         self.rows.begin(rows, np.array(cases), np.array(lights_s), looked=looked)

@@ -22,7 +22,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.placement import places
-from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.scenarios.staged import staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
@@ -76,7 +76,7 @@ def episodes_of_scenario(
     if at.reverse:
         raise UserError(f"{scenario.id} is driven backwards at {at.name}; learners drive forwards")
     drawn = _cases(scenario, values or {}, cases, cases_seed, early_or_late_s)
-    played = scenes.staged.cast(scenario, drawn, at.name, vehicle)
+    played = scenes.scenarios.cast(scenario, drawn, at.name, vehicle)
     futures: list[Future] = []
     starts: list[Array] = []
     reasons: list[str] = []
@@ -185,7 +185,7 @@ def _place(
     world: World,
     vehicle: VehicleParameters,
     wanted: str | int,
-) -> Place:
+) -> ScenarioPlace:
     most = wanted + 1 if isinstance(wanted, int) and wanted >= 0 else None
     found = places(scenario, world, vehicle=vehicle, most=most)
     if not found.places:

@@ -13,13 +13,12 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from foretwin.contracts.arrays import Flags, Indices
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
-from foretwin.sim_worker.futures.play import Rows
 from foretwin.sim_worker.gym.course import CASE, Course, Source, told
 from foretwin.sim_worker.gym.observation import Observation
 from foretwin.sim_worker.gym.picture import Picture, draw_row
-from foretwin.sim_worker.gym.rows import Flags
 from foretwin.sim_worker.gym.spaces import action_space, observation_space, split_settings
 
 MASK = "reset_mask"
@@ -112,7 +111,7 @@ class JunctionVectorEnv(VectorEnv[Observation, npt.NDArray[np.float32], npt.NDAr
         ]
         self._np_random = self._rngs[0]
 
-    def _begin(self, rows: Rows, case: int | None = None, *, looked: bool) -> dict[str, Any]:
+    def _begin(self, rows: Indices, case: int | None = None, *, looked: bool) -> dict[str, Any]:
         begun = [self.course.draw(self._rngs[row], case) for row in rows]
         self.course.begin(rows, begun, looked=looked)
         self._over[rows] = False
