@@ -15,7 +15,7 @@ from foretwin.geometry.frenet_path import FrenetPath, PathPose
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.scenarios.openscenario_entities import reference_behind_centre_m
 from foretwin.sim_worker.scenarios.roles import Cast, CastActor
-from foretwin.world_gen.export.opendrive_elements import number
+from foretwin.world_gen.export.xml_tree import number
 
 _STEP_S, _SPACING_M = 0.1, 0.5
 _MOST_DRIFT_M = 0.06

@@ -25,7 +25,7 @@ from foretwin.world_gen.export.commonroad_signs import DEFAULT_COUNTRY, traffic_
 from foretwin.world_gen.export.lane_borders import Borders, lane_borders
 from foretwin.world_gen.export.lane_markings import Marking, lane_markings
 from foretwin.world_gen.export.lanelets import URBAN_MPS, crosswalk_edges, is_marked, narrower_lane
-from foretwin.world_gen.export.xml_text import in_comment
+from foretwin.world_gen.export.xml_tree import in_comment
 
 VERSION = "2020a"
 TIME_STEP_S = 0.1

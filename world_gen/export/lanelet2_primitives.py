@@ -12,7 +12,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
 from foretwin.contracts.world import ATTRIBUTION, World
-from foretwin.world_gen.export.xml_text import in_comment, legal
+from foretwin.world_gen.export.xml_tree import in_comment, legal
 
 Tags = Mapping[str, str]
 LICENSE_URL = "https://opendatacommons.org/licenses/odbl/1-0/"

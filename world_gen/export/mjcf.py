@@ -31,7 +31,7 @@ from foretwin.world_gen.export.solids import (
     island_height_m,
     stops_cars,
 )
-from foretwin.world_gen.export.xml_text import in_comment
+from foretwin.world_gen.export.xml_tree import in_comment
 
 STATIC = 1
 """Contype of buildings and islands; their conaffinity is VEHICLE."""

@@ -37,7 +37,7 @@ from foretwin.world_gen.export.solids import (
     island_height_m,
     stops_cars,
 )
-from foretwin.world_gen.export.xml_text import in_comment
+from foretwin.world_gen.export.xml_tree import in_comment
 
 SDF_VERSION = "1.7"
 NAMESPACE = "urn:foretwin:sdformat"
