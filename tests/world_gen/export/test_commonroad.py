@@ -19,7 +19,7 @@ from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
 from foretwin.contracts.world import ATTRIBUTION, Building, Crossing, StopLine, World
 from foretwin.world_gen.export.commonroad import write_commonroad
-from foretwin.world_gen.export.commonroad_lights import cycle
+from foretwin.world_gen.export.commonroad_controls import cycle
 from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.drawn_world import road, world
 from tests.world_gen.export.signalled import signalled_crossing
