@@ -24,6 +24,10 @@ from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.drawn_world import road, world
 from tests.world_gen.export.signalled import signalled_crossing
 
+COVERS = (
+    "foretwin.world_gen.export.commonroad_controls",
+    "foretwin.world_gen.export.commonroad_intersections",
+)
 DAY = datetime.date(2025, 6, 1)
 STRAIGHT = [(0.0, 0.0), (50.0, 0.0)]
 

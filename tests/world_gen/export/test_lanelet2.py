@@ -24,6 +24,14 @@ from tests.world_gen.export.drawn_world import road, world
 from tests.world_gen.export.lanelet2_file import assert_closed, read, written
 from tests.world_gen.export.signalled import signalled_crossing
 
+COVERS = (
+    "foretwin.world_gen.export.lanelet2_orientation",
+    "foretwin.world_gen.export.lanelet2_primitives",
+    "foretwin.world_gen.export.lanelet2_surroundings",
+    "foretwin.world_gen.export.lanelets",
+    "foretwin.world_gen.export.road_heights",
+)
+
 
 @pytest.mark.parametrize("drawn", [signalled_crossing(), world_of(roundabout())], ids=["x", "o"])
 def test_ids_are_unique_and_references_closed(drawn: World, tmp_path: Path) -> None:

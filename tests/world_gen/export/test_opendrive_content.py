@@ -26,6 +26,12 @@ from tests.world_gen.drawn_maps import (
 from tests.world_gen.export import drawn_world
 from tests.world_gen.export.test_opendrive import check_closed, plain, written
 
+COVERS = (
+    "foretwin.world_gen.export.opendrive_objects",
+    "foretwin.world_gen.export.opendrive_sidewalks",
+    "foretwin.world_gen.export.opendrive_signals",
+)
+
 
 def test_who_waits_is_written_for_every_conflict(tmp_path: Path) -> None:
     world = plain()

@@ -25,6 +25,11 @@ from foretwin.world_gen.export.sdformat_shapes import extrusions
 from foretwin.world_gen.export.sdformat_vehicles import SdfVehicle, place_vehicles
 from tests.world_gen.drawn_maps import GERMANY, crossing, roundabout, world_of
 
+COVERS = (
+    "foretwin.world_gen.export.sdformat_plugins",
+    "foretwin.world_gen.export.sdformat_shapes",
+    "foretwin.world_gen.export.sdformat_vehicles",
+)
 _CAR = {
     "mass_kg": 1100.0, "yaw_inertia_kgm2": 1800.0, "wheelbase_m": 2.6,
     "cog_from_rear_axle_m": 1.4, "cog_height_m": 0.6, "front_cornering_stiffness_npr": 1.3e5,

@@ -12,6 +12,11 @@ from foretwin.world_gen.report.report import JunctionReport, note_kind, report_o
 from foretwin.world_gen.report.values import SOURCE_CONFIDENCE, SUBJECT_WEIGHT, SubjectReport
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
 
+COVERS = (
+    "foretwin.world_gen.report.subjects",
+    "foretwin.world_gen.report.text",
+    "foretwin.world_gen.report.values",
+)
 SQUARE = {20: (20.0, 20.0), 21: (35.0, 20.0), 22: (35.0, 35.0), 23: (20.0, 35.0)}
 
 

@@ -14,6 +14,7 @@ from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE, world_spec, write_mjcf
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
 
+COVERS = ("foretwin.world_gen.export.solids",)
 L_BUILDING = {
     "extra_nodes": {
         20: (20.0, 20.0), 21: (50.0, 20.0), 22: (50.0, 30.0), 23: (30.0, 30.0),

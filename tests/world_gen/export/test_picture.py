@@ -18,6 +18,12 @@ from foretwin.world_gen.export.picture import write_picture
 from foretwin.world_gen.report.report import report_of
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
 
+COVERS = (
+    "foretwin.world_gen.export.picture_ground",
+    "foretwin.world_gen.export.picture_marks",
+    "foretwin.world_gen.export.picture_style",
+    "foretwin.world_gen.export.picture_traffic",
+)
 HOUSE = {20: (10.0, 10.0), 21: (30.0, 10.0), 22: (30.0, 30.0), 23: (10.0, 30.0)}
 BRIDGE = {30: (-60.0, 60.0), 31: (60.0, 60.0)}
 
