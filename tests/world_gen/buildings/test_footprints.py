@@ -122,8 +122,9 @@ def test_below_an_overhang_is_open():
 def test_a_part_without_a_height_has_its_outlines():
     osm = drawn_map(HALVES, [OUTLINE, (21, [1, 9, 10, 4, 1], {"building:part": "yes"})])
     assert [f.height_m for f in footprints(osm, [])] == [
-        Quantity(10.0, "tagged"), Quantity(10.0, "inferred"),
-    ]  # fmt: skip
+        Quantity(10.0, "tagged"),
+        Quantity(10.0, "inferred"),
+    ]
 
 
 def test_a_part_without_an_outline_is_a_building():

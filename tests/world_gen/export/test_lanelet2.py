@@ -60,9 +60,12 @@ def test_the_projector_file_gives_back_the_local_coordinates(tmp_path: Path) -> 
     assert values["projector_type"] == "TransverseMercator"
     assert values["vertical_datum"] == "WGS84"
     projection = pyproj.Proj(
-        proj="tmerc", lat_0=float(values["latitude"]), lon_0=float(values["longitude"]),
-        k_0=float(values["scale_factor"]), ellps="WGS84",
-    )  # fmt: skip
+        proj="tmerc",
+        lat_0=float(values["latitude"]),
+        lon_0=float(values["longitude"]),
+        k_0=float(values["scale_factor"]),
+        ellps="WGS84",
+    )
     for node in read(tmp_path / "map.osm").nodes.values():
         x, y = projection(float(node["lon"]), float(node["lat"]))
         assert x == pytest.approx(float(node["local_x"]), abs=0.001)
