@@ -1,7 +1,7 @@
 """Footprints cut into few convex pieces, since a mesh collides as its convex hull.
 
 Most footprints are rectangles put together: a piece that is a rectangle, within the tolerance, is
-told as one, since a box costs a simulation a tenth of what a mesh does.
+marked as one, since a box costs a simulation a tenth of what a mesh does.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def convex_cover(outlines: Outlined, *, tolerance_m: float = COLLISION_TOLERANCE
     is_box = shapely.get_type_id(boxes) == shapely.GeometryType.POLYGON
     near_m = BOX_SHARE * tolerance_m
     is_box[is_box] = nearly_the_same(boxes[is_box], pieces[is_box], near_m, convex=True)
-    return _told(owner[of], np.where(is_box, boxes, pieces), is_box)
+    return _parts_of(owner[of], np.where(is_box, boxes, pieces), is_box)
 
 
 def sound_polygons(shapes: Geometries) -> tuple[Geometries, Indices]:
@@ -75,7 +75,7 @@ def sound_polygons(shapes: Geometries) -> tuple[Geometries, Indices]:
     return polygons_of(shapes, np.arange(len(shapes)))
 
 
-def _told(owner: Indices, pieces: Geometries, is_box: npt.NDArray[np.bool_]) -> ConvexParts:
+def _parts_of(owner: Indices, pieces: Geometries, is_box: npt.NDArray[np.bool_]) -> ConvexParts:
     pieces = shapely.orient_polygons(pieces)
     points = shapely.get_coordinates(pieces)
     counts = shapely.get_num_coordinates(pieces)

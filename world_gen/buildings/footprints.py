@@ -80,25 +80,25 @@ class BuildingIndex:
         involved = np.zeros(0, dtype=np.intp)
         if is_part.any():
             # An outline gives way to its parts, and a part takes its outline's height.
-            asked, other = self._tree.query(self._tree.geometries[todo])
-            apart = is_part[todo[asked]] != is_part[other]
-            involved = np.concatenate([todo[asked[apart]], other[apart]])
+            which, other = self._tree.query(self._tree.geometries[todo])
+            apart = is_part[todo[which]] != is_part[other]
+            involved = np.concatenate([todo[which[apart]], other[apart]])
         self._make_raw(_distinct(np.concatenate([todo, involved])))
         done = {k: self._raw[k] for k in todo.tolist()}
         done.update(self._resolved(_distinct(involved), is_part, done))
         self._done.update(done)
 
     def _resolved(
-        self, entries: Indices, is_part: npt.NDArray[np.bool_], asked: Container[int]
+        self, entries: Indices, is_part: npt.NDArray[np.bool_], wanted: Container[int]
     ) -> dict[int, tuple[Footprint, ...]]:
-        """Return those entries that were asked for, outlines without what parts describe."""
+        """Return the entries that are `wanted`, outlines without what parts describe."""
         owners: tuple[list[int], list[int]] = ([], [])
         shapes: tuple[list[Footprint], list[Footprint]] = ([], [])
         for k, part in zip(entries.tolist(), is_part[entries].tolist(), strict=True):
             shapes[part].extend(self._raw[k])
             owners[part].extend([k] * len(self._raw[k]))
         left, parts = resolve_parts(*shapes)
-        found: dict[int, tuple[Footprint, ...]] = {k: () for k in entries.tolist() if k in asked}
+        found: dict[int, tuple[Footprint, ...]] = {k: () for k in entries.tolist() if k in wanted}
         for k, pieces in zip(owners[0], left, strict=True):
             if k in found:
                 found[k] += tuple(pieces)

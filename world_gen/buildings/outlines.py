@@ -1,4 +1,4 @@
-"""Outlines of a map's buildings: a table of rings, from which polygons are made when asked for."""
+"""Outlines of a map's buildings: a table of rings, from which polygons are made on demand."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class OutlineTable(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BuildingOutlines(NamedTuple):
-    """Polygons (M,), the entry asked for that each belongs to (M,), and what had to be mended.
+    """Polygons (M,), the requested entry that each belongs to (M,), and what had to be mended.
 
-    `owner` and the keys of `notes` count the entries as they were asked for; `owner` ascends.
+    `owner` and the keys of `notes` count the entries as they were requested; `owner` ascends.
     """
 
     polygons: npt.NDArray[np.object_]

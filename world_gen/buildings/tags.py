@@ -95,8 +95,8 @@ def building_extent(tags: Mapping[str, str]) -> Extent:
     height, note = _height(tags, DEFAULT_HEIGHT_M if canopy is None else canopy)
     if low is not None and low >= height.value:
         if height.source == "tagged":
-            told = tags.get("height") or tags.get("building:height")
-            return Extent(height, 0.0, f"begins at {low:g} m, above its height {told}; from 0 m")
+            stated = tags.get("height") or tags.get("building:height")
+            return Extent(height, 0.0, f"begins at {low:g} m, above its height {stated}; from 0 m")
         height = Quantity(low + LEVEL_HEIGHT_M, height.source)
     if low is None and canopy is not None:
         roof = height_in_m(tags.get("roof:height")) or CANOPY_THICKNESS_M

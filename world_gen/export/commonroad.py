@@ -30,7 +30,7 @@ VERSION = "2020a"
 TIME_STEP_S = 0.1
 UNKNOWN_GEONAME = -999
 PASSABLE_UNDER_M = 2.5
-"""Buildings that begin higher over the road stand in nobody's way and are left out."""
+"""Buildings that begin higher over the road stand in no vehicle's way and are left out."""
 _KINDS: dict[LaneKind, tuple[str, tuple[str, ...]]] = {
     "driving": ("", ("vehicle", "bicycle")),
     "bus": ("busLane", ("bus", "taxi", "priorityVehicle")),
@@ -52,7 +52,7 @@ def write_commonroad(
     """Write the World as CommonRoad XML, dated today where no `date` is given.
 
     `country` is the ISO code of three letters whose traffic signs are meant; the World does not
-    know it, and CommonRoad's own Zamunda has German signs. Raises ValueError where CommonRoad
+    hold it, and CommonRoad's own Zamunda has German signs. Raises ValueError where CommonRoad
     has no signs of that country, OSError where the file cannot be written.
     """
     about = f"{world.attribution}; world {world.id}"
@@ -97,7 +97,7 @@ def commonroad_elements(world: World, *, country: str = DEFAULT_COUNTRY) -> Iter
     yield from intersections(world, lanes, ids)
     for building in world.buildings:
         if building.min_height_m < PASSABLE_UNDER_M and _is_sound(building):
-            # The outline of its ground: the format knows no courtyards.
+            # The outline of its ground: the format has no courtyards.
             obstacle = element("environmentObstacle", id=next(ids))
             child(obstacle, "type", "building")
             points(child(child(obstacle, "shape"), "polygon"), building.outline)

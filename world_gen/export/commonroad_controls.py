@@ -39,7 +39,7 @@ SIGNS: Mapping[str, Mapping[SignName, str]] = {
     "ITA": {"max_speed": "274"},
     "CHN": {"max_speed": "274"},
 }
-"""The ids that CommonRoad gives the signs of each country that it knows."""
+"""The ids that CommonRoad gives the signs of each country that it supports."""
 _SIGNED_RULES = frozenset({"stop", "give_way", "priority_road"})
 _AT_LINES: tuple[SignName, SignName] = ("stop", "give_way")
 _FROM_LEFT: tuple[Turn, ...] = ("left", "straight", "right")
@@ -101,7 +101,7 @@ class _Kerbside:
         value: str | None = None,
         tagged: bool,
     ) -> None:
-        """Put up a sign at a place (2,) for lanes; a virtual one where no tag tells of it."""
+        """Put up a sign at a place (2,) for lanes; a virtual one where no tag says so."""
         if sign not in self._names:
             return
         made = element("trafficSign", id=next(self._ids))
@@ -121,7 +121,7 @@ def traffic_signs(
     country: str,
     ids: Iterator[int],
 ) -> RoadControls:
-    """Return the signs of a World; ValueError where CommonRoad knows none of the country."""
+    """Return the signs of a World; ValueError where CommonRoad has none of the country."""
     if country not in SIGNS:
         known = ", ".join(sorted(SIGNS))
         raise ValueError(f"country {country!r}: CommonRoad has traffic signs of {known}")

@@ -1,4 +1,4 @@
-"""Intersections of a CommonRoad scenario: who comes in where, and which ways lead on."""
+"""Intersections of a CommonRoad scenario: which lanes come in where, and which ways lead on."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from foretwin.world_gen.export.lanelets import indicated
 from foretwin.world_gen.export.xml_tree import Element, child, element
 
 LEFT_OF_RAD = math.radians(150.0)
-"""Whoever comes from farther round does not come from the left but from ahead."""
+"""Traffic from farther round does not come from the left but from ahead."""
 _TAGS = {"right": "successorsRight", "straight": "successorsStraight", "left": "successorsLeft"}
 _Approach = tuple[str, bool]
 

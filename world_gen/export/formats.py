@@ -33,7 +33,7 @@ class Format:
     name: str
     suffix: str
     write: Writer
-    told_by_suffix: bool = False
+    decided_by_suffix: bool = False
     """Whether the writer goes by the file's suffix."""
 
 

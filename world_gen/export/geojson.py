@@ -71,7 +71,7 @@ def write_geojson(world: World, path: Path) -> None:
 
     Lengths are metres, angles radians counter-clockwise from east, speeds m/s. A value `x` of the
     map has its source (tagged, inferred or default) in `x_source`. What crosses the antimeridian
-    is cut there, as RFC 7946 asks for.
+    is cut there, as RFC 7946 recommends.
     """
     path.write_bytes(msgspec.json.encode(geojson_of(world)))
 

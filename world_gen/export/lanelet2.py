@@ -1,7 +1,7 @@
 """A World as a Lanelet2 map in OSM XML, as the Lanelet2 library and Autoware read it.
 
 Nodes carry latitude and longitude and, for readers that want metres, `local_x` and `local_y` in
-the World's frame; `ele` is the height above the World's plane. A file beside the map tells
+the World's frame; `ele` is the height above the World's plane. A file beside the map gives
 Autoware the projection: transverse Mercator of scale 1 about the World's origin, as the World's
 own frame.
 """
@@ -44,7 +44,7 @@ def write_lanelet2(world: World, path: Path, *, crosswalk_rules: bool = False) -
     """Write the World as a Lanelet2 map; return the path of Autoware's projector file beside it.
 
     That is `map_projector_info.yaml` beside a `lanelet2_map.osm`, else it is named as the map is.
-    `crosswalk_rules` adds the regulatory elements of subtype `crosswalk` that Autoware knows and
+    `crosswalk_rules` adds the regulatory elements of subtype `crosswalk` that Autoware supports and
     the Lanelet2 library alone refuses. Raises OSError where a file cannot be written.
     """
     drawn = lanelet2_map(world, crosswalk_rules=crosswalk_rules)

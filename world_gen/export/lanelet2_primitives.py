@@ -30,7 +30,7 @@ class RelationMember(NamedTuple):
 class Lanelet2Map:
     """A map while it is drawn; ids count up from 1 and are unique over all kinds.
 
-    Lanelet2 knows by a shared node that lanelets follow each other, and by a shared way that
+    Lanelet2 sees by a shared node that lanelets follow each other, and by a shared way that
     they lie side by side: points of roads with the same coordinates are one node here, and
     lines over the same nodes one way, whichever way they run.
     """

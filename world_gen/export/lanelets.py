@@ -33,7 +33,7 @@ _KERBLESS_CLASSES = frozenset({"motorway", "trunk", "motorway_link", "trunk_link
 class Marking(NamedTuple):
     """One border of a lane.
 
-    Of `dashed_solid` the dashed line is on the left in driving direction: only who is left of it
+    Of `dashed_solid` the dashed line is on the left in driving direction: only traffic left of it
     may cross. `beyond_id` is the lane on the other side, and `oncoming` whether that is driven
     the other way.
     """
@@ -47,7 +47,7 @@ class Marking(NamedTuple):
 def lane_markings(world: World, borders: Mapping[str, Borders]) -> dict[tuple[str, Side], Marking]:
     """Return what lies on both sides of each lane, by its id and the side.
 
-    Lines between lanes follow from `Lane.change`; what no tag tells is usual for the road's
+    Lines between lanes follow from `Lane.change`; what no tag says is usual for the road's
     class.
     """
     users: dict[bytes, list[tuple[Lane, Side]]] = defaultdict(list)
@@ -103,7 +103,7 @@ def narrower_lane(connection: Connection, lanes: Mapping[str, Lane]) -> Lane:
 
 
 def indicated(turn: Turn, side: DrivingSide) -> Turn:
-    """Return the turn as it is indicated: neither format knows U-turns, which lead across."""
+    """Return the turn as it is indicated: neither format has U-turns, which lead across."""
     across: Turn = "left" if side == "right" else "right"
     return across if turn == "u_turn" else turn
 

@@ -23,9 +23,9 @@ FIT_M = 0.02
 CORNER_M = 0.02
 SIMPLIFY_M = 0.004
 END_BEND_M = 5.0
-"""Within this distance of its end a straight takes up the heading that is asked for there."""
+"""Within this distance of its end a straight takes up the heading that is required there."""
 TILT_M = 0.01
-"""So far the second point may give way to the heading that is asked for at the first."""
+"""So far the second point may give way to the heading that is required at the first."""
 _SAME_HEADING = 1e-7
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 

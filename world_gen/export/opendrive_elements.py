@@ -33,7 +33,7 @@ def road_element(road: OdrRoad, *, side: DrivingSide, version: OpenDriveVersion)
     """Return a `<road>` without objects and signals."""
     rule: str | None = "RHT" if side == "right" else "LHT"
     if version == "1.4" and side == "right":
-        # 1.4 does not know it, but its readers that know left-hand traffic read it there too.
+        # 1.4 does not define it, but its readers that support left-hand traffic read it there too.
         rule = None
     made = element(
         "road",
@@ -66,7 +66,7 @@ def _add_type(made: Element, road: OdrRoad, version: OpenDriveVersion) -> None:
     in_town, outside = ROAD_TYPE.get(road.road_class.removesuffix("_link"), ("unknown", "unknown"))
     kind = in_town if kmh <= TOWN_KMH else outside
     if version == "1.4" and kind.startswith("town"):
-        kind = "town"  # 1.4 does not tell roads in towns apart
+        kind = "town"  # 1.4 has one type for all roads in towns
     item = child(made, "type", s=0, type=kind)
     if limits:
         child(item, "speed", max=kmh, unit="km/h")
@@ -128,7 +128,7 @@ def _add_lane(
         kind = LANE_TYPE.get(lane.kind, lane.kind)
     direction = "reversed" if strip.reversed else None
     if version == "1.4" and (direction or kind == "bus"):
-        # 1.4 has no bus lanes, and cannot tell that a lane is driven the other way.
+        # 1.4 has no bus lanes, and cannot say that a lane is driven the other way.
         kind, direction = "restricted", None
     item = child(group, "lane", type=kind, level="false", id=strip.number, direction=direction)
     link = child(item, "link")

@@ -1,4 +1,4 @@
-"""Roads as OpenDRIVE knows them: a reference line and lanes with signed numbers beside it."""
+"""Roads as OpenDRIVE has them: a reference line and lanes with signed numbers beside it."""
 
 from __future__ import annotations
 

@@ -169,7 +169,7 @@ def _add(made: Element, own: int, post: _Post, version: OpenDriveVersion) -> Non
         t=t[0],
         dynamic=post.dynamic,
         orientation="+" if post.along else "-",
-        # The file asks for the lower edge, the World says where the middle is.
+        # The file has the lower edge, the World the middle.
         zOffset=float(post.position[2]) - height_m / 2.0,
         width=width_m,
         height=height_m,

@@ -84,8 +84,8 @@ def _title(world: World, report: WorldReport) -> str:
         sure = report.confidence
     else:
         kind, control = place.kind.replace("_", " "), place.control.replace("_", " ")
-        told = kind if kind == control else f"{kind}, {control}"
-        what = f"{told}, {place.driving_side}-hand traffic"
+        words = kind if kind == control else f"{kind}, {control}"
+        what = f"{words}, {place.driving_side}-hand traffic"
         sure = report.junctions[0].confidence if report.junctions else report.confidence
     trust = "" if sure is None else f"   confidence {sure:.2f}"
     return f"{place.name or place.id}   ({what}){trust}"

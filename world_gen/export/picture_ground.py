@@ -69,7 +69,7 @@ def _buildings(axes: Axes, world: World, view: View) -> None:
     colours = ScalarMappable(style.HEIGHT_SCALE_M, style.HEIGHT_COLOURS)
     for (source, overhang), buildings in sorted(groups.items()):
         heights = np.array([b.height_m.value for b in buildings])
-        # Hatching is drawn in the edge's colour: tagged heights are told by their firm outline.
+        # Hatching is drawn in the edge's colour: tagged heights are marked by their firm outline.
         axes.add_collection(
             PathCollection(
                 [_outline(building) for building in buildings],

@@ -187,15 +187,15 @@ def _described(world: World, junction: WorldJunction, report: JunctionReport) ->
     mine = {c.id for c in world.connections if c.junction_id == junction.summary.id}
     rules = Counter(c.rule.replace("_", " ") for c in world.conflicts if c.first_id in mine)
     if rules:
-        told = ", ".join(f"{rule} {n}" for rule, n in rules.most_common())
-        lines += _wrapped(f"who waits: {told}", 11)
+        counts = ", ".join(f"{rule} {n}" for rule, n in rules.most_common())
+        lines += _wrapped(f"who waits: {counts}", 11)
     if junction.plan is not None:
         plan = junction.plan
         cycle = " | ".join(
             f"{'+'.join(g.rpartition(':')[2] for g in phase.green_group_ids)} {phase.green_s:g} s"
             for phase in plan.phases
         )
-        told = f"signal plan ({plan.source}): {cycle}; "
-        told += f"amber {plan.amber_s:g} s, all red {plan.all_red_s:g} s"
-        lines += _wrapped(told, 4)
+        words = f"signal plan ({plan.source}): {cycle}; "
+        words += f"amber {plan.amber_s:g} s, all red {plan.all_red_s:g} s"
+        lines += _wrapped(words, 4)
     return lines

@@ -1,4 +1,4 @@
-"""The traffic of a World's picture: lanes, turns, connections, lines, signals, who waits."""
+"""The traffic of a World's picture: lanes, turns, connections, lines, signals, right of way."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ACROSS: frozenset[YieldRule] = frozenset(("turn_across", "u_turn"))
 
 
 def draw_traffic(axes: Axes, world: World, view: View) -> None:
-    """Draw lanes, then what leads across junctions, then what tells who goes first."""
+    """Draw lanes, then what leads across junctions, then what gives the right of way."""
     _draw_lanes(axes, world, view)
     _draw_connections(axes, world, view)
     _draw_stop_lines(axes, world, view)

@@ -1,4 +1,4 @@
-"""What an SDFormat world asks of its simulator: Gazebo Classic with ROS 2, or Gazebo (gz-sim).
+"""What an SDFormat world needs of its simulator: Gazebo Classic with ROS 2, or Gazebo (gz-sim).
 
 Names and elements of the plugins are those of gazebo_ros_pkgs 3.x and of gz-sim 7 and later.
 """
@@ -14,7 +14,7 @@ from foretwin.world_gen.export.xml_tree import Element, child, leaves
 
 HEADING_DEG: Mapping[str, str] = {"classic": "180", "gazebo": "0"}
 """Gazebo Classic takes its local axes for west and south (gazebo-classic issue 2022): turned by
-180 degrees, its GPS sensor tells east and north as SDFormat means them."""
+180 degrees, its GPS sensor reports east and north as SDFormat means them."""
 
 MAX_SPEED_MPS = 70.0
 GPS_RATE_HZ = 10.0
