@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import datetime
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import count
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from shapely.geometry import Polygon
 from foretwin.contracts.world import Building, Connection, Crossing, Lane, LaneKind, World
 from foretwin.world_gen.export import commonroad_controls as controls
 from foretwin.world_gen.export import lanelets
-from foretwin.world_gen.export.commonroad_controls import DEFAULT_COUNTRY, RoadControls, points
+from foretwin.world_gen.export.commonroad_controls import DEFAULT_COUNTRY, points
 from foretwin.world_gen.export.commonroad_intersections import intersections
 from foretwin.world_gen.export.lane_borders import Borders, lane_borders
 from foretwin.world_gen.export.lanelets import URBAN_MPS, Marking
@@ -77,24 +77,19 @@ def write_commonroad(
 def commonroad_elements(world: World, *, country: str = DEFAULT_COUNTRY) -> Iterator[Element]:
     """Yield the children of the root element in the format's order."""
     ids = count(1)  # all kinds share one range
-    borders = lane_borders(world)
-    lanes = {lane.id: next(ids) for lane in world.lanes}
-    lanes |= {c.id: next(ids) for c in world.connections if c.id in borders}
-    signs = controls.traffic_signs(world, lanes, borders, country, ids)
-    lights = controls.traffic_lights(world, lanes, TIME_STEP_S, ids)
+    draft = _Lanelets(world, country, ids)
     yield _location(world)
     yield _tags(world)
-    draft = _Lanelets(world, lanes, borders, signs, lights)
     for lane in world.lanes:
         yield draft.lane(lane)
     for connection in world.connections:
-        if connection.id in lanes:
+        if connection.id in draft.ids:
             yield draft.connection(connection)
     for crossing in world.crossings:
         yield _crosswalk(crossing, next(ids))
-    yield from signs.elements
-    yield from lights.elements
-    yield from intersections(world, lanes, ids)
+    yield from draft.signs.elements
+    yield from draft.lights.elements
+    yield from intersections(world, draft.ids, ids)
     for building in world.buildings:
         if building.min_height_m < PASSABLE_UNDER_M and _is_sound(building):
             # The outline of its ground: the format has no courtyards.
@@ -105,17 +100,14 @@ def commonroad_elements(world: World, *, country: str = DEFAULT_COUNTRY) -> Iter
 
 
 class _Lanelets:
-    """Writes lanes and connections as lanelets."""
+    """Writes lanes and connections as lanelets, whose `ids` are by those of the World."""
 
-    def __init__(
-        self,
-        world: World,
-        ids: Mapping[str, int],
-        borders: Mapping[str, Borders],
-        signs: RoadControls,
-        lights: RoadControls,
-    ) -> None:
-        self._ids, self._borders, self._signs, self._lights = ids, borders, signs, lights
+    def __init__(self, world: World, country: str, ids: Iterator[int]) -> None:
+        borders = self._borders = lane_borders(world)
+        self.ids = {lane.id: next(ids) for lane in world.lanes}
+        self.ids |= {c.id: next(ids) for c in world.connections if c.id in borders}
+        self.signs = controls.traffic_signs(world, self.ids, borders, country, ids)
+        self.lights = controls.traffic_lights(world, self.ids, TIME_STEP_S, ids)
         self._class_of = {road.id: road.road_class for road in world.roads}
         self._lanes = {lane.id: lane for lane in world.lanes}
         self._markings = lanelets.lane_markings(world, borders)
@@ -129,13 +121,13 @@ class _Lanelets:
                 if name in self._lanes:
                     self._join(lane.id, name)
         for c in world.connections:
-            if c.id in ids:
+            if c.id in self.ids:
                 self._join(c.from_lane_id, c.id)
                 self._join(c.id, c.to_lane_id)
 
     def _join(self, before: str, after: str) -> None:
-        self._after[before].append(self._ids[after])
-        self._before[after].append(self._ids[before])
+        self._after[before].append(self.ids[after])
+        self._before[after].append(self.ids[before])
 
     def lane(self, lane: Lane) -> Element:
         """Return the lanelet of a lane."""
@@ -144,7 +136,7 @@ class _Lanelets:
         for tag, marking in (("adjacentLeft", left), ("adjacentRight", right)):
             if marking.beyond_id is not None:
                 way = "opposite" if marking.oncoming else "same"
-                child(lanelet, tag, ref=self._ids[marking.beyond_id], drivingDir=way)
+                child(lanelet, tag, ref=self.ids[marking.beyond_id], drivingDir=way)
         return self._ended(lanelet, lane.id, self._types(lane), lane.kind)
 
     def connection(self, connection: Connection) -> Element:
@@ -157,7 +149,7 @@ class _Lanelets:
         return self._ended(lanelet, connection.id, types, lane.kind)
 
     def _begun(self, name: str, left: str, right: str) -> Element:
-        lanelet = _bounded(self._ids[name], self._borders[name], left, right)
+        lanelet = _bounded(self.ids[name], self._borders[name], left, right)
         for tag, others in (("predecessor", self._before), ("successor", self._after)):
             for other in others[name]:
                 child(lanelet, tag, ref=other)
@@ -171,7 +163,7 @@ class _Lanelets:
         return [*types, own] if own else types
 
     def _ended(self, lanelet: Element, name: str, types: Sequence[str], kind: LaneKind) -> Element:
-        line, lights = self._stop_lines.get(name), self._lights.of(name)
+        line, lights = self._stop_lines.get(name), self.lights.of(name)
         _, users = _KINDS[kind]
         if line is not None:
             made = child(lanelet, "stopLine")
@@ -182,7 +174,7 @@ class _Lanelets:
                 child(made, "trafficLightRef", ref=light)
         leaves(lanelet, (("laneletType", word) for word in types))
         leaves(lanelet, (("userOneWay", user) for user in users))
-        for sign in self._signs.of(name):
+        for sign in self.signs.of(name):
             child(lanelet, "trafficSignRef", ref=sign)
         for light in lights:
             child(lanelet, "trafficLightRef", ref=light)

@@ -93,13 +93,7 @@ class _Kerbside:
         return lanes[-self._near]
 
     def add(
-        self,
-        sign: SignName,
-        place: Array,
-        lanes: Iterable[str],
-        *,
-        value: str | None = None,
-        tagged: bool,
+        self, sign: SignName, place: Array, lanes: Iterable[str], *, tagged: bool, value: str = ""
     ) -> None:
         """Put up a sign at a place (2,) for lanes; a virtual one where no tag says so."""
         if sign not in self._names:
@@ -107,7 +101,7 @@ class _Kerbside:
         made = element("trafficSign", id=next(self._ids))
         part = child(made, "trafficSignElement")
         child(part, "trafficSignID", self._names[sign])
-        if value is not None:
+        if value:
             child(part, "additionalValue", value)
         position(made, place)
         child(made, "virtual", "false" if tagged else "true")

@@ -235,10 +235,7 @@ def _fit(points: Array, heading: Array, toward: Array) -> list[Array]:
         return [cubic]
     middle = int(np.clip(aside.argmax(), 1, len(points) - 2))
     through = unit(points[middle + 1] - points[middle - 1])
-    return [
-        *_fit(points[: middle + 1], heading, through),
-        *_fit(points[middle:], through, toward),
-    ]
+    return [*_fit(points[: middle + 1], heading, through), *_fit(points[middle:], through, toward)]
 
 
 def _evaluated(controls: Array, t: Array) -> tuple[Array, Array]:

@@ -117,11 +117,7 @@ def _add_lanes(
 
 
 def _add_lane(
-    group: Element,
-    strip: OdrLane,
-    beyond: OdrLane | None,
-    road: OdrRoad,
-    version: OpenDriveVersion,
+    group: Element, strip: OdrLane, beyond: OdrLane | None, road: OdrRoad, version: OpenDriveVersion
 ) -> None:
     kind, lane = "sidewalk" if strip.sidewalk else "none", strip.lane
     if lane is not None:

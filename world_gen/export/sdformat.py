@@ -132,7 +132,7 @@ def _road(made: Element, world: World) -> None:
 def _area(link: StaticLink, area: Area, top_m: float, rgba: Rgba, *, solid: bool = False) -> None:
     rings = extrusions(area.outline, area.holes, tolerance_m=AREA_TOLERANCE_M)
     for number, ring in enumerate(rings):
-        link.prism(f"{area.id}.{number}", ring, 0.0, top_m, rgba=rgba, solid=solid)
+        link.prism(f"{area.id}.{number}", ring, (0.0, top_m), rgba, solid=solid)
 
 
 def _markings(made: Element, world: World) -> None:
@@ -150,8 +150,8 @@ def _stripe(link: StaticLink, name: str, ends: Array, width_m: float, rgba: Rgba
     middle, long = ends.mean(axis=0), float(np.hypot(*along))
     if long < 0.05:
         return
-    centre, size = (*middle, MARKING_TOP_M / 2), (long, width_m, MARKING_TOP_M)
-    link.box(name, centre, size, yaw_rad=math.atan2(along[1], along[0]), rgba=rgba)
+    at = (*middle, MARKING_TOP_M / 2, math.atan2(along[1], along[0]))
+    link.box(name, at, (long, width_m, MARKING_TOP_M), rgba)
 
 
 def _signals(made: Element, world: World) -> None:
@@ -159,12 +159,12 @@ def _signals(made: Element, world: World) -> None:
     for signal in world.signals:
         x, y, z = (float(v) for v in signal.position)
         yaw = signal.yaw_rad
-        link.cylinder(f"{signal.id}.pole", (x, y, z / 2), 0.06, z, rgba=_SIGNAL)
-        link.box(f"{signal.id}.head", (x, y, z), (0.2, 0.35, 0.95), yaw_rad=yaw, rgba=_SIGNAL)
+        link.cylinder(f"{signal.id}.pole", (x, y, z / 2), 0.06, z, _SIGNAL)
+        link.box(f"{signal.id}.head", (x, y, z, yaw), (0.2, 0.35, 0.95), _SIGNAL)
         front = x + 0.11 * math.cos(yaw), y + 0.11 * math.sin(yaw)
         for number, (lamp, rgba) in enumerate(_LAMPS):
-            centre = (*front, z + 0.3 * (1 - number))
-            link.box(f"{signal.id}.{lamp}", centre, (0.03, 0.2, 0.2), yaw_rad=yaw, rgba=rgba)
+            at = (*front, z + 0.3 * (1 - number), yaw)
+            link.box(f"{signal.id}.{lamp}", at, (0.03, 0.2, 0.2), rgba)
 
 
 def _buildings(made: Element, world: World) -> None:
@@ -175,5 +175,4 @@ def _buildings(made: Element, world: World) -> None:
             continue
         rings = extrusions(building.outline, building.holes, tolerance_m=BUILDING_TOLERANCE_M)
         for number, ring in enumerate(rings):
-            name = f"{building.id}.{number}"
-            link.prism(name, ring, low, high, rgba=solids.BUILDING, solid=True)
+            link.prism(f"{building.id}.{number}", ring, (low, high), solids.BUILDING, solid=True)

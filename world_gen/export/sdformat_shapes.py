@@ -17,6 +17,7 @@ from foretwin.world_gen.export.xml_tree import Element, child, leaves
 GRID_M = 0.001
 """Points lie on this grid, as they are written, so that outlines in the file are valid."""
 LEAST_AREA_M2 = 0.05
+Size = tuple[float, float, float]
 Sizes = Sequence[tuple[str, str]]
 """What describes a shape, such as its radius and its length."""
 _MANY_POINTS = 400
@@ -48,42 +49,28 @@ class StaticLink:
         self._names: set[str] = set()
 
     def box(
-        self,
-        name: str,
-        centre_m: Sequence[float],
-        size_m: Sequence[float],
-        *,
-        yaw_rad: float = 0.0,
-        rgba: Rgba,
-        solid: bool = False,
+        self, name: str, at: Sequence[float], size_m: Size, rgba: Rgba, *, solid: bool = False
     ) -> None:
-        """Add a box of (length, width, height) around a centre."""
-        size = [("size", numbers(*size_m))]
-        self._add(name, "box", size, (*centre_m, yaw_rad), rgba, solid=solid)
+        """Add a box of (length, width, height) around its centre (x, y, z and yaw)."""
+        self._add(name, "box", [("size", numbers(*size_m))], at, rgba, solid=solid)
 
     def cylinder(
-        self, name: str, centre_m: Sequence[float], radius_m: float, height_m: float, *, rgba: Rgba
+        self, name: str, at: Sequence[float], radius_m: float, height_m: float, rgba: Rgba
     ) -> None:
-        """Add an upright cylinder that is only seen."""
+        """Add an upright cylinder around its centre (x, y, z) that is only seen."""
         size = [("radius", numbers(radius_m)), ("length", numbers(height_m))]
-        self._add(name, "cylinder", size, centre_m, rgba, solid=False)
+        self._add(name, "cylinder", size, at, rgba, solid=False)
 
     def prism(
-        self,
-        name: str,
-        ring: Array,
-        low_m: float,
-        high_m: float,
-        *,
-        rgba: Rgba,
-        solid: bool = False,
+        self, name: str, ring: Array, span_m: tuple[float, float], rgba: Rgba, *, solid: bool
     ) -> None:
         """Add an outline (N, 2) from one height to another, as a box where it is a rectangle."""
+        low_m, high_m = span_m
         rectangle = rectangle_of(ring)
         if rectangle is not None:
             x, y, length, width, yaw = rectangle
-            centre, size = (x, y, (low_m + high_m) / 2), (length, width, high_m - low_m)
-            self.box(name, centre, size, yaw_rad=yaw, rgba=rgba, solid=solid)
+            at, size = (x, y, (low_m + high_m) / 2, yaw), (length, width, high_m - low_m)
+            self.box(name, at, size, rgba, solid=solid)
             return
         outline = [("point", numbers(x, y)) for x, y in ring.tolist()]
         outline.append(("height", numbers(high_m - low_m)))

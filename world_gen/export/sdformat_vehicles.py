@@ -8,7 +8,7 @@ vehicle and can be run into; a ghost is a shadow that collides with nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,7 @@ GROUND_CLEARANCE_M = 0.18
 STEERING_DAMPING_NMSPRAD = 100.0
 """Damps the wheels' angle to half of critical: the drive plugin itself has no damping."""
 LEFT, UP = "0 1 0", "0 0 1"
+FREE = {"lower": "-1e16", "upper": "1e16"}
 _GAP_M = 10.0
 _COLOURS: dict[str, Rgba] = {
     "twin": (0.15, 0.6, 0.2, 1.0),
@@ -126,19 +127,22 @@ def _add_twin(model: Element, vehicle: SdfVehicle, simulator: Simulator) -> None
     _inertial(body, body_kg, cog_x, cog_z, _box_inertia(car, body_kg, yaw_inertia))
     gps_sensor(body, vehicle.name, simulator, above_m=car.height_m.value)
     hardest = max(car.max_drive_accel_mps2.value, car.max_brake_decel_mps2.value)
-    effort = mass * WHEEL_RADIUS_M / 2 * hardest
-    limit, rate = steering_limit_rad(car), car.max_tire_rate_radps.value
-    damping = STEERING_DAMPING_NMSPRAD
+    driven = FREE | {"effort": numbers(mass * WHEEL_RADIUS_M / 2 * hardest)}
+    reach = numbers(steering_limit_rad(car), digits=4)
+    steered = {"lower": f"-{reach}", "upper": reach}
+    steered["velocity"] = numbers(car.max_tire_rate_radps.value)
     for side, y in (("left", half_track), ("right", -half_track)):
-        _wheel(model, f"rear_{side}_wheel", 0.0, y, wheel_kg, car.friction.value)
-        _hinge(model, f"rear_{side}_wheel_joint", "base_link", f"rear_{side}_wheel", effort=effort)
-        knuckle = child(model, "link", name=f"front_{side}_knuckle")
+        rear, front, held = f"rear_{side}_wheel", f"front_{side}_wheel", f"front_{side}_knuckle"
+        _wheel(model, rear, 0.0, y, wheel_kg, car.friction.value)
+        _hinge(model, (f"{rear}_joint", "base_link", rear), driven)
+        knuckle = child(model, "link", name=held)
         pose(knuckle, wheelbase, y, WHEEL_RADIUS_M)
         _inertial(knuckle, knuckle_kg, 0.0, 0.0, (0.2, 0.2, 0.2))
-        turning = f"front_{side}_steer_joint", "base_link", f"front_{side}_knuckle"
-        _hinge(model, *turning, axis=UP, limit_rad=limit, rate_radps=rate, damping=damping)
-        _wheel(model, f"front_{side}_wheel", wheelbase, y, wheel_kg, car.friction.value)
-        _hinge(model, f"front_{side}_wheel_joint", f"front_{side}_knuckle", f"front_{side}_wheel")
+        turning = f"front_{side}_steer_joint", "base_link", held
+        axis = _hinge(model, turning, steered, axis=UP)
+        child(child(axis, "dynamics"), "damping", numbers(STEERING_DAMPING_NMSPRAD))
+        _wheel(model, front, wheelbase, y, wheel_kg, car.friction.value)
+        _hinge(model, (f"{front}_joint", held, front), FREE)
     ackermann_plugin(
         model, vehicle.name, car, simulator, wheel_radius_m=WHEEL_RADIUS_M, track_m=2 * half_track
     )
@@ -204,28 +208,13 @@ def _wheel(model: Element, name: str, x: float, y: float, mass_kg: float, fricti
 
 
 def _hinge(
-    model: Element,
-    name: str,
-    parent: str,
-    of: str,
-    *,
-    axis: str = LEFT,
-    limit_rad: float | None = None,
-    effort: float | None = None,
-    rate_radps: float | None = None,
-    damping: float = 0.0,
-) -> None:
+    model: Element, between: tuple[str, str, str], limit: Mapping[str, str], *, axis: str = LEFT
+) -> Element:
+    """Add a joint, its name `between` those of its parent and its child, and return its axis."""
+    name, parent, of = between
     joint = child(model, "joint", name=name, type="revolute")
     leaves(joint, {"parent": parent, "child": of})
     element = child(joint, "axis")
     child(element, "xyz", axis)
-    limit, reach = child(element, "limit"), "1e16"
-    if limit_rad is not None:
-        reach = numbers(limit_rad, digits=4)
-    leaves(limit, {"lower": f"-{reach}", "upper": reach})
-    if effort is not None:
-        child(limit, "effort", numbers(effort))
-    if rate_radps is not None:
-        child(limit, "velocity", numbers(rate_radps))
-    if damping:
-        child(child(element, "dynamics"), "damping", numbers(damping))
+    leaves(child(element, "limit"), limit)
+    return element

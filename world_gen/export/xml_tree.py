@@ -46,9 +46,11 @@ def _written(attributes: Mapping[str, XmlValue]) -> dict[str, str]:
 
 
 def _word(value: XmlValue) -> str | None:
+    if value is None:
+        return None
     if isinstance(value, str):
         return legal(value, instead="?")
-    return number(value) if isinstance(value, float) else None if value is None else str(value)
+    return number(value) if isinstance(value, float) else str(value)
 
 
 def number(value: float) -> str:
