@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,17 +29,32 @@ _ACROSS: frozenset[YieldRule] = frozenset(("turn_across", "u_turn"))
 def draw_traffic(axes: Axes, world: World, view: View) -> None:
     """Draw lanes, then what leads across junctions, then what gives the right of way."""
     _draw_lanes(axes, world, view)
-    _draw_connections(axes, world, view)
-    _draw_stop_lines(axes, world, view)
+    _draw_lines(axes, _connections(world, view))
+    _draw_lines(axes, _stop_lines(world, view))
     if view.close:
         _draw_conflicts(axes, world, view)
         _draw_who_waits(axes, world, view)
     _draw_signals(axes, world, view)
 
 
-def _lines(axes: Axes, lines: list[Array], **look: Any) -> None:
-    if lines:
-        axes.add_collection(LineCollection(lines, **look))
+class _LineLook(NamedTuple):
+    """How a line is drawn, dashed by the source of what it shows."""
+
+    colour: str
+    source: Provenance
+    width: float
+    order: float
+    alpha: float = 1.0
+
+
+def _draw_lines(axes: Axes, lines: Iterable[tuple[_LineLook, Array]]) -> None:
+    """Draw lines, those that look alike at once."""
+    groups: dict[_LineLook, list[Array]] = defaultdict(list)
+    for line, points in lines:
+        groups[line].append(points)
+    for (colour, source, width, order, alpha), together in groups.items():
+        look = Look(colors=colour, linestyles=style.DASH[source], linewidths=width, alpha=alpha)
+        axes.add_collection(LineCollection(together, zorder=order, **look))
 
 
 def _order(layer: int) -> float:
@@ -56,22 +71,22 @@ def _draw_lanes(axes: Axes, world: World, view: View) -> None:
     counted = {road.id: road.lane_count_source for road in world.roads}
     near = [lane for lane in world.lanes if view.meets(lane.centerline)]
     strips: list[Array] = []
-    groups: dict[tuple[float, float, str, Provenance, float], list[Array]] = defaultdict(list)
+    lines: list[tuple[_LineLook, Array]] = []
     broad, narrow = (1.2, 1.0) if view.close else (0.5, 0.5)
     for lane in near:
         half, order, fade = lane.width_m.value / 2, _order(lane.layer), _fade(lane.layer)
-        sides = offset(lane.centerline, half), offset(lane.centerline, -half)
-        groups[4.5 + order, broad, style.LANE_EDGE, lane.width_m.source, fade].extend(sides)
+        left, right = offset(lane.centerline, half), offset(lane.centerline, -half)
+        edge = _LineLook(style.LANE_EDGE, lane.width_m.source, broad, 4.5 + order, fade)
+        lines += [(edge, left), (edge, right)]
         if lane.kind == "parking":
-            strips.append(np.concatenate([sides[0], sides[1][::-1]]))
+            strips.append(np.concatenate([left, right[::-1]]))
         else:
             source = counted.get(lane.road_id, "inferred")
-            groups[5.0 + order, narrow, _colour(lane), source, fade].append(lane.centerline)
+            middle = _LineLook(_colour(lane), source, narrow, 5.0 + order, fade)
+            lines.append((middle, lane.centerline))
     if strips:
         axes.add_collection(PolyCollection(strips, facecolors=style.PARKING, zorder=1.3))
-    for (order, width, colour, source, fade), lines in groups.items():
-        look = Look(linewidths=width, colors=colour, linestyles=style.DASH[source], alpha=fade)
-        _lines(axes, lines, zorder=order, **look)
+    _draw_lines(axes, lines)
     if view.close:
         _draw_arrows(axes, (lane for lane in near if lane.kind != "parking"), view)
 
@@ -125,47 +140,32 @@ def _draw_turns(axes: Axes, lane: Lane, at: Array, ahead: Array, size: float) ->
         tip = fork + reach[turn] * way
         colour, order = style.TURN_COLOUR[turn], 6.3 + _order(lane.layer)
         shaft = np.array([foot, fork, tip - 0.7 * size * way])
-        dash = style.DASH["tagged"] if tagged else (0, (2, 1))
-        _lines(axes, [shaft], zorder=order, linewidths=1.6, colors=colour, linestyles=dash)
+        look = Look(colors=colour, linestyles="-" if tagged else (0, (2, 1)), linewidths=1.6)
+        axes.add_collection(LineCollection([shaft], zorder=order, **look))
         head = _head(tip, way, 0.75 * size)
         _filled(axes, [head], colour, tagged, linewidths=1.0, zorder=order + 0.1)
 
 
-def _draw_connections(axes: Axes, world: World, view: View) -> None:
-    source = {lane.id: lane.turns_source for lane in world.lanes}
-    groups: dict[tuple[bool, Turn, bool, bool], list[Array]] = defaultdict(list)
+def _connections(world: World, view: View) -> Iterator[tuple[_LineLook, Array]]:
+    tagged = {lane.id for lane in world.lanes if lane.turns_source == "tagged"}
+    share = 1.0 if view.close else 0.45
     for connection in world.connections:
         if view.meets(connection.centerline):
-            tagged = source.get(connection.from_lane_id) == "tagged"
-            key = connection.layer > 0, connection.turn, bool(connection.junction_id), tagged
-            groups[key].append(connection.centerline)
-    for (up, turn, in_junction, tagged), lines in groups.items():
-        _lines(
-            axes,
-            lines,
-            colors=style.TURN_COLOUR[turn],
-            linestyles=style.DASH["tagged" if tagged else "inferred"],
-            alpha=0.9 if in_junction else 0.5,
-            zorder=5.5 + _order(up),
-            linewidths=(1.8 if tagged else 1.3) * (1.0 if view.close else 0.45),
-        )
+            colour, order = style.TURN_COLOUR[connection.turn], 5.5 + _order(connection.layer)
+            alpha = 0.9 if connection.junction_id else 0.5
+            line = _LineLook(colour, "inferred", 1.3 * share, order, alpha)
+            if connection.from_lane_id in tagged:
+                line = line._replace(source="tagged", width=1.8 * share)
+            yield line, connection.centerline
 
 
-def _draw_stop_lines(axes: Axes, world: World, view: View) -> None:
-    groups: dict[tuple[str, Provenance], list[Array]] = defaultdict(list)
+def _stop_lines(world: World, view: View) -> Iterator[tuple[_LineLook, Array]]:
     for line in world.stop_lines:
         if view.holds(line.ends):
-            groups[line.control.value, line.control.source].append(line.ends)
-    for (control, source), lines in groups.items():
-        _lines(
-            axes,
-            lines,
-            colors=style.LINE_COLOUR.get(control, style.LINE_COLOUR["none"]),
-            linestyles=style.DASH[source],
-            capstyle="butt",
-            zorder=6.0,
-            linewidths=(4.0 if control != "none" else 2.2) * (1.0 if view.close else 0.4),
-        )
+            control, source = line.control.value, line.control.source
+            colour = style.LINE_COLOUR.get(control, style.LINE_COLOUR["none"])
+            width = (4.0 if control != "none" else 2.2) * (1.0 if view.close else 0.4)
+            yield _LineLook(colour, source, width, 6.0), line.ends
 
 
 def _draw_conflicts(axes: Axes, world: World, view: View) -> None:
