@@ -54,15 +54,10 @@ def lane_borders(world: World) -> dict[str, Borders]:
     roads = _roads(world, lanes)
     joints = _joints(lanes, roads)
     beyond = _directions_beyond(joints, roads)
-    drawn = {
-        name: parallel(
-            road.line,
-            np.array(road.offsets_m),
-            before=beyond.get((name, 0)),
-            after=beyond.get((name, 1)),
-        )
-        for name, road in roads.items()
-    }
+    drawn = {}
+    for name, road in roads.items():
+        before, after = beyond.get((name, 0)), beyond.get((name, 1))
+        drawn[name] = parallel(road.line, np.array(road.offsets_m), before=before, after=after)
     _join_ends(joints, roads, drawn)
     found: dict[str, Borders] = {}
     for name, road in roads.items():

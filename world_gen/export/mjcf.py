@@ -59,9 +59,8 @@ def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
         _add_road(spec, world)
         spec.worldbody.add_light(pos=[0, 0, 200], dir=[0.3, 0.2, -1], castshadow=False)
     buildings = world.buildings if visual else _near_road(world)
-    block = _block_default(spec, "building", solids.BUILDING, solid=True)
     extents = [(f"building:{b.id}", b.min_height_m, b.height_m.value) for b in buildings]
-    _add_blocks(spec, buildings, extents, block)
+    _add_blocks(spec, "building", solids.BUILDING, buildings, extents, solid=True)
     _add_islands(spec, world, visual=visual)
     return spec
 
@@ -103,30 +102,28 @@ def _add_islands(spec: mujoco.MjSpec, world: World, *, visual: bool) -> None:
     for solid in (True, False):
         chosen = [island for island in world.islands if solids.stops_cars(island) is solid]
         if chosen and (solid or visual):
-            block = _block_default(spec, "mound" if solid else "island", solids.ISLAND, solid=solid)
-            height = solids.island_height_m(solid=solid)
-            _add_blocks(spec, chosen, [(island.id, 0.0, height) for island in chosen], block)
-
-
-def _block_default(
-    spec: mujoco.MjSpec, name: str, rgba: solids.Rgba, *, solid: bool
-) -> mujoco.MjsDefault:
-    block = spec.add_default(name, spec.default)
-    block.geom.type = mujoco.mjtGeom.mjGEOM_BOX
-    block.geom.rgba = rgba
-    block.geom.group = COLLISION_GROUP
-    block.geom.contype = STATIC if solid else 0
-    block.geom.conaffinity = VEHICLE if solid else 0
-    return block
+            extents = [(i.id, 0.0, solids.island_height_m(solid=solid)) for i in chosen]
+            name = "mound" if solid else "island"
+            _add_blocks(spec, name, solids.ISLAND, chosen, extents, solid=solid)
 
 
 def _add_blocks(
     spec: mujoco.MjSpec,
+    default: str,
+    rgba: solids.Rgba,
     outlines: Sequence[Building | Area],
     extents: Sequence[tuple[str, float, float]],
-    block: mujoco.MjsDefault,
+    *,
+    solid: bool,
 ) -> None:
-    """Add outlines, each with a name, an underside and a top, as boxes and convex prisms."""
+    """Add outlines, each with a name, an underside and a top, as boxes and convex prisms.
+
+    All have the default class `default`, and none is touched that is not `solid`.
+    """
+    block = spec.add_default(default, spec.default)
+    block.geom.type, block.geom.group = mujoco.mjtGeom.mjGEOM_BOX, COLLISION_GROUP
+    block.geom.rgba = rgba
+    block.geom.contype, block.geom.conaffinity = (STATIC, VEHICLE) if solid else (0, 0)
     parts = convex_cover([(one.outline, one.holes) for one in outlines])
     add_geom, add_mesh = spec.worldbody.add_geom, spec.add_mesh
     low_m, high_m = np.array([extent[1:] for extent in extents]).reshape(-1, 2)[parts.owner].T
