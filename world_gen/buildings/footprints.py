@@ -92,19 +92,14 @@ class BuildingIndex:
         self, entries: Indices, is_part: npt.NDArray[np.bool_], wanted: Container[int]
     ) -> dict[int, tuple[Footprint, ...]]:
         """Return the entries that are `wanted`, outlines without what parts describe."""
-        owners: tuple[list[int], list[int]] = ([], [])
-        shapes: tuple[list[Footprint], list[Footprint]] = ([], [])
-        for k, part in zip(entries.tolist(), is_part[entries].tolist(), strict=True):
-            shapes[part].extend(self._raw[k])
-            owners[part].extend([k] * len(self._raw[k]))
-        left, parts = resolve_parts(*shapes)
+        wholes = [(k, f) for k in entries[~is_part[entries]].tolist() for f in self._raw[k]]
+        parts = [(k, f) for k in entries[is_part[entries]].tolist() for f in self._raw[k]]
+        left, known = resolve_parts([f for _, f in wholes], [f for _, f in parts])
         found: dict[int, tuple[Footprint, ...]] = {k: () for k in entries.tolist() if k in wanted}
-        for k, pieces in zip(owners[0], left, strict=True):
+        pieces = [*left, *([part] for part in known)]
+        for (k, _), mine in zip(wholes + parts, pieces, strict=True):
             if k in found:
-                found[k] += tuple(pieces)
-        for k, known in zip(owners[1], parts, strict=True):
-            if k in found:
-                found[k] += (known,)
+                found[k] += tuple(mine)
         return found
 
     def _make_raw(self, entries: Indices) -> None:
