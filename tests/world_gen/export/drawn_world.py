@@ -10,8 +10,15 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.contracts.provenance import Quantity
-from foretwin.contracts.world import Connection, IntersectionSummary, Lane, Road, World
+from foretwin.contracts.provenance import Choice, Quantity
+from foretwin.contracts.world import (
+    Connection,
+    Crossing,
+    IntersectionSummary,
+    Lane,
+    Road,
+    World,
+)
 
 NOWHERE = IntersectionSummary(
     id="drawn",
@@ -22,6 +29,12 @@ NOWHERE = IntersectionSummary(
     control="uncontrolled",
     driving_side="right",
     osm_nodes=(),
+)
+ZEBRA = Crossing(
+    id="x",
+    line=np.array([[20.0, -3.0], [20.0, 3.0]]),
+    width_m=Quantity(4.0, "default"),
+    kind=Choice("zebra", "tagged"),
 )
 NOTHING_ELSE: dict[str, Any] = dict.fromkeys(
     ("stop_lines", "crossings", "signals", "islands", "kerbs", "road_surface", "buildings"), ()

@@ -17,11 +17,11 @@ from lxml import etree
 
 from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
-from foretwin.contracts.world import ATTRIBUTION, Building, Crossing, StopLine, World
+from foretwin.contracts.world import ATTRIBUTION, Building, StopLine, World
 from foretwin.world_gen.export.commonroad import write_commonroad
 from foretwin.world_gen.export.commonroad_controls import cycle
 from tests.world_gen.drawn_maps import roundabout, world_of
-from tests.world_gen.export.drawn_world import road, world
+from tests.world_gen.export.drawn_world import ZEBRA, road, world
 from tests.world_gen.export.signalled import signalled_crossing
 
 COVERS = (
@@ -277,13 +277,7 @@ def test_buildings_are_obstacles_unless_one_drives_under_them(tmp_path: Path) ->
 
 
 def test_crossings_are_crosswalks_for_pedestrians_both_ways(tmp_path: Path) -> None:
-    zebra = Crossing(
-        id="x",
-        line=np.array([[20.0, -3.0], [20.0, 3.0]]),
-        width_m=Quantity(4.0, "default"),
-        kind=Choice("zebra", "tagged"),
-    )
-    root = written(world(road("r", STRAIGHT, ahead=[3.0]), crossings=(zebra,)), tmp_path)
+    root = written(world(road("r", STRAIGHT, ahead=[3.0]), crossings=(ZEBRA,)), tmp_path)
     lanelet = list(root.iterfind("lanelet"))[-1]
     assert lanelet.findtext("laneletType") == "crosswalk"
     assert lanelet.findtext("userBidirectional") == "pedestrian"

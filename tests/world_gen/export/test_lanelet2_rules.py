@@ -8,11 +8,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import Signal
-from foretwin.contracts.world import Crossing, WorldJunction
+from foretwin.contracts.world import WorldJunction
 from tests.world_gen.drawn_maps import crossing, world_of
-from tests.world_gen.export.drawn_world import road, world
+from tests.world_gen.export.drawn_world import ZEBRA, road, world
 from tests.world_gen.export.lanelet2_file import written
 from tests.world_gen.export.signalled import signalled_crossing
 
@@ -101,14 +100,8 @@ def test_an_all_way_stop_lists_a_line_for_each_lane(tmp_path: Path) -> None:
 
 
 def test_a_crosswalk_is_a_lanelet_as_wide_as_it_is(tmp_path: Path) -> None:
-    zebra = Crossing(
-        id="x",
-        line=np.array([[20.0, -3.0], [20.0, 3.0]]),
-        width_m=Quantity(4.0, "default"),
-        kind=Choice("zebra", "tagged"),
-    )
     one = road("a", [(0.0, 0.0), (50.0, 0.0)], ahead=[3.0], against=[3.0])
-    drawn = world(one, crossings=(zebra,))
+    drawn = world(one, crossings=(ZEBRA,))
     found = written(drawn, tmp_path)
     members, tags = found.lanelet("x")
     assert tags["subtype"] == "crosswalk"
