@@ -19,8 +19,8 @@ from foretwin.world_gen.polygon_areas import Outlined, polygons_from
 
 COLLISION_TOLERANCE_M = SILHOUETTE_TOLERANCE_M - FOOTPRINT_TOLERANCE_M
 """How far convex parts may move a silhouette that the footprint has moved already."""
-SIMPLIFY_SHARE, HULL_SHARE, BOX_SHARE = 0.25, 0.15, 0.6
-"""Most of it goes into rectangles, since those save most; together they are 1."""
+SIMPLIFY_M, HULL_M, BOX_M = (share * COLLISION_TOLERANCE_M for share in (0.25, 0.15, 0.6))
+"""Most of it goes into rectangles, since those save most; the shares together are 1."""
 _MIN_AREA_M2 = 0.01
 
 Geometries = npt.NDArray[np.object_]
@@ -42,27 +42,26 @@ class ConvexParts(NamedTuple):
     yaw_rad: Array
 
 
-def convex_cover(outlines: Outlined, *, tolerance_m: float = COLLISION_TOLERANCE_M) -> ConvexParts:
+def convex_cover(outlines: Outlined) -> ConvexParts:
     """Return convex pieces that together cover polygons, each an outline (N, 2) and its holes.
 
-    No point of a silhouette moves by more than `tolerance_m`: outlines are simplified, pieces taken
-    for their convex hulls, and those for rectangles, each within its share of it. Self-crossing
-    outlines are mended.
+    No point of a silhouette moves by more than `COLLISION_TOLERANCE_M`: outlines are simplified,
+    pieces taken for their convex hulls, and those for rectangles, each within its share of it.
+    Self-crossing outlines are mended.
     """
     shapes, owner = sound_polygons(polygons_from(outlines))
-    simple = shapely.simplify(shapes, SIMPLIFY_SHARE * tolerance_m, preserve_topology=True)
+    simple = shapely.simplify(shapes, SIMPLIFY_M, preserve_topology=True)
     counts = shapely.get_num_coordinates(simple), shapely.get_num_coordinates(shapes)
     changed = np.flatnonzero(counts[0] != counts[1])
     # What is empty, or crosses itself now, stays as it was.
     worse = changed[~shapely.is_valid(simple[changed]) | shapely.is_empty(simple[changed])]
     simple[worse] = shapes[worse]
-    pieces, of = cut_at_reflex_corners(simple, HULL_SHARE * tolerance_m)
+    pieces, of = cut_at_reflex_corners(simple, HULL_M)
     keep = shapely.area(pieces) >= _MIN_AREA_M2
     pieces, of = pieces[keep], of[keep]
     boxes = shapely.oriented_envelope(pieces)
     is_box = shapely.get_type_id(boxes) == shapely.GeometryType.POLYGON
-    near_m = BOX_SHARE * tolerance_m
-    is_box[is_box] = nearly_the_same(boxes[is_box], pieces[is_box], near_m, convex=True)
+    is_box[is_box] = nearly_the_same(boxes[is_box], pieces[is_box], BOX_M, convex=True)
     return _parts_of(owner[of], np.where(is_box, boxes, pieces), is_box)
 
 

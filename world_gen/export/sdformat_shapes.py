@@ -13,9 +13,10 @@ from shapely.geometry import Polygon
 from foretwin.contracts.arrays import Array
 from foretwin.world_gen.export.solids import Rgba
 from foretwin.world_gen.export.xml_tree import Element, child, leaves
+from foretwin.world_gen.polygon_areas import GRID_M
 
-GRID_M = 0.001
-"""Points lie on this grid, as they are written, so that outlines in the file are valid."""
+RECTANGLE_M = 0.05
+"""So far a corner may lie from a rectangle's."""
 LEAST_AREA_M2 = 0.05
 Size = tuple[float, float, float]
 Sizes = Sequence[tuple[str, str]]
@@ -110,19 +111,17 @@ def shaped(
         leaves(child(part, "material"), {"ambient": numbers(*rgba), "diffuse": numbers(*rgba)})
 
 
-def rectangle_of(
-    ring: Array, *, tolerance_m: float = 0.05
-) -> tuple[float, float, float, float, float] | None:
+def rectangle_of(ring: Array) -> tuple[float, float, float, float, float] | None:
     """Return x, y, length, width, yaw of a ring (4, 2) that is a rectangle, else None."""
     if len(ring) != 4:
         return None
     sides = np.roll(ring, -1, axis=0) - ring
     middle = ring.mean(axis=0)
-    if np.hypot(*(ring[0] + ring[2] - ring[1] - ring[3])) > tolerance_m:
+    if np.hypot(*(ring[0] + ring[2] - ring[1] - ring[3])) > RECTANGLE_M:
         return None
     length, width = float(np.hypot(*sides[0])), float(np.hypot(*sides[1]))
     skew = abs(float(sides[0] @ sides[1]))
-    if skew > tolerance_m * max(length, width) or min(length, width) < 0.01:
+    if skew > RECTANGLE_M * max(length, width) or min(length, width) < 0.01:
         return None
     yaw = math.atan2(sides[0][1], sides[0][0])
     return float(middle[0]), float(middle[1]), length, width, yaw
@@ -147,6 +146,7 @@ def extrusions(
         if isinstance(part, Polygon)
         for piece in _without_holes(part)
     ]
+    # On the grid, as they are written, outlines in the file are valid.
     return [
         shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:-1]
         for part in shapely.get_parts(shapely.set_precision(pieces, GRID_M))
