@@ -53,8 +53,8 @@ def number_junctions(axes: Axes, world: World, view: View) -> None:
             axes.annotate(str(number), tuple(at), zorder=11, **place, **look)
 
 
-def _line(colour: str, label: str, style: Any = "-", width: float = 2.0) -> Line2D:
-    return Line2D([], [], color=colour, linestyle=style, linewidth=width, label=label)
+def _line(colour: str, label: str, dash: Any = "-", width: float = 2.0) -> Line2D:
+    return Line2D([], [], color=colour, linestyle=dash, linewidth=width, label=label)
 
 
 def _dot(marker: str, edge: str, fill: str, label: str, size: float = 8.0) -> Line2D:
