@@ -21,7 +21,7 @@ from foretwin.world_gen.buildings.outlines import (
     valid_polygons,
 )
 from foretwin.world_gen.buildings.parts import Footprint, resolve_parts
-from foretwin.world_gen.buildings.tags import building_extent
+from foretwin.world_gen.buildings.tags import HEADROOM_M, building_extent
 from foretwin.world_gen.extent import box_deg
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.polygon_areas import GRID_M, rings_of
@@ -30,8 +30,6 @@ SILHOUETTE_TOLERANCE_M = 0.25
 """How far a silhouette may move from the map's outline to the parts that are run into."""
 FOOTPRINT_TOLERANCE_M = 0.05
 """The share of it that footprints take; convex parts take the rest."""
-HEADROOM_M = 2.5
-"""What begins higher stands in no car's way."""
 
 
 Polygons = npt.NDArray[np.object_]

@@ -20,6 +20,8 @@ CANOPY_HEIGHT_M = 5.0
 """Of a roof on posts without a height, such as a filling station's."""
 CARPORT_HEIGHT_M = 3.0
 CANOPY_THICKNESS_M = 0.4
+HEADROOM_M = 2.5
+"""What begins higher over the road stands in no car's way."""
 BRIDGE_CLEARANCE_M = 4.5
 """Under a building that bridges a street and has no min_height."""
 

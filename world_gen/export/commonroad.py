@@ -18,6 +18,7 @@ from lxml import etree
 from shapely.geometry import Polygon
 
 from foretwin.contracts.world import Building, Connection, Crossing, Lane, LaneKind, World
+from foretwin.world_gen.buildings.tags import HEADROOM_M
 from foretwin.world_gen.export import commonroad_controls as controls
 from foretwin.world_gen.export import lanelets
 from foretwin.world_gen.export.commonroad_controls import DEFAULT_COUNTRY, points
@@ -29,8 +30,6 @@ from foretwin.world_gen.export.xml_tree import Element, child, document, element
 VERSION = "2020a"
 TIME_STEP_S = 0.1
 UNKNOWN_GEONAME = -999
-PASSABLE_UNDER_M = 2.5
-"""Buildings that begin higher over the road stand in no vehicle's way and are left out."""
 _KINDS: dict[LaneKind, tuple[str, tuple[str, ...]]] = {
     "driving": ("", ("vehicle", "bicycle")),
     "bus": ("busLane", ("bus", "taxi", "priorityVehicle")),
@@ -91,7 +90,7 @@ def commonroad_elements(world: World, *, country: str = DEFAULT_COUNTRY) -> Iter
     yield from draft.lights.elements
     yield from intersections(world, draft.ids, ids)
     for building in world.buildings:
-        if building.min_height_m < PASSABLE_UNDER_M and _is_sound(building):
+        if building.min_height_m < HEADROOM_M and _is_sound(building):
             # The outline of its ground: the format has no courtyards.
             obstacle = element("environmentObstacle", id=next(ids))
             child(obstacle, "type", "building")

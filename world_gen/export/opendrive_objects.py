@@ -21,10 +21,9 @@ from foretwin.world_gen.export.choices import OpenDriveVersion
 from foretwin.world_gen.export.lanelets import crosswalk_edges
 from foretwin.world_gen.export.opendrive_places import OdrNetwork
 from foretwin.world_gen.export.opendrive_roads import OdrRoad
+from foretwin.world_gen.export.solids import STOP_LINE_M
 from foretwin.world_gen.export.xml_tree import Element, child, number
 
-STOP_LINE_M = 0.5
-"""Breadth of a stop line (RMS-1, 1993)."""
 ISLAND_HEIGHT_M = 0.15
 _CROSSWALKS = {"zebra": "zebra", "marked": "zebra", "uncontrolled": "zebra", "unmarked": "virtual"}
 """OpenDRIVE's kinds of crosswalks by OSM's; all others are `pedestrian`."""

@@ -16,11 +16,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import PROVENANCES, Provenance
 from foretwin.contracts.world import Area, Building, Crossing, Road, World
 from foretwin.geometry.polyline import left_of, offset
+from foretwin.world_gen.buildings.tags import HEADROOM_M
 from foretwin.world_gen.export import picture_style as style
 from foretwin.world_gen.export.picture_style import Look, View
-
-OVERHANG_M = 2.5
-"""What begins higher is drawn see-through: cars pass below it."""
 
 
 def draw_ground(axes: Axes, world: World, view: View) -> None:
@@ -65,7 +63,8 @@ def _buildings(axes: Axes, world: World, view: View) -> None:
     groups: dict[tuple[Provenance, bool], list[Building]] = defaultdict(list)
     for building in sorted(world.buildings, key=lambda b: b.height_m.value):
         if view.meets(building.outline):
-            groups[building.height_m.source, building.min_height_m >= OVERHANG_M].append(building)
+            # What cars pass below is drawn see-through.
+            groups[building.height_m.source, building.min_height_m >= HEADROOM_M].append(building)
     colours = ScalarMappable(style.HEIGHT_SCALE_M, style.HEIGHT_COLOURS)
     for (source, overhang), buildings in sorted(groups.items()):
         heights = np.array([b.height_m.value for b in buildings])

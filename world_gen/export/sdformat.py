@@ -29,7 +29,6 @@ NAMESPACE = "urn:foretwin:sdformat"
 """Of our own elements, which SDFormat lets pass and keeps because they have a namespace."""
 MARKING_TOP_M, SIDEWALK_TOP_M = 0.02, 0.03
 BUILDING_TOLERANCE_M, AREA_TOLERANCE_M = 0.1, 0.02
-STOP_LINE_WIDTH_M, YIELD_LINE_WIDTH_M = 0.5, 0.3
 STEP_S = 0.002
 
 _SIDEWALK: Rgba = (0.62, 0.61, 0.58, 1.0)
@@ -139,7 +138,8 @@ def _markings(made: Element, world: World) -> None:
     link = StaticLink(made, "markings")
     for line in world.stop_lines:
         if line.control.value != "none":
-            wide = YIELD_LINE_WIDTH_M if line.control.value == "give_way" else STOP_LINE_WIDTH_M
+            yields = line.control.value == "give_way"
+            wide = solids.YIELD_LINE_M if yields else solids.STOP_LINE_M
             _stripe(link, line.id, line.ends, wide, _PAINT)
     for crossing in world.crossings:
         _stripe(link, crossing.id, crossing.line, crossing.width_m.value, _CROSSING)
