@@ -1,4 +1,7 @@
-"""How polygons become areas of a World: rings counter-clockwise, in millimetres, many at once."""
+"""Many lines and polygons at once, and how polygons become areas of a World.
+
+Areas have rings counter-clockwise, in millimetres.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,54 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
+from shapely import GeometryType
 from shapely.geometry import Polygon
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import Area
+from foretwin.geometry.polyline_batch import Polylines
 
-_POLYGON = 3
+GRID_M = 0.001
+"""Worlds are written in millimetres: areas lie on that grid, so that rounding breaks nothing."""
+Outlined = Sequence[tuple[Array, Sequence[Array]]]
+"""Polygons as an outline (N, 2) and holes each."""
+
+
+def lines_of(polylines: Sequence[Array]) -> np.ndarray:
+    """Return shapely's lines of polylines (N, 2), made from one array of coordinates."""
+    joined = Polylines.of(polylines)
+    lines: np.ndarray = shapely.linestrings(joined.xy_m, indices=joined.line)
+    return lines
+
+
+def polygons_of_rings(rings: Sequence[Array]) -> np.ndarray:
+    """Return valid polygons, one for each ring (N, 2) that need not be closed or simple."""
+    found = polygons_from([(ring, ()) for ring in rings])
+    bad = ~shapely.is_valid(found)
+    # A bend tighter than the road is wide folds its inner edge.
+    found[bad] = shapely.buffer(found[bad], 0.0)
+    return found
+
+
+def polygons_from(outlines: Outlined) -> np.ndarray:
+    """Return polygons of outlines and holes, valid or not, made from one array of coordinates."""
+    rings = Polylines.of([ring for outline, holes in outlines for ring in (outline, *holes)])
+    made = shapely.linearrings(rings.xy_m, indices=rings.line)
+    owner = np.repeat(np.arange(len(outlines)), [1 + len(holes) for _, holes in outlines])
+    polygons: np.ndarray = shapely.polygons(made, indices=owner)
+    return polygons
+
+
+def cut_out(shapes: np.ndarray, others: np.ndarray, row: np.ndarray, other: np.ndarray) -> None:
+    """Take others out of shapes, in place, by pairs of rows; `row` ascends.
+
+    Shape by shape would take a call each: in round k every shape loses its k-th neighbour.
+    """
+    turn = np.arange(len(row)) - np.searchsorted(row, row)
+    for k in range(int(turn.max(initial=-1)) + 1):
+        now = turn == k
+        shapes[row[now]] = shapely.difference(shapes[row[now]], others[other[now]])
 
 
 def rings_of(polygons: np.ndarray) -> list[list[Array]]:
@@ -46,7 +90,7 @@ def areas_of(
     """
     parts, owner = shapely.get_parts(shapes, return_index=True)
     size = shapely.area(parts)
-    keep = (shapely.get_type_id(parts) == _POLYGON) & (size > smallest_m2)
+    keep = (shapely.get_type_id(parts) == GeometryType.POLYGON) & (size > smallest_m2)
     parts, owner, size = parts[keep], owner[keep], size[keep]
     order = np.lexsort((*shapely.bounds(parts).T[::-1], -np.round(size, 3), owner))
     found: list[list[Area]] = [[] for _ in names]

@@ -198,7 +198,7 @@ def _format(name: str | None, file: Path | None) -> Format:
         known = ", ".join(dict.fromkeys(format_.suffix for format_ in FORMATS.values()))
         raise UserError(f"--out {file}: ends in none of {known}; --format says what to write")
     format_ = FORMATS[name or said[0]]
-    if (said or format_.told_by_suffix) and format_.name not in said:
+    if (said or format_.decided_by_suffix) and format_.name not in said:
         raise UserError(f"--out {file}: a file of --format {name} ends in {format_.suffix}")
     return format_
 

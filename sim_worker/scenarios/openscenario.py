@@ -33,7 +33,7 @@ from foretwin.sim_worker.scenarios.openscenario_motion import (
 )
 from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.world_gen.export.opendrive import write_opendrive
-from foretwin.world_gen.export.xml_text import in_comment, legal
+from foretwin.world_gen.export.xml_tree import in_comment, legal
 
 UNSAID = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 

@@ -13,8 +13,7 @@ from foretwin.contracts.scenario import EGO
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.scenarios.roles import StagedActor
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
-from foretwin.world_gen.export.opendrive_elements import number
-from foretwin.world_gen.export.xml_text import legal
+from foretwin.world_gen.export.xml_tree import legal, number
 
 
 def element(

@@ -19,7 +19,7 @@ from foretwin.sim_worker.scenarios.openscenario_entities import (
     reference_behind_centre_m,
 )
 from foretwin.sim_worker.scenarios.roles import StagedActor, StagedCase
-from foretwin.world_gen.export.opendrive_elements import number
+from foretwin.world_gen.export.xml_tree import number
 
 _STEP_S, _SPACING_M = 0.1, 0.5
 _MOST_DRIFT_M = 0.06

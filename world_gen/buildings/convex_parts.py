@@ -1,12 +1,11 @@
 """Footprints cut into few convex pieces, since a mesh collides as its convex hull.
 
 Most footprints are rectangles put together: a piece that is a rectangle, within the tolerance, is
-told as one, since a box costs a simulation a tenth of what a mesh does.
+marked as one, since a box costs a simulation a tenth of what a mesh does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +15,12 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.reflex_cuts import cut_at_reflex_corners, nearly_the_same, polygons_of
 from foretwin.world_gen.buildings.footprints import FOOTPRINT_TOLERANCE_M, SILHOUETTE_TOLERANCE_M
+from foretwin.world_gen.polygon_areas import Outlined, polygons_from
 
 COLLISION_TOLERANCE_M = SILHOUETTE_TOLERANCE_M - FOOTPRINT_TOLERANCE_M
 """How far convex parts may move a silhouette that the footprint has moved already."""
-SIMPLIFY_SHARE, HULL_SHARE, BOX_SHARE = 0.25, 0.15, 0.6
-"""Most of it goes into rectangles, since those save most; together they are 1."""
+SIMPLIFY_M, HULL_M, BOX_M = (share * COLLISION_TOLERANCE_M for share in (0.25, 0.15, 0.6))
+"""Most of it goes into rectangles, since those save most; the shares together are 1."""
 _MIN_AREA_M2 = 0.01
 
 Geometries = npt.NDArray[np.object_]
@@ -42,54 +42,30 @@ class ConvexParts(NamedTuple):
     yaw_rad: Array
 
 
-def convex_cover(
-    outlines: Sequence[tuple[Array, tuple[Array, ...]]],
-    *,
-    tolerance_m: float = COLLISION_TOLERANCE_M,
-) -> ConvexParts:
+def convex_cover(outlines: Outlined) -> ConvexParts:
     """Return convex pieces that together cover polygons, each an outline (N, 2) and its holes.
 
-    No point of a silhouette moves by more than `tolerance_m`: outlines are simplified, pieces taken
-    for their convex hulls, and those for rectangles, each within its share of it. Self-crossing
-    outlines are mended.
+    No point of a silhouette moves by more than `COLLISION_TOLERANCE_M`: outlines are simplified,
+    pieces taken for their convex hulls, and those for rectangles, each within its share of it.
+    Self-crossing outlines are mended.
     """
-    shapes, owner = _sound(polygons_from(outlines))
-    simple = shapely.simplify(shapes, SIMPLIFY_SHARE * tolerance_m, preserve_topology=True)
-    changed = np.flatnonzero(
-        shapely.get_num_coordinates(simple) != shapely.get_num_coordinates(shapes)
-    )
+    shapes, owner = sound_polygons(polygons_from(outlines))
+    simple = shapely.simplify(shapes, SIMPLIFY_M, preserve_topology=True)
+    counts = shapely.get_num_coordinates(simple), shapely.get_num_coordinates(shapes)
+    changed = np.flatnonzero(counts[0] != counts[1])
     # What is empty, or crosses itself now, stays as it was.
     worse = changed[~shapely.is_valid(simple[changed]) | shapely.is_empty(simple[changed])]
     simple[worse] = shapes[worse]
-    pieces, of = cut_at_reflex_corners(simple, HULL_SHARE * tolerance_m)
+    pieces, of = cut_at_reflex_corners(simple, HULL_M)
     keep = shapely.area(pieces) >= _MIN_AREA_M2
     pieces, of = pieces[keep], of[keep]
     boxes = shapely.oriented_envelope(pieces)
-    is_box = shapely.get_type_id(boxes) == _POLYGON
-    is_box[is_box] = nearly_the_same(
-        boxes[is_box], pieces[is_box], BOX_SHARE * tolerance_m, convex=True
-    )
-    return _told(owner[of], np.where(is_box, boxes, pieces), is_box)
+    is_box = shapely.get_type_id(boxes) == shapely.GeometryType.POLYGON
+    is_box[is_box] = nearly_the_same(boxes[is_box], pieces[is_box], BOX_M, convex=True)
+    return _parts_of(owner[of], np.where(is_box, boxes, pieces), is_box)
 
 
-_POLYGON = 3
-
-
-def polygons_from(outlines: Sequence[tuple[Array, tuple[Array, ...]]]) -> Geometries:
-    """Return polygons of outlines and holes, made from one array of coordinates."""
-    rings = [ring for outline, holes in outlines for ring in (outline, *holes)]
-    if not rings:
-        return np.zeros(0, dtype=object)
-    counts = [len(ring) for ring in rings]
-    made = shapely.linearrings(
-        np.concatenate(rings), indices=np.repeat(np.arange(len(rings)), counts)
-    )
-    of = np.repeat(np.arange(len(outlines)), [1 + len(holes) for _, holes in outlines])
-    polygons: Geometries = shapely.polygons(made, indices=of)
-    return polygons
-
-
-def _sound(shapes: Geometries) -> tuple[Geometries, Indices]:
+def sound_polygons(shapes: Geometries) -> tuple[Geometries, Indices]:
     """Return valid polygons, and of which shape each is."""
     bad = ~shapely.is_valid(shapes)
     if bad.any():
@@ -98,7 +74,7 @@ def _sound(shapes: Geometries) -> tuple[Geometries, Indices]:
     return polygons_of(shapes, np.arange(len(shapes)))
 
 
-def _told(owner: Indices, pieces: Geometries, is_box: npt.NDArray[np.bool_]) -> ConvexParts:
+def _parts_of(owner: Indices, pieces: Geometries, is_box: npt.NDArray[np.bool_]) -> ConvexParts:
     pieces = shapely.orient_polygons(pieces)
     points = shapely.get_coordinates(pieces)
     counts = shapely.get_num_coordinates(pieces)

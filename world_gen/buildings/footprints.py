@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 import shapely
+from shapely import GeometryType
 
 from foretwin.contracts.frames import LocalFrame, target_from_source_m
 from foretwin.contracts.world import Building
@@ -19,19 +20,16 @@ from foretwin.world_gen.buildings.outlines import (
     outlines,
     valid_polygons,
 )
-from foretwin.world_gen.buildings.parts import GRID_M, resolve_parts
-from foretwin.world_gen.buildings.parts import Footprint as Footprint
-from foretwin.world_gen.buildings.tags import building_extent
+from foretwin.world_gen.buildings.parts import Footprint, resolve_parts
+from foretwin.world_gen.buildings.tags import HEADROOM_M, building_extent
 from foretwin.world_gen.extent import box_deg
 from foretwin.world_gen.osm.osm_map import OsmMap
-from foretwin.world_gen.polygon_areas import rings_of
+from foretwin.world_gen.polygon_areas import GRID_M, rings_of
 
 SILHOUETTE_TOLERANCE_M = 0.25
 """How far a silhouette may move from the map's outline to the parts that are run into."""
 FOOTPRINT_TOLERANCE_M = 0.05
 """The share of it that footprints take; convex parts take the rest."""
-HEADROOM_M = 2.5
-"""What begins higher stands in no car's way."""
 
 
 Polygons = npt.NDArray[np.object_]
@@ -80,59 +78,47 @@ class BuildingIndex:
         involved = np.zeros(0, dtype=np.intp)
         if is_part.any():
             # An outline gives way to its parts, and a part takes its outline's height.
-            asked, other = self._tree.query(self._tree.geometries[todo])
-            apart = is_part[todo[asked]] != is_part[other]
-            involved = np.concatenate([todo[asked[apart]], other[apart]])
+            which, other = self._tree.query(self._tree.geometries[todo])
+            apart = is_part[todo[which]] != is_part[other]
+            involved = np.concatenate([todo[which[apart]], other[apart]])
         self._make_raw(_distinct(np.concatenate([todo, involved])))
         done = {k: self._raw[k] for k in todo.tolist()}
         done.update(self._resolved(_distinct(involved), is_part, done))
         self._done.update(done)
 
     def _resolved(
-        self, entries: Indices, is_part: npt.NDArray[np.bool_], asked: Container[int]
+        self, entries: Indices, is_part: npt.NDArray[np.bool_], wanted: Container[int]
     ) -> dict[int, tuple[Footprint, ...]]:
-        """Return those entries that were asked for, outlines without what parts describe."""
-        owners: tuple[list[int], list[int]] = ([], [])
-        shapes: tuple[list[Footprint], list[Footprint]] = ([], [])
-        for k, part in zip(entries.tolist(), is_part[entries].tolist(), strict=True):
-            shapes[part].extend(self._raw[k])
-            owners[part].extend([k] * len(self._raw[k]))
-        left, parts = resolve_parts(*shapes)
-        found: dict[int, tuple[Footprint, ...]] = {k: () for k in entries.tolist() if k in asked}
-        for k, pieces in zip(owners[0], left, strict=True):
+        """Return the entries that are `wanted`, outlines without what parts describe."""
+        wholes = [(k, f) for k in entries[~is_part[entries]].tolist() for f in self._raw[k]]
+        parts = [(k, f) for k in entries[is_part[entries]].tolist() for f in self._raw[k]]
+        left, known = resolve_parts([f for _, f in wholes], [f for _, f in parts])
+        found: dict[int, tuple[Footprint, ...]] = {k: () for k in entries.tolist() if k in wanted}
+        pieces = [*left, *([part] for part in known)]
+        for (k, _), mine in zip(wholes + parts, pieces, strict=True):
             if k in found:
-                found[k] += tuple(pieces)
-        for k, known in zip(owners[1], parts, strict=True):
-            if k in found:
-                found[k] += (known,)
+                found[k] += tuple(mine)
         return found
 
     def _make_raw(self, entries: Indices) -> None:
         todo = np.array([k for k in entries.tolist() if k not in self._raw], dtype=np.intp)
         table = self._table
         made = outlines(self._osm, table, todo)
-        polygons, owner = made.polygons.tolist(), made.owner.tolist()
-        begin = 0
-        for n, k in enumerate(todo.tolist()):
-            end = begin
-            while end < len(owner) and owner[end] == n:
-                end += 1
+        starts = np.searchsorted(made.owner, np.arange(len(todo)))
+        pieces = np.split(made.polygons, starts)[1:]
+        for n, (k, polygons) in enumerate(zip(todo.tolist(), pieces, strict=True)):
             height, low, unclear = building_extent(table.tags[k])
             name, part = table.names[k], table.is_part[k]
             note = made.notes.get(n, "")
             if note or unclear:
                 kind = "way" if name[0] == "w" else "relation"
                 note = f"{kind} {name[1:]}: building {'; '.join(filter(None, (note, unclear)))}"
-                if begin == end:
+                if not len(polygons):
                     self._lost[k] = note
-            if end - begin == 1:
-                self._raw[k] = (Footprint(name, polygons[begin], height, low, part, note),)
-            else:
-                self._raw[k] = tuple(
-                    Footprint(name if i == 0 else f"{name}.{i}", polygon, height, low, part, note)
-                    for i, polygon in enumerate(polygons[begin:end])
-                )
-            begin = end
+            self._raw[k] = tuple(
+                Footprint(name if i == 0 else f"{name}.{i}", polygon, height, low, part, note)
+                for i, polygon in enumerate(polygons)
+            )
 
 
 def _distinct(rows: Indices) -> Indices:
@@ -157,12 +143,12 @@ def buildings_in_frame(
     moved = shapely.simplify(moved, FOOTPRINT_TOLERANCE_M - GRID_M, preserve_topology=True)
     low = np.flatnonzero([f.min_height_m < HEADROOM_M for f in near])
     blocked = low[_cut_back(moved, low, driven)]
-    whole = shapely.get_type_id(moved) == _POLYGON
+    whole = shapely.get_type_id(moved) == GeometryType.POLYGON
     owners, pieces = np.arange(len(near)), moved
     if not whole.all():
         pieces, owners = shapely.get_parts(moved, return_index=True)
     pieces = shapely.transform(pieces, lambda xy: np.round(xy, 3))
-    sound = shapely.is_valid(pieces) & (shapely.get_type_id(pieces) == _POLYGON)
+    sound = shapely.is_valid(pieces) & (shapely.get_type_id(pieces) == GeometryType.POLYGON)
     sound &= (shapely.area(pieces) >= MIN_PIECE_M2) | ~np.isin(owners, blocked)
     if not sound.all():
         pieces, owners = _mended(pieces, owners, sound)
@@ -189,29 +175,17 @@ def _cut_back(shapes: Polygons, chosen: Indices, driven: Polygons) -> Indices:
     return touched
 
 
-_POLYGON = 3
-
-
 def _mended(
     pieces: Polygons, owners: Indices, sound: npt.NDArray[np.bool_]
 ) -> tuple[Polygons, Indices]:
     """Return pieces as polygons that are valid also when written in millimetres."""
-    found: list[shapely.Polygon] = []
-    of: list[int] = []
-    for piece, owner, is_sound in zip(
-        pieces.tolist(), owners.tolist(), sound.tolist(), strict=True
-    ):
-        if is_sound:
-            mine = [piece]
-        else:
-            mine = [
-                part
-                for polygon in valid_polygons(piece)
-                for part in valid_polygons(shapely.set_precision(polygon, GRID_M))
-            ]
-        found.extend(mine)
-        of.extend([owner] * len(mine))
-    return np.array(found, dtype=object), np.array(of, dtype=np.intp)
+    found: list[tuple[shapely.Polygon, int]] = []
+    for piece, owner, is_sound in zip(pieces, owners.tolist(), sound.tolist(), strict=True):
+        polygons = [] if is_sound else valid_polygons(piece)
+        mended = (shapely.set_precision(polygon, GRID_M) for polygon in polygons)
+        parts = [piece] if is_sound else [p for shape in mended for p in valid_polygons(shape)]
+        found.extend((part, owner) for part in parts)
+    return np.array([p for p, _ in found], dtype=object), np.array([k for _, k in found], np.intp)
 
 
 def _buildings(of: Sequence[Footprint], pieces: npt.NDArray[np.object_]) -> tuple[Building, ...]:

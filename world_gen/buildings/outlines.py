@@ -1,8 +1,8 @@
-"""Outlines of a map's buildings: a table of rings, from which polygons are made when asked for."""
+"""Outlines of a map's buildings: a table of rings, from which polygons are made on demand."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -43,9 +43,9 @@ class OutlineTable(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BuildingOutlines(NamedTuple):
-    """Polygons (M,), the entry asked for that each belongs to (M,), and what had to be mended.
+    """Polygons (M,), the requested entry that each belongs to (M,), and what had to be mended.
 
-    `owner` and the keys of `notes` count the entries as they were asked for; `owner` ascends.
+    `owner` and the keys of `notes` count the entries as they were requested; `owner` ascends.
     """
 
     polygons: npt.NDArray[np.object_]
@@ -59,55 +59,60 @@ def outline_table(osm: OsmMap) -> OutlineTable:
     What cannot be an outline is left out and named in the table's notes.
     """
     notes: list[str] = []
-    names: list[str] = []
-    tags: list[Mapping[str, str]] = []
-    rings: list[Sequence[int]] = []
-    inner: list[bool] = []
-    first_ring = [0]
-    taken: set[int] = set()
-    for relation in _building_relations(osm, notes):
-        taken.update(m.ref for m in relation.members if m.kind == "w" and m.role != "inner")
-        members = _members(osm, relation, notes)
-        if members:
-            names.append(f"r{relation.id}")
-            tags.append(relation.tags)
-            inner.extend(member_is_inner for member_is_inner, _ in members)
-            rings.extend(nodes for _, nodes in members)
-            first_ring.append(len(rings))
-    relations = len(names)
+    relations = _building_relations(osm, notes)
+    entries = [
+        _Entry(f"r{relation.id}", relation.tags, members)
+        for relation in relations
+        if (members := _members(osm, relation, notes))
+    ]
+    taken = {m.ref for r in relations for m in r.members if m.kind == "w" and m.role != "inner"}
+    first_way = len(entries)
+    entries += _building_ways(osm, taken, notes)
+    rings = [ring for entry in entries for ring in entry.rings]
+    first_ring = _starts([len(entry.rings) for entry in entries])
+    latlon, first_point = osm.points_of([nodes for _, nodes in rings])
+    return OutlineTable(
+        names=tuple(entry.name for entry in entries),
+        tags=tuple(entry.tags for entry in entries),
+        is_part=tuple(is_part(entry.tags) for entry in entries),
+        is_way=np.arange(len(entries)) >= first_way,
+        first_ring=first_ring,
+        inner=np.array([is_inner for is_inner, _ in rings], dtype=bool),
+        first_point=first_point,
+        latlon_deg=latlon,
+        boxes_deg=boxes_deg(latlon, first_point[first_ring]),
+        notes=tuple(notes),
+    )
+
+
+class _Entry(NamedTuple):
+    name: str
+    tags: Mapping[str, str]
+    rings: list[tuple[bool, Sequence[int]]]
+    """Whether a ring is an inner one, and its nodes."""
+
+
+def _building_ways(osm: OsmMap, taken: set[int], notes: list[str]) -> Iterator[_Entry]:
+    """Yield ways that are buildings, but for those that relations have `taken`."""
     for way in osm.ways.values():
-        about = way.tags
+        about, nodes = way.tags, way.nodes
         if "building" not in about and "building:part" not in about:
             continue
         if way.id in taken and not is_part(about):
             continue
-        nodes = way.nodes
         if not stands_above_ground(about):
             if about.get("building", "no") != "no" and "layer" in about:
                 notes.append(f"way {way.id}: building below the road; left out")
-            continue
-        if nodes[0] != nodes[-1] or len(nodes) < 4:
+        elif nodes[0] != nodes[-1] or len(nodes) < 4:
             why = "is not closed" if nodes[0] != nodes[-1] else "has fewer than three corners"
             notes.append(f"way {way.id}: building outline {why}; left out")
-            continue
-        names.append(f"w{way.id}")
-        tags.append(about)
-        rings.append(nodes)
-        inner.append(False)
-        first_ring.append(len(rings))
-    latlon, first_point = osm.points_of(rings)
-    return OutlineTable(
-        names=tuple(names),
-        tags=tuple(tags),
-        is_part=tuple(is_part(t) for t in tags),
-        is_way=np.arange(len(names)) >= relations,
-        first_ring=np.array(first_ring, dtype=np.intp),
-        inner=np.array(inner, dtype=bool),
-        first_point=first_point,
-        latlon_deg=latlon,
-        boxes_deg=boxes_deg(latlon, first_point[np.array(first_ring, dtype=np.intp)]),
-        notes=tuple(notes),
-    )
+        else:
+            yield _Entry(f"w{way.id}", about, [(False, nodes)])
+
+
+def _starts(counts: Sequence[int]) -> Indices:
+    """Return where each of so many begins, and where the last one ends."""
+    return np.concatenate([[0], np.cumsum(counts, dtype=np.intp)])
 
 
 def _building_relations(osm: OsmMap, notes: list[str]) -> list[OsmRelation]:

@@ -12,14 +12,13 @@ from shapely.geometry import Polygon
 
 from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.world_gen.buildings.outlines import valid_polygons
+from foretwin.world_gen.polygon_areas import GRID_M
 
 _OWN_SHARE = 0.5
 """A part belongs to the outline that holds at least this share of it."""
 _SLIVER_M = 0.25
 """Where no more than this width of an outline is left beside its parts, it was drawn inexactly."""
 _ON_TOP_M = 0.5
-GRID_M = 0.001
-"""Outlines are written in millimetres."""
 
 
 class Footprint(NamedTuple):
@@ -52,11 +51,8 @@ def resolve_parts(
         for k in mine:
             if parts[k].height_m.source == "default":
                 known[k] = _with_height_of(parts[k], outline)
-        cutting = [
-            parts[k].polygon
-            for k in mine
-            if parts[k].min_height_m < outline.height_m.value - _ON_TOP_M
-        ]
+        top_m = outline.height_m.value - _ON_TOP_M
+        cutting = [parts[k].polygon for k in mine if parts[k].min_height_m < top_m]
         if cutting:
             left[i] = _remainder(outline, cutting)
     return left, known

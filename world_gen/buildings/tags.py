@@ -20,23 +20,16 @@ CANOPY_HEIGHT_M = 5.0
 """Of a roof on posts without a height, such as a filling station's."""
 CARPORT_HEIGHT_M = 3.0
 CANOPY_THICKNESS_M = 0.4
+HEADROOM_M = 2.5
+"""What begins higher over the road stands in no car's way."""
 BRIDGE_CLEARANCE_M = 4.5
 """Under a building that bridges a street and has no min_height."""
 
-HEIGHT_KEYS = frozenset(
-    (
-        "height",
-        "building:height",
-        "est_height",
-        "building:levels",
-        "roof:levels",
-        "roof:height",
-        "min_height",
-        "building:min_height",
-        "building:min_level",
-        "min_level",
-    )
-)
+_HEIGHT = ("height", "building:height")
+_UNDERSIDE = ("min_height", "building:min_height")
+_UNDERSIDE_LEVEL = ("building:min_level", "min_level")
+_LEVELS_AND_ROOF = ("building:levels", "roof:levels", "roof:height")
+HEIGHT_KEYS = frozenset((*_HEIGHT, "est_height", *_UNDERSIDE, *_UNDERSIDE_LEVEL, *_LEVELS_AND_ROOF))
 _FEET = re.compile(
     r"^\s*(\d+(?:\.\d+)?)\s*(?:'|ft|feet|foot)\s*(?:(\d+(?:\.\d+)?)\s*(?:\"|''|in))?\s*$"
 )
@@ -104,8 +97,8 @@ def building_extent(tags: Mapping[str, str]) -> Extent:
     height, note = _height(tags, DEFAULT_HEIGHT_M if canopy is None else canopy)
     if low is not None and low >= height.value:
         if height.source == "tagged":
-            told = tags.get("height") or tags.get("building:height")
-            return Extent(height, 0.0, f"begins at {low:g} m, above its height {told}; from 0 m")
+            stated = tags.get("height") or tags.get("building:height")
+            return Extent(height, 0.0, f"begins at {low:g} m, above its height {stated}; from 0 m")
         height = Quantity(low + LEVEL_HEIGHT_M, height.source)
     if low is None and canopy is not None:
         roof = height_in_m(tags.get("roof:height")) or CANOPY_THICKNESS_M
@@ -121,17 +114,11 @@ _PLAIN = Extent(Quantity(DEFAULT_HEIGHT_M, "default"), 0.0)
 
 
 def _height(tags: Mapping[str, str], default_m: float) -> tuple[Quantity, str]:
-    for key in ("height", "building:height"):
-        if value := height_in_m(tags.get(key)):
+    given = [key for key in _HEIGHT if key in tags]
+    for key in given:
+        if value := height_in_m(tags[key]):
             return Quantity(value, "tagged"), ""
-    note = next(
-        (
-            f"{key}={tags[key]} is not understood"
-            for key in ("height", "building:height")
-            if key in tags
-        ),
-        "",
-    )
+    note = f"{given[0]}={tags[given[0]]} is not understood" if given else ""
     if value := height_in_m(tags.get("est_height")):
         return Quantity(value, "inferred"), note
     levels = _count(tags.get("building:levels"))
@@ -149,10 +136,10 @@ def _height(tags: Mapping[str, str], default_m: float) -> tuple[Quantity, str]:
 
 
 def _underside(tags: Mapping[str, str]) -> float | None:
-    for key in ("min_height", "building:min_height"):
+    for key in _UNDERSIDE:
         if (value := height_in_m(tags.get(key))) is not None:
             return value
-    for key in ("building:min_level", "min_level"):
+    for key in _UNDERSIDE_LEVEL:
         if (level := _count(tags.get(key))) is not None:
             return level * LEVEL_HEIGHT_M
     return None

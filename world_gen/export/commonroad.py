@@ -8,43 +8,36 @@ marked as virtual.
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from lxml import etree
 from shapely.geometry import Polygon
 
-from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import Building, Connection, Crossing, Lane, LaneKind, Road, World
-from foretwin.world_gen.export.commonroad_elements import IdCounter, child, points, put, ref
+from foretwin.contracts.world import Building, Connection, Crossing, Lane, LaneKind, World
+from foretwin.world_gen.buildings.tags import HEADROOM_M
+from foretwin.world_gen.export import commonroad_controls as controls
+from foretwin.world_gen.export import lanelets
+from foretwin.world_gen.export.commonroad_controls import DEFAULT_COUNTRY, points
 from foretwin.world_gen.export.commonroad_intersections import intersections
-from foretwin.world_gen.export.commonroad_lights import traffic_lights
-from foretwin.world_gen.export.commonroad_signs import DEFAULT_COUNTRY, traffic_signs
 from foretwin.world_gen.export.lane_borders import Borders, lane_borders
-from foretwin.world_gen.export.lane_markings import Marking, lane_markings
-from foretwin.world_gen.export.lanelets import URBAN_MPS, crosswalk_edges, is_marked, narrower_lane
-from foretwin.world_gen.export.xml_text import in_comment
+from foretwin.world_gen.export.lanelets import URBAN_MPS, Marking
+from foretwin.world_gen.export.xml_tree import Element, child, document, element, in_comment, leaves
 
 VERSION = "2020a"
 TIME_STEP_S = 0.1
 UNKNOWN_GEONAME = -999
-PASSABLE_UNDER_M = 2.5
-"""Buildings that begin higher over the road stand in nobody's way and are left out."""
-_TYPES: dict[LaneKind, str] = {
-    "bus": "busLane",
-    "bicycle": "bicycleLane",
-    "parking": "parking",
-    "tram": "restricted",
+_KINDS: dict[LaneKind, tuple[str, tuple[str, ...]]] = {
+    "driving": ("", ("vehicle", "bicycle")),
+    "bus": ("busLane", ("bus", "taxi", "priorityVehicle")),
+    "bicycle": ("bicycleLane", ("bicycle",)),
+    "parking": ("parking", ("vehicle",)),
+    "tram": ("restricted", ("train",)),
 }
-_USERS: dict[LaneKind, tuple[str, ...]] = {
-    "driving": ("vehicle", "bicycle"),
-    "bus": ("bus", "taxi", "priorityVehicle"),
-    "bicycle": ("bicycle",),
-    "parking": ("vehicle",),
-    "tram": ("train",),
-}
+"""Type and users of lanes by kind; those for driving have the type of their road alone."""
 _CLASS_TYPES = {"motorway": "interstate", "trunk": "highway"}
 
 
@@ -58,160 +51,143 @@ def write_commonroad(
     """Write the World as CommonRoad XML, dated today where no `date` is given.
 
     `country` is the ISO code of three letters whose traffic signs are meant; the World does not
-    know it, and CommonRoad's own Zamunda has German signs. Raises ValueError where CommonRoad
+    hold it, and CommonRoad's own Zamunda has German signs. Raises ValueError where CommonRoad
     has no signs of that country, OSError where the file cannot be written.
     """
-    root = {
-        "commonRoadVersion": VERSION,
-        "benchmarkID": f"{country}_Foretwin{world.id}-1",
-        "author": "foretwin",
-        "affiliation": "",
-        "source": f"{world.attribution}; world {world.id}",
-        "date": (date or datetime.date.today()).isoformat(),
-        "timeStepSize": str(TIME_STEP_S),
-    }
-    elements = commonroad_elements(world, country=country)
-    # lxml would not say which file cannot be written: it is opened here.
-    with path.open("wb") as file, etree.xmlfile(file, encoding="utf-8") as xml:
-        xml.write_declaration()
-        with xml.element("commonRoad", root):
-            xml.write("\n")
-            put(xml, etree.Comment(in_comment(f"{world.attribution}; world {world.id}")))
-            for element in elements:
-                put(xml, element)
+    about = f"{world.attribution}; world {world.id}"
+    root = element(
+        "commonRoad",
+        commonRoadVersion=VERSION,
+        benchmarkID=f"{country}_Foretwin{world.id}-1",
+        author="foretwin",
+        affiliation="",
+        source=about,
+        date=(date or datetime.date.today()).isoformat(),
+        timeStepSize=TIME_STEP_S,
+    )
+    root.append(etree.Comment(in_comment(about)))
+    root.extend(commonroad_elements(world, country=country))
+    root.text = "\n"
+    for part in root:
+        part.tail = "\n"
+    path.write_bytes(document(root, encoding="utf-8"))
 
 
-def commonroad_elements(world: World, *, country: str = DEFAULT_COUNTRY) -> Iterable[Any]:
+def commonroad_elements(world: World, *, country: str = DEFAULT_COUNTRY) -> Iterator[Element]:
     """Yield the children of the root element in the format's order."""
-    ids = IdCounter()
-    borders = lane_borders(world)
-    lanes = {lane.id: ids.new() for lane in world.lanes}
-    lanes |= {c.id: ids.new() for c in world.connections if c.id in borders}
-    signs = traffic_signs(world, lanes, borders, country, ids)
-    lights = traffic_lights(world, lanes, TIME_STEP_S, ids)
+    ids = count(1)  # all kinds share one range
+    draft = _Lanelets(world, country, ids)
     yield _location(world)
     yield _tags(world)
-    draft = _Lanelets(world, lanes, borders)
     for lane in world.lanes:
-        yield draft.lane(lane, signs.of(lane.id), lights.of(lane.id))
+        yield draft.lane(lane)
     for connection in world.connections:
-        if connection.id in lanes:
-            yield draft.connection(connection, signs.of(connection.id))
+        if connection.id in draft.ids:
+            yield draft.connection(connection)
     for crossing in world.crossings:
-        yield _crosswalk(crossing, ids.new())
-    yield from signs.elements
-    yield from lights.elements
-    yield from intersections(world, lanes, ids)
+        yield _crosswalk(crossing, next(ids))
+    yield from draft.signs.elements
+    yield from draft.lights.elements
+    yield from intersections(world, draft.ids, ids)
     for building in world.buildings:
-        if building.min_height_m < PASSABLE_UNDER_M and _is_sound(building):
-            yield _obstacle(building, ids.new())
+        if building.min_height_m < HEADROOM_M and _is_sound(building):
+            # The outline of its ground: the format has no courtyards.
+            obstacle = element("environmentObstacle", id=next(ids))
+            child(obstacle, "type", "building")
+            points(child(child(obstacle, "shape"), "polygon"), building.outline)
+            yield obstacle
 
 
 class _Lanelets:
-    """Writes lanes and connections as lanelets."""
+    """Writes lanes and connections as lanelets, whose `ids` are by those of the World."""
 
-    def __init__(
-        self, world: World, ids: Mapping[str, int], borders: Mapping[str, Borders]
-    ) -> None:
-        self._ids = ids
-        self._borders = borders
-        self._roads: dict[str, Road] = {road.id: road for road in world.roads}
+    def __init__(self, world: World, country: str, ids: Iterator[int]) -> None:
+        borders = self._borders = lane_borders(world)
+        self.ids = {lane.id: next(ids) for lane in world.lanes}
+        self.ids |= {c.id: next(ids) for c in world.connections if c.id in borders}
+        self.signs = controls.traffic_signs(world, self.ids, borders, country, ids)
+        self.lights = controls.traffic_lights(world, self.ids, TIME_STEP_S, ids)
+        self._class_of = {road.id: road.road_class for road in world.roads}
         self._lanes = {lane.id: lane for lane in world.lanes}
-        self._markings = lane_markings(world, borders)
+        self._markings = lanelets.lane_markings(world, borders)
         self._stop_lines = {
             line.across_id: line for line in world.stop_lines if line.control.value != "none"
         }
-        self._before: dict[str, list[int]] = {}
-        self._after: dict[str, list[int]] = {}
+        self._before: dict[str, list[int]] = defaultdict(list)
+        self._after: dict[str, list[int]] = defaultdict(list)
         for lane in world.lanes:
             for name in lane.successor_ids:
                 if name in self._lanes:
                     self._join(lane.id, name)
         for c in world.connections:
-            if c.id in ids:
+            if c.id in self.ids:
                 self._join(c.from_lane_id, c.id)
                 self._join(c.id, c.to_lane_id)
 
     def _join(self, before: str, after: str) -> None:
-        self._after.setdefault(before, []).append(self._ids[after])
-        self._before.setdefault(after, []).append(self._ids[before])
+        self._after[before].append(self.ids[after])
+        self._before[after].append(self.ids[before])
 
-    def lane(self, lane: Lane, signs: Sequence[int], lights: Sequence[int]) -> Any:
+    def lane(self, lane: Lane) -> Element:
         """Return the lanelet of a lane."""
         left, right = self._markings[lane.id, "left"], self._markings[lane.id, "right"]
         lanelet = self._begun(lane.id, _line_marking(left), _line_marking(right))
-        for name, marking in (("adjacentLeft", left), ("adjacentRight", right)):
+        for tag, marking in (("adjacentLeft", left), ("adjacentRight", right)):
             if marking.beyond_id is not None:
-                ref(lanelet, name, self._ids[marking.beyond_id]).set(
-                    "drivingDir", "opposite" if marking.oncoming else "same"
-                )
-        self._stop_line(lanelet, lane.id, lights)
-        self._end(lanelet, self._types(lane), lane.kind, signs, lights)
-        return lanelet
+                way = "opposite" if marking.oncoming else "same"
+                child(lanelet, tag, ref=self.ids[marking.beyond_id], drivingDir=way)
+        return self._ended(lanelet, lane.id, self._types(lane), lane.kind)
 
-    def connection(self, connection: Connection, signs: Sequence[int]) -> Any:
+    def connection(self, connection: Connection) -> Element:
         """Return the lanelet of a connection; users are those of its narrower lane."""
-        kind_of = narrower_lane(connection, self._lanes)
-        lanelet = self._begun(connection.id, "no_marking", "no_marking")
-        self._stop_line(lanelet, connection.id, ())
-        types = self._types(kind_of)
+        lane = lanelets.narrower_lane(connection, self._lanes)
+        types = self._types(lane)
         if connection.junction_id:
             types.append("intersection")
-        self._end(lanelet, types, kind_of.kind, signs, ())
-        return lanelet
+        lanelet = self._begun(connection.id, "no_marking", "no_marking")
+        return self._ended(lanelet, connection.id, types, lane.kind)
 
-    def _begun(self, name: str, left: str, right: str) -> Any:
-        lanelet = etree.Element("lanelet", id=str(self._ids[name]))
-        borders = self._borders[name]
-        for tag, line, marking in (
-            ("leftBound", borders.left, left),
-            ("rightBound", borders.right, right),
-        ):
-            bound = child(lanelet, tag)
-            points(bound, line)
-            child(bound, "lineMarking", marking)
-        for other in self._before.get(name, ()):
-            ref(lanelet, "predecessor", other)
-        for other in self._after.get(name, ()):
-            ref(lanelet, "successor", other)
+    def _begun(self, name: str, left: str, right: str) -> Element:
+        lanelet = _bounded(self.ids[name], self._borders[name], left, right)
+        for tag, others in (("predecessor", self._before), ("successor", self._after)):
+            for other in others[name]:
+                child(lanelet, tag, ref=other)
         return lanelet
-
-    def _stop_line(self, lanelet: Any, name: str, lights: Sequence[int]) -> None:
-        line = self._stop_lines.get(name)
-        if line is None:
-            return
-        element = child(lanelet, "stopLine")
-        points(element, line.ends)
-        gives_way = line.control.value == "give_way"
-        child(element, "lineMarking", "broad_dashed" if gives_way else "broad_solid")
-        for light in lights if line.control.value == "signal" else ():
-            ref(element, "trafficLightRef", light)
 
     def _types(self, lane: Lane) -> list[str]:
-        road = self._roads.get(lane.road_id)
-        road_class = road.road_class.removesuffix("_link") if road is not None else ""
+        road_class = self._class_of.get(lane.road_id, "").removesuffix("_link")
         country = lane.speed_limit_mps.value > URBAN_MPS
         types = [_CLASS_TYPES.get(road_class, "country" if country else "urban")]
-        if lane.kind in _TYPES:
-            types.append(_TYPES[lane.kind])
-        return types
+        own, _ = _KINDS[lane.kind]
+        return [*types, own] if own else types
 
-    def _end(
-        self,
-        lanelet: Any,
-        types: Iterable[str],
-        kind: LaneKind,
-        signs: Sequence[int],
-        lights: Sequence[int],
-    ) -> None:
-        for name in types:
-            child(lanelet, "laneletType", name)
-        for user in _USERS[kind]:
-            child(lanelet, "userOneWay", user)
-        for sign in signs:
-            ref(lanelet, "trafficSignRef", sign)
+    def _ended(self, lanelet: Element, name: str, types: Sequence[str], kind: LaneKind) -> Element:
+        line, lights = self._stop_lines.get(name), self.lights.of(name)
+        _, users = _KINDS[kind]
+        if line is not None:
+            made = child(lanelet, "stopLine")
+            points(made, line.ends)
+            gives_way = line.control.value == "give_way"
+            child(made, "lineMarking", "broad_dashed" if gives_way else "broad_solid")
+            for light in lights if line.control.value == "signal" else ():
+                child(made, "trafficLightRef", ref=light)
+        leaves(lanelet, (("laneletType", word) for word in types))
+        leaves(lanelet, (("userOneWay", user) for user in users))
+        for sign in self.signs.of(name):
+            child(lanelet, "trafficSignRef", ref=sign)
         for light in lights:
-            ref(lanelet, "trafficLightRef", light)
+            child(lanelet, "trafficLightRef", ref=light)
+        return lanelet
+
+
+def _bounded(number: int, borders: Borders, left: str, right: str) -> Element:
+    """Return a lanelet with both bounds, marked as said."""
+    lanelet = element("lanelet", id=number)
+    for tag, line, marking in zip(("leftBound", "rightBound"), borders, (left, right), strict=True):
+        bound = child(lanelet, tag)
+        points(bound, line)
+        child(bound, "lineMarking", marking)
+    return lanelet
 
 
 def _line_marking(marking: Marking) -> str:
@@ -223,9 +199,9 @@ def _line_marking(marking: Marking) -> str:
     return f"broad_{marking.pattern}" if broad else marking.pattern
 
 
-def _location(world: World) -> Any:
+def _location(world: World) -> Element:
     origin = world.frame.origin
-    location = etree.Element("location")
+    location = element("location")
     child(location, "geoNameId", UNKNOWN_GEONAME)
     child(location, "gpsLatitude", f"{origin.lat_deg:.9f}")
     child(location, "gpsLongitude", f"{origin.lon_deg:.9f}")
@@ -236,46 +212,28 @@ def _location(world: World) -> Any:
         f"+proj=tmerc +lat_0={origin.lat_deg:.11f} +lon_0={origin.lon_deg:.11f} +k=1 +x_0=0 "
         "+y_0=0 +ellps=WGS84 +units=m +no_defs",
     )
-    moved = child(transformation, "additionalTransformation")
-    for name, value in (("xTranslation", 0), ("yTranslation", 0), ("zRotation", 0), ("scaling", 1)):
-        child(moved, name, value)
+    moved = {"xTranslation": "0", "yTranslation": "0", "zRotation": "0", "scaling": "1"}
+    leaves(child(transformation, "additionalTransformation"), moved)
     return location
 
 
-def _tags(world: World) -> Any:
-    tags = etree.Element("scenarioTags")
+def _tags(world: World) -> Element:
+    tags = element("scenarioTags")
     kinds = {world.intersection.kind, *(j.summary.kind for j in world.junctions)}
-    urban = (
-        not world.lanes
-        or np.median([lane.speed_limit_mps.value for lane in world.lanes]) <= URBAN_MPS
-    )
-    child(tags, "urban" if urban else "rural")
+    limits_mps = [lane.speed_limit_mps.value for lane in world.lanes]
+    child(tags, "urban" if not limits_mps or np.median(limits_mps) <= URBAN_MPS else "rural")
     child(tags, "intersection")
     if kinds & {"roundabout", "circular", "mini_roundabout"}:
         child(tags, "roundabout")
     return tags
 
 
-def _crosswalk(crossing: Crossing, number: int) -> Any:
-    lanelet = etree.Element("lanelet", id=str(number))
-    marked = "dashed" if is_marked(crossing) else "no_marking"
-    for tag, edge in zip(("leftBound", "rightBound"), crosswalk_edges(crossing), strict=True):
-        bound = child(lanelet, tag)
-        points(bound, edge)
-        child(bound, "lineMarking", marked)
-    child(lanelet, "laneletType", "crosswalk")
-    child(lanelet, "userBidirectional", "pedestrian")
+def _crosswalk(crossing: Crossing, number: int) -> Element:
+    marked = "dashed" if lanelets.is_marked(crossing) else "no_marking"
+    lanelet = _bounded(number, lanelets.crosswalk_edges(crossing), marked, marked)
+    leaves(lanelet, {"laneletType": "crosswalk", "userBidirectional": "pedestrian"})
     return lanelet
 
 
 def _is_sound(building: Building) -> bool:
-    outline: Array = building.outline
-    return len(outline) >= 3 and bool(Polygon(outline).is_valid)
-
-
-def _obstacle(building: Building, number: int) -> Any:
-    """Return a building as the outline of its ground: the format knows no courtyards."""
-    obstacle = etree.Element("environmentObstacle", id=str(number))
-    child(obstacle, "type", "building")
-    points(child(child(obstacle, "shape"), "polygon"), building.outline)
-    return obstacle
+    return len(building.outline) >= 3 and bool(Polygon(building.outline).is_valid)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from foretwin.contracts.vehicle import VehicleParameters
@@ -22,22 +23,28 @@ class ExportOptions:
     vehicle: VehicleParameters | None = None
 
 
+Writer = Callable[[World, Path, ExportOptions], None]
+
+
 @dataclass(frozen=True, slots=True)
 class Format:
     """A format: how its files end, and what writes them."""
 
     name: str
     suffix: str
-    write: Callable[[World, Path, ExportOptions], None]
-    told_by_suffix: bool = False
+    write: Writer
+    decided_by_suffix: bool = False
     """Whether the writer goes by the file's suffix."""
 
 
 # Writers are imported when they are used: each needs libraries that the others do not.
-def _mjcf(world: World, path: Path, _: ExportOptions) -> None:
-    from foretwin.world_gen.export.mjcf import write_mjcf
+def _plain(module: str, name: str) -> Writer:
+    """Return the writer `name` of a module of this package, which has no options."""
 
-    write_mjcf(world, path)
+    def write(world: World, path: Path, _: ExportOptions) -> None:
+        getattr(import_module(f"foretwin.world_gen.export.{module}"), name)(world, path)
+
+    return write
 
 
 def _sdf(world: World, path: Path, options: ExportOptions) -> None:
@@ -54,41 +61,17 @@ def _opendrive(world: World, path: Path, options: ExportOptions) -> None:
     write_opendrive(world, path, version=options.opendrive_version)
 
 
-def _lanelet2(world: World, path: Path, _: ExportOptions) -> None:
-    from foretwin.world_gen.export.lanelet2 import write_lanelet2
-
-    write_lanelet2(world, path)
-
-
-def _commonroad(world: World, path: Path, _: ExportOptions) -> None:
-    from foretwin.world_gen.export.commonroad import write_commonroad
-
-    write_commonroad(world, path)
-
-
-def _geojson(world: World, path: Path, _: ExportOptions) -> None:
-    from foretwin.world_gen.export.geojson import write_geojson
-
-    write_geojson(world, path)
-
-
-def _picture(world: World, path: Path, _: ExportOptions) -> None:
-    from foretwin.world_gen.export.picture import write_picture
-
-    write_picture(world, path)
-
-
 FORMATS: dict[str, Format] = {
     format_.name: format_
     for format_ in (
-        Format("mjcf", ".xml", _mjcf),
+        Format("mjcf", ".xml", _plain("mjcf", "write_mjcf")),
         Format("sdf", ".sdf", _sdf),
         Format("opendrive", ".xodr", _opendrive),
-        Format("lanelet2", ".osm", _lanelet2),
-        Format("commonroad", ".xml", _commonroad),
-        Format("geojson", ".geojson", _geojson),
-        Format("svg", ".svg", _picture, True),
-        Format("png", ".png", _picture, True),
+        Format("lanelet2", ".osm", _plain("lanelet2", "write_lanelet2")),
+        Format("commonroad", ".xml", _plain("commonroad", "write_commonroad")),
+        Format("geojson", ".geojson", _plain("geojson", "write_geojson")),
+        Format("svg", ".svg", _plain("picture", "write_picture"), True),
+        Format("png", ".png", _plain("picture", "write_picture"), True),
     )
 }
 DEFAULT_FORMAT = "mjcf"

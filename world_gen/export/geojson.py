@@ -31,8 +31,25 @@ FIELDS = {
     "signal": "osm_node group_id lane_ids",
     "conflict": "first_id second_id kind:conflict_kind yields_id rule source",
     "building": "height_m min_height_m",
+    "road_surface": "source",
+    "sidewalk": "source",
+    "island": "source",
 }
 """The fields of each kind of thing, in the order of the file; after a colon its name there."""
+_LINES = {
+    "road": ("roads", "reference_line"),
+    "lane": ("lanes", "centerline"),
+    "connection": ("connections", "centerline"),
+    "stop_line": ("stop_lines", "ends"),
+    "crossing": ("crossings", "line"),
+}
+"""Where a World has what is written as lines, and which line."""
+_AREAS = {
+    "road_surface": "road_surface",
+    "sidewalk": "sidewalks",
+    "island": "islands",
+    "building": "buildings",
+}
 
 Shape = Literal["Point", "LineString", "Polygon"]
 Json = dict[str, Any]
@@ -54,7 +71,7 @@ def write_geojson(world: World, path: Path) -> None:
 
     Lengths are metres, angles radians counter-clockwise from east, speeds m/s. A value `x` of the
     map has its source (tagged, inferred or default) in `x_source`. What crosses the antimeridian
-    is cut there, as RFC 7946 asks for.
+    is cut there, as RFC 7946 recommends.
     """
     path.write_bytes(msgspec.json.encode(geojson_of(world)))
 
@@ -64,17 +81,15 @@ def geojson_of(world: World) -> Json:
     drafts = list(_drafts(world))
     rings = [ring for draft in drafts for ring in draft.rings]
     lon_lat = iter(_lon_lat(world.frame, rings))
-    features = []
-    for draft in drafts:
-        geometry = _geometry(draft.shape, [next(lon_lat) for _ in draft.rings])
-        features.append(
-            {
-                "type": "Feature",
-                "id": f"{draft.kind}:{draft.id}",
-                "geometry": geometry,
-                "properties": {"kind": draft.kind, "id": draft.id, **draft.properties},
-            }
-        )
+    features = [
+        {
+            "type": "Feature",
+            "id": f"{draft.kind}:{draft.id}",
+            "geometry": _geometry(draft.shape, [next(lon_lat) for _ in draft.rings]),
+            "properties": {"kind": draft.kind, "id": draft.id, **draft.properties},
+        }
+        for draft in drafts
+    ]
     origin = world.frame.origin
     return {
         "type": "FeatureCollection",
@@ -93,18 +108,15 @@ def geojson_of(world: World) -> Json:
 
 def _drafts(world: World) -> Iterable[_FeatureDraft]:
     yield from _junctions(world)
-    yield from _ways(world)
-    yield from _control(world)
-    for kind, areas in (
-        ("road_surface", world.road_surface),
-        ("sidewalk", world.sidewalks),
-        ("island", world.islands),
-    ):
-        for area in areas:
-            yield _polygon(kind, area.id, area.outline, area.holes, {"source": area.source})
-    for building in world.buildings:
-        properties = _properties("building", building)
-        yield _polygon("building", building.id, building.outline, building.holes, properties)
+    for kind, (parts, line) in _LINES.items():
+        for part in getattr(world, parts):
+            points, properties = getattr(part, line), _properties(kind, part)
+            yield _FeatureDraft(kind, part.id, "LineString", (points,), properties)
+    yield from _signals_and_conflicts(world)
+    for kind, parts in _AREAS.items():
+        for area in getattr(world, parts):
+            rings = _closed(area.outline, area.holes)
+            yield _FeatureDraft(kind, area.id, "Polygon", rings, _properties(kind, area))
 
 
 def _junctions(world: World) -> Iterable[_FeatureDraft]:
@@ -117,29 +129,16 @@ def _junctions(world: World) -> Iterable[_FeatureDraft]:
             "signal_plan": msgspec.to_builtins(junction.plan),
         }
         if junction.area is None:
-            at = _local_point(world.frame, junction.summary.lat, junction.summary.lon)
-            yield _FeatureDraft("junction", junction.summary.id, "Point", (at,), properties)
+            lat, lon = np.array([junction.summary.lat]), np.array([junction.summary.lon])
+            at = (local_from_geo(world.frame, lat, lon),)
+            yield _FeatureDraft("junction", junction.summary.id, "Point", at, properties)
         else:
-            area = junction.area
-            properties["area_source"] = area.source
-            yield _polygon("junction", junction.summary.id, area.outline, area.holes, properties)
+            properties["area_source"] = junction.area.source
+            rings = _closed(junction.area.outline, junction.area.holes)
+            yield _FeatureDraft("junction", junction.summary.id, "Polygon", rings, properties)
 
 
-def _ways(world: World) -> Iterable[_FeatureDraft]:
-    for road in world.roads:
-        yield _line("road", road.id, road.reference_line, _properties("road", road))
-    for lane in world.lanes:
-        yield _line("lane", lane.id, lane.centerline, _properties("lane", lane))
-    for connection in world.connections:
-        properties = _properties("connection", connection)
-        yield _line("connection", connection.id, connection.centerline, properties)
-
-
-def _control(world: World) -> Iterable[_FeatureDraft]:
-    for line in world.stop_lines:
-        yield _line("stop_line", line.id, line.ends, _properties("stop_line", line))
-    for crossing in world.crossings:
-        yield _line("crossing", crossing.id, crossing.line, _properties("crossing", crossing))
+def _signals_and_conflicts(world: World) -> Iterable[_FeatureDraft]:
     for signal in world.signals:
         properties = {
             **_properties("signal", signal),
@@ -152,7 +151,8 @@ def _control(world: World) -> Iterable[_FeatureDraft]:
         properties = _properties("conflict", conflict)
         name = f"{conflict.first_id}|{conflict.second_id}"
         if len(conflict.area) >= 3 and abs(_doubled_area(conflict.area)) > 1e-4:
-            yield _polygon("conflict", name, conflict.area, (), properties)
+            rings = _closed(conflict.area, ())
+            yield _FeatureDraft("conflict", name, "Polygon", rings, properties)
         else:
             yield _FeatureDraft("conflict", name, "Point", (conflict.point[None, :],), properties)
 
@@ -170,17 +170,10 @@ def _properties(kind: str, part: object) -> Json:
     return found
 
 
-def _line(kind: str, name: str, points: Array, properties: Json) -> _FeatureDraft:
-    return _FeatureDraft(kind, name, "LineString", (points,), properties)
-
-
-def _polygon(
-    kind: str, name: str, outline: Array, holes: Sequence[Array], properties: Json
-) -> _FeatureDraft:
+def _closed(outline: Array, holes: Sequence[Array]) -> tuple[Array, ...]:
     """Close the rings, counter-clockwise outside and clockwise inside (RFC 7946, section 3.1.6)."""
     rings = [_turned(outline, 1.0), *(_turned(hole, -1.0) for hole in holes)]
-    closed = tuple(np.concatenate([ring, ring[:1]]) for ring in rings)
-    return _FeatureDraft(kind, name, "Polygon", closed, properties)
+    return tuple(np.concatenate([ring, ring[:1]]) for ring in rings)
 
 
 def _turned(ring: Array, sign: float) -> Array:
@@ -190,10 +183,6 @@ def _turned(ring: Array, sign: float) -> Array:
 def _doubled_area(ring: Array) -> float:
     ahead = np.roll(ring, -1, axis=0)
     return float((ring[:, 0] * ahead[:, 1] - ahead[:, 0] * ring[:, 1]).sum())
-
-
-def _local_point(frame: LocalFrame, lat: float, lon: float) -> Array:
-    return local_from_geo(frame, np.array([lat]), np.array([lon]))
 
 
 def _lon_lat(frame: LocalFrame, rings: Sequence[Array]) -> list[Array]:
@@ -212,11 +201,10 @@ def _geometry(shape: Shape, rings: list[Array]) -> Json:
     east = max(float(ring[:, 0].max()) for ring in rings)
     if west < -180.0 or east > 180.0:
         return _cut(shape, rings)
-    if shape == "Point":
-        return {"type": shape, "coordinates": rings[0][0].tolist()}
-    if shape == "LineString":
-        return {"type": shape, "coordinates": rings[0].tolist()}
-    return {"type": shape, "coordinates": [ring.tolist() for ring in rings]}
+    if shape == "Polygon":
+        return {"type": shape, "coordinates": [ring.tolist() for ring in rings]}
+    (line,) = rings
+    return {"type": shape, "coordinates": (line[0] if shape == "Point" else line).tolist()}
 
 
 def _cut(shape: Shape, rings: list[Array]) -> Json:

@@ -16,7 +16,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Connection, Lane, World
-from foretwin.geometry.polyline import arc_lengths, left_of, unit
+from foretwin.geometry.polyline import apart, arc_lengths, left_of, unit
 from foretwin.world_gen.export.parallels import filled, parallel, untangled
 
 BLEND_M = 10.0
@@ -52,17 +52,13 @@ def lane_borders(world: World) -> dict[str, Borders]:
     """Return the borders of every lane and connection of a World by its id."""
     lanes = {lane.id: lane for lane in world.lanes}
     roads = _roads(world, lanes)
-    beyond = _directions_beyond(lanes, roads)
-    drawn = {
-        name: parallel(
-            road.line,
-            np.array(road.offsets_m),
-            before=beyond.get((name, 0)),
-            after=beyond.get((name, 1)),
-        )
-        for name, road in roads.items()
-    }
-    _join_ends(lanes, roads, drawn)
+    joints = _joints(lanes, roads)
+    beyond = _directions_beyond(joints, roads)
+    drawn = {}
+    for name, road in roads.items():
+        before, after = beyond.get((name, 0)), beyond.get((name, 1))
+        drawn[name] = parallel(road.line, np.array(road.offsets_m), before=before, after=after)
+    _join_ends(joints, roads, drawn)
     found: dict[str, Borders] = {}
     for name, road in roads.items():
         lines = np.round(drawn[name], 3)
@@ -93,8 +89,7 @@ def _roads(world: World, lanes: Mapping[str, Lane]) -> dict[str, _RoadDraft]:
 
 def _distinct(line: Array) -> Array:
     """Return a line (N, 2) without points that coincide with the one before; its ends stay."""
-    steps = np.hypot(*np.diff(line, axis=0).T)
-    kept: Array = line[np.concatenate([[True], steps > _COINCIDENT_M])]
+    kept: Array = line[apart(line, tolerance_m=_COINCIDENT_M)]
     kept[-1] = line[-1]
     return kept if len(kept) > 1 else line[[0, -1]]
 
@@ -111,54 +106,64 @@ def _road(line: Array, lanes: Sequence[Lane]) -> _RoadDraft:
             offsets.append(left)
         offsets.append(right)
         outer = len(offsets) - 2
-        sides[lane.id] = (
-            _BorderIndices(outer + 1, outer) if lane.reverse else _BorderIndices(outer, outer + 1)
-        )
+        sides[lane.id] = _BorderIndices(outer, outer + 1)
+        if lane.reverse:
+            sides[lane.id] = _BorderIndices(outer + 1, outer)
     return _RoadDraft(line, offsets, sides)
 
 
-def _road_of(roads: Mapping[str, _RoadDraft]) -> dict[str, str]:
-    return {lane_id: name for name, road in roads.items() for lane_id in road.sides}
+class _LaneEnd(NamedTuple):
+    """A lane's last point or first one: of which road, and at which of its ends."""
+
+    lane: Lane
+    road: str
+    end: int
+
+    def outgoing(self, roads: Mapping[str, _RoadDraft]) -> Array:
+        """Return the direction (2,) of the road's line here, pointing out of the road."""
+        line = roads[self.road].line
+        return unit(line[-1] - line[-2] if self.end else line[0] - line[1])
+
+
+_Joint = tuple[_LaneEnd, _LaneEnd]
+
+
+def _joints(lanes: Mapping[str, Lane], roads: Mapping[str, _RoadDraft]) -> list[_Joint]:
+    """Return where lanes lead straight into others."""
+    road_of = {lane_id: name for name, road in roads.items() for lane_id in road.sides}
+
+    def end_of(lane: Lane, *, first: bool) -> _LaneEnd:
+        return _LaneEnd(lane, road_of[lane.id], 1 if first == lane.reverse else 0)
+
+    pairs = ((lane, name) for lane in lanes.values() for name in lane.successor_ids)
+    known = ((lane, lanes[name]) for lane, name in pairs if name in lanes)
+    return [(end_of(lane, first=False), end_of(after, first=True)) for lane, after in known]
 
 
 def _directions_beyond(
-    lanes: Mapping[str, Lane], roads: Mapping[str, _RoadDraft]
+    joints: Sequence[_Joint], roads: Mapping[str, _RoadDraft]
 ) -> dict[tuple[str, int], Array]:
     """Return, where lanes lead straight into others, the road's direction beyond its end.
 
     By (road, end), as a unit vector (2,) along that road's own reference line.
     """
-    road_of = _road_of(roads)
     found: dict[tuple[str, int], Array] = {}
-    for lane in lanes.values():
-        for follower in (lanes[name] for name in lane.successor_ids if name in lanes):
-            here, there = road_of[lane.id], road_of[follower.id]
-            leaving = _heading(roads[here].line, first=False, reverse=lane.reverse)
-            entering = _heading(roads[there].line, first=True, reverse=follower.reverse)
-            found[here, 0 if lane.reverse else 1] = -entering if lane.reverse else entering
-            found[there, 1 if follower.reverse else 0] = -leaving if follower.reverse else leaving
+    for pair in joints:
+        for here, there in (pair, pair[::-1]):
+            inward = -there.outgoing(roads)
+            found[here.road, here.end] = inward if here.end else -inward
     return found
 
 
-def _heading(line: Array, *, first: bool, reverse: bool) -> Array:
-    """Return the driving direction where a lane of the road begins, or where it ends."""
-    step = line[1] - line[0] if first != reverse else line[-1] - line[-2]
-    return unit(-step if reverse else step)
-
-
 def _join_ends(
-    lanes: Mapping[str, Lane], roads: Mapping[str, _RoadDraft], drawn: dict[str, Array]
+    joints: Sequence[_Joint], roads: Mapping[str, _RoadDraft], drawn: dict[str, Array]
 ) -> None:
     """Draw the ends of borders together where a lane leads straight into another."""
-    road_of = _road_of(roads)
     groups = _Groups()
-    for lane in lanes.values():
-        for follower in (lanes[name] for name in lane.successor_ids if name in lanes):
-            here, there = road_of[lane.id], road_of[follower.id]
-            end, start = 0 if lane.reverse else 1, 1 if follower.reverse else 0
-            mine, its = roads[here].sides[lane.id], roads[there].sides[follower.id]
-            groups.join((here, mine.left, end), (there, its.left, start))
-            groups.join((here, mine.right, end), (there, its.right, start))
+    for here, there in joints:
+        mine, its = roads[here.road].sides[here.lane.id], roads[there.road].sides[there.lane.id]
+        groups.join((here.road, mine.left, here.end), (there.road, its.left, there.end))
+        groups.join((here.road, mine.right, here.end), (there.road, its.right, there.end))
     for members in groups.found():
         ends = np.array([drawn[road][border, -end] for road, border, end in members])
         meeting = ends.mean(axis=0)

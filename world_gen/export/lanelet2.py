@@ -1,7 +1,7 @@
 """A World as a Lanelet2 map in OSM XML, as the Lanelet2 library and Autoware read it.
 
 Nodes carry latitude and longitude and, for readers that want metres, `local_x` and `local_y` in
-the World's frame; `ele` is the height above the World's plane. A file beside the map tells
+the World's frame; `ele` is the height above the World's plane. A file beside the map gives
 Autoware the projection: transverse Mercator of scale 1 about the World's origin, as the World's
 own frame.
 """
@@ -11,37 +11,32 @@ from __future__ import annotations
 from pathlib import Path
 
 from foretwin.contracts.world import Connection, Crossing, Lane, LaneKind, World
+from foretwin.world_gen.export import lanelets
 from foretwin.world_gen.export.lane_borders import Borders, lane_borders
-from foretwin.world_gen.export.lane_markings import SIDES, lane_markings
-from foretwin.world_gen.export.lanelet2_markings import VIRTUAL, border_tags
 from foretwin.world_gen.export.lanelet2_orientation import oriented
 from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
-from foretwin.world_gen.export.lanelet2_rules import LaneletRules, add_rules
+from foretwin.world_gen.export.lanelet2_rules import add_rules
 from foretwin.world_gen.export.lanelet2_surroundings import add_intersection_areas, add_surroundings
-from foretwin.world_gen.export.lanelets import (
-    URBAN_MPS,
-    crosswalk_edges,
-    indicated,
-    is_marked,
-    narrower_lane,
-)
+from foretwin.world_gen.export.lanelets import SIDES, URBAN_MPS, Marking
 from foretwin.world_gen.export.road_heights import RoadHeights
 
 AUTOWARE_MAP_NAME = "lanelet2_map.osm"
 """A map of this name gets the projector file under the name that Autoware looks for beside it."""
-_SUBTYPES: dict[LaneKind, str] = {
-    "driving": "road",
-    "bus": "bus_lane",
-    "bicycle": "bicycle_lane",
-    "parking": "parking",
-    "tram": "rail",
+_KINDS: dict[LaneKind, tuple[str, tuple[str, ...]]] = {
+    "driving": ("road", ("vehicle",)),
+    "bus": ("bus_lane", ("vehicle:bus", "vehicle:emergency", "vehicle:taxi")),
+    "bicycle": ("bicycle_lane", ("bicycle",)),
+    "parking": ("parking", ()),
+    "tram": ("rail", ("train",)),
 }
-_PARTICIPANTS: dict[LaneKind, tuple[str, ...]] = {
-    "driving": ("vehicle",),
-    "bus": ("vehicle:bus", "vehicle:emergency", "vehicle:taxi"),
-    "bicycle": ("bicycle",),
-    "parking": (),
-    "tram": ("train",),
+"""Subtype and participants of lanes by kind."""
+VIRTUAL: Tags = {"type": "virtual"}
+_BORDER_TYPES = {
+    "thin": "line_thin",
+    "thick": "line_thick",
+    "kerb": "curbstone",
+    "edge": "road_border",
+    "none": "virtual",
 }
 
 
@@ -49,7 +44,7 @@ def write_lanelet2(world: World, path: Path, *, crosswalk_rules: bool = False) -
     """Write the World as a Lanelet2 map; return the path of Autoware's projector file beside it.
 
     That is `map_projector_info.yaml` beside a `lanelet2_map.osm`, else it is named as the map is.
-    `crosswalk_rules` adds the regulatory elements of subtype `crosswalk` that Autoware knows and
+    `crosswalk_rules` adds the regulatory elements of subtype `crosswalk` that Autoware supports and
     the Lanelet2 library alone refuses. Raises OSError where a file cannot be written.
     """
     drawn = lanelet2_map(world, crosswalk_rules=crosswalk_rules)
@@ -71,28 +66,18 @@ def lanelet2_map(world: World, *, crosswalk_rules: bool = False) -> Lanelet2Map:
     rules = add_rules(world, ids, crosswalks if crosswalk_rules else {}, drawn)
     areas = add_intersection_areas(world, drawn)
     lanes = {lane.id: lane for lane in world.lanes}
-    for lane in world.lanes:
-        _add_lanelet(lane.id, _lane_tags(lane), members, ids, rules, drawn)
+    tags = {lane.id: _lane_tags(lane) for lane in world.lanes}
     for connection in world.connections:
         if connection.id in members:
-            tags = _connection_tags(connection, lanes, world)
+            tags[connection.id] = _connection_tags(connection, lanes, world)
             if connection.junction_id in areas:
-                tags["intersection_area"] = str(areas[connection.junction_id])
-            _add_lanelet(connection.id, tags, members, ids, rules, drawn)
+                tags[connection.id]["intersection_area"] = str(areas[connection.junction_id])
+    for name, about in tags.items():
+        mine = rules.get(name, ())
+        named = [RelationMember("relation", rule, "regulatory_element") for rule in mine]
+        drawn.relation([*members[name], *named], about, number=ids[name])
     add_surroundings(world, drawn)
     return drawn
-
-
-def _add_lanelet(
-    name: str,
-    tags: Tags,
-    members: dict[str, list[RelationMember]],
-    ids: dict[str, int],
-    rules: LaneletRules,
-    drawn: Lanelet2Map,
-) -> None:
-    mine = [RelationMember("relation", rule, "regulatory_element") for rule in rules.of(name)]
-    drawn.relation([*members[name], *mine], tags, number=ids[name])
 
 
 def _lane_members(
@@ -105,14 +90,29 @@ def _lane_members(
         )
         for lane in world.lanes
     }
-    markings = lane_markings(world, borders)
-    found: dict[str, list[RelationMember]] = {}
-    for lane in world.lanes:
-        found[lane.id] = [
-            RelationMember("way", drawn.road_way(line, border_tags(markings[lane.id, side])), side)
-            for side, line in zip(SIDES, nodes[lane.id], strict=True)
+    markings = lanelets.lane_markings(world, borders)
+    return {
+        name: [
+            RelationMember("way", drawn.road_way(line, border_tags(markings[name, side])), side)
+            for side, line in zip(SIDES, lines, strict=True)
         ]
-    return found
+        for name, lines in nodes.items()
+    }
+
+
+def border_tags(marking: Marking) -> dict[str, str]:
+    """Return the tags of a border drawn in driving direction: Lanelet2 infers lane changes."""
+    tags = {"type": _BORDER_TYPES[marking.paint]}
+    if marking.paint == "kerb":
+        tags["subtype"] = "high"
+    if marking.pattern:
+        tags["subtype"] = marking.pattern
+    if marking.oncoming or marking.pattern == "solid":
+        # One may overtake over a dashed middle line, but no one changes lanes over it.
+        tags["lane_change"] = "no"
+    elif marking.pattern == "dashed":
+        tags["lane_change"] = "yes"
+    return tags
 
 
 def _connection_members(
@@ -120,33 +120,26 @@ def _connection_members(
 ) -> dict[str, list[RelationMember]]:
     found: dict[str, list[RelationMember]] = {}
     for connection in world.connections:
-        if connection.id not in borders:
-            continue
-        lines = zip(SIDES, oriented(borders[connection.id]), strict=True)
-        found[connection.id] = [
-            RelationMember(
-                "way",
-                drawn.road_way(
-                    drawn.road_nodes(line, heights.along(line, connection.layer)), VIRTUAL
-                ),
-                side,
-            )
-            for side, line in lines
-        ]
+        if connection.id in borders:
+            members = found[connection.id] = []
+            for side, line in zip(SIDES, oriented(borders[connection.id]), strict=True):
+                nodes = drawn.road_nodes(line, heights.along(line, connection.layer))
+                members.append(RelationMember("way", drawn.road_way(nodes, VIRTUAL), side))
     return found
 
 
 def _lane_tags(lane: Lane) -> dict[str, str]:
     urban = lane.speed_limit_mps.value <= URBAN_MPS
+    subtype, participants = _KINDS[lane.kind]
     tags = {
         "type": "lanelet",
-        "subtype": _SUBTYPES[lane.kind],
+        "subtype": subtype,
         "location": "urban" if urban else "nonurban",
         "one_way": "yes",
         "foretwin:id": lane.id,
         "foretwin:width": f"{lane.width_m.value:.2f} {lane.width_m.source}",
     }
-    tags |= {f"participant:{who}": "yes" for who in _PARTICIPANTS[lane.kind]}
+    tags |= {f"participant:{kind}": "yes" for kind in participants}
     if lane.kind == "driving" and urban:
         tags["participant:bicycle"] = "yes"
     if lane.kind in ("driving", "bus"):
@@ -162,7 +155,7 @@ def _connection_tags(
 ) -> dict[str, str]:
     """Return the tags of the narrower of both lanes, with the turn where it is a junction's."""
     start, end = lanes[connection.from_lane_id], lanes[connection.to_lane_id]
-    tags = _lane_tags(narrower_lane(connection, lanes))
+    tags = _lane_tags(lanelets.narrower_lane(connection, lanes))
     tags["foretwin:id"] = connection.id
     tags["foretwin:width"] = f"{connection.width_m.value:.2f} {connection.width_m.source}"
     if "speed_limit" in tags:
@@ -171,7 +164,9 @@ def _connection_tags(
         tags["foretwin:speed_limit"] = slower.source
     tags.pop("road_name", None)
     if connection.junction_id:
-        tags["turn_direction"] = indicated(connection.turn, world.intersection.driving_side)
+        tags["turn_direction"] = lanelets.indicated(
+            connection.turn, world.intersection.driving_side
+        )
     return tags
 
 
@@ -179,23 +174,22 @@ def _crosswalk(crossing: Crossing, drawn: Lanelet2Map) -> int:
     """Draw the lanelet over which pedestrians cross and return its id."""
     paint = {"type": "zebra_marking" if crossing.kind.value == "zebra" else "pedestrian_marking"}
     sides = []
-    for name, edge in zip(SIDES, crosswalk_edges(crossing), strict=True):
-        nodes = tuple(drawn.node(x, y, 0.0) for x, y in edge.tolist())
-        way = drawn.way(nodes, paint if is_marked(crossing) else VIRTUAL)
+    for name, edge in zip(SIDES, lanelets.crosswalk_edges(crossing), strict=True):
+        way = drawn.way(
+            drawn.ground_nodes(edge), paint if lanelets.is_marked(crossing) else VIRTUAL
+        )
         sides.append(RelationMember("way", way, name))
-    return drawn.relation(
-        sides,
-        {
-            "type": "lanelet",
-            "subtype": "crosswalk",
-            "location": "urban",
-            "one_way": "no",
-            "participant:pedestrian": "yes",
-            "speed_limit": "10",
-            "foretwin:id": crossing.id,
-            "foretwin:kind": f"{crossing.kind.value} {crossing.kind.source}",
-        },
-    )
+    tags = {
+        "type": "lanelet",
+        "subtype": "crosswalk",
+        "location": "urban",
+        "one_way": "no",
+        "participant:pedestrian": "yes",
+        "speed_limit": "10",
+        "foretwin:id": crossing.id,
+        "foretwin:kind": f"{crossing.kind.value} {crossing.kind.source}",
+    }
+    return drawn.relation(sides, tags)
 
 
 def _projector_path(path: Path) -> Path:

@@ -10,19 +10,20 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import arc_lengths, left_of, points_at, unit
+from foretwin.geometry.polyline import arc_lengths, left_of, points_at, unit, without_repeats
 from foretwin.world_gen.export.lane_borders import Borders
 from foretwin.world_gen.export.parallels import filled
 
 _SHARES = (0.35, 0.65, 0.2, 0.8, 0.1, 0.9, 0.04, 0.96)
 """Where else on a line its middle point may lie, as shares of its length."""
+_COINCIDENT_M = 5e-4
 _SWING_M = 3.0
 """How far a line swings out where the map turns a lane around on the spot."""
 
 
 def read_as_drawn(borders: Borders) -> bool:
     """Return whether Lanelet2 takes both ways in the direction in which they are drawn."""
-    left, right = _distinct(borders.left), _distinct(borders.right)
+    left, right = (without_repeats(line, tolerance_m=_COINCIDENT_M) for line in borders)
     if len(left) > 1 and _is_left(left, _middle(right)):
         return False
     return len(right) < 2 or _is_left(right, _middle(left))
@@ -77,11 +78,6 @@ def _with_middle(line: Array, share: float) -> Array:
     halves = filled(before, count)[:-1], filled(after, count)
     joined: Array = np.concatenate(halves)
     return np.round(joined, 3)
-
-
-def _distinct(line: Array) -> Array:
-    kept: Array = line[np.concatenate([[True], np.hypot(*np.diff(line, axis=0).T) > 5e-4])]
-    return kept
 
 
 def _is_left(line: Array, point: Array) -> bool:

@@ -12,30 +12,25 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
 from foretwin.contracts.world import ATTRIBUTION, World
-from foretwin.world_gen.export.xml_text import in_comment, legal
+from foretwin.world_gen.export.xml_tree import in_comment, legal
 
 Tags = Mapping[str, str]
+MemberKind = Literal["way", "relation"]
 LICENSE_URL = "https://opendatacommons.org/licenses/odbl/1-0/"
 
 
 class RelationMember(NamedTuple):
     """One member of a relation."""
 
-    kind: Literal["way", "relation"]
+    kind: MemberKind
     ref: int
     role: str
-
-
-class _Relation(NamedTuple):
-    id: int
-    members: Sequence[RelationMember]
-    tags: Tags
 
 
 class Lanelet2Map:
     """A map while it is drawn; ids count up from 1 and are unique over all kinds.
 
-    Lanelet2 knows by a shared node that lanelets follow each other, and by a shared way that
+    Lanelet2 sees by a shared node that lanelets follow each other, and by a shared way that
     they lie side by side: points of roads with the same coordinates are one node here, and
     lines over the same nodes one way, whichever way they run.
     """
@@ -48,7 +43,7 @@ class Lanelet2Map:
         self._node_at: dict[tuple[int, int], int] = {}
         self._way_over: dict[tuple[int, ...], int] = {}
         self._ways: list[tuple[int, tuple[int, ...], Tags]] = []
-        self._relations: list[_Relation] = []
+        self._relations: list[tuple[int, Sequence[RelationMember], Tags]] = []
 
     def new_id(self) -> int:
         """Return an id for a relation that others name before it is drawn."""
@@ -63,6 +58,10 @@ class Lanelet2Map:
         if tags:
             self._node_tags[node] = tags
         return node
+
+    def ground_nodes(self, points: Array) -> tuple[int, ...]:
+        """Add nodes of their own at points (N, 2) on the World's plane."""
+        return tuple(self.node(x, y, 0.0) for x, y in points.tolist())
 
     def road_nodes(self, line: Array, z_m: Array) -> tuple[int, ...]:
         """Return the nodes of a line (N, 2) at heights (N,), shared where coordinates are equal."""
@@ -94,7 +93,7 @@ class Lanelet2Map:
     ) -> int:
         """Add a relation, under an id from `new_id` where one is given."""
         number = self.new_id() if number is None else number
-        self._relations.append(_Relation(number, members, tags))
+        self._relations.append((number, members, tags))
         return number
 
     def write(self, world: World, path: Path) -> None:
@@ -112,12 +111,11 @@ class Lanelet2Map:
             for way, nodes, tags in self._ways:
                 refs = "".join([f'<nd ref="{node}"/>' for node in nodes])
                 file.write(_line("way", way, refs + _tags(tags)))
-            for relation in self._relations:
-                members = "".join(
-                    f'<member type="{m.kind}" ref="{m.ref}" role="{m.role}"/>'
-                    for m in relation.members
+            for relation, members, tags in self._relations:
+                listed = "".join(
+                    f'<member type="{m.kind}" ref="{m.ref}" role="{m.role}"/>' for m in members
                 )
-                file.write(_line("relation", relation.id, members + _tags(relation.tags)))
+                file.write(_line("relation", relation, listed + _tags(tags)))
             file.write("</osm>\n")
 
     def _node_lines(self, frame: LocalFrame) -> Iterator[str]:

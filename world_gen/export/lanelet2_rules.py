@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain, product
 
 import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.signals import Signal, SignalPlan
+from foretwin.contracts.signals import Signal
 from foretwin.contracts.world import Conflict, Connection, Lane, StopLine, World
 from foretwin.geometry.polyline import left_of
-from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
+from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, MemberKind, RelationMember
 
 LIGHT_WIDTH_M = 0.35
 LIGHT_HEIGHT_M = 0.9
@@ -20,35 +22,22 @@ _BULBS = (("red", 0.75), ("yellow", 0.45), ("green", 0.15))
 """Colours and heights over the light's lower edge."""
 
 
-class LaneletRules:
-    """Which regulatory elements each lane or connection names, by its id in the World."""
-
-    def __init__(self) -> None:
-        self._of: dict[str, list[int]] = {}
-
-    def of(self, name: str) -> Sequence[int]:
-        """Return the ids of a lanelet's regulatory elements."""
-        return self._of.get(name, ())
-
-    def add(self, rule: int, names: Iterable[str]) -> None:
-        """Let lanelets name a rule."""
-        for name in dict.fromkeys(names):
-            self._of.setdefault(name, []).append(rule)
-
-
 def add_rules(
     world: World, ids: Mapping[str, int], crosswalks: Mapping[str, int], drawn: Lanelet2Map
-) -> LaneletRules:
-    """Add every regulatory element; `ids` are lanelets by the World's ids, as are `crosswalks`."""
-    rules = LaneletRules()
-    lines = _StopLines(world, drawn)
-    _add_speed_limits(world, rules, drawn)
-    _add_lights(world, ids, lines, rules, drawn)
+) -> Mapping[str, Sequence[int]]:
+    """Add every regulatory element, and return those that each lane or connection names.
+
+    `ids` are lanelets by the World's ids, as are `crosswalks`.
+    """
+    rules = _Rules(world, ids, drawn)
+    rules.add_speed_limits()
+    rules.add_lights()
     all_way = {j.summary.id for j in world.junctions if j.summary.control == "all_way_stop"}
-    _add_all_way_stops(world, all_way, ids, lines, rules, drawn)
-    _add_right_of_way(world, all_way, ids, lines, rules, drawn)
-    _add_crosswalk_rules(world, crosswalks, ids, lines, rules, drawn)
-    return rules
+    rules.add_all_way_stops(all_way)
+    rules.add_right_of_way(all_way)
+    if crosswalks:
+        rules.add_crosswalk_rules(crosswalks)
+    return rules.of
 
 
 class _StopLines:
@@ -96,79 +85,136 @@ class _StopLines:
 
     def _draw(self, lines: list[StopLine]) -> int:
         points: list[Array] = []
-        for line in lines:
-            for end in line.ends:
-                if not points or math.hypot(*(end - points[-1])) > 0.05:
-                    points.append(end)
+        for end in (end for line in lines for end in line.ends):
+            if not points or math.hypot(*(end - points[-1])) > 0.05:
+                points.append(end)
         control = lines[0].control
-        nodes = tuple(self._drawn.node(x, y, 0.0) for x, y in np.array(points).tolist())
         gives_way = control.value == "give_way"
         tags = {
             "type": "yield_line" if gives_way else "stop_line",
             "subtype": "dashed" if gives_way else "solid",
             "foretwin:control": f"{control.value} {control.source}",
         }
-        return self._drawn.way(nodes, tags)
+        return self._drawn.way(self._drawn.ground_nodes(np.array(points)), tags)
 
 
-def _refers(ways: Iterable[int], role: str) -> list[RelationMember]:
-    return [RelationMember("way", way, role) for way in ways]
+class _Rules:
+    """Adds rules to a map and gathers which of them each lane or connection names."""
+
+    def __init__(self, world: World, ids: Mapping[str, int], drawn: Lanelet2Map) -> None:
+        self.of: dict[str, list[int]] = defaultdict(list)
+        self._world, self._ids, self._drawn = world, ids, drawn
+        self._lines = _StopLines(world, drawn)
+
+    def _add(
+        self, subtype: str, members: Sequence[RelationMember], names: Iterable[str], **tags: str
+    ) -> None:
+        """Add a rule that lanelets, by the World's ids, name once each."""
+        tags = {"type": "regulatory_element", "subtype": subtype, **tags}
+        rule = self._drawn.relation(members, tags)
+        for name in dict.fromkeys(names):
+            self.of[name].append(rule)
+
+    def add_speed_limits(self) -> None:
+        """Add a rule for each limit that the map states; a guess stays a tag of its lanelet."""
+        posted: dict[int, list[str]] = defaultdict(list)
+        for lane in self._world.lanes:
+            if lane.speed_limit_mps.source == "tagged" and lane.kind in ("driving", "bus"):
+                posted[round(lane.speed_limit_mps.value * 3.6)].append(lane.id)
+        for kmh, lanes in sorted(posted.items()):
+            self._add("speed_limit", [], lanes, sign_type=f"{kmh} km/h")
+
+    def add_lights(self) -> None:
+        """Add one rule for the heads that show one group to the same lanes.
+
+        Connections name it, as Autoware wants it; so does the lane before them where all that
+        follow it obey the same heads, as Lanelet2 has it.
+        """
+        shown = {signal.id: _draw_light(signal, self._drawn) for signal in self._world.signals}
+        heads: dict[tuple[str, str], list[str]] = defaultdict(list)
+        groups_at: dict[str, set[str]] = defaultdict(set)
+        for signal in self._world.signals:
+            for lane_id in signal.lane_ids:
+                heads[signal.group_id, lane_id].append(signal.id)
+                groups_at[lane_id].add(signal.group_id)
+        governed: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
+        for (group, lane_id), names in heads.items():
+            governed[group, tuple(names)].append(lane_id)
+        following: dict[str, list[Connection]] = defaultdict(list)
+        for connection in self._world.connections:
+            if connection.id in self._ids:
+                following[connection.from_lane_id].append(connection)
+        for (group, signals), lane_ids in governed.items():
+            line = self._lines.way(lane_ids)
+            members = _members("way", "refers", (shown[name][0] for name in signals))
+            members += _members("way", "light_bulbs", (shown[name][1] for name in signals))
+            members += _members("way", "ref_line", [line])
+            named = [n for n in lane_ids if n in self._ids and groups_at[n] == {group}]
+            after = (c for lane_id in lane_ids for c in following[lane_id])
+            named += [c.id for c in after if c.signal_group_id in (None, group)]
+            self._add("traffic_light", members, named, **{"foretwin:group": group})
+
+    def add_all_way_stops(self, junctions: set[str]) -> None:
+        """Add one rule for each junction at which all stop and go in order of arrival."""
+        entering: dict[str, list[str]] = defaultdict(list)
+        for connection in self._world.connections:
+            if connection.junction_id in junctions and connection.from_lane_id in self._ids:
+                entering[connection.junction_id].append(connection.from_lane_id)
+        for _, names in sorted(entering.items()):
+            lanes = list(dict.fromkeys(names))
+            members = _members("relation", "yield", (self._ids[name] for name in lanes))
+            ways = [self._lines.way((name,)) for name in lanes]
+            if None not in ways:  # one for each lanelet, or none
+                members += _members("way", "ref_line", ways)
+            self._add("all_way_stop", members, lanes)
+
+    def add_right_of_way(self, without: set[str]) -> None:
+        """Add, for each connection that waits, a rule at each of its lines with all that go first.
+
+        Those that no two lights ever let go together are a fallback for when the lights are off.
+        Connections of junctions `without` have rules of another kind.
+        """
+        connections = {c.id: c for c in self._world.connections if c.id in self._ids}
+        together = _green_together(self._world)
+        waits: dict[tuple[str, bool, int | None], list[str]] = defaultdict(list)
+        for conflict in self._world.conflicts:
+            loser, winner = connections.get(conflict.yields_id), connections.get(conflict.goes_id)
+            if loser is None or winner is None or loser.junction_id in without:
+                continue
+            groups = {loser.signal_group_id, winner.signal_group_id}
+            fallback = None not in groups and len(groups) == 2 and groups not in together
+            line = self._lines.where_it_waits(loser, conflict)
+            waits[loser.id, fallback, line].append(winner.id)
+        for (name, fallback, line), winners in waits.items():
+            members = _members("relation", "yield", [self._ids[name]])
+            members += _members("relation", "right_of_way", (self._ids[n] for n in winners))
+            members += _members("way", "ref_line", [line])
+            tags = {"fallback": "yes"} if fallback else {}
+            self._add("right_of_way", members, [name, *winners], **tags)
+
+    def add_crosswalk_rules(self, crosswalks: Mapping[str, int]) -> None:
+        """Add Autoware's rule for each crosswalk, named by the lanelets that it lies across."""
+        every: list[Lane | Connection] = [*self._world.lanes, *self._world.connections]
+        parts = [part for part in every if part.id in self._ids]
+        tree = shapely.STRtree([shapely.LineString(part.centerline) for part in parts])
+        for crossing in self._world.crossings:
+            line = shapely.LineString(crossing.line)
+            met = tree.query(line, predicate="intersects")
+            names = [parts[int(i)].id for i in sorted(met.tolist())]
+            band = line.buffer(crossing.width_m.value / 2, cap_style="flat")
+            if not names or band.is_empty:
+                continue
+            corners = self._drawn.ground_nodes(shapely.get_coordinates(band.exterior)[:-1])
+            outline = self._drawn.way(corners, {"type": "crosswalk_polygon", "area": "yes"})
+            members = _members("relation", "refers", [crosswalks[crossing.id]])
+            members += _members("way", "crosswalk_polygon", [outline])
+            members += _members("way", "ref_line", [self._lines.way(names)])
+            self._add("crosswalk", members, names)
 
 
-def _rule(subtype: str, **tags: str) -> dict[str, str]:
-    return {"type": "regulatory_element", "subtype": subtype, **tags}
-
-
-def _add_speed_limits(world: World, rules: LaneletRules, drawn: Lanelet2Map) -> None:
-    """Add a rule for each limit that the map states; a guess stays a tag of its lanelet."""
-    posted: dict[float, list[str]] = {}
-    for lane in world.lanes:
-        if lane.speed_limit_mps.source == "tagged" and lane.kind in ("driving", "bus"):
-            posted.setdefault(round(lane.speed_limit_mps.value * 3.6), []).append(lane.id)
-    for kmh, lanes in sorted(posted.items()):
-        rules.add(drawn.relation([], _rule("speed_limit", sign_type=f"{kmh} km/h")), lanes)
-
-
-def _add_lights(
-    world: World,
-    ids: Mapping[str, int],
-    lines: _StopLines,
-    rules: LaneletRules,
-    drawn: Lanelet2Map,
-) -> None:
-    """Add one rule for the heads that show one group to the same lanes.
-
-    Connections name it, as Autoware wants it; so does the lane before them where all that
-    follow it obey the same heads, as Lanelet2 has it.
-    """
-    shown = {signal.id: _draw_light(signal, drawn) for signal in world.signals}
-    governed: dict[tuple[str, tuple[str, ...]], list[str]] = {}
-    heads: dict[tuple[str, str], list[str]] = {}
-    for signal in world.signals:
-        for lane_id in signal.lane_ids:
-            heads.setdefault((signal.group_id, lane_id), []).append(signal.id)
-    for (group, lane_id), names in heads.items():
-        governed.setdefault((group, tuple(names)), []).append(lane_id)
-    groups_at: dict[str, set[str]] = {}
-    for group, lane_id in heads:
-        groups_at.setdefault(lane_id, set()).add(group)
-    following: dict[str, list[Connection]] = {}
-    for connection in world.connections:
-        if connection.id in ids:
-            following.setdefault(connection.from_lane_id, []).append(connection)
-    for (group, signals), lane_ids in governed.items():
-        line = lines.way(lane_ids)
-        members = _refers((shown[name][0] for name in signals), "refers")
-        members += _refers((shown[name][1] for name in signals), "light_bulbs")
-        members += _refers([] if line is None else [line], "ref_line")
-        rule = drawn.relation(members, _rule("traffic_light", **{"foretwin:group": group}))
-        named = [
-            c.id
-            for lane_id in lane_ids
-            for c in following.get(lane_id, ())
-            if c.signal_group_id in (None, group)
-        ]
-        rules.add(rule, [*(n for n in lane_ids if n in ids and groups_at[n] == {group}), *named])
+def _members(kind: MemberKind, role: str, refs: Iterable[int | None]) -> list[RelationMember]:
+    """Return members of one role, without those that are None."""
+    return [RelationMember(kind, ref, role) for ref in refs if ref is not None]
 
 
 def _draw_light(signal: Signal, drawn: Lanelet2Map) -> tuple[int, int]:
@@ -177,10 +223,7 @@ def _draw_light(signal: Signal, drawn: Lanelet2Map) -> tuple[int, int]:
     facing = np.array([math.cos(signal.yaw_rad), math.sin(signal.yaw_rad)])
     left = left_of(-facing) * (LIGHT_WIDTH_M / 2)
     low = z - LIGHT_HEIGHT_M / 2
-    edge = (
-        drawn.node(x + left[0], y + left[1], low),
-        drawn.node(x - left[0], y - left[1], low),
-    )
+    edge = [drawn.node(x + side * left[0], y + side * left[1], low) for side in (1.0, -1.0)]
     tags = {
         "type": "traffic_light",
         "subtype": "red_yellow_green",
@@ -188,103 +231,13 @@ def _draw_light(signal: Signal, drawn: Lanelet2Map) -> tuple[int, int]:
         "foretwin:id": signal.id,
         "foretwin:position": signal.source,
     }
-    light = drawn.way(edge, tags)
+    light = drawn.way(tuple(edge), tags)
     bulbs = tuple(drawn.node(x, y, low + up, {"color": color}) for color, up in _BULBS)
     return light, drawn.way(bulbs, {"type": "light_bulbs", "traffic_light_id": str(light)})
 
 
-def _add_all_way_stops(
-    world: World,
-    junctions: set[str],
-    ids: Mapping[str, int],
-    lines: _StopLines,
-    rules: LaneletRules,
-    drawn: Lanelet2Map,
-) -> None:
-    """Add one rule for each junction at which all stop and go in order of arrival."""
-    entering: dict[str, list[str]] = {}
-    for connection in world.connections:
-        if connection.junction_id in junctions and connection.from_lane_id in ids:
-            entering.setdefault(connection.junction_id, []).append(connection.from_lane_id)
-    for junction in sorted(entering):
-        lanes = list(dict.fromkeys(entering[junction]))
-        members = [RelationMember("relation", ids[name], "yield") for name in lanes]
-        ways = [lines.way((name,)) for name in lanes]
-        if all(way is not None for way in ways):  # one for each lanelet, or none
-            members += _refers((way for way in ways if way is not None), "ref_line")
-        rules.add(drawn.relation(members, _rule("all_way_stop")), lanes)
-
-
-def _add_right_of_way(
-    world: World,
-    without: set[str],
-    ids: Mapping[str, int],
-    lines: _StopLines,
-    rules: LaneletRules,
-    drawn: Lanelet2Map,
-) -> None:
-    """Add, for each connection that waits, a rule at each of its lines with all for which it does.
-
-    Those that no two lights ever let go together are a fallback for when the lights are off.
-    """
-    connections = {c.id: c for c in world.connections if c.id in ids}
-    together = _green_together(world)
-    waits: dict[tuple[str, bool, int | None], list[str]] = {}
-    for conflict in world.conflicts:
-        loser, winner = conflict.yields_id, conflict.goes_id
-        if loser not in connections or winner not in connections:
-            continue
-        if connections[loser].junction_id in without:
-            continue
-        groups = {connections[n].signal_group_id for n in (loser, winner)}
-        fallback = None not in groups and len(groups) == 2 and frozenset(groups) not in together
-        line = lines.where_it_waits(connections[loser], conflict)
-        waits.setdefault((loser, fallback, line), []).append(winner)
-    for (loser, fallback, line), winners in waits.items():
-        members = [RelationMember("relation", ids[loser], "yield")]
-        members += [RelationMember("relation", ids[name], "right_of_way") for name in winners]
-        members += _refers([] if line is None else [line], "ref_line")
-        tags = _rule("right_of_way", **({"fallback": "yes"} if fallback else {}))
-        rules.add(drawn.relation(members, tags), [loser, *winners])
-
-
 def _green_together(world: World) -> set[frozenset[str | None]]:
     """Return pairs of groups that some phase lets go at once."""
-    plans: list[SignalPlan] = [j.plan for j in world.junctions if j.plan is not None]
-    return {
-        frozenset((a, b))
-        for plan in plans
-        for phase in plan.phases
-        for a in phase.green_group_ids
-        for b in phase.green_group_ids
-    }
-
-
-def _add_crosswalk_rules(
-    world: World,
-    crosswalks: Mapping[str, int],
-    ids: Mapping[str, int],
-    lines: _StopLines,
-    rules: LaneletRules,
-    drawn: Lanelet2Map,
-) -> None:
-    """Add Autoware's rule for each crosswalk, named by the lanelets that it lies across."""
-    if not crosswalks:
-        return
-    every: list[Lane | Connection] = [*world.lanes, *world.connections]
-    parts = [part for part in every if part.id in ids]
-    tree = shapely.STRtree([shapely.LineString(part.centerline) for part in parts])
-    for crossing in world.crossings:
-        met = tree.query(shapely.LineString(crossing.line), predicate="intersects")
-        names = [parts[int(i)].id for i in sorted(met.tolist())]
-        half = crossing.width_m.value / 2
-        band = shapely.LineString(crossing.line).buffer(half, cap_style="flat")
-        if not names or band.is_empty:
-            continue
-        nodes = tuple(drawn.node(x, y, 0.0) for x, y in list(band.exterior.coords)[:-1])
-        tags: Tags = {"type": "crosswalk_polygon", "area": "yes"}
-        members = [RelationMember("relation", crosswalks[crossing.id], "refers")]
-        members += _refers([drawn.way(nodes, tags)], "crosswalk_polygon")
-        line = lines.way(names)
-        members += _refers([] if line is None else [line], "ref_line")
-        rules.add(drawn.relation(members, _rule("crosswalk")), names)
+    phases = (phase for j in world.junctions if j.plan is not None for phase in j.plan.phases)
+    pairs = (product(phase.green_group_ids, repeat=2) for phase in phases)
+    return {frozenset(pair) for pair in chain.from_iterable(pairs)}

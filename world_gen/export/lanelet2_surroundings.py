@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import shapely
 from shapely.geometry import Polygon
 
-from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import World
+from foretwin.contracts.world import Area, Building, World
 from foretwin.world_gen.export.lanelet2_primitives import Lanelet2Map, RelationMember, Tags
 
 
@@ -22,19 +19,14 @@ def add_surroundings(world: World, drawn: Lanelet2Map) -> None:
             "foretwin:id": building.id,
             "foretwin:height": building.height_m.source,
         }
-        _add_area(building.outline, building.holes, tags, drawn, edge={"type": "building"})
+        _add_area(building, tags, drawn, edge={"type": "building"})
     for island in world.islands:
         tags = {"subtype": "traffic_island", "foretwin:id": island.id}
-        edge = {"type": "curbstone", "subtype": "high"}
-        _add_area(island.outline, island.holes, tags, drawn, edge=edge)
+        _add_area(island, tags, drawn, edge={"type": "curbstone", "subtype": "high"})
+    walkway = {"subtype": "walkway", "participant:pedestrian": "yes"}
     for sidewalk in world.sidewalks:
-        tags = {
-            "subtype": "walkway",
-            "participant:pedestrian": "yes",
-            "foretwin:id": sidewalk.id,
-        }
-        edge = {"type": "curbstone", "subtype": "low"}
-        _add_area(sidewalk.outline, sidewalk.holes, tags, drawn, edge=edge)
+        tags = {**walkway, "foretwin:id": sidewalk.id}
+        _add_area(sidewalk, tags, drawn, edge={"type": "curbstone", "subtype": "low"})
 
 
 def add_intersection_areas(world: World, drawn: Lanelet2Map) -> dict[str, int]:
@@ -44,23 +36,20 @@ def add_intersection_areas(world: World, drawn: Lanelet2Map) -> dict[str, int]:
         area = junction.area
         if area is None or len(area.outline) < 3 or not Polygon(area.outline).is_valid:
             continue
-        nodes = tuple(drawn.node(x, y, 0.0) for x, y in area.outline.tolist())
         name = junction.summary.id
         tags = {"type": "intersection_area", "area": "yes", "foretwin:id": name}
-        found[name] = drawn.way(nodes, tags)
+        found[name] = drawn.way(drawn.ground_nodes(area.outline), tags)
     return found
 
 
-def _add_area(
-    outline: Array, holes: Sequence[Array], tags: Tags, drawn: Lanelet2Map, *, edge: Tags
-) -> None:
-    polygon = Polygon(outline, holes) if len(outline) >= 3 else Polygon()
+def _add_area(area: Area | Building, tags: Tags, drawn: Lanelet2Map, *, edge: Tags) -> None:
+    polygon = Polygon(area.outline, area.holes) if len(area.outline) >= 3 else Polygon()
     if polygon.is_empty or not polygon.is_valid:
         return
     members = []
     # Lanelet2 wants outer rings clockwise and inner ones counter-clockwise.
     turned = shapely.orient_polygons(polygon, exterior_cw=True)
     for role, ring in (("outer", turned.exterior), *(("inner", r) for r in turned.interiors)):
-        nodes = tuple(drawn.node(x, y, 0.0) for x, y in list(ring.coords)[:-1])
+        nodes = drawn.ground_nodes(shapely.get_coordinates(ring)[:-1])
         members.append(RelationMember("way", drawn.way((*nodes, nodes[0]), edge), role))
     drawn.relation(members, {"type": "multipolygon", "location": "urban", **tags})

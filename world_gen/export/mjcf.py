@@ -17,21 +17,11 @@ import shapely
 from shapely.geometry import Polygon
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.world import Building, World
-from foretwin.geometry.reflex_cuts import polygons_of
-from foretwin.world_gen.buildings.convex_parts import convex_cover, polygons_from
-from foretwin.world_gen.export.solids import (
-    BUILDING,
-    GROUND,
-    ISLAND,
-    ROAD,
-    ROAD_TOP_M,
-    THINNEST_M,
-    Rgba,
-    island_height_m,
-    stops_cars,
-)
-from foretwin.world_gen.export.xml_text import in_comment
+from foretwin.contracts.world import Area, Building, World
+from foretwin.world_gen.buildings.convex_parts import convex_cover, sound_polygons
+from foretwin.world_gen.export import solids
+from foretwin.world_gen.export.xml_tree import in_comment
+from foretwin.world_gen.polygon_areas import polygons_from
 
 STATIC = 1
 """Contype of buildings and islands; their conaffinity is VEHICLE."""
@@ -40,6 +30,7 @@ VEHICLE = 2
 ROAD_USER = 4
 """Contype of mocap road users and shadows; their conaffinity is VEHICLE. A ghost has 0 and 0."""
 
+UNTOUCHED = {"contype": 0, "conaffinity": 0}
 TIMESTEP_S = 0.01
 WORKER_REACH_M = 20.0
 """Without visuals, buildings farther than this from the road are left out."""
@@ -57,24 +48,19 @@ def world_spec(world: World, *, visual: bool = True) -> mujoco.MjSpec:
     _set_options(spec)
     spec.add_text(name="attribution", data=world.attribution)
     spec.add_text(name="world", data=world.id)
-    ground = spec.worldbody.add_geom()
-    ground.name = "ground"
-    ground.type = mujoco.mjtGeom.mjGEOM_PLANE
-    ground.size = [world.radius_m, world.radius_m, 1.0]
-    ground.rgba = GROUND
-    # A planar car has no vertical joint: touching the plane would only cost time.
-    ground.contype = ground.conaffinity = 0
+    spec.worldbody.add_geom(
+        name="ground",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[world.radius_m, world.radius_m, 1.0],
+        rgba=solids.GROUND,
+        **UNTOUCHED,  # a planar car has no vertical joint: touching would only cost time
+    )
     if visual:
         _add_road(spec, world)
         spec.worldbody.add_light(pos=[0, 0, 200], dir=[0.3, 0.2, -1], castshadow=False)
     buildings = world.buildings if visual else _near_road(world)
-    _add_blocks(
-        spec,
-        "building",
-        [(b.outline, b.holes) for b in buildings],
-        [(b.id, b.min_height_m, b.height_m.value) for b in buildings],
-        _block_default(spec, "building", BUILDING, solid=True),
-    )
+    extents = [(f"building:{b.id}", b.min_height_m, b.height_m.value) for b in buildings]
+    _add_blocks(spec, "building", solids.BUILDING, buildings, extents, solid=True)
     _add_islands(spec, world, visual=visual)
     return spec
 
@@ -114,39 +100,31 @@ def _near_road(world: World) -> list[Building]:
 
 def _add_islands(spec: mujoco.MjSpec, world: World, *, visual: bool) -> None:
     for solid in (True, False):
-        chosen = [i for i in world.islands if stops_cars(i) is solid]
-        if not chosen or not (solid or visual):
-            continue
-        height = island_height_m(solid=solid)
-        name = "mound" if solid else "island"
-        _add_blocks(
-            spec,
-            "",
-            [(island.outline, island.holes) for island in chosen],
-            [(island.id, 0.0, height) for island in chosen],
-            _block_default(spec, name, ISLAND, solid=solid),
-        )
-
-
-def _block_default(spec: mujoco.MjSpec, name: str, rgba: Rgba, *, solid: bool) -> mujoco.MjsDefault:
-    block = spec.add_default(name, spec.default)
-    block.geom.type = mujoco.mjtGeom.mjGEOM_BOX
-    block.geom.rgba = rgba
-    block.geom.group = COLLISION_GROUP
-    block.geom.contype = STATIC if solid else 0
-    block.geom.conaffinity = VEHICLE if solid else 0
-    return block
+        chosen = [island for island in world.islands if solids.stops_cars(island) is solid]
+        if chosen and (solid or visual):
+            extents = [(i.id, 0.0, solids.island_height_m(solid=solid)) for i in chosen]
+            name = "mound" if solid else "island"
+            _add_blocks(spec, name, solids.ISLAND, chosen, extents, solid=solid)
 
 
 def _add_blocks(
     spec: mujoco.MjSpec,
-    prefix: str,
-    outlines: Sequence[tuple[Array, tuple[Array, ...]]],
+    default: str,
+    rgba: solids.Rgba,
+    outlines: Sequence[Building | Area],
     extents: Sequence[tuple[str, float, float]],
-    block: mujoco.MjsDefault,
+    *,
+    solid: bool,
 ) -> None:
-    """Add outlines, each with an id, an underside and a top, as boxes and convex prisms."""
-    parts = convex_cover(outlines)
+    """Add outlines, each with a name, an underside and a top, as boxes and convex prisms.
+
+    All have the default class `default`, and none is touched that is not `solid`.
+    """
+    block = spec.add_default(default, spec.default)
+    block.geom.type, block.geom.group = mujoco.mjtGeom.mjGEOM_BOX, COLLISION_GROUP
+    block.geom.rgba = rgba
+    block.geom.contype, block.geom.conaffinity = (STATIC, VEHICLE) if solid else (0, 0)
+    parts = convex_cover([(one.outline, one.holes) for one in outlines])
     add_geom, add_mesh = spec.worldbody.add_geom, spec.add_mesh
     low_m, high_m = np.array([extent[1:] for extent in extents]).reshape(-1, 2)[parts.owner].T
     centres = np.column_stack([parts.centre_m, (low_m + high_m) / 2])
@@ -156,11 +134,11 @@ def _add_blocks(
     count: dict[int, int] = {}
     owners, boxes = parts.owner.tolist(), parts.is_box.tolist()
     for k, (owner, is_box) in enumerate(zip(owners, boxes, strict=True)):
-        given, low, high = extents[owner]
-        if high - low < THINNEST_M:
+        name, low, high = extents[owner]
+        if high - low < solids.THINNEST_M:
             continue
         count[owner] = n = count.get(owner, -1) + 1
-        name = f"{prefix}:{given}:{n}" if prefix else f"{given}:{n}"
+        name = f"{name}:{n}"
         geom = add_geom(block)
         geom.name = name
         if is_box:
@@ -190,25 +168,18 @@ def _prism_faces(n: int) -> list[int]:
     return faces
 
 
-def _valid(shapes: npt.NDArray[np.object_]) -> npt.NDArray[np.object_]:
-    bad = ~shapely.is_valid(shapes)
-    shapes[bad] = shapely.make_valid(shapes[bad])
-    return shapes
-
-
 def _distinct(points: Array) -> tuple[Array, npt.NDArray[np.intp]]:
     """Return points (N, 2) once each on a grid of 0.1 mm, and the row of each in these."""
     steps = np.rint(points * 1e4).astype(np.int64)
-    _, first, rows = np.unique(
-        (steps[:, 0] << 32) + steps[:, 1], return_index=True, return_inverse=True
-    )
+    keys = (steps[:, 0] << 32) + steps[:, 1]
+    _, first, rows = np.unique(keys, return_index=True, return_inverse=True)
     return np.round(points[first], 4), rows
 
 
 def _add_road(spec: mujoco.MjSpec, world: World) -> None:
     """Add the road surface as a mesh that is seen and never touched."""
     shapes = polygons_from([(area.outline, area.holes) for area in world.road_surface])
-    sound, _ = polygons_of(_valid(shapes), np.arange(len(shapes)))
+    sound, _ = sound_polygons(shapes)
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(sound))
     triangles = triangles[shapely.area(triangles) > 1e-4]
     if not len(triangles):
@@ -221,13 +192,11 @@ def _add_road(spec: mujoco.MjSpec, world: World) -> None:
     faces = np.where(cross[:, None] < 0.0, faces[:, ::-1], faces)[np.abs(cross) > 1e-4]
     mesh = spec.add_mesh()
     mesh.name = "road"
-    mesh.uservert = np.column_stack([corners, np.full(len(corners), ROAD_TOP_M)]).ravel().tolist()
+    mesh.uservert = (
+        np.column_stack([corners, np.full(len(corners), solids.ROAD_TOP_M)]).ravel().tolist()
+    )
     mesh.userface = faces.ravel().tolist()
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-    geom = spec.worldbody.add_geom()
-    geom.name = "road"
-    geom.type = mujoco.mjtGeom.mjGEOM_MESH
-    geom.meshname = "road"
-    geom.rgba = ROAD
-    geom.group = VISUAL_GROUP
-    geom.contype = geom.conaffinity = 0
+    look = {"meshname": "road", "rgba": solids.ROAD, "group": VISUAL_GROUP}
+    shape = mujoco.mjtGeom.mjGEOM_MESH
+    spec.worldbody.add_geom(name="road", type=shape, **look, **UNTOUCHED)

@@ -23,9 +23,9 @@ FIT_M = 0.02
 CORNER_M = 0.02
 SIMPLIFY_M = 0.004
 END_BEND_M = 5.0
-"""Within this distance of its end a straight takes up the heading that is asked for there."""
+"""Within this distance of its end a straight takes up the heading that is required there."""
 TILT_M = 0.01
-"""So far the second point may give way to the heading that is asked for at the first."""
+"""So far the second point may give way to the heading that is required at the first."""
 _SAME_HEADING = 1e-7
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -55,14 +55,7 @@ class Curve:
         piece = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, len(self.lengths_m) - 1)
         # As OpenDRIVE reads a normalised cubic: its parameter runs evenly with the length.
         t = np.clip((s - starts[piece]) / self.lengths_m[piece], 0.0, 1.0)[:, None]
-        p = self.controls[piece]
-        r = 1.0 - t
-        points = r**3 * p[:, 0] + 3 * r * r * t * p[:, 1] + 3 * r * t * t * p[:, 2] + t**3 * p[:, 3]
-        step = (
-            r * r * (p[:, 1] - p[:, 0])
-            + 2 * r * t * (p[:, 2] - p[:, 1])
-            + t * t * (p[:, 3] - p[:, 2])
-        )
+        points, step = _evaluated(self.controls[piece], t)
         return points, step / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-12)[:, None]
 
     def locate(self, points_m: Array) -> tuple[Array, Array]:
@@ -234,17 +227,7 @@ def _fit(points: Array, heading: Array, toward: Array) -> list[Array]:
         usual = math.hypot(*(cubic[1] - begin))
         if 0.2 * usual < min(h1, h2) and max(h1, h2) < 2.0 * usual:
             cubic = np.array([begin, begin + heading * h1, finish - toward * h2, finish])
-    tangent = (
-        (r * r)[:, None] * (cubic[1] - cubic[0])
-        + (2 * r * t)[:, None] * (cubic[2] - cubic[1])
-        + (t * t)[:, None] * (cubic[3] - cubic[2])
-    )
-    on_curve = (
-        (r**3)[:, None] * cubic[0]
-        + b1[:, None] * cubic[1]
-        + b2[:, None] * cubic[2]
-        + (t**3)[:, None] * cubic[3]
-    )
+    on_curve, tangent = _evaluated(cubic, t[:, None])
     gap = points - on_curve
     size = np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-9)
     aside = np.abs(tangent[:, 0] * gap[:, 1] - tangent[:, 1] * gap[:, 0]) / size
@@ -252,21 +235,20 @@ def _fit(points: Array, heading: Array, toward: Array) -> list[Array]:
         return [cubic]
     middle = int(np.clip(aside.argmax(), 1, len(points) - 2))
     through = unit(points[middle + 1] - points[middle - 1])
-    return [
-        *_fit(points[: middle + 1], heading, through),
-        *_fit(points[middle:], through, toward),
-    ]
+    return [*_fit(points[: middle + 1], heading, through), *_fit(points[middle:], through, toward)]
+
+
+def _evaluated(controls: Array, t: Array) -> tuple[Array, Array]:
+    """Return points (..., 2) of cubics (..., 4, 2) at `t` (..., 1), and a third of their slopes."""
+    p0, p1, p2, p3 = np.moveaxis(controls, -2, 0)
+    r = 1.0 - t
+    points = r**3 * p0 + 3 * r * r * t * p1 + 3 * r * t * t * p2 + t**3 * p3
+    return points, r * r * (p1 - p0) + 2 * r * t * (p2 - p1) + t * t * (p3 - p2)
 
 
 def _lengths(controls: Array) -> Array:
     """Return arc lengths (N,) by Gauss's quadrature with 16 nodes."""
     t = 0.5 * (_NODES + 1.0)[None, :, None]
-    r = 1.0 - t
-    p = controls[:, None]
-    speed = 3 * (
-        r * r * (p[:, :, 1] - p[:, :, 0])
-        + 2 * r * t * (p[:, :, 2] - p[:, :, 1])
-        + t * t * (p[:, :, 3] - p[:, :, 2])
-    )
+    speed = 3 * _evaluated(controls[:, None], t)[1]
     lengths: Array = 0.5 * (np.hypot(speed[..., 0], speed[..., 1]) * _WEIGHTS).sum(axis=1)
     return lengths

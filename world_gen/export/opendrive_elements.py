@@ -1,35 +1,17 @@
-"""Roads and junctions as elements of an OpenDRIVE file."""
+"""Roads as elements of an OpenDRIVE file, without the objects and signals beside them."""
 
 from __future__ import annotations
 
 import math
-from typing import Literal
-
-from lxml import etree
 
 from foretwin.contracts.world import DrivingSide, Lane
+from foretwin.world_gen.export.choices import OpenDriveVersion
 from foretwin.world_gen.export.opendrive_curve import Curve
-from foretwin.world_gen.export.opendrive_roads import Cubic, OdrLane, OdrRoad
-from foretwin.world_gen.export.xml_text import legal
+from foretwin.world_gen.export.opendrive_roads import OdrLane, OdrRoad
+from foretwin.world_gen.export.xml_tree import Element, child, element
 
-Version = Literal["1.8", "1.4"]
-LANE_TYPE = {
-    "1.8": {
-        "driving": "driving",
-        "bus": "bus",
-        "bicycle": "biking",
-        "parking": "parking",
-        "tram": "tram",
-    },
-    "1.4": {
-        "driving": "driving",
-        "bus": "restricted",
-        "bicycle": "biking",
-        "parking": "parking",
-        "tram": "tram",
-    },
-}
-"""1.4 has no bus lanes."""
+LANE_TYPE = {"bicycle": "biking"}
+"""What OpenDRIVE calls kinds of lanes that it does not call as the World does."""
 ROAD_TYPE = {
     "motorway": ("motorway", "motorway"),
     "trunk": ("townExpressway", "rural"),
@@ -42,174 +24,134 @@ ROAD_TYPE = {
     "service": ("townPrivate", "townPrivate"),
 }
 """Type of a road by OSM's class in towns and, where faster is allowed, in the open country."""
-IN_1_4 = {
-    "townExpressway": "town",
-    "townArterial": "town",
-    "townCollector": "town",
-    "townLocal": "town",
-    "townPrivate": "town",
-}
 TOWN_KMH = 70.0
 LINE_M = 0.12
 """Width of a lane marking."""
 
 
-def text(words: str) -> str:
-    """Return words from a map with what XML 1.0 cannot hold as question marks."""
-    return legal(words, instead="?")
-
-
-def number(value: float) -> str:
-    """Return a number with as many digits as a nanometre over a kilometre needs."""
-    return f"{value + 0.0:.12g}"
-
-
-def road_element(road: OdrRoad, *, side: DrivingSide, version: Version) -> etree._Element:
+def road_element(road: OdrRoad, *, side: DrivingSide, version: OpenDriveVersion) -> Element:
     """Return a `<road>` without objects and signals."""
-    element = etree.Element("road", name=text(road.name), length=number(road.curve.length_m))
-    element.set("id", str(road.id))
-    element.set("junction", str(road.junction))
-    if version == "1.8" or side == "left":
-        # 1.4 does not know it, but its readers that know left-hand traffic read it there too.
-        element.set("rule", "RHT" if side == "right" else "LHT")
-    _add_links(element, road)
-    _add_type(element, road, version)
-    _add_plan_view(element, road.curve)
-    profile = etree.SubElement(element, "elevationProfile")
-    etree.SubElement(profile, "elevation", {"s": "0", **_coefficients(road.height)})
-    _add_lanes(element, road, side=side, version=version)
-    return element
+    rule: str | None = "RHT" if side == "right" else "LHT"
+    if version == "1.4" and side == "right":
+        # 1.4 does not define it, but its readers that support left-hand traffic read it there too.
+        rule = None
+    made = element(
+        "road",
+        name=road.name,
+        length=road.curve.length_m,
+        id=road.id,
+        junction=road.junction,
+        rule=rule,
+    )
+    _add_links(made, road)
+    _add_type(made, road, version)
+    _add_plan_view(made, road.curve)
+    child(child(made, "elevationProfile"), "elevation", s=0, **road.height._asdict())
+    _add_lanes(made, road, side=side, version=version)
+    return made
 
 
-def _add_links(element: etree._Element, road: OdrRoad) -> None:
-    link = etree.SubElement(element, "link")
+def _add_links(made: Element, road: OdrRoad) -> None:
+    link = child(made, "link")
     for tag, to in (("predecessor", road.predecessor), ("successor", road.successor)):
-        if to is None:
-            continue
-        kind, other, at_end = to
-        item = etree.SubElement(link, tag, elementType=kind, elementId=str(other))
-        if kind == "road":
-            item.set("contactPoint", "end" if at_end else "start")
+        if to is not None:
+            kind, other, at_end = to
+            contact = None if kind == "junction" else "end" if at_end else "start"
+            child(link, tag, elementType=kind, elementId=other, contactPoint=contact)
 
 
-def _add_type(element: etree._Element, road: OdrRoad, version: Version) -> None:
+def _add_type(made: Element, road: OdrRoad, version: OpenDriveVersion) -> None:
     limits = [lane.lane.speed_limit_mps.value for lane in road.lanes if lane.lane is not None]
     kmh = round(max(limits) * 3.6) if limits else 0
     in_town, outside = ROAD_TYPE.get(road.road_class.removesuffix("_link"), ("unknown", "unknown"))
     kind = in_town if kmh <= TOWN_KMH else outside
-    kind = IN_1_4.get(kind, kind) if version == "1.4" else kind
-    item = etree.SubElement(element, "type", s="0", type=kind)
+    if version == "1.4" and kind.startswith("town"):
+        kind = "town"  # 1.4 has one type for all roads in towns
+    item = child(made, "type", s=0, type=kind)
     if limits:
-        etree.SubElement(item, "speed", max=str(kmh), unit="km/h")
+        child(item, "speed", max=kmh, unit="km/h")
 
 
-def _add_plan_view(element: etree._Element, curve: Curve) -> None:
-    plan = etree.SubElement(element, "planView")
+def _add_plan_view(made: Element, curve: Curve) -> None:
+    plan = child(made, "planView")
     s = 0.0
     for control, straight, length in zip(
         curve.controls.tolist(), curve.straight, curve.lengths_m.tolist(), strict=True
     ):
-        (x0, y0), (x1, y1), (x2, y2), (x3, y3) = control
+        (x0, y0), (x1, y1), *_ = control
         heading = math.atan2(y1 - y0, x1 - x0)
-        item = etree.SubElement(
-            plan,
-            "geometry",
-            s=number(s),
-            x=number(x0),
-            y=number(y0),
-            hdg=number(heading),
-            length=number(length),
-        )
+        item = child(plan, "geometry", s=s, x=x0, y=y0, hdg=heading, length=length)
         s += length
         if straight:
-            etree.SubElement(item, "line")
+            child(item, "line")
             continue
         cos, sin = math.cos(heading), math.sin(heading)
-        u = [cos * (x - x0) + sin * (y - y0) for x, y in ((x1, y1), (x2, y2), (x3, y3))]
-        v = [cos * (y - y0) - sin * (x - x0) for x, y in ((x1, y1), (x2, y2), (x3, y3))]
-        etree.SubElement(
-            item,
-            "paramPoly3",
-            aU="0",
-            bU=number(3 * u[0]),
-            cU=number(3 * u[1] - 6 * u[0]),
-            dU=number(u[2] - 3 * u[1] + 3 * u[0]),
-            aV="0",
-            bV="0",
-            cV=number(3 * v[1]),
-            dV=number(v[2] - 3 * v[1]),
-            pRange="normalized",
-        )
+        u1, u2, u3 = (cos * (x - x0) + sin * (y - y0) for x, y in control[1:])
+        v2, v3 = (cos * (y - y0) - sin * (x - x0) for x, y in control[2:])
+        along = {"aU": 0, "bU": 3 * u1, "cU": 3 * u2 - 6 * u1, "dU": u3 - 3 * u2 + 3 * u1}
+        # The first handle lies on the heading: nothing of it is aside.
+        aside = {"aV": 0, "bV": 0, "cV": 3 * v2, "dV": v3 - 3 * v2}
+        child(item, "paramPoly3", **along, **aside, pRange="normalized")
 
 
 def _add_lanes(
-    element: etree._Element, road: OdrRoad, *, side: DrivingSide, version: Version
+    made: Element, road: OdrRoad, *, side: DrivingSide, version: OpenDriveVersion
 ) -> None:
-    lanes = etree.SubElement(element, "lanes")
+    lanes = child(made, "lanes")
     if any(road.offset):
-        etree.SubElement(lanes, "laneOffset", {"s": "0", **_coefficients(road.offset)})
-    section = etree.SubElement(lanes, "laneSection", s="0")
+        child(lanes, "laneOffset", s=0, **road.offset._asdict())
+    section = child(lanes, "laneSection", s=0)
     left = [lane for lane in road.lanes if lane.number > 0]
     right = [lane for lane in road.lanes if lane.number < 0]
     if left:
-        group = etree.SubElement(section, "left")
-        for i, lane in enumerate(left):
-            _add_lane(group, lane, left[i - 1] if i else None, road, version)
-    centre = etree.SubElement(
-        etree.SubElement(section, "center"), "lane", type="none", level="false"
-    )
-    centre.set("id", "0")
+        group = child(section, "left")
+        for lane, beyond in zip(left, [None, *left[:-1]], strict=True):
+            _add_lane(group, lane, beyond, road, version)
+    centre = child(child(section, "center"), "lane", type="none", level="false", id=0)
     kind = "broken" if left and right and road.junction < 0 else "solid"
-    _add_mark(centre, "none" if road.junction >= 0 else kind, "none", version)
+    _add_mark(centre, "none" if road.junction >= 0 else kind, "none")
     if right:
-        group = etree.SubElement(section, "right")
-        for i, lane in enumerate(right):
-            beyond = right[i + 1] if i + 1 < len(right) else None
+        group = child(section, "right")
+        for lane, beyond in zip(right, [*right[1:], None], strict=True):
             _add_lane(group, lane, beyond, road, version)
 
 
 def _add_lane(
-    group: etree._Element, lane: OdrLane, beyond: OdrLane | None, road: OdrRoad, version: Version
+    group: Element, strip: OdrLane, beyond: OdrLane | None, road: OdrRoad, version: OpenDriveVersion
 ) -> None:
-    kind = "sidewalk" if lane.sidewalk else "none"
-    kind = kind if lane.lane is None else LANE_TYPE[version][lane.lane.kind]
-    if lane.reversed and version == "1.4":
-        kind = "restricted"  # 1.4 cannot tell that it is driven the other way
-    item = etree.SubElement(group, "lane", type=kind, level="false")
-    item.set("id", str(lane.number))
-    if lane.reversed and version == "1.8":
-        item.set("direction", "reversed")
-    link = etree.SubElement(item, "link")
-    if lane.predecessor is not None:
-        etree.SubElement(link, "predecessor").set("id", str(lane.predecessor))
-    if lane.successor is not None:
-        etree.SubElement(link, "successor").set("id", str(lane.successor))
-    etree.SubElement(item, "width", {"sOffset": "0", **_coefficients(lane.width)})
+    kind, lane = "sidewalk" if strip.sidewalk else "none", strip.lane
+    if lane is not None:
+        kind = LANE_TYPE.get(lane.kind, lane.kind)
+    direction = "reversed" if strip.reversed else None
+    if version == "1.4" and (direction or kind == "bus"):
+        # 1.4 has no bus lanes, and cannot say that a lane is driven the other way.
+        kind, direction = "restricted", None
+    item = child(group, "lane", type=kind, level="false", id=strip.number, direction=direction)
+    link = child(item, "link")
+    for tag, number in (("predecessor", strip.predecessor), ("successor", strip.successor)):
+        if number is not None:
+            child(link, tag, id=number)
+    child(item, "width", sOffset=0, **strip.width._asdict())
     if road.junction >= 0:
-        _add_mark(item, "none", "none", version)
-    elif beyond is None or beyond.lane is None or lane.lane is None:
-        _add_mark(item, "solid", "none", version)
+        _add_mark(item, "none", "none")
+    elif beyond is None or beyond.lane is None or lane is None:
+        _add_mark(item, "solid", "none")
     else:
-        _add_mark(item, *_between(lane, beyond), version)
-    if lane.lane is not None:
-        speed = etree.SubElement(item, "speed", sOffset="0", unit="m/s")
-        speed.set("max", number(round(lane.lane.speed_limit_mps.value, 3)))
+        _add_mark(item, *_between(lane, beyond.lane, leftward=strip.number > 0))
+    if lane is not None:
+        limit = round(lane.speed_limit_mps.value, 3)
+        child(item, "speed", sOffset=0, unit="m/s", max=limit)
 
 
-def _between(inner: OdrLane, outer: OdrLane) -> tuple[str, str]:
+def _between(inner: Lane, outer: Lane, *, leftward: bool) -> tuple[str, str]:
     """Return the marking between two lanes, and to which side it may be crossed."""
-    a, b = inner.lane, outer.lane
-    assert a is not None
-    assert b is not None
-    if a.reverse != b.reverse:
+    outward, inward = _may_leave(inner, outer), _may_leave(outer, inner)
+    if inner.reverse != outer.reverse or not (outward or inward):
         return "solid", "none"
-    outward, inward = _may_leave(a, b), _may_leave(b, a)
     if outward and inward:
         return "broken", "both"
-    if not outward and not inward:
-        return "solid", "none"
     # To the left of lane 0 numbers grow outward, to the right inward.
-    grows = outward == (inner.number > 0)
+    grows = outward == leftward
     return ("broken solid" if outward else "solid broken"), "increase" if grows else "decrease"
 
 
@@ -219,14 +161,7 @@ def _may_leave(lane: Lane, toward: Lane) -> bool:
     return lane.right_id == toward.id and lane.change in ("both", "right")
 
 
-def _add_mark(item: etree._Element, kind: str, change: str, version: Version) -> None:
-    mark = etree.SubElement(
-        item, "roadMark", sOffset="0", type=kind, weight="standard", color="white"
-    )
-    if kind != "none":
-        mark.set("width", number(LINE_M))
-    mark.set("laneChange", change)
-
-
-def _coefficients(cubic: Cubic) -> dict[str, str]:
-    return {key: number(value) for key, value in zip("abcd", cubic, strict=True)}
+def _add_mark(item: Element, kind: str, change: str) -> None:
+    width = None if kind == "none" else LINE_M
+    style = {"type": kind, "weight": "standard", "color": "white", "width": width}
+    child(item, "roadMark", sOffset=0, **style, laneChange=change)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +20,7 @@ from foretwin.world_gen.export.opendrive_roads import (
     End,
     OdrLane,
     OdrRoad,
+    inward,
     roads_of,
     runs_along,
 )
@@ -32,19 +35,15 @@ _ASIDE_M = 0.05
 """Lanes of joined roads whose ends lie farther apart are not linked: a file must not jump."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OdrConnection:
-    """A connecting road of a junction and the lane that leads onto it."""
+class OdrConnection(NamedTuple):
+    """A connection of the World, its connecting road, and the road that leads onto that."""
 
     connection: Connection
     road: OdrRoad
-    incoming: int
-    from_number: int
-    to_number: int
+    incoming: OdrRoad
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OdrJunction:
+class OdrJunction(NamedTuple):
     """A place where roads meet."""
 
     id: int
@@ -54,8 +53,7 @@ class OdrJunction:
     connections: tuple[OdrConnection, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OdrNetwork:
+class OdrNetwork(NamedTuple):
     """All roads and junctions of a file; `road_of` names the road of each of the World's lanes."""
 
     side: DrivingSide
@@ -101,21 +99,31 @@ def network_of(world: World) -> OdrNetwork:
         a, b = (End(by_source[e.road.id], e.at_end) for e in place.ends)
         _join(a, b, lanes)
     junctions: list[OdrJunction] = []
-    number = len(roads) + 1
+    ids = count(len(roads) + 1)
     for key, place in places.items():
         ends = [End(by_source[e.road.id], e.at_end) for e in place.ends if e.road.id in by_source]
         known = [c for c in place.connections if {c.from_lane_id, c.to_lane_id} <= road_of.keys()]
         if not known and len(ends) < 3:
             continue
+        number = next(ids)
         short = taper(key, number, ends, known, lanes, side)
         if short is not None:
             roads.append(short)
-            number += 1
             continue
-        junction = _junction(key, number, ends, known, lanes, road_of, side)
-        junctions.append(junction)
-        roads.extend(item.road for item in junction.connections)
-        number += 1 + len(known)
+        for end in ends:
+            end.link("junction", number)
+        made = []
+        for connection in known:
+            start, to = lanes[connection.from_lane_id], lanes[connection.to_lane_id]
+            a, b = End(road_of[start.id], not start.reverse), End(road_of[to.id], to.reverse)
+            road = _connecting_road(connection, next(ids), a, b, start, to, side)
+            road.junction = number
+            a.link("junction", number)
+            b.link("junction", number)
+            made.append(OdrConnection(connection, road, a.road))
+        name = next((c.junction_id for c in known if c.junction_id), "")
+        junctions.append(OdrJunction(number, key, name, tuple(made)))
+        roads.extend(item.road for item in made)
     return OdrNetwork(
         side=side,
         roads=tuple(roads),
@@ -127,15 +135,15 @@ def network_of(world: World) -> OdrNetwork:
 
 
 def _places(world: World, lanes: Mapping[str, Lane]) -> dict[str, _RoadJoint]:
-    found: dict[str, _RoadJoint] = {}
+    found: dict[str, _RoadJoint] = defaultdict(_RoadJoint)
     for road in world.roads:
         if not any(i in lanes for i in road.lane_ids):
             continue
         for key, at_end in ((road.from_place, False), (road.to_place, True)):
             if key is not None:
-                found.setdefault(key, _RoadJoint()).ends.append(_PlainEnd(road, at_end))
+                found[key].ends.append(_PlainEnd(road, at_end))
     for connection in world.connections:
-        found.setdefault(connection.place_id, _RoadJoint()).connections.append(connection)
+        found[connection.place_id].connections.append(connection)
     return found
 
 
@@ -154,13 +162,9 @@ def _pairs(
     start: Iterable[str], to: Collection[str], lanes: Mapping[str, Lane]
 ) -> list[tuple[Lane, Lane]]:
     """Return which lanes of one road, by id, lead straight into which of another."""
-    return [
-        (lanes[i], lanes[j])
-        for i in start
-        if i in lanes
-        for j in lanes[i].successor_ids
-        if j in to and j in lanes
-    ]
+    first = (lanes[i] for i in start if i in lanes)
+    pairs = ((lane, j) for lane in first for j in lane.successor_ids)
+    return [(lane, lanes[j]) for lane, j in pairs if j in to and j in lanes]
 
 
 def _tip(end: _PlainEnd) -> Array:
@@ -186,16 +190,13 @@ def _headings(joined: Sequence[_RoadJoint]) -> dict[tuple[str, bool], Array]:
 
 def _join(a: End, b: End, lanes: Mapping[str, Lane]) -> None:
     """Link two roads and those of their lanes that go on."""
-    a.road.link(at_end=a.at_end, to=("road", b.road.id, b.at_end))
-    b.road.link(at_end=b.at_end, to=("road", a.road.id, a.at_end))
+    a.link("road", b.road.id, at_end=b.at_end)
+    b.link("road", a.road.id, at_end=a.at_end)
     for start, to in ((a, b), (b, a)):
         for one, other in _pairs(start.road.numbers, to.road.numbers, lanes):
             if one.reverse == start.at_end or other.reverse != to.at_end:
                 continue
-            gap = (
-                start.road.end_of(one, at_end=start.at_end).point
-                - to.road.end_of(other, at_end=to.at_end).point
-            )
+            gap = start.lane_end(one).point - to.lane_end(other).point
             if math.hypot(*gap) <= _ASIDE_M:
                 _link_lanes(start, start.road.numbers[one.id], to, to.road.numbers[other.id])
     same_way = 1 if a.at_end != b.at_end else -1
@@ -207,62 +208,20 @@ def _join(a: End, b: End, lanes: Mapping[str, Lane]) -> None:
 
 def _same_strip(a: End, mine: int, b: End, theirs: int, same_way: int) -> bool:
     """Return whether two strips that are not driven on meet edge to edge."""
-    inner = mine - (1 if mine > 0 else -1), theirs - (1 if theirs > 0 else -1)
-    return all(
-        abs(a.road.edge_m(m, at_end=a.at_end) - same_way * b.road.edge_m(n, at_end=b.at_end))
-        < _SAME_EDGE_M
-        for m, n in ((mine, theirs), inner)
-    )
+    edges = (mine, theirs), (inward(mine), inward(theirs))
+    return all(abs(a.edge_m(m) - same_way * b.edge_m(n)) < _SAME_EDGE_M for m, n in edges)
 
 
 def _link_lanes(a: End, number: int, b: End, other: int) -> None:
-    for end, mine, theirs in ((a, number, other), (b, other, number)):
-        lane = end.road.lane_numbered(mine)
-        if end.at_end:
-            lane.successor = theirs
-        else:
-            lane.predecessor = theirs
-
-
-def _junction(
-    place: str,
-    number: int,
-    ends: Sequence[End],
-    connections: Sequence[Connection],
-    lanes: Mapping[str, Lane],
-    road_of: Mapping[str, OdrRoad],
-    side: DrivingSide,
-) -> OdrJunction:
-    for end in ends:
-        end.road.link(at_end=end.at_end, to=("junction", number, False))
-    made = []
-    for i, connection in enumerate(connections, start=1):
-        start, to = lanes[connection.from_lane_id], lanes[connection.to_lane_id]
-        a = End(road_of[start.id], not start.reverse)
-        b = End(road_of[to.id], to.reverse)
-        road = _connecting_road(connection, number + i, a, b, start, to, side)
-        road.junction = number
-        for end in (a, b):
-            end.road.link(at_end=end.at_end, to=("junction", number, False))
-        made.append(
-            OdrConnection(
-                connection=connection,
-                road=road,
-                incoming=a.road.id,
-                from_number=a.road.numbers[start.id],
-                to_number=road.lanes[0].number,
-            )
-        )
-    junction_id = next((c.junction_id for c in connections if c.junction_id), "")
-    return OdrJunction(id=number, place=place, junction_id=junction_id, connections=tuple(made))
+    a.link_lane(number, other)
+    b.link_lane(other, number)
 
 
 def _connecting_road(
     connection: Connection, number: int, a: End, b: End, start: Lane, to: Lane, side: DrivingSide
 ) -> OdrRoad:
     """Return the road of one connection: one lane about its middle, tangent to both lanes."""
-    begin = a.road.end_of(start, at_end=a.at_end)
-    finish = b.road.end_of(to, at_end=b.at_end)
+    begin, finish = a.lane_end(start), b.lane_end(to)
     if math.hypot(*(finish.point - begin.point)) < MIN_ROAD_M:
         beyond = begin.point + begin.heading * MIN_ROAD_M
         curve = curve_between(begin.point, begin.heading, beyond, begin.heading)
@@ -287,7 +246,7 @@ def _connecting_road(
         offset=Cubic.between(half * first, half * last, curve.length_m),
         lanes=[lane],
         road_class=a.road.road_class,
-        height=Cubic(a.road.height.at(a.road.curve.length_m if a.at_end else 0.0)),
+        height=Cubic(a.height_m),
         predecessor=("road", a.road.id, a.at_end),
         successor=("road", b.road.id, b.at_end),
     )

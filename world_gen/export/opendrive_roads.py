@@ -1,4 +1,4 @@
-"""Roads as OpenDRIVE knows them: a reference line and lanes with signed numbers beside it."""
+"""Roads as OpenDRIVE has them: a reference line and lanes with signed numbers beside it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import DrivingSide, Lane, Road, World
+from foretwin.geometry.polyline import left_of
 from foretwin.world_gen.export.opendrive_curve import Curve, fit_curve
-from foretwin.world_gen.export.opendrive_heights import heights_of, node_of
 from foretwin.world_gen.export.opendrive_sidewalks import Sidewalk
+from foretwin.world_gen.export.road_heights import heights_of, node_of
 
 GAP_M = 0.01
 """Lanes farther apart than this have a strip without traffic between them."""
+
+
+Link = tuple[Literal["road", "junction"], int, bool]
 
 
 class Cubic(NamedTuple):
@@ -44,13 +48,6 @@ class Pose(NamedTuple):
 
     point: Array
     heading: Array
-
-
-class End(NamedTuple):
-    """One end of a road."""
-
-    road: OdrRoad
-    at_end: bool
 
 
 @dataclass(slots=True, kw_only=True)
@@ -84,42 +81,65 @@ class OdrRoad:
     road_class: str
     height: Cubic
     junction: int = -1
-    predecessor: tuple[Literal["road", "junction"], int, bool] | None = None
+    predecessor: Link | None = None
     """What it is linked to before its start, its id, and, for a road, whether at its end."""
-    successor: tuple[Literal["road", "junction"], int, bool] | None = None
+    successor: Link | None = None
     road: Road | None = None
     numbers: dict[str, int] = field(default_factory=dict)
     """The number of each of the World's lanes."""
 
-    def link(self, *, at_end: bool, to: tuple[Literal["road", "junction"], int, bool]) -> None:
-        """Say what follows after one end."""
-        if at_end:
-            self.successor = to
+
+class End(NamedTuple):
+    """One end of a road."""
+
+    road: OdrRoad
+    at_end: bool
+
+    @property
+    def s_m(self) -> float:
+        """Arc length of the reference line here."""
+        return self.road.curve.length_m if self.at_end else 0.0
+
+    @property
+    def height_m(self) -> float:
+        """Height of the road here."""
+        return self.road.height.at(self.s_m)
+
+    def link(self, kind: Literal["road", "junction"], number: int, *, at_end: bool = False) -> None:
+        """Say what follows after this end: a junction, or a road from its start or its end."""
+        if self.at_end:
+            self.road.successor = (kind, number, at_end)
         else:
-            self.predecessor = to
+            self.road.predecessor = (kind, number, at_end)
 
-    def lane_numbered(self, number: int) -> OdrLane:
-        """Return the lane with this number."""
-        return next(lane for lane in self.lanes if lane.number == number)
+    def link_lane(self, number: int, following: int) -> None:
+        """Say which lane follows after a lane of the road, both by number."""
+        lane = next(lane for lane in self.road.lanes if lane.number == number)
+        if self.at_end:
+            lane.successor = following
+        else:
+            lane.predecessor = following
 
-    def edge_m(self, number: int, *, at_end: bool) -> float:
+    def edge_m(self, number: int) -> float:
         """Return how far a lane's outer edge, or lane 0, lies to the left of the reference line."""
-        s = self.curve.length_m if at_end else 0.0
-        left = self.offset.at(s)
+        left = self.road.offset.at(self.s_m)
         step = 1 if number > 0 else -1
-        for lane in self.lanes:
+        for lane in self.road.lanes:
             if 0 < lane.number * step <= number * step:
-                left += step * lane.width.at(s)
+                left += step * lane.width.at(self.s_m)
         return left
 
-    def end_of(self, lane: Lane, *, at_end: bool) -> Pose:
-        """Return where one of the World's lanes ends at an end of the road, as it is driven."""
-        number = self.numbers[lane.id]
-        inner = number - (1 if number > 0 else -1)
-        left = (self.edge_m(number, at_end=at_end) + self.edge_m(inner, at_end=at_end)) / 2.0
-        point, direction = self.curve.end(at_end=at_end)
-        aside = left * np.array([-direction[1], direction[0]])
-        return Pose(point + aside, -direction if lane.reverse else direction)
+    def lane_end(self, lane: Lane) -> Pose:
+        """Return where one of the World's lanes ends here, as it is driven."""
+        number = self.road.numbers[lane.id]
+        left = (self.edge_m(number) + self.edge_m(inward(number))) / 2.0
+        point, direction = self.road.curve.end(at_end=self.at_end)
+        return Pose(point + left * left_of(direction), -direction if lane.reverse else direction)
+
+
+def inward(number: int) -> int:
+    """Return the number of the lane on the inner side of a lane; it may be lane 0."""
+    return number - (1 if number > 0 else -1)
 
 
 def roads_of(
@@ -142,11 +162,9 @@ def roads_of(
         mine = [lanes[i] for i in road.lane_ids if i in lanes]
         if not mine:
             continue
-        curve = fit_curve(
-            road.reference_line,
-            start=headings.get((road.id, False)),
-            end=headings.get((road.id, True)),
-        )
+        start, end = headings.get((road.id, False)), headings.get((road.id, True))
+        curve = fit_curve(road.reference_line, start=start, end=end)
+        rise = heights[node_of(road, at_end=False)], heights[node_of(road, at_end=True)]
         strips, centre_m = _strips(mine, side)
         strips = _with_sidewalks(strips, centre_m, road, sidewalks.get(road.id, ()))
         found.append(
@@ -158,11 +176,7 @@ def roads_of(
                 offset=Cubic(centre_m),
                 lanes=strips,
                 road_class=road.road_class,
-                height=Cubic.between(
-                    heights[node_of(road, at_end=False)],
-                    heights[node_of(road, at_end=True)],
-                    curve.length_m,
-                ),
+                height=Cubic.between(*rise, curve.length_m),
                 road=road,
                 numbers={s.lane.id: s.number for s in strips if s.lane is not None},
             )
@@ -179,33 +193,30 @@ def _strips(lanes: Sequence[Lane], side: DrivingSide) -> tuple[list[OdrLane], fl
     """Return lanes and gaps from left to right, and where lane 0 lies to the left of the line."""
     ordered = sorted(lanes, key=lambda lane: -lane.left_of_reference_m)
     centre = _lane_zero(ordered, side)
-    edges = [
-        (
-            lane.left_of_reference_m + lane.width_m.value / 2.0,
-            lane.left_of_reference_m - lane.width_m.value / 2.0,
-        )
-        for lane in ordered
-    ]
-    left: list[tuple[Lane | None, float]] = []
-    right: list[tuple[Lane | None, float]] = []
-    zero_m = edges[centre - 1][1] if centre else edges[0][0]
-    at = zero_m
-    for lane, (_, outer) in zip(ordered[centre:], edges[centre:], strict=True):
-        at = _add(right, lane, at, outer, lane.width_m.value)
-    at = -zero_m
-    for lane, (outer, _) in zip(ordered[:centre][::-1], edges[:centre][::-1], strict=True):
-        at = _add(left, lane, at, -outer, lane.width_m.value)
-    numbered = [(len(left) - i, strip) for i, strip in enumerate(reversed(left))]
-    numbered += [(-1 - i, strip) for i, strip in enumerate(right)]
-    return [
-        OdrLane(
-            number=number,
-            width=Cubic(width),
-            lane=lane,
-            reversed=lane is not None and lane.reverse == runs_along(number, side),
-        )
-        for number, (lane, width) in numbered
-    ], zero_m
+    beside, step = (ordered[centre - 1], -1) if centre else (ordered[0], 1)
+    zero_m = beside.left_of_reference_m + step * beside.width_m.value / 2.0
+    left = _outward(ordered[:centre][::-1], 1, zero_m, side)
+    right = _outward(ordered[centre:], -1, zero_m, side)
+    return [*left[::-1], *right], zero_m
+
+
+def _outward(
+    lanes: Sequence[Lane], step: Literal[1, -1], zero_m: float, side: DrivingSide
+) -> list[OdrLane]:
+    """Return lanes to one side of lane 0, numbered outward by `step`, and the gaps before them."""
+    found: list[OdrLane] = []
+    at = -step * zero_m
+    for lane in lanes:
+        width = lane.width_m.value
+        gap = at - (-step * lane.left_of_reference_m - width / 2.0 + width)
+        if gap > GAP_M:
+            found.append(OdrLane(number=step * (len(found) + 1), width=Cubic(gap), lane=None))
+            at -= gap
+        number = step * (len(found) + 1)
+        against = lane.reverse == runs_along(number, side)
+        found.append(OdrLane(number=number, width=Cubic(width), lane=lane, reversed=against))
+        at -= width
+    return found
 
 
 def _with_sidewalks(
@@ -218,25 +229,14 @@ def _with_sidewalks(
         mine = [strip for strip in strips if strip.number * step > 0]
         outer = centre_m + step * sum(strip.width.a for strip in mine)
         gap = step * ((road.left_m if sidewalk.left else road.right_m) - outer)
-        more = [OdrLane(number=0, width=Cubic(sidewalk.width_m), lane=None, sidewalk=True)]
-        if gap > GAP_M:
-            more.insert(0, OdrLane(number=0, width=Cubic(gap), lane=None))
-        for i, strip in enumerate(more, start=len(mine) + 1):
-            strip.number = i * step
+        widths = [gap, sidewalk.width_m] if gap > GAP_M else [sidewalk.width_m]
+        more = [
+            OdrLane(number=i * step, width=Cubic(width), lane=None)
+            for i, width in enumerate(widths, start=len(mine) + 1)
+        ]
+        more[-1].sidewalk = True
         found = [*reversed(more), *found] if sidewalk.left else [*found, *more]
     return found
-
-
-def _add(
-    strips: list[tuple[Lane | None, float]], lane: Lane, at: float, outer: float, width: float
-) -> float:
-    """Add a lane outward (downwards) of `at`, after a strip for a gap; return where it ends."""
-    gap = at - (outer + width)
-    if gap > GAP_M:
-        strips.append((None, gap))
-        at -= gap
-    strips.append((lane, width))
-    return at - width
 
 
 def _lane_zero(ordered: Sequence[Lane], side: DrivingSide) -> int:

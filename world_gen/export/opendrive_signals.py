@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from itertools import count
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from lxml import etree
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.signals import Signal
-from foretwin.contracts.world import DrivingSide, Lane, StopLine, World
-from foretwin.world_gen.export.opendrive_elements import Version, number
-from foretwin.world_gen.export.opendrive_places import OdrJunction, OdrNetwork
+from foretwin.contracts.world import Lane, StopLine, World
+from foretwin.world_gen.export.choices import OpenDriveVersion
+from foretwin.world_gen.export.opendrive_places import OdrNetwork
 from foretwin.world_gen.export.opendrive_roads import OdrRoad
+from foretwin.world_gen.export.xml_tree import Element, child, element
 
 SIGN_BESIDE_M = 0.6
 SIGN_HEIGHT_M = 2.65
@@ -29,173 +29,160 @@ _SIGNS = {"stop": ("206", "stop"), "give_way": ("205", "yield")}
 """Type in Germany's catalogue of signs and meaning of the signs at stop lines by their control."""
 
 
+_Ruled = tuple[OdrRoad, bool, list[int]]
+"""The first three fields of a `_Post`."""
+
+
 class Controller(NamedTuple):
     """Signals that change together, and the junctions that they lead into."""
 
     id: int
     junctions: frozenset[int]
-    element: etree._Element
+    element: Element
 
 
-def add_signals(
-    world: World, network: OdrNetwork, elements: Mapping[int, etree._Element], version: Version
-) -> list[Controller]:
-    """Add `<signals>` to the roads' `elements`, which are by id, and return their controllers."""
-    lanes = {lane.id: lane for lane in world.lanes}
-    ids = count(1)
-    groups: dict[str, list[int]] = {}
-    leads_into: dict[str, set[int]] = {}
-    junction_of = _junction_of_lane(network.junctions)
-    for signal in world.signals:
-        for road, mine in _by_road(signal.lane_ids, lanes, network):
-            own = next(ids)
-            _add(
-                elements[road.id],
-                road,
-                _ruled(road, mine),
-                own,
-                _light(signal),
-                signal.position,
-                signal.yaw_rad,
-                version,
-            )
-            groups.setdefault(signal.group_id, []).append(own)
-            into = leads_into.setdefault(signal.group_id, set())
-            into.update(junction_of[lane.id] for lane in mine if lane.id in junction_of)
-    for lines in _signed(world.stop_lines, lanes, network):
-        place, yaw = _beside(lines, network.side)
-        road = network.road_of[lines[0].lane_id]
-        ruled = _ruled(road, [lanes[line.lane_id] for line in lines])
-        face = _sign(lines[0], network.side)
-        _add(elements[road.id], road, ruled, next(ids), face, place, yaw, version)
-    for line in world.stop_lines:
-        over = network.connecting.get(line.connection_id or "")
-        if over is not None and line.control.value in _SIGNS:
-            place, yaw = _beside([line], network.side)
-            # A connecting road runs as it is driven, and has one lane.
-            ruled = _Ruled(True, [over.lanes[0].number])
-            face = _sign(line, network.side)
-            _add(elements[over.id], over, ruled, next(ids), face, place, yaw, version)
-    return [
-        Controller(i, frozenset(leads_into[name]), _controller(i, name, members))
-        for i, (name, members) in enumerate(groups.items(), start=1)
-    ]
+class _Post(NamedTuple):
+    """A signal head or sign as the file has it, facing `yaw_rad` at `position` (3,).
 
+    It is for lanes of one road, by number, which run `along` its reference line or against it.
+    """
 
-class _Face(NamedTuple):
+    road: OdrRoad
+    along: bool
+    numbers: list[int]
     name: str
     type: str
     country: str
     meaning: str
-    dynamic: bool
-    width_m: float
-    height_m: float
+    dynamic: str
+    size_m: tuple[float, float]
+    position: Array
+    yaw_rad: float
+    group: str | None = None
 
 
-class _Ruled(NamedTuple):
-    """The lanes of a road, by number, that a signal is for, and whether they run along it."""
+def add_signals(
+    world: World, network: OdrNetwork, elements: Mapping[int, Element], version: OpenDriveVersion
+) -> list[Controller]:
+    """Add `<signals>` to the roads' `elements`, which are by id, and return their controllers."""
+    lanes = {lane.id: lane for lane in world.lanes}
+    groups: dict[str, list[int]] = {}
+    posts = [*_lights(world, network, lanes), *_signs(world, network, lanes)]
+    for own, post in enumerate(posts, start=1):
+        _add(elements[post.road.id], own, post, version)
+        if post.group is not None:
+            groups.setdefault(post.group, []).append(own)
+    leads_into = _leads_into(world.signals, network)
+    return [
+        Controller(i, leads_into[name], _controller(i, name, members))
+        for i, (name, members) in enumerate(groups.items(), start=1)
+    ]
 
-    along: bool
-    numbers: list[int]
+
+def _lights(world: World, network: OdrNetwork, lanes: Mapping[str, Lane]) -> Iterator[_Post]:
+    """Yield every head once for each road whose lanes obey it."""
+    kind, country, meaning = "1000001", "OpenDRIVE", "trafficLight"
+    for head in world.signals:
+        by_road: dict[int, list[str]] = defaultdict(list)
+        for lane_id in head.lane_ids:
+            if lane_id in network.road_of:
+                by_road[network.road_of[lane_id].id].append(lane_id)
+        for mine in by_road.values():
+            ruled = _ruled(network, lanes, mine)
+            at, yaw_rad = head.position, head.yaw_rad
+            post = _Post(*ruled, head.id, kind, country, meaning, "yes", LIGHT_M, at, yaw_rad)
+            yield post._replace(group=head.group_id)
 
 
-def _ruled(road: OdrRoad, lanes: Sequence[Lane]) -> _Ruled:
-    return _Ruled(not lanes[0].reverse, [road.numbers[lane.id] for lane in lanes])
+def _signs(world: World, network: OdrNetwork, lanes: Mapping[str, Lane]) -> Iterator[_Post]:
+    """Yield the signs at stop lines, one for those of one road and direction."""
+    together: dict[tuple[int, bool, str], list[StopLine]] = defaultdict(list)
+    inside = []
+    for line in world.stop_lines:
+        if line.control.value not in _SIGNS:
+            continue
+        if line.across_id in network.road_of:
+            road_id = network.road_of[line.lane_id].id
+            together[road_id, lanes[line.lane_id].reverse, line.control.value].append(line)
+        elif line.across_id in network.connecting:
+            inside.append(line)
+    for lines in together.values():
+        yield _sign(lines, network, _ruled(network, lanes, [line.lane_id for line in lines]))
+    for line in inside:
+        # A connecting road runs as it is driven, and has one lane.
+        road = network.connecting[line.across_id]
+        yield _sign([line], network, (road, True, [road.lanes[0].number]))
 
 
-def _light(signal: Signal) -> _Face:
-    return _Face(signal.id, "1000001", "OpenDRIVE", "trafficLight", True, *LIGHT_M)
+def _ruled(network: OdrNetwork, lanes: Mapping[str, Lane], lane_ids: Sequence[str]) -> _Ruled:
+    road = network.road_of[lane_ids[0]]
+    return road, not lanes[lane_ids[0]].reverse, [road.numbers[i] for i in lane_ids]
 
 
-def _sign(line: StopLine, side: DrivingSide) -> _Face:
-    kind, meaning = _SIGNS[line.control.value]
+def _sign(lines: Sequence[StopLine], network: OdrNetwork, ruled: _Ruled) -> _Post:
+    kind, meaning = _SIGNS[lines[0].control.value]
     # Germany's signs stand for the Vienna convention's, which left-hand countries may not share.
-    return _Face(line.id, kind, "DE" if side == "right" else "OpenDRIVE", meaning, False, *SIGN_M)
+    country = "DE" if network.side == "right" else "OpenDRIVE"
+    place, yaw_rad = _beside(lines, kerb=1 if network.side == "right" else 0)
+    return _Post(*ruled, lines[0].id, kind, country, meaning, "no", SIGN_M, place, yaw_rad)
 
 
-def _junction_of_lane(junctions: Sequence[OdrJunction]) -> dict[str, int]:
-    return {
-        item.connection.from_lane_id: junction.id
-        for junction in junctions
-        for item in junction.connections
-    }
-
-
-def _by_road(
-    lane_ids: Sequence[str], lanes: Mapping[str, Lane], network: OdrNetwork
-) -> list[tuple[OdrRoad, list[Lane]]]:
-    found: dict[int, tuple[OdrRoad, list[Lane]]] = {}
-    for i in lane_ids:
-        if i in network.road_of:
-            road = network.road_of[i]
-            found.setdefault(road.id, (road, []))[1].append(lanes[i])
-    return list(found.values())
-
-
-def _signed(
-    lines: Sequence[StopLine], lanes: Mapping[str, Lane], network: OdrNetwork
-) -> list[list[StopLine]]:
-    """Return the stop lines that have a sign, together those of one road and direction."""
-    found: dict[tuple[int, bool, str], list[StopLine]] = {}
-    for line in lines:
-        if line.control.value in _SIGNS and line.across_id in network.road_of:
-            key = (network.road_of[line.lane_id].id, lanes[line.lane_id].reverse)
-            found.setdefault((*key, line.control.value), []).append(line)
-    return list(found.values())
-
-
-def _beside(lines: Sequence[StopLine], side: DrivingSide) -> tuple[Array, float]:
-    """Return where a sign stands, at the kerb side of the lines, and where it faces."""
-    kerb = 1 if side == "right" else 0
+def _beside(lines: Sequence[StopLine], *, kerb: int) -> tuple[Array, float]:
+    """Return where a sign stands, at the end `kerb` of the lines, and where it faces."""
     across = lines[0].ends[0] - lines[0].ends[1]
     across /= max(math.hypot(*across), 1e-6)
     outward = across * (1.0 if kerb == 0 else -1.0)
     ends = np.array([line.ends[kerb] for line in lines])
     at = ends[int(np.argmax(ends @ outward))] + outward * SIGN_BESIDE_M
-    # `across` points to the driver's left: he looks a quarter turn clockwise of it.
+    # `across` points to the driver's left, a quarter turn counter-clockwise of the direction.
     facing = math.atan2(-across[0], across[1])
     return np.array([at[0], at[1], SIGN_HEIGHT_M]), facing + math.pi
 
 
-def _add(
-    element: etree._Element,
-    road: OdrRoad,
-    ruled: _Ruled,
-    own: int,
-    face: _Face,
-    position: Array,
-    yaw_rad: float,
-    version: Version,
-) -> None:
-    signals = element.find("signals")
+def _leads_into(heads: Iterable[Signal], network: OdrNetwork) -> dict[str, frozenset[int]]:
+    """Return for each group the junctions that the lanes of its heads lead into."""
+    junction_of = {
+        item.connection.from_lane_id: junction.id
+        for junction in network.junctions
+        for item in junction.connections
+    }
+    found: dict[str, frozenset[int]] = defaultdict(frozenset)
+    for head in heads:
+        found[head.group_id] |= {junction_of[i] for i in head.lane_ids if i in junction_of}
+    return found
+
+
+def _add(made: Element, own: int, post: _Post, version: OpenDriveVersion) -> None:
+    signals = made.find("signals")
     if signals is None:
-        signals = etree.SubElement(element, "signals")
-    s, t = road.curve.locate(position[:2])
-    _, direction = road.curve.at(s)
+        signals = child(made, "signals")
+    s, t = post.road.curve.locate(post.position[:2])
+    _, direction = post.road.curve.at(s)
     heading = math.atan2(direction[0, 1], direction[0, 0])
-    usual = heading + math.pi if ruled.along else heading
-    item = etree.SubElement(
+    usual = heading + math.pi if post.along else heading
+    width_m, height_m = post.size_m
+    item = child(
         signals,
         "signal",
-        name=face.name,
-        s=number(s[0]),
-        t=number(t[0]),
-        dynamic="yes" if face.dynamic else "no",
-        orientation="+" if ruled.along else "-",
-        # The file asks for the lower edge, the World says where the middle is.
-        zOffset=number(float(position[2]) - face.height_m / 2.0),
-        width=number(face.width_m),
-        height=number(face.height_m),
-        country=face.country,
-        type=face.type,
-        subtype="-1",
-        hOffset=number(float(wrap_angle(yaw_rad - usual))),
+        name=post.name,
+        s=s[0],
+        t=t[0],
+        dynamic=post.dynamic,
+        orientation="+" if post.along else "-",
+        # The file has the lower edge, the World the middle.
+        zOffset=float(post.position[2]) - height_m / 2.0,
+        width=width_m,
+        height=height_m,
+        country=post.country,
+        type=post.type,
+        subtype=-1,
+        hOffset=float(wrap_angle(post.yaw_rad - usual)),
+        id=own,
     )
-    item.set("id", str(own))
-    for first, last in _runs(ruled.numbers):
-        etree.SubElement(item, "validity", fromLane=str(first), toLane=str(last))
+    for first, last in _runs(post.numbers):
+        child(item, "validity", fromLane=first, toLane=last)
     if version == "1.8":
-        etree.SubElement(etree.SubElement(item, "semantics"), "priority", type=face.meaning)
+        child(child(item, "semantics"), "priority", type=post.meaning)
 
 
 def _runs(numbers: Sequence[int]) -> list[tuple[int, int]]:
@@ -209,9 +196,8 @@ def _runs(numbers: Sequence[int]) -> list[tuple[int, int]]:
     return runs
 
 
-def _controller(own: int, name: str, signals: Sequence[int]) -> etree._Element:
-    element = etree.Element("controller", name=name)
-    element.set("id", str(own))
+def _controller(own: int, name: str, signals: Sequence[int]) -> Element:
+    made = element("controller", name=name, id=own)
     for signal in signals:
-        etree.SubElement(element, "control", signalId=str(signal), type="0")
-    return element
+        child(made, "control", signalId=signal, type=0)
+    return made

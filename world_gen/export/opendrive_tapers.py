@@ -6,8 +6,8 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 
 from foretwin.contracts.world import Connection, DrivingSide, Lane
-from foretwin.world_gen.export.opendrive_curve import Curve, curve_between
-from foretwin.world_gen.export.opendrive_roads import Cubic, End, OdrLane, OdrRoad, Pose
+from foretwin.world_gen.export.opendrive_curve import curve_between
+from foretwin.world_gen.export.opendrive_roads import Cubic, End, OdrLane, OdrRoad, Pose, inward
 
 
 def taper(
@@ -44,17 +44,31 @@ def taper(
     if math.hypot(*span) < 0.5 or float(begin.heading @ -finish.heading) < -0.2:
         return None
     curve = curve_between(begin.point, begin.heading, finish.point, -finish.heading)
-    road = _road(place, number, curve, (first, second), along, side)
+    left = sum(flag != (side == "right") for flag in along)
+    road = OdrRoad(
+        id=number,
+        name=a.road.name,
+        source=place,
+        curve=curve,
+        offset=Cubic.between(_lane_zero(first, left), _lane_zero(second, left), curve.length_m),
+        lanes=[
+            OdrLane(
+                number=left - i if i < left else left - i - 1,
+                width=Cubic.between(l0 - r0, l1 - r1, curve.length_m),
+                lane=lane,
+            )
+            for i, ((lane, l0, r0), (_, l1, r1)) in enumerate(zip(first, second, strict=True))
+        ],
+        road_class=a.road.road_class,
+        height=Cubic(a.height_m),
+    )
     for (lane, _, _), (other, _, _), mine in zip(first, second, road.lanes, strict=True):
         mine.predecessor, mine.successor = a.road.numbers[lane.id], b.road.numbers[other.id]
-        _set_next(a, mine.predecessor, mine.number)
-        _set_next(b, mine.successor, mine.number)
-    road.link(at_end=False, to=("road", a.road.id, a.at_end))
-    road.link(at_end=True, to=("road", b.road.id, b.at_end))
-    a.road.link(at_end=a.at_end, to=("road", road.id, False))
-    b.road.link(at_end=b.at_end, to=("road", road.id, True))
-    road.name, road.road_class = a.road.name, a.road.road_class
-    road.height = Cubic(a.road.height.at(a.road.curve.length_m if a.at_end else 0.0))
+        a.link_lane(mine.predecessor, mine.number)
+        b.link_lane(mine.successor, mine.number)
+    for end, own in ((a, End(road, False)), (b, End(road, True))):
+        own.link("road", end.road.id, at_end=end.at_end)
+        end.link("road", road.id, at_end=own.at_end)
     return road
 
 
@@ -80,53 +94,17 @@ def _section(end: End, *, facing: bool) -> Section | None:
             continue
         if item.lane is None or item.reversed:
             return None
-        inner = item.number - (1 if item.number > 0 else -1)
-        edges = [flip * end.road.edge_m(n, at_end=end.at_end) for n in (item.number, inner)]
+        edges = [flip * end.edge_m(n) for n in (item.number, inward(item.number))]
         found.append((item.lane, max(edges), min(edges)))
     return sorted(found, key=lambda row: -row[1])
 
 
-def _road(
-    place: str,
-    number: int,
-    curve: Curve,
-    sections: tuple[Section, Section],
-    along: Sequence[bool],
-    side: DrivingSide,
-) -> OdrRoad:
-    first, second = sections
-    left = sum(flag != (side == "right") for flag in along)
-    zero = [section[left - 1][2] if left else section[0][1] for section in (first, second)]
-    lanes = []
-    for i, ((lane, l0, r0), (_, l1, r1)) in enumerate(zip(first, second, strict=True)):
-        lanes.append(
-            OdrLane(
-                number=left - i if i < left else left - i - 1,
-                width=Cubic.between(l0 - r0, l1 - r1, curve.length_m),
-                lane=lane,
-            )
-        )
-    return OdrRoad(
-        id=number,
-        name="",
-        source=place,
-        curve=curve,
-        offset=Cubic.between(zero[0], zero[1], curve.length_m),
-        lanes=lanes,
-        road_class="",
-        height=Cubic(0.0),
-    )
+def _lane_zero(section: Section, left: int) -> float:
+    """Return how far to the left lane 0 lies, to the right of so many lanes."""
+    return section[left - 1][2] if left else section[0][1]
 
 
 def _pose(end: End) -> Pose:
     """Return the end of a road's reference line, looking out of the road."""
     point, direction = end.road.curve.end(at_end=end.at_end)
     return Pose(point, direction if end.at_end else -direction)
-
-
-def _set_next(end: End, number: int, following: int) -> None:
-    lane = end.road.lane_numbered(number)
-    if end.at_end:
-        lane.successor = following
-    else:
-        lane.predecessor = following

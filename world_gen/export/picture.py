@@ -14,15 +14,8 @@ from matplotlib.figure import Figure
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
+from foretwin.world_gen.export import picture_marks as marks
 from foretwin.world_gen.export.picture_ground import draw_ground
-from foretwin.world_gen.export.picture_marks import (
-    draw_height_scale,
-    draw_legend,
-    draw_panel,
-    north_arrow,
-    number_junctions,
-    scale_bar,
-)
 from foretwin.world_gen.export.picture_style import View, view_around
 from foretwin.world_gen.export.picture_traffic import draw_traffic
 from foretwin.world_gen.report.report import WorldReport, report_of
@@ -66,24 +59,21 @@ def _figure(world: World, report: WorldReport) -> Figure:
     if world.bounds_m is not None:
         view = _all_of(world, _aspect(_MAIN_BOX))
         _draw(main, world, view)
-        number_junctions(main, world, view)
+        marks.number_junctions(main, world, view)
         top = 0.93
     else:
         _draw(main, world, _close_view(world))
-        whole = figure.add_axes(_WHOLE_BOX)
-        middle = np.zeros(2)
-        view = view_around(middle, world.radius_m, _aspect(_WHOLE_BOX), close=False)
-        _draw(whole, world, view)
+        view = view_around(np.zeros(2), world.radius_m, _aspect(_WHOLE_BOX), close=False)
+        _draw(figure.add_axes(_WHOLE_BOX), world, view)
         top = 0.57
     title = _title(world, report)
-    figure.text(
-        0.01, 0.972, title, fontsize=min(18.0, 1550.0 / len(title)), weight="bold", va="center"
-    )
+    size = min(18.0, 1550.0 / len(title))
+    figure.text(0.01, 0.972, title, fontsize=size, weight="bold", va="center")
     figure.text(0.01, 0.945, _subtitle(world), fontsize=10.5, va="center", color="#444444")
     figure.text(0.99, 0.012, world.attribution, fontsize=12, ha="right", weight="bold")
-    draw_legend(figure)
-    draw_height_scale(figure, (0.84, 0.135, 0.15, 0.011))
-    draw_panel(figure, world, report, top=top)
+    marks.draw_legend(figure)
+    marks.draw_height_scale(figure, (0.84, 0.135, 0.15, 0.011))
+    marks.draw_panel(figure, world, report, top=top)
     return figure
 
 
@@ -94,8 +84,8 @@ def _title(world: World, report: WorldReport) -> str:
         sure = report.confidence
     else:
         kind, control = place.kind.replace("_", " "), place.control.replace("_", " ")
-        told = kind if kind == control else f"{kind}, {control}"
-        what = f"{told}, {place.driving_side}-hand traffic"
+        words = kind if kind == control else f"{kind}, {control}"
+        what = f"{words}, {place.driving_side}-hand traffic"
         sure = report.junctions[0].confidence if report.junctions else report.confidence
     trust = "" if sure is None else f"   confidence {sure:.2f}"
     return f"{place.name or place.id}   ({what}){trust}"
@@ -103,13 +93,12 @@ def _title(world: World, report: WorldReport) -> str:
 
 def _subtitle(world: World) -> str:
     place = world.intersection
-    reach = f"radius {world.radius_m:g} m"
+    name, reach = f"intersection {place.id}", f"radius {world.radius_m:g} m"
     if world.bounds_m is not None:
         west, south, east, north = world.bounds_m
-        reach = f"{east - west:.0f} m by {north - south:.0f} m"
+        name, reach = place.id, f"{east - west:.0f} m by {north - south:.0f} m"
     return (
-        f"{'' if world.bounds_m else 'intersection '}{place.id}   world {world.id}   "
-        f"{place.lat:.6f}, {place.lon:.6f}   "
+        f"{name}   world {world.id}   {place.lat:.6f}, {place.lon:.6f}   "
         f"{reach}   {len(world.lanes)} lanes, {len(world.connections)} connections, "
         f"{len(world.conflicts)} conflicts, {len(world.buildings)} buildings"
     )
@@ -118,9 +107,9 @@ def _subtitle(world: World) -> str:
 def _draw(axes: Axes, world: World, view: View) -> None:
     draw_ground(axes, world, view)
     draw_traffic(axes, world, view)
-    scale_bar(axes, view)
+    marks.scale_bar(axes, view)
     if view.close or world.bounds_m is not None:
-        north_arrow(axes)
+        marks.north_arrow(axes)
 
 
 def _aspect(box: tuple[float, float, float, float]) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,26 +16,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import PROVENANCES, Provenance
 from foretwin.contracts.world import Area, Building, Crossing, Road, World
 from foretwin.geometry.polyline import left_of, offset
-from foretwin.world_gen.export.picture_style import (
-    DASH,
-    DECK_EDGE,
-    GROUND,
-    HATCH,
-    HEIGHT_COLOURS,
-    HEIGHT_SCALE_M,
-    ISLAND,
-    ISLAND_EDGE,
-    JUNCTION,
-    KERB,
-    ROAD,
-    SIDEWALK,
-    SIGNAL,
-    TUNNEL,
-    View,
-)
-
-OVERHANG_M = 2.5
-"""What begins higher is drawn see-through: cars pass below it."""
+from foretwin.world_gen.buildings.tags import HEADROOM_M
+from foretwin.world_gen.export import picture_style as style
+from foretwin.world_gen.export.picture_style import Look, View
 
 
 def draw_ground(axes: Axes, world: World, view: View) -> None:
@@ -42,61 +26,57 @@ def draw_ground(axes: Axes, world: World, view: View) -> None:
     axes.set_aspect("equal")
     axes.set_xlim(view.west_m, view.east_m)
     axes.set_ylim(view.south_m, view.north_m)
-    axes.set_facecolor(GROUND)
+    axes.set_facecolor(style.GROUND)
     axes.set_xticks([])
     axes.set_yticks([])
-    _areas(axes, view, world.sidewalks, facecolor=SIDEWALK, edgecolor="none", zorder=0.8)
-    _areas(axes, view, world.road_surface, facecolor=ROAD, edgecolor="none", zorder=1.0)
     junctions = [j.area for j in world.junctions if j.area is not None]
-    _areas(axes, view, junctions, facecolor=JUNCTION, edgecolor="none", zorder=1.1)
+    for areas, colour, order in (
+        (world.sidewalks, style.SIDEWALK, 0.8),
+        (world.road_surface, style.ROAD, 1.0),
+        (junctions, style.JUNCTION, 1.1),
+    ):
+        _areas(axes, view, areas, facecolor=colour, edgecolor="none", zorder=order)
     for source in PROVENANCES:
         islands = [island for island in world.islands if island.source == source]
-        style = {"linestyle": DASH[source], "linewidth": 0.9, "zorder": 2.0}
-        _areas(axes, view, islands, facecolor=ISLAND, edgecolor=ISLAND_EDGE, **style)
-    axes.add_collection(
-        LineCollection(
-            list(world.kerbs), colors=KERB, linewidths=1.2 if view.close else 0.6, zorder=4.7
-        )
-    )
+        colours = {"facecolor": style.ISLAND, "edgecolor": style.ISLAND_EDGE, "zorder": 2.0}
+        _areas(axes, view, islands, linestyle=style.DASH[source], linewidth=0.9, **colours)
+    broad = 1.2 if view.close else 0.6
+    kerbs = LineCollection(list(world.kerbs), colors=style.KERB, linewidths=broad, zorder=4.7)
+    axes.add_collection(kerbs)
     _tunnels_and_decks(axes, world, view)
     _buildings(axes, world, view)
     _crossings(axes, world, view)
 
 
-def _outline(outline: Array, holes: Iterable[Array] = ()) -> Outline:
-    rings = [np.concatenate([ring, ring[:1]]) for ring in (outline, *holes)]
-    codes = [
-        code
-        for ring in rings
-        for code in (Outline.MOVETO, *[Outline.LINETO] * (len(ring) - 2), Outline.CLOSEPOLY)
-    ]
-    return Outline(np.concatenate(rings), codes)
+def _outline(area: Area | Building) -> Outline:
+    rings = (np.concatenate([ring, ring[:1]]) for ring in (area.outline, *area.holes))
+    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
 
 
-def _areas(axes: Axes, view: View, areas: Sequence[Area], **style: Any) -> None:
-    paths = [_outline(area.outline, area.holes) for area in areas if view.meets(area.outline)]
+def _areas(axes: Axes, view: View, areas: Sequence[Area], **look: Any) -> None:
+    paths = [_outline(area) for area in areas if view.meets(area.outline)]
     if paths:
-        axes.add_collection(PathCollection(paths, **style))
+        axes.add_collection(PathCollection(paths, **look))
 
 
 def _buildings(axes: Axes, world: World, view: View) -> None:
-    groups: dict[tuple[Provenance, bool], list[Building]] = {}
+    groups: dict[tuple[Provenance, bool], list[Building]] = defaultdict(list)
     for building in sorted(world.buildings, key=lambda b: b.height_m.value):
         if view.meets(building.outline):
-            key = building.height_m.source, building.min_height_m >= OVERHANG_M
-            groups.setdefault(key, []).append(building)
-    colours = ScalarMappable(HEIGHT_SCALE_M, HEIGHT_COLOURS)
+            # What cars pass below is drawn see-through.
+            groups[building.height_m.source, building.min_height_m >= HEADROOM_M].append(building)
+    colours = ScalarMappable(style.HEIGHT_SCALE_M, style.HEIGHT_COLOURS)
     for (source, overhang), buildings in sorted(groups.items()):
         heights = np.array([b.height_m.value for b in buildings])
-        # Hatching is drawn in the edge's colour: tagged heights are told by their firm outline.
+        # Hatching is drawn in the edge's colour: tagged heights are marked by their firm outline.
         axes.add_collection(
             PathCollection(
-                [_outline(b.outline, b.holes) for b in buildings],
+                [_outline(building) for building in buildings],
                 facecolors=colours.to_rgba(heights, alpha=0.3 if overhang else 0.9),
                 edgecolors="#3f3226" if source == "tagged" else "#8a7762",
-                hatch=HATCH[source] if view.close and not overhang else None,
+                hatch=style.HATCH[source] if view.close and not overhang else None,
                 linewidths=1.4 if source == "tagged" else 0.7,
-                linestyles=":" if overhang else DASH[source],
+                linestyles=":" if overhang else style.DASH[source],
                 zorder=6.8 if overhang else 3.0,
             )
         )
@@ -108,23 +88,17 @@ def _tunnels_and_decks(axes: Axes, world: World, view: View) -> None:
     below = [_edges(road) for road in near if road.tunnel or road.layer < 0]
     above = [_edges(road) for road in near if not road.tunnel and road.layer > 0]
     for roads, fill, edge, alpha, order in (
-        (below, TUNNEL, TUNNEL, 0.35, 2.2),
-        (above, ROAD, DECK_EDGE, 1.0, 6.6),
+        (below, style.TUNNEL, style.TUNNEL, 0.35, 2.2),
+        (above, style.ROAD, style.DECK_EDGE, 1.0, 6.6),
     ):
         if roads:
             decks = [np.concatenate([left, right[::-1]]) for left, right in roads]
-            axes.add_collection(
-                PolyCollection(decks, facecolors=fill, edgecolors="none", alpha=alpha, zorder=order)
-            )
-            axes.add_collection(
-                LineCollection(
-                    [line for sides in roads for line in sides],
-                    colors=edge,
-                    linewidths=1.6,
-                    linestyles="-" if alpha == 1.0 else "--",
-                    zorder=order + 0.05,
-                )
-            )
+            look = Look(facecolors=fill, edgecolors="none", alpha=alpha)
+            axes.add_collection(PolyCollection(decks, zorder=order, **look))
+            sides = [line for edges in roads for line in edges]
+            look = {"colors": edge, "linestyles": "-" if alpha == 1.0 else "--"}
+            look |= {"linewidths": 1.6, "zorder": order + 0.05}
+            axes.add_collection(LineCollection(sides, **look))
 
 
 def _edges(road: Road) -> tuple[Array, Array]:
@@ -138,18 +112,15 @@ def _crossings(axes: Axes, world: World, view: View) -> None:
         bars = _bars(crossing)
         unmarked = crossing.kind.value == "unmarked"
         if bars:
-            axes.add_collection(
-                PolyCollection(
-                    bars,
-                    facecolors="none" if unmarked else "#ffffff",
-                    edgecolors="#6f757d",
-                    linewidths=0.6 if view.close else 0.2,
-                    linestyles=DASH[crossing.kind.source],
-                    zorder=4.0,
-                )
-            )
+            look = {
+                "facecolors": "none" if unmarked else "#ffffff",
+                "edgecolors": "#6f757d",
+                "linewidths": 0.6 if view.close else 0.2,
+                "linestyles": style.DASH[crossing.kind.source],
+            }
+            axes.add_collection(PolyCollection(bars, zorder=4.0, **look))
         if view.close and crossing.kind.value == "traffic_signals":
-            axes.plot(*crossing.line.T, "s", color=SIGNAL, markersize=3.0, zorder=7.0)
+            axes.plot(*crossing.line.T, "s", color=style.SIGNAL, markersize=3.0, zorder=7.0)
 
 
 def _bars(crossing: Crossing) -> list[Array]:

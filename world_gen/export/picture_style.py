@@ -13,6 +13,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import Turn
 
+Look = dict[str, Any]
+"""How an artist is drawn, in matplotlib's words."""
 GROUND, ROAD, JUNCTION, KERB, SIDEWALK = "#e9ece4", "#c9ccd1", "#b9bdc4", "#7c828a", "#d9d3c7"
 LANE_EDGE, LANE, BUS, BICYCLE, TRAM, RING = (
     "#ffffff",

@@ -1,10 +1,11 @@
-"""The traffic of a World's picture: lanes, turns, connections, lines, signals, who waits."""
+"""The traffic of a World's picture: lanes, turns, connections, lines, signals, right of way."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,26 +15,11 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import Conflict, Connection, Lane, StopLine, Turn, World, YieldRule
 from foretwin.geometry.polyline import direction_at, left_of, length, offset, points_at, unit
-from foretwin.world_gen.export.picture_style import (
-    BICYCLE,
-    BUS,
-    CROSSING_CONFLICT,
-    DASH,
-    LANE,
-    LANE_EDGE,
-    LINE_COLOUR,
-    MERGING_CONFLICT,
-    PARKING,
-    RING,
-    SIGNAL,
-    TRAM,
-    TURN_COLOUR,
-    WAITS,
-    View,
-)
+from foretwin.world_gen.export import picture_style as style
+from foretwin.world_gen.export.picture_style import Look, View
 
 ARROW_SPACING_M = 24.0
-_KIND_COLOUR: Mapping[str, str] = {"bus": BUS, "bicycle": BICYCLE, "tram": TRAM}
+_KIND_COLOUR: Mapping[str, str] = {"bus": style.BUS, "bicycle": style.BICYCLE, "tram": style.TRAM}
 _TURN_DEG: Mapping[Turn, float] = {"straight": 0.0, "left": 75.0, "right": -75.0, "u_turn": 160.0}
 _GENERAL: frozenset[YieldRule] = frozenset(("near_side", "order", "merge_order"))
 """Rules under which two roads wait for each other: neither has priority."""
@@ -41,19 +27,34 @@ _ACROSS: frozenset[YieldRule] = frozenset(("turn_across", "u_turn"))
 
 
 def draw_traffic(axes: Axes, world: World, view: View) -> None:
-    """Draw lanes, then what leads across junctions, then what tells who goes first."""
+    """Draw lanes, then what leads across junctions, then what gives the right of way."""
     _draw_lanes(axes, world, view)
-    _draw_connections(axes, world, view)
-    _draw_stop_lines(axes, world, view)
+    _draw_lines(axes, _connections(world, view))
+    _draw_lines(axes, _stop_lines(world, view))
     if view.close:
         _draw_conflicts(axes, world, view)
         _draw_who_waits(axes, world, view)
     _draw_signals(axes, world, view)
 
 
-def _lines(axes: Axes, lines: list[Array], **style: Any) -> None:
-    if lines:
-        axes.add_collection(LineCollection(lines, **style))
+class _LineLook(NamedTuple):
+    """How a line is drawn, dashed by the source of what it shows."""
+
+    colour: str
+    source: Provenance
+    width: float
+    order: float
+    alpha: float = 1.0
+
+
+def _draw_lines(axes: Axes, lines: Iterable[tuple[_LineLook, Array]]) -> None:
+    """Draw lines, those that look alike at once."""
+    groups: dict[_LineLook, list[Array]] = defaultdict(list)
+    for line, points in lines:
+        groups[line].append(points)
+    for (colour, source, width, order, alpha), together in groups.items():
+        look = Look(colors=colour, linestyles=style.DASH[source], linewidths=width, alpha=alpha)
+        axes.add_collection(LineCollection(together, zorder=order, **look))
 
 
 def _order(layer: int) -> float:
@@ -61,42 +62,37 @@ def _order(layer: int) -> float:
     return 2.0 if layer > 0 else 0.0
 
 
+def _fade(layer: int) -> float:
+    """Return how firmly the lines of a layer are drawn: those of tunnels faintly."""
+    return 0.45 if layer < 0 else 1.0
+
+
 def _draw_lanes(axes: Axes, world: World, view: View) -> None:
     counted = {road.id: road.lane_count_source for road in world.roads}
     near = [lane for lane in world.lanes if view.meets(lane.centerline)]
-    parked = [lane for lane in near if lane.kind == "parking"]
-    if parked:
-        axes.add_collection(
-            PolyCollection([_strip(lane) for lane in parked], facecolors=PARKING, zorder=1.3)
-        )
-    groups: dict[tuple[bool, bool, Provenance], list[Array]] = {}
-    middles: dict[tuple[bool, bool, str, Provenance], list[Array]] = {}
+    strips: list[Array] = []
+    lines: list[tuple[_LineLook, Array]] = []
+    broad, narrow = (1.2, 1.0) if view.close else (0.5, 0.5)
     for lane in near:
-        half, up, down = lane.width_m.value / 2, lane.layer > 0, lane.layer < 0
-        borders = groups.setdefault((up, down, lane.width_m.source), [])
-        borders += [offset(lane.centerline, half), offset(lane.centerline, -half)]
+        half, order, fade = lane.width_m.value / 2, _order(lane.layer), _fade(lane.layer)
+        left, right = offset(lane.centerline, half), offset(lane.centerline, -half)
+        edge = _LineLook(style.LANE_EDGE, lane.width_m.source, broad, 4.5 + order, fade)
+        lines += [(edge, left), (edge, right)]
         if lane.kind == "parking":
-            continue
-        key = up, down, _colour(lane), counted.get(lane.road_id, "inferred")
-        middles.setdefault(key, []).append(lane.centerline)
-    for (up, down, source), lines in groups.items():
-        style = {"colors": LANE_EDGE, "linestyles": DASH[source], "alpha": 0.45 if down else 1.0}
-        _lines(axes, lines, linewidths=1.2 if view.close else 0.5, zorder=4.5 + _order(up), **style)
-    for (up, down, colour, source), lines in middles.items():
-        style = {"colors": colour, "linestyles": DASH[source], "alpha": 0.45 if down else 1.0}
-        _lines(axes, lines, linewidths=1.0 if view.close else 0.5, zorder=5.0 + _order(up), **style)
+            strips.append(np.concatenate([left, right[::-1]]))
+        else:
+            source = counted.get(lane.road_id, "inferred")
+            middle = _LineLook(_colour(lane), source, narrow, 5.0 + order, fade)
+            lines.append((middle, lane.centerline))
+    if strips:
+        axes.add_collection(PolyCollection(strips, facecolors=style.PARKING, zorder=1.3))
+    _draw_lines(axes, lines)
     if view.close:
         _draw_arrows(axes, (lane for lane in near if lane.kind != "parking"), view)
 
 
-def _strip(lane: Lane) -> Array:
-    half = lane.width_m.value / 2
-    left, right = offset(lane.centerline, half), offset(lane.centerline, -half)
-    return np.concatenate([left, right[::-1]])
-
-
 def _colour(lane: Lane) -> str:
-    return _KIND_COLOUR.get(lane.kind, RING if lane.role == "ring" else LANE)
+    return _KIND_COLOUR.get(lane.kind, style.RING if lane.role == "ring" else style.LANE)
 
 
 def _draw_arrows(axes: Axes, lanes: Iterable[Lane], view: View) -> None:
@@ -121,10 +117,10 @@ def _draw_arrows(axes: Axes, lanes: Iterable[Lane], view: View) -> None:
             _filled(axes, heads, colour, tagged, linewidths=0.9, alpha=fade, zorder=order)
 
 
-def _filled(axes: Axes, shapes: list[Array], colour: str, tagged: bool, **style: Any) -> None:
+def _filled(axes: Axes, shapes: list[Array], colour: str, tagged: bool, **look: Any) -> None:
     """Fill shapes whose value is tagged; of others draw the edge alone."""
     inner = colour if tagged else "white"
-    axes.add_collection(PolyCollection(shapes, facecolors=inner, edgecolors=colour, **style))
+    axes.add_collection(PolyCollection(shapes, facecolors=inner, edgecolors=colour, **look))
 
 
 def _head(tip: Array, ahead: Array, size: float) -> Array:
@@ -142,71 +138,54 @@ def _draw_turns(axes: Axes, lane: Lane, at: Array, ahead: Array, size: float) ->
         cos, sin = math.cos(a), math.sin(a)
         way = np.array([cos * ahead[0] - sin * ahead[1], sin * ahead[0] + cos * ahead[1]])
         tip = fork + reach[turn] * way
-        colour, order = TURN_COLOUR[turn], 6.3 + _order(lane.layer)
-        shaft, dash = np.array([foot, fork, tip - 0.7 * size * way]), (0, (2, 1))
-        style = {"colors": colour, "linestyles": DASH["tagged"] if tagged else dash}
-        axes.add_collection(LineCollection([shaft], zorder=order, linewidths=1.6, **style))
+        colour, order = style.TURN_COLOUR[turn], 6.3 + _order(lane.layer)
+        shaft = np.array([foot, fork, tip - 0.7 * size * way])
+        look = Look(colors=colour, linestyles="-" if tagged else (0, (2, 1)), linewidths=1.6)
+        axes.add_collection(LineCollection([shaft], zorder=order, **look))
         head = _head(tip, way, 0.75 * size)
         _filled(axes, [head], colour, tagged, linewidths=1.0, zorder=order + 0.1)
 
 
-def _draw_connections(axes: Axes, world: World, view: View) -> None:
-    source = {lane.id: lane.turns_source for lane in world.lanes}
-    groups: dict[tuple[bool, Turn, bool, bool], list[Array]] = {}
+def _connections(world: World, view: View) -> Iterator[tuple[_LineLook, Array]]:
+    tagged = {lane.id for lane in world.lanes if lane.turns_source == "tagged"}
+    share = 1.0 if view.close else 0.45
     for connection in world.connections:
         if view.meets(connection.centerline):
-            tagged = source.get(connection.from_lane_id) == "tagged"
-            key = connection.layer > 0, connection.turn, bool(connection.junction_id), tagged
-            groups.setdefault(key, []).append(connection.centerline)
-    for (up, turn, in_junction, tagged), lines in groups.items():
-        _lines(
-            axes,
-            lines,
-            colors=TURN_COLOUR[turn],
-            linestyles=DASH["tagged" if tagged else "inferred"],
-            alpha=0.9 if in_junction else 0.5,
-            zorder=5.5 + _order(up),
-            linewidths=(1.8 if tagged else 1.3) * (1.0 if view.close else 0.45),
-        )
+            colour, order = style.TURN_COLOUR[connection.turn], 5.5 + _order(connection.layer)
+            alpha = 0.9 if connection.junction_id else 0.5
+            line = _LineLook(colour, "inferred", 1.3 * share, order, alpha)
+            if connection.from_lane_id in tagged:
+                line = line._replace(source="tagged", width=1.8 * share)
+            yield line, connection.centerline
 
 
-def _draw_stop_lines(axes: Axes, world: World, view: View) -> None:
-    groups: dict[tuple[str, Provenance], list[Array]] = {}
+def _stop_lines(world: World, view: View) -> Iterator[tuple[_LineLook, Array]]:
     for line in world.stop_lines:
         if view.holds(line.ends):
-            groups.setdefault((line.control.value, line.control.source), []).append(line.ends)
-    for (control, source), lines in groups.items():
-        _lines(
-            axes,
-            lines,
-            colors=LINE_COLOUR.get(control, LINE_COLOUR["none"]),
-            linestyles=DASH[source],
-            capstyle="butt",
-            zorder=6.0,
-            linewidths=(4.0 if control != "none" else 2.2) * (1.0 if view.close else 0.4),
-        )
+            control, source = line.control.value, line.control.source
+            colour = style.LINE_COLOUR.get(control, style.LINE_COLOUR["none"])
+            width = (4.0 if control != "none" else 2.2) * (1.0 if view.close else 0.4)
+            yield _LineLook(colour, source, width, 6.0), line.ends
 
 
 def _draw_conflicts(axes: Axes, world: World, view: View) -> None:
-    for kind, marker, colour in (
-        ("crossing", "x", CROSSING_CONFLICT),
-        ("merging", "+", MERGING_CONFLICT),
-    ):
+    crossing, merging = ("x", style.CROSSING_CONFLICT), ("+", style.MERGING_CONFLICT)
+    for kind, (marker, colour) in {"crossing": crossing, "merging": merging}.items():
         points = [c.point for c in world.conflicts if c.kind == kind and view.holds(c.point)]
         if points:
-            at, style = np.array(points), {"marker": marker, "color": colour, "alpha": 0.85}
-            _dots(axes, at, markersize=4.0, markeredgewidth=0.9, zorder=7.5, **style)
+            look = {"marker": marker, "color": colour, "alpha": 0.85, "zorder": 7.5}
+            _dots(axes, np.array(points), markersize=4.0, markeredgewidth=0.9, **look)
 
 
-def _dots(axes: Axes, at: Array, **style: Any) -> None:
+def _dots(axes: Axes, at: Array, **look: Any) -> None:
     """Draw marks at points (N, 2) or (2,)."""
-    axes.plot(*at.T, linestyle="", **style)
+    axes.plot(*at.T, linestyle="", **look)
 
 
-def _sign(axes: Axes, at: Array, marker: str, colour: str, tagged: bool, **style: float) -> None:
+def _sign(axes: Axes, at: Array, marker: str, colour: str, tagged: bool, **look: float) -> None:
     """Draw a mark at (2,), filled where its value is tagged."""
     inner = colour if tagged else "white"
-    _dots(axes, at, marker=marker, color=inner, markeredgecolor=colour, **style)
+    _dots(axes, at, marker=marker, color=inner, markeredgecolor=colour, **look)
 
 
 def _draw_who_waits(axes: Axes, world: World, view: View) -> None:
@@ -231,9 +210,9 @@ def _draw_mark(
     """Draw a mark just before a place (2,) at which drivers wait."""
     if not view.holds(at):
         return
-    colour = LINE_COLOUR["stop"] if shape == "8" else WAITS
-    style = {"markersize": 9.0, "markeredgewidth": 1.4, "zorder": 7.8}
-    _sign(axes, at - 1.6 * ahead, shape, colour, source == "tagged", **style)
+    colour = style.LINE_COLOUR["stop"] if shape == "8" else style.WAITS
+    look = {"markersize": 9.0, "markeredgewidth": 1.4, "zorder": 7.8}
+    _sign(axes, at - 1.6 * ahead, shape, colour, source == "tagged", **look)
 
 
 def _rules_by_lane(
@@ -243,11 +222,11 @@ def _rules_by_lane(
 ) -> dict[str, dict[YieldRule, Provenance]]:
     """Return for lanes the rules under which their connections wait, but for signs inside."""
     start = {c.id: c.from_lane_id for c in connections}
-    found: dict[str, dict[YieldRule, Provenance]] = {}
+    found: dict[str, dict[YieldRule, Provenance]] = defaultdict(dict)
     for conflict in conflicts:
         line = line_of.get(conflict.yields_id)
         if line is None or line.control.value != conflict.rule:
-            found.setdefault(start[conflict.yields_id], {})[conflict.rule] = conflict.source
+            found[start[conflict.yields_id]][conflict.rule] = conflict.source
     return found
 
 
@@ -255,17 +234,13 @@ def _mark(
     rules: Mapping[YieldRule, Provenance], line: StopLine | None
 ) -> tuple[str, Provenance] | None:
     """Return the marker of the strongest reason to wait, and where it came from."""
-    control = None if line is None else line.control
-    if control is not None and control.value == "signal":
+    if line is not None and line.control.value == "signal":
         return None
-    if control is not None and control.value in ("stop", "give_way"):
-        return ("8" if control.value == "stop" else "v"), control.source
-    firm = [source for rule, source in rules.items() if rule not in _GENERAL | _ACROSS]
-    if firm:
+    if line is not None and line.control.value in ("stop", "give_way"):
+        return ("8" if line.control.value == "stop" else "v"), line.control.source
+    if rules.keys() - _GENERAL - _ACROSS:
         return "v", "inferred"
-    if any(rule in _GENERAL for rule in rules):
-        return "D", "default"
-    return None
+    return ("D", "default") if rules.keys() & _GENERAL else None
 
 
 def _draw_signals(axes: Axes, world: World, view: View) -> None:
@@ -274,16 +249,9 @@ def _draw_signals(axes: Axes, world: World, view: View) -> None:
         if not view.holds(at):
             continue
         tagged = signal.source == "tagged"
-        style = {"markersize": 12 if view.close else 3.5, "markeredgewidth": 1.6, "zorder": 8.6}
-        _sign(axes, at, "o", SIGNAL, tagged, **style)
+        size = 12 if view.close else 3.5
+        _sign(axes, at, "o", style.SIGNAL, tagged, markersize=size, markeredgewidth=1.6, zorder=8.6)
         if view.close:
-            axes.annotate(
-                signal.group_id.rpartition(":")[2],
-                tuple(at),
-                ha="center",
-                va="center",
-                zorder=9.0,
-                fontsize=6.5,
-                color="white" if tagged else SIGNAL,
-                annotation_clip=True,
-            )
+            look = Look(color="white" if tagged else style.SIGNAL, fontsize=6.5)
+            look |= {"ha": "center", "va": "center", "zorder": 9.0, "annotation_clip": True}
+            axes.annotate(signal.group_id.rpartition(":")[2], tuple(at), **look)

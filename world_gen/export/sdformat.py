@@ -16,35 +16,19 @@ from lxml import etree
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, World
+from foretwin.world_gen.export import solids
 from foretwin.world_gen.export.choices import SIMULATORS, Simulator
 from foretwin.world_gen.export.sdformat_plugins import HEADING_DEG, world_plugins
-from foretwin.world_gen.export.sdformat_shapes import (
-    Element,
-    StaticLink,
-    child,
-    extrusions,
-    numbers,
-)
+from foretwin.world_gen.export.sdformat_shapes import StaticLink, extrusions, numbers, shaped
 from foretwin.world_gen.export.sdformat_vehicles import SdfVehicle, add_vehicle
-from foretwin.world_gen.export.solids import (
-    BUILDING,
-    GROUND,
-    ISLAND,
-    ROAD,
-    ROAD_TOP_M,
-    THINNEST_M,
-    Rgba,
-    island_height_m,
-    stops_cars,
-)
-from foretwin.world_gen.export.xml_text import in_comment
+from foretwin.world_gen.export.solids import Rgba
+from foretwin.world_gen.export.xml_tree import Element, child, document, element, in_comment, leaves
 
 SDF_VERSION = "1.7"
 NAMESPACE = "urn:foretwin:sdformat"
 """Of our own elements, which SDFormat lets pass and keeps because they have a namespace."""
 MARKING_TOP_M, SIDEWALK_TOP_M = 0.02, 0.03
 BUILDING_TOLERANCE_M, AREA_TOLERANCE_M = 0.1, 0.02
-STOP_LINE_WIDTH_M, YIELD_LINE_WIDTH_M = 0.5, 0.3
 STEP_S = 0.002
 
 _SIDEWALK: Rgba = (0.62, 0.61, 0.58, 1.0)
@@ -56,6 +40,13 @@ _LAMPS: tuple[tuple[str, Rgba], ...] = (
     ("amber", (0.9, 0.65, 0.1, 1.0)),
     ("green", (0.1, 0.7, 0.3, 1.0)),
 )
+_SCENE = {"ambient": "0.5 0.5 0.5 1", "background": "0.7 0.8 0.9 1", "shadows": "0"}
+_SUN = {
+    "pose": "0 0 200 0 0 0",
+    "diffuse": "0.8 0.8 0.8 1",
+    "specular": "0.1 0.1 0.1 1",
+    "direction": "0.3 0.2 -1",
+}
 
 
 def write_sdf(
@@ -73,26 +64,22 @@ def write_sdf(
     if simulator not in SIMULATORS:
         raise ValueError(f"simulator {simulator!r}: one of {', '.join(SIMULATORS)}")
     _check_names(vehicles)
-    root = etree.Element("sdf", version=SDF_VERSION)
-    element = child(root, "world", name=f"world_{world.id or 'unnamed'}")
-    attribution = etree.SubElement(
-        element, f"{{{NAMESPACE}}}attribution", nsmap={"foretwin": NAMESPACE}
-    )
-    attribution.text = world.attribution
-    _surroundings(element, world, simulator)
-    _road(element, world)
-    _markings(element, world)
-    _signals(element, world)
-    _buildings(element, world)
-    for vehicle in vehicles:
-        add_vehicle(element, vehicle, simulator)
+    root = element("sdf", version=SDF_VERSION)
     place = world.intersection
     about = f" {world.attribution}; world {world.id}, {place.kind} {place.name} ({place.id}) "
-    root.insert(0, etree.Comment(in_comment(about)))
-    tree = etree.ElementTree(root)
-    etree.indent(tree, space=" ")
-    with path.open("wb") as file:  # lxml would not say which file cannot be written
-        tree.write(file, xml_declaration=True, encoding="utf-8")
+    root.append(etree.Comment(in_comment(about)))
+    made = child(root, "world", name=f"world_{world.id or 'unnamed'}")
+    attribution = f"{{{NAMESPACE}}}attribution"
+    etree.SubElement(made, attribution, nsmap={"foretwin": NAMESPACE}).text = world.attribution
+    _surroundings(made, world, simulator)
+    _road(made, world)
+    _markings(made, world)
+    _signals(made, world)
+    _buildings(made, world)
+    for vehicle in vehicles:
+        add_vehicle(made, vehicle, simulator)
+    etree.indent(root, space=" ")
+    path.write_bytes(document(root))
 
 
 def _check_names(vehicles: Sequence[SdfVehicle]) -> None:
@@ -105,68 +92,54 @@ def _check_names(vehicles: Sequence[SdfVehicle]) -> None:
         taken.add(vehicle.name)
 
 
-def _surroundings(element: Element, world: World, simulator: Simulator) -> None:
-    physics = child(element, "physics", type="ode")
-    child(physics, "max_step_size", numbers(STEP_S))
-    child(physics, "real_time_factor", "1")
-    child(physics, "real_time_update_rate", numbers(1 / STEP_S))
-    world_plugins(element, simulator)
-    scene = child(element, "scene")
-    child(scene, "ambient", "0.5 0.5 0.5 1")
-    child(scene, "background", "0.7 0.8 0.9 1")
-    child(scene, "shadows", "0")
-    where = child(element, "spherical_coordinates")
-    child(where, "surface_model", "EARTH_WGS84")
-    child(where, "world_frame_orientation", "ENU")
-    child(where, "latitude_deg", numbers(world.frame.origin.lat_deg, digits=9))
-    child(where, "longitude_deg", numbers(world.frame.origin.lon_deg, digits=9))
-    child(where, "elevation", numbers(world.frame.origin.alt_m))
-    child(where, "heading_deg", HEADING_DEG[simulator])
-    sun = child(element, "light", name="sun", type="directional")
-    child(sun, "pose", "0 0 200 0 0 0")
-    child(sun, "diffuse", "0.8 0.8 0.8 1")
-    child(sun, "specular", "0.1 0.1 0.1 1")
-    child(sun, "direction", "0.3 0.2 -1")
-    _ground(element, world)
+def _surroundings(made: Element, world: World, simulator: Simulator) -> None:
+    rate = {"max_step_size": numbers(STEP_S), "real_time_factor": "1"}
+    rate["real_time_update_rate"] = numbers(1 / STEP_S)
+    leaves(child(made, "physics", type="ode"), rate)
+    world_plugins(made, simulator)
+    leaves(child(made, "scene"), _SCENE)
+    origin = world.frame.origin
+    where = {
+        "surface_model": "EARTH_WGS84",
+        "world_frame_orientation": "ENU",
+        "latitude_deg": numbers(origin.lat_deg, digits=9),
+        "longitude_deg": numbers(origin.lon_deg, digits=9),
+        "elevation": numbers(origin.alt_m),
+        "heading_deg": HEADING_DEG[simulator],
+    }
+    leaves(child(made, "spherical_coordinates"), where)
+    leaves(child(made, "light", name="sun", type="directional"), _SUN)
+    ground = child(made, "model", name="ground")
+    child(ground, "static", "1")
+    link = child(ground, "link", name="link")
+    plane = [("normal", "0 0 1"), ("size", numbers(2 * world.radius_m, 2 * world.radius_m))]
+    shaped(child(link, "collision", name="plane.collision"), "plane", plane)
+    shaped(child(link, "visual", name="plane.visual"), "plane", plane, rgba=solids.GROUND)
 
 
-def _ground(element: Element, world: World) -> None:
-    model = child(element, "model", name="ground")
-    child(model, "static", "1")
-    link = child(model, "link", name="link")
-    for tag in ("collision", "visual"):
-        part = child(link, tag, name=f"plane.{tag}")
-        shape = child(child(part, "geometry"), "plane")
-        child(shape, "normal", "0 0 1")
-        child(shape, "size", numbers(2 * world.radius_m, 2 * world.radius_m))
-        if tag == "visual":
-            paint = child(part, "material")
-            child(paint, "ambient", numbers(*GROUND))
-            child(paint, "diffuse", numbers(*GROUND))
-
-
-def _road(element: Element, world: World) -> None:
-    link = StaticLink(element, "road")
+def _road(made: Element, world: World) -> None:
+    link = StaticLink(made, "road")
     for area in world.road_surface:
-        _area(link, area, ROAD_TOP_M, ROAD)
+        _area(link, area, solids.ROAD_TOP_M, solids.ROAD)
     for area in world.sidewalks:
         _area(link, area, SIDEWALK_TOP_M, _SIDEWALK)
     for island in world.islands:
-        solid = stops_cars(island)
-        _area(link, island, island_height_m(solid=solid), ISLAND, solid=solid)
+        solid = solids.stops_cars(island)
+        _area(link, island, solids.island_height_m(solid=solid), solids.ISLAND, solid=solid)
 
 
 def _area(link: StaticLink, area: Area, top_m: float, rgba: Rgba, *, solid: bool = False) -> None:
     rings = extrusions(area.outline, area.holes, tolerance_m=AREA_TOLERANCE_M)
     for number, ring in enumerate(rings):
-        link.prism(f"{area.id}.{number}", ring, 0.0, top_m, rgba=rgba, solid=solid)
+        link.prism(f"{area.id}.{number}", ring, (0.0, top_m), rgba, solid=solid)
 
 
-def _markings(element: Element, world: World) -> None:
-    link = StaticLink(element, "markings")
+def _markings(made: Element, world: World) -> None:
+    link = StaticLink(made, "markings")
     for line in world.stop_lines:
         if line.control.value != "none":
-            wide = YIELD_LINE_WIDTH_M if line.control.value == "give_way" else STOP_LINE_WIDTH_M
+            yields = line.control.value == "give_way"
+            wide = solids.YIELD_LINE_M if yields else solids.STOP_LINE_M
             _stripe(link, line.id, line.ends, wide, _PAINT)
     for crossing in world.crossings:
         _stripe(link, crossing.id, crossing.line, crossing.width_m.value, _CROSSING)
@@ -177,41 +150,29 @@ def _stripe(link: StaticLink, name: str, ends: Array, width_m: float, rgba: Rgba
     middle, long = ends.mean(axis=0), float(np.hypot(*along))
     if long < 0.05:
         return
-    link.box(
-        name,
-        (middle[0], middle[1], MARKING_TOP_M / 2),
-        (long, width_m, MARKING_TOP_M),
-        yaw_rad=math.atan2(along[1], along[0]),
-        rgba=rgba,
-    )
+    at = (*middle, MARKING_TOP_M / 2, math.atan2(along[1], along[0]))
+    link.box(name, at, (long, width_m, MARKING_TOP_M), rgba)
 
 
-def _signals(element: Element, world: World) -> None:
-    link = StaticLink(element, "signals")
+def _signals(made: Element, world: World) -> None:
+    link = StaticLink(made, "signals")
     for signal in world.signals:
         x, y, z = (float(v) for v in signal.position)
-        facing = np.array([math.cos(signal.yaw_rad), math.sin(signal.yaw_rad)])
-        link.cylinder(f"{signal.id}.pole", (x, y, z / 2), 0.06, z, rgba=_SIGNAL)
-        link.box(
-            f"{signal.id}.head", (x, y, z), (0.2, 0.35, 0.95), yaw_rad=signal.yaw_rad, rgba=_SIGNAL
-        )
+        yaw = signal.yaw_rad
+        link.cylinder(f"{signal.id}.pole", (x, y, z / 2), 0.06, z, _SIGNAL)
+        link.box(f"{signal.id}.head", (x, y, z, yaw), (0.2, 0.35, 0.95), _SIGNAL)
+        front = x + 0.11 * math.cos(yaw), y + 0.11 * math.sin(yaw)
         for number, (lamp, rgba) in enumerate(_LAMPS):
-            at = np.array([x, y]) + 0.11 * facing
-            link.box(
-                f"{signal.id}.{lamp}",
-                (at[0], at[1], z + 0.3 * (1 - number)),
-                (0.03, 0.2, 0.2),
-                yaw_rad=signal.yaw_rad,
-                rgba=rgba,
-            )
+            at = (*front, z + 0.3 * (1 - number), yaw)
+            link.box(f"{signal.id}.{lamp}", at, (0.03, 0.2, 0.2), rgba)
 
 
-def _buildings(element: Element, world: World) -> None:
-    link = StaticLink(element, "buildings")
+def _buildings(made: Element, world: World) -> None:
+    link = StaticLink(made, "buildings")
     for building in world.buildings:
         low, high = building.min_height_m, building.height_m.value
-        if high - low < THINNEST_M:
+        if high - low < solids.THINNEST_M:
             continue
         rings = extrusions(building.outline, building.holes, tolerance_m=BUILDING_TOLERANCE_M)
         for number, ring in enumerate(rings):
-            link.prism(f"{building.id}.{number}", ring, low, high, rgba=BUILDING, solid=True)
+            link.prism(f"{building.id}.{number}", ring, (low, high), solids.BUILDING, solid=True)

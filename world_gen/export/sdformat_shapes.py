@@ -8,26 +8,21 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
-from lxml import etree
 from shapely.geometry import Polygon
 
 from foretwin.contracts.arrays import Array
 from foretwin.world_gen.export.solids import Rgba
+from foretwin.world_gen.export.xml_tree import Element, child, leaves
+from foretwin.world_gen.polygon_areas import GRID_M
 
-Element = etree._Element
-
-GRID_M = 0.001
-"""Points lie on this grid, as they are written, so that outlines in the file are valid."""
+RECTANGLE_M = 0.05
+"""So far a corner may lie from a rectangle's."""
 LEAST_AREA_M2 = 0.05
+Size = tuple[float, float, float]
+Sizes = Sequence[tuple[str, str]]
+"""What describes a shape, such as its radius and its length."""
 _MANY_POINTS = 400
 """Outlines with more are halved: triangulating grows faster than the number of points."""
-
-
-def child(parent: Element, tag: str, text: str | None = None, **attributes: str) -> Element:
-    """Add an element and return it."""
-    element = etree.SubElement(parent, tag, attributes)
-    element.text = text
-    return element
 
 
 def numbers(*values: float, digits: int = 3) -> str:
@@ -37,7 +32,9 @@ def numbers(*values: float, digits: int = 3) -> str:
     )
 
 
-def pose(parent: Element, x: float, y: float, z: float, yaw_rad: float = 0.0) -> None:
+def pose(
+    parent: Element, x: float = 0.0, y: float = 0.0, z: float = 0.0, yaw_rad: float = 0.0
+) -> None:
     """Place the parent element, metres and radians."""
     if x or y or z or yaw_rad:
         child(parent, "pose", f"{numbers(x, y, z)} 0 0 {numbers(yaw_rad, digits=6)}")
@@ -53,73 +50,40 @@ class StaticLink:
         self._names: set[str] = set()
 
     def box(
-        self,
-        name: str,
-        centre_m: Sequence[float],
-        size_m: Sequence[float],
-        *,
-        yaw_rad: float = 0.0,
-        rgba: Rgba,
-        solid: bool = False,
+        self, name: str, at: Sequence[float], size_m: Size, rgba: Rgba, *, solid: bool = False
     ) -> None:
-        """Add a box of (length, width, height) around a centre."""
-        for part in self._parts(name, solid, rgba):
-            pose(part, centre_m[0], centre_m[1], centre_m[2], yaw_rad)
-            self._finish(part, _box_geometry(size_m), rgba)
+        """Add a box of (length, width, height) around its centre (x, y, z and yaw)."""
+        self._add(name, "box", [("size", numbers(*size_m))], at, rgba, solid=solid)
 
     def cylinder(
-        self, name: str, centre_m: Sequence[float], radius_m: float, height_m: float, *, rgba: Rgba
+        self, name: str, at: Sequence[float], radius_m: float, height_m: float, rgba: Rgba
     ) -> None:
-        """Add an upright cylinder that is only seen."""
-        for part in self._parts(name, False, rgba):
-            pose(part, centre_m[0], centre_m[1], centre_m[2])
-            geometry = etree.Element("geometry")
-            shape = child(geometry, "cylinder")
-            child(shape, "radius", numbers(radius_m))
-            child(shape, "length", numbers(height_m))
-            self._finish(part, geometry, rgba)
+        """Add an upright cylinder around its centre (x, y, z) that is only seen."""
+        size = [("radius", numbers(radius_m)), ("length", numbers(height_m))]
+        self._add(name, "cylinder", size, at, rgba, solid=False)
 
     def prism(
-        self,
-        name: str,
-        ring: Array,
-        low_m: float,
-        high_m: float,
-        *,
-        rgba: Rgba,
-        solid: bool = False,
+        self, name: str, ring: Array, span_m: tuple[float, float], rgba: Rgba, *, solid: bool
     ) -> None:
         """Add an outline (N, 2) from one height to another, as a box where it is a rectangle."""
+        low_m, high_m = span_m
         rectangle = rectangle_of(ring)
         if rectangle is not None:
             x, y, length, width, yaw = rectangle
-            self.box(
-                name,
-                (x, y, (low_m + high_m) / 2),
-                (length, width, high_m - low_m),
-                yaw_rad=yaw,
-                rgba=rgba,
-                solid=solid,
-            )
+            at, size = (x, y, (low_m + high_m) / 2, yaw), (length, width, high_m - low_m)
+            self.box(name, at, size, rgba, solid=solid)
             return
-        for part in self._parts(name, solid, rgba):
-            pose(part, 0.0, 0.0, low_m)
-            geometry = etree.Element("geometry")
-            polyline = child(geometry, "polyline")
-            for x, y in ring.tolist():
-                child(polyline, "point", numbers(x, y))
-            child(polyline, "height", numbers(high_m - low_m))
-            self._finish(part, geometry, rgba)
+        outline = [("point", numbers(x, y)) for x, y in ring.tolist()]
+        outline.append(("height", numbers(high_m - low_m)))
+        self._add(name, "polyline", outline, (0.0, 0.0, low_m), rgba, solid=solid)
 
-    def _parts(self, name: str, solid: bool, rgba: Rgba) -> list[Element]:
+    def _add(
+        self, name: str, shape: str, size: Sizes, at: Sequence[float], rgba: Rgba, *, solid: bool
+    ) -> None:
         name = self._free(name)
-        parts = [child(self._link, "collision", name=f"{name}.collision")] if solid else []
-        return [*parts, child(self._link, "visual", name=name)]
-
-    def _finish(self, part: Element, geometry: Element, rgba: Rgba) -> None:
-        part.append(geometry)
-        if part.tag == "visual":
-            material(part, rgba)
+        if solid:
+            shaped(child(self._link, "collision", name=f"{name}.collision"), shape, size, at)
+        shaped(child(self._link, "visual", name=name), shape, size, at, rgba)
 
     def _free(self, wanted: str) -> str:
         """Return a name that SDFormat allows and that no other shape of the link has."""
@@ -132,36 +96,32 @@ class StaticLink:
         return name
 
 
-def _box_geometry(size_m: Sequence[float]) -> Element:
-    geometry = etree.Element("geometry")
-    child(child(geometry, "box"), "size", numbers(*size_m))
-    return geometry
+def shaped(
+    part: Element, shape: str, size: Sizes, at: Sequence[float] = (), rgba: Rgba | None = None
+) -> None:
+    """Give a collision or visual its shape, its place (x, y, z and yaw) and, if any, one colour.
+
+    The fourth number of a colour is opacity.
+    """
+    pose(part, *at)
+    leaves(child(child(part, "geometry"), shape), size)
+    if rgba is not None:
+        if rgba[3] < 1.0:
+            child(part, "transparency", numbers(1.0 - rgba[3]))
+        leaves(child(part, "material"), {"ambient": numbers(*rgba), "diffuse": numbers(*rgba)})
 
 
-def material(visual: Element, rgba: Rgba) -> None:
-    """Give a visual one colour; its fourth number is opacity."""
-    if rgba[3] < 1.0:
-        child(visual, "transparency", numbers(1.0 - rgba[3]))
-    element = child(visual, "material")
-    child(element, "ambient", numbers(*rgba))
-    child(element, "diffuse", numbers(*rgba))
-
-
-def rectangle_of(
-    ring: Array, *, tolerance_m: float = 0.05
-) -> tuple[float, float, float, float, float] | None:
+def rectangle_of(ring: Array) -> tuple[float, float, float, float, float] | None:
     """Return x, y, length, width, yaw of a ring (4, 2) that is a rectangle, else None."""
     if len(ring) != 4:
         return None
     sides = np.roll(ring, -1, axis=0) - ring
     middle = ring.mean(axis=0)
-    if np.hypot(*(ring[0] + ring[2] - ring[1] - ring[3])) > tolerance_m:
+    if np.hypot(*(ring[0] + ring[2] - ring[1] - ring[3])) > RECTANGLE_M:
         return None
     length, width = float(np.hypot(*sides[0])), float(np.hypot(*sides[1]))
-    if (
-        abs(float(sides[0] @ sides[1])) > tolerance_m * max(length, width)
-        or min(length, width) < 0.01
-    ):
+    skew = abs(float(sides[0] @ sides[1]))
+    if skew > RECTANGLE_M * max(length, width) or min(length, width) < 0.01:
         return None
     yaw = math.atan2(sides[0][1], sides[0][0])
     return float(middle[0]), float(middle[1]), length, width, yaw
@@ -186,6 +146,7 @@ def extrusions(
         if isinstance(part, Polygon)
         for piece in _without_holes(part)
     ]
+    # On the grid, as they are written, outlines in the file are valid.
     return [
         shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:-1]
         for part in shapely.get_parts(shapely.set_precision(pieces, GRID_M))
@@ -200,20 +161,13 @@ def _without_holes(polygon: Polygon) -> list[Polygon]:
         return [polygon]
     west, south, east, north = polygon.bounds
     across = 0 if east - west >= north - south else 1
-    if polygon.interiors:
-        inside = [
-            Polygon(hole).representative_point().coords[0][across] for hole in polygon.interiors
-        ]
+    inside = [Polygon(hole).representative_point().coords[0][across] for hole in polygon.interiors]
+    at = (west + east) / 2 if across == 0 else (south + north) / 2
+    if inside:
         at = sorted(inside)[len(inside) // 2]
-    else:
-        at = (west + east) / 2 if across == 0 else (south + north) / 2
     if across == 0:
         halves = shapely.box(west, south, at, north), shapely.box(at, south, east, north)
     else:
         halves = shapely.box(west, south, east, at), shapely.box(west, at, east, north)
-    pieces: list[Polygon] = []
-    for half in halves:
-        for part in shapely.get_parts(polygon.intersection(half)):
-            if isinstance(part, Polygon):
-                pieces.extend(_without_holes(part))
-    return pieces
+    parts = shapely.get_parts([polygon.intersection(half) for half in halves])
+    return [piece for p in parts if isinstance(p, Polygon) for piece in _without_holes(p)]

@@ -8,7 +8,7 @@ vehicle and can be run into; a ghost is a shadow that collides with nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,9 @@ from foretwin.contracts.world import World
 from foretwin.geometry.polyline import direction_at, length, points_at
 from foretwin.world_gen.export.choices import Simulator, VehicleKind
 from foretwin.world_gen.export.sdformat_plugins import ackermann_plugin, gps_sensor
-from foretwin.world_gen.export.sdformat_shapes import Element, child, material, numbers, pose
+from foretwin.world_gen.export.sdformat_shapes import numbers, pose, shaped
 from foretwin.world_gen.export.solids import Rgba
+from foretwin.world_gen.export.xml_tree import Element, child, leaves
 
 WHEEL_RADIUS_M, WHEEL_WIDTH_M = 0.33, 0.2
 """Assumed, as vehicle parameters do not have them: a 205/55 R16 tyre, rounded."""
@@ -28,6 +29,8 @@ WHEEL_SHARE, KNUCKLE_SHARE = 0.018, 0.009
 GROUND_CLEARANCE_M = 0.18
 STEERING_DAMPING_NMSPRAD = 100.0
 """Damps the wheels' angle to half of critical: the drive plugin itself has no damping."""
+LEFT, UP = "0 1 0", "0 0 1"
+FREE = {"lower": "-1e16", "upper": "1e16"}
 _GAP_M = 10.0
 _COLOURS: dict[str, Rgba] = {
     "twin": (0.15, 0.6, 0.2, 1.0),
@@ -72,14 +75,11 @@ def place_vehicles(
     for number, (name, kind) in enumerate(named):
         x, y, yaw = number * _GAP_M, 0.0, 0.0
         if number < len(room):
-            line, at = room[number]
-            (x, y), heading = points_at(line, at), direction_at(line, at)
+            line, s = room[number]
+            (x, y), heading = points_at(line, s), direction_at(line, s)
             yaw = math.atan2(heading[1], heading[0])
-        vehicles.append(
-            SdfVehicle(
-                name=name, kind=kind, parameters=parameters, x_m=float(x), y_m=float(y), yaw_rad=yaw
-            )
-        )
+        at = {"x_m": float(x), "y_m": float(y), "yaw_rad": yaw}
+        vehicles.append(SdfVehicle(name=name, kind=kind, parameters=parameters, **at))
     return tuple(vehicles)
 
 
@@ -98,15 +98,10 @@ def _add_shadow(model: Element, vehicle: SdfVehicle) -> None:
     link = child(model, "link", name="base_link")
     _body(link, vehicle, solid=vehicle.kind == "shadow")
     car = vehicle.parameters
-    _inertial(
-        link,
-        car.mass_kg.value,
-        car.cog_from_rear_axle_m.value,
-        car.cog_height_m.value,
-        _box_inertia(car, car.mass_kg.value, car.yaw_inertia_kgm2.value),
-    )
-    child(link, "gravity", "0")
-    child(link, "kinematic", "1")
+    mass = car.mass_kg.value
+    inertia = _box_inertia(car, mass, car.yaw_inertia_kgm2.value)
+    _inertial(link, mass, car.cog_from_rear_axle_m.value, car.cog_height_m.value, inertia)
+    leaves(link, {"gravity": "0", "kinematic": "1"})
 
 
 def _add_twin(model: Element, vehicle: SdfVehicle, simulator: Simulator) -> None:
@@ -131,31 +126,23 @@ def _add_twin(model: Element, vehicle: SdfVehicle, simulator: Simulator) -> None
     _body(body, vehicle, solid=True)
     _inertial(body, body_kg, cog_x, cog_z, _box_inertia(car, body_kg, yaw_inertia))
     gps_sensor(body, vehicle.name, simulator, above_m=car.height_m.value)
-    effort = (
-        mass
-        * WHEEL_RADIUS_M
-        / 2
-        * max(car.max_drive_accel_mps2.value, car.max_brake_decel_mps2.value)
-    )
-    inner = steering_limit_rad(car)
+    hardest = max(car.max_drive_accel_mps2.value, car.max_brake_decel_mps2.value)
+    driven = FREE | {"effort": numbers(mass * WHEEL_RADIUS_M / 2 * hardest)}
+    reach = numbers(steering_limit_rad(car), digits=4)
+    steered = {"lower": f"-{reach}", "upper": reach}
+    steered["velocity"] = numbers(car.max_tire_rate_radps.value)
     for side, y in (("left", half_track), ("right", -half_track)):
-        _wheel(model, f"rear_{side}_wheel", 0.0, y, wheel_kg, car.friction.value)
-        _hinge(model, f"rear_{side}_wheel_joint", "base_link", f"rear_{side}_wheel", effort=effort)
-        knuckle = child(model, "link", name=f"front_{side}_knuckle")
+        rear, front, held = f"rear_{side}_wheel", f"front_{side}_wheel", f"front_{side}_knuckle"
+        _wheel(model, rear, 0.0, y, wheel_kg, car.friction.value)
+        _hinge(model, (f"{rear}_joint", "base_link", rear), driven)
+        knuckle = child(model, "link", name=held)
         pose(knuckle, wheelbase, y, WHEEL_RADIUS_M)
         _inertial(knuckle, knuckle_kg, 0.0, 0.0, (0.2, 0.2, 0.2))
-        _hinge(
-            model,
-            f"front_{side}_steer_joint",
-            "base_link",
-            f"front_{side}_knuckle",
-            axis="0 0 1",
-            limit_rad=inner,
-            rate_radps=car.max_tire_rate_radps.value,
-            damping=STEERING_DAMPING_NMSPRAD,
-        )
-        _wheel(model, f"front_{side}_wheel", wheelbase, y, wheel_kg, car.friction.value)
-        _hinge(model, f"front_{side}_wheel_joint", f"front_{side}_knuckle", f"front_{side}_wheel")
+        turning = f"front_{side}_steer_joint", "base_link", held
+        axis = _hinge(model, turning, steered, axis=UP)
+        child(child(axis, "dynamics"), "damping", numbers(STEERING_DAMPING_NMSPRAD))
+        _wheel(model, front, wheelbase, y, wheel_kg, car.friction.value)
+        _hinge(model, (f"{front}_joint", held, front), FREE)
     ackermann_plugin(
         model, vehicle.name, car, simulator, wheel_radius_m=WHEEL_RADIUS_M, track_m=2 * half_track
     )
@@ -175,15 +162,13 @@ def steering_limit_rad(car: VehicleParameters) -> float:
 def _body(link: Element, vehicle: SdfVehicle, *, solid: bool) -> None:
     car = vehicle.parameters
     high = car.height_m.value - GROUND_CLEARANCE_M
-    centre = car.length_m.value / 2 - car.rear_overhang_m.value
-    for tag in ("collision", "visual") if solid else ("visual",):
-        part = child(link, tag, name=f"body.{tag}")
-        pose(part, centre, 0.0, GROUND_CLEARANCE_M + high / 2)
-        shape = child(child(part, "geometry"), "box")
-        # The wheels of a twin stand within its box: links of one model do not collide.
-        child(shape, "size", numbers(car.length_m.value, car.width_m.value, high))
-        if tag == "visual":
-            material(part, _COLOURS[vehicle.kind])
+    centre = car.length_m.value / 2 - car.rear_overhang_m.value, 0.0, GROUND_CLEARANCE_M + high / 2
+    # The wheels of a twin stand within its box: links of one model do not collide.
+    size = [("size", numbers(car.length_m.value, car.width_m.value, high))]
+    if solid:
+        shaped(child(link, "collision", name="body.collision"), "box", size, centre)
+    visual = child(link, "visual", name="body.visual")
+    shaped(visual, "box", size, centre, _COLOURS[vehicle.kind])
 
 
 def _box_inertia(
@@ -200,12 +185,8 @@ def _inertial(
     pose(inertial, x_m, 0.0, z_m)
     child(inertial, "mass", numbers(mass_kg))
     tensor = child(inertial, "inertia")
-    for name, value in zip(
-        ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
-        (inertia[0], 0.0, 0.0, inertia[1], 0.0, inertia[2]),
-        strict=True,
-    ):
-        child(tensor, name, numbers(value, digits=4))
+    xx, yy, zz = (numbers(value, digits=4) for value in inertia)
+    leaves(tensor, {"ixx": xx, "ixy": "0", "ixz": "0", "iyy": yy, "iyz": "0", "izz": zz})
 
 
 def _wheel(model: Element, name: str, x: float, y: float, mass_kg: float, friction: float) -> None:
@@ -214,48 +195,26 @@ def _wheel(model: Element, name: str, x: float, y: float, mass_kg: float, fricti
     spin = 0.5 * mass_kg * WHEEL_RADIUS_M**2
     tilt = mass_kg / 12.0 * (3 * WHEEL_RADIUS_M**2 + WHEEL_WIDTH_M**2)
     _inertial(link, mass_kg, 0.0, 0.0, (tilt, spin, tilt))
+    size = [("radius", numbers(WHEEL_RADIUS_M)), ("length", numbers(WHEEL_WIDTH_M))]
     for tag in ("collision", "visual"):
         part = child(link, tag, name=f"tyre.{tag}")
         child(part, "pose", f"0 0 0 {numbers(np.pi / 2, digits=6)} 0 0")
-        shape = child(child(part, "geometry"), "cylinder")
-        child(shape, "radius", numbers(WHEEL_RADIUS_M))
-        child(shape, "length", numbers(WHEEL_WIDTH_M))
-        if tag == "visual":
-            material(part, _TYRE)
-            continue
-        surface = child(part, "surface")
-        grip = child(child(surface, "friction"), "ode")
-        child(grip, "mu", numbers(friction))
-        child(grip, "mu2", numbers(friction))
-        contact = child(child(surface, "contact"), "ode")
-        child(contact, "kp", "1e7")
-        child(contact, "kd", "1e3")
-        child(contact, "min_depth", "0.001")
+        shaped(part, "cylinder", size, rgba=_TYRE if tag == "visual" else None)
+        if tag == "collision":
+            surface, grip = child(part, "surface"), numbers(friction)
+            leaves(child(child(surface, "friction"), "ode"), {"mu": grip, "mu2": grip})
+            stiff = {"kp": "1e7", "kd": "1e3", "min_depth": "0.001"}
+            leaves(child(child(surface, "contact"), "ode"), stiff)
 
 
 def _hinge(
-    model: Element,
-    name: str,
-    parent: str,
-    of: str,
-    *,
-    axis: str = "0 1 0",
-    limit_rad: float | None = None,
-    effort: float | None = None,
-    rate_radps: float | None = None,
-    damping: float = 0.0,
-) -> None:
+    model: Element, between: tuple[str, str, str], limit: Mapping[str, str], *, axis: str = LEFT
+) -> Element:
+    """Add a joint, its name `between` those of its parent and its child, and return its axis."""
+    name, parent, of = between
     joint = child(model, "joint", name=name, type="revolute")
-    child(joint, "parent", parent)
-    child(joint, "child", of)
+    leaves(joint, {"parent": parent, "child": of})
     element = child(joint, "axis")
     child(element, "xyz", axis)
-    limit = child(element, "limit")
-    child(limit, "lower", "-1e16" if limit_rad is None else numbers(-limit_rad, digits=4))
-    child(limit, "upper", "1e16" if limit_rad is None else numbers(limit_rad, digits=4))
-    if effort is not None:
-        child(limit, "effort", numbers(effort))
-    if rate_radps is not None:
-        child(limit, "velocity", numbers(rate_radps))
-    if damping:
-        child(child(element, "dynamics"), "damping", numbers(damping))
+    leaves(child(element, "limit"), limit)
+    return element

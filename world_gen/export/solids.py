@@ -1,6 +1,6 @@
-"""What the models for MuJoCo and for Gazebo make of a World alike: heights, colours, what is solid.
+"""What formats make of a World alike: heights, colours, breadths of lines, what is solid.
 
-Apart from both, so that neither writer loads the other's libraries.
+Apart from all, so that no writer loads another's libraries.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ ROAD_TOP_M = 0.01
 RING_ISLAND_HEIGHT_M = 1.0
 """A roundabout's middle is a mound with plants: a car that drives straight on must hit it."""
 TRAFFIC_ISLAND_HEIGHT_M = 0.12
+STOP_LINE_M = 0.5
+"""Breadth of a stop line (RMS-1, 1993)."""
+YIELD_LINE_M = 0.3
 THINNEST_M = 0.01
 """Buildings that are lower from underside to top are left out."""
 

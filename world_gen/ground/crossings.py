@@ -18,16 +18,14 @@ _MARKED = ("zebra", "marked", "uncontrolled", "traffic_signals")
 
 
 def crossings(
-    around: Surroundings,
-    node_tags: Mapping[int, Mapping[str, str]],
-    beside: BesideRoads | None = None,
+    around: Surroundings, node_tags: Mapping[int, Mapping[str, str]], beside: BesideRoads
 ) -> tuple[Crossing, ...]:
     """Return each crossing node on a car road within the World, once.
 
     A node is one by its own tags, or since a way tagged as a crossing (`beside`) meets the road.
     """
     places: dict[int, tuple[int, int, Mapping[str, str]]] = {}
-    drawn = beside.crossed_at if beside is not None else {}
+    drawn = beside.crossed_at
     amid = {n for c in around.clusters if len(c.legs) > 2 for n in c.nodes} if drawn else set()
     for index, edge in sorted(around.edges.items()):
         for i, node in enumerate(edge.node_ids[: len(edge.xy_m)]):

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline_batch import Polylines
-from foretwin.world_gen.ground.paved import Paved
 from foretwin.world_gen.lanes.lane_curves import LaneSet
+from foretwin.world_gen.lanes.legs import Cluster
+from foretwin.world_gen.polygon_areas import cut_out, lines_of
 
 OVERLAP_M = 0.06
 """So near to a neighbouring piece the border of a place is no kerb."""
 SHORTEST_M = 0.3
+
+
+class Paved(NamedTuple):
+    """Pieces of paved ground as shapely polygons: of roads, and of places where they meet.
+
+    `roads[i]` belongs to the World's i-th road, `places[k]` to the cluster `place_of[k]`.
+    """
+
+    roads: np.ndarray
+    places: np.ndarray
+    place_of: tuple[Cluster, ...]
 
 
 def kerb_lines(lanes: LaneSet, paved: Paved) -> tuple[Array, ...]:
@@ -40,29 +53,19 @@ def _road_edges(
     """Return both edges of every road without what lies in other pieces."""
     if not lanes.roads:
         return []
-    sides = Polylines.of([line for road in lanes.roads for line in lanes.edges[road.id]])
-    lines = shapely.linestrings(sides.xy_m, indices=sides.line)
+    lines = lines_of([line for road in lanes.roads for line in lanes.edges[road.id]])
     road = np.repeat(np.arange(len(lanes.roads)), 2)
     row, piece = tree.query(lines)
     place_row = {c.key: len(paved.roads) + k for k, c in enumerate(paved.place_of)}
-    own = np.array(
-        [
-            (place_row.get(r.from_place or "", -1), place_row.get(r.to_place or "", -1))
-            for r in lanes.roads
-        ]
-    )[road[row]]
+    ends = [(r.from_place or "", r.to_place or "") for r in lanes.roads]
+    own = np.array([[place_row.get(key, -1) for key in pair] for pair in ends])[road[row]]
     # A road's edge ends where its own places begin: nothing of it lies inside.
     wanted = (road[row] != piece) & (own != piece[:, None]).all(axis=1)
     wanted &= layer[road[row]] == layer[piece]
     row, piece = row[wanted], piece[wanted]
     # Looking closely only now is cheaper: most of what is near is a road's own.
     meet = shapely.intersects(lines[row], tree.geometries[piece])
-    row, piece = row[meet], piece[meet]
-    # Line by line would take a call each: in round k every line loses its k-th neighbour.
-    turn = np.arange(len(row)) - np.searchsorted(row, row)
-    for k in range(int(turn.max(initial=-1)) + 1):
-        now = turn == k
-        lines[row[now]] = shapely.difference(lines[row[now]], tree.geometries[piece[now]])
+    cut_out(lines, tree.geometries, row[meet], piece[meet])
     return list(lines[~shapely.is_empty(lines)])
 
 

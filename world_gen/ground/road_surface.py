@@ -6,7 +6,8 @@ Nothing is dissolved into one surface: a region has thousands of pieces, and eac
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import NamedTuple
 
@@ -20,13 +21,12 @@ from foretwin.contracts.world import Area
 from foretwin.geometry.polyline_batch import Polylines, cut, offset, without_repeats
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.ground.islands import island_areas
-from foretwin.world_gen.ground.kerbs import kerb_lines
-from foretwin.world_gen.ground.paved import GRID_M, Paved
+from foretwin.world_gen.ground.kerbs import Paved, kerb_lines
 from foretwin.world_gen.ground.place_outlines import simple_outlines
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneSet
-from foretwin.world_gen.polygon_areas import areas_of
+from foretwin.world_gen.polygon_areas import GRID_M, areas_of, lines_of, polygons_of_rings
 
 CORNER_FILLET_M = 3.0
 SMALLEST_M2 = 0.5
@@ -50,7 +50,7 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
     simple = simple_outlines(around, lanes, connections)
     outlined = {around.clusters[i].key for i in simple.rows}
     turning = [c for c in connections if c.cluster.key not in outlined]
-    swept = _swept([(c.centerline, c.width_m.value) for c in turning])
+    swept = _swept(turning)
     rows, shapes = _place_polygons(around, turning, swept, frozenset(simple.rows))
     order = np.argsort([*simple.rows, *rows], kind="stable")
     clusters = tuple(around.clusters[(*simple.rows, *rows)[k]] for k in order)
@@ -72,42 +72,19 @@ def areas(around: Surroundings, lanes: LaneSet, connections: list[ConnectionDraf
     )
 
 
-def _swept(paths: list[tuple[Array, float]]) -> np.ndarray:
-    if not paths:
-        return np.array([], dtype=object)
-    counts = [len(xy) for xy, _ in paths]
-    lines = shapely.linestrings(
-        np.concatenate([xy for xy, _ in paths]), indices=np.repeat(np.arange(len(paths)), counts)
-    )
-    swept: np.ndarray = shapely.buffer(
-        shapely.simplify(lines, 0.03, preserve_topology=False),
-        [width / 2 for _, width in paths],
-        cap_style="flat",
-        join_style="mitre",
-        mitre_limit=2.0,
-    )
+def _swept(connections: Sequence[ConnectionDraft]) -> np.ndarray:
+    """Return what connections sweep, polygon by polygon."""
+    lines = lines_of([c.centerline for c in connections])
+    lines = shapely.simplify(lines, 0.03, preserve_topology=False)
+    half_m = [c.width_m.value / 2 for c in connections]
+    flat = {"cap_style": "flat", "join_style": "mitre", "mitre_limit": 2.0}
+    swept: np.ndarray = shapely.buffer(lines, half_m, **flat)
     return swept
 
 
 def _road_polygons(lanes: LaneSet) -> np.ndarray:
     sides = (lanes.edges[road.id] for road in lanes.roads)
-    return polygons([np.concatenate([right, left[::-1]]) for left, right in sides])
-
-
-def polygons(rings: list[Array]) -> np.ndarray:
-    """Return valid polygons, one for each ring (N, 2) that need not be closed or simple."""
-    if not rings:
-        return np.array([], dtype=object)
-    counts = [len(ring) for ring in rings]
-    closed = shapely.linearrings(
-        np.concatenate(rings), indices=np.repeat(np.arange(len(rings)), counts)
-    )
-    found: np.ndarray = shapely.polygons(closed)
-    bad = ~shapely.is_valid(found)
-    if bad.any():
-        # A bend tighter than the road is wide folds its inner edge.
-        found[bad] = shapely.buffer(found[bad], 0.0)
-    return found
+    return polygons_of_rings([np.concatenate([right, left[::-1]]) for left, right in sides])
 
 
 def _place_polygons(
@@ -149,8 +126,7 @@ def _stubs_and_inner_edges(
     These are the stub of each leg, from its node to where its lanes begin, and all inner edges.
     """
     ways: list[Array] = []
-    stop_m: list[float] = []
-    edges_m: list[tuple[float, float]] = []
+    spans_m: list[tuple[float, float, float]] = []
     owners: list[int] = []
     for i, cluster in enumerate(around.clusters):
         if i in done:
@@ -159,29 +135,23 @@ def _stubs_and_inner_edges(
             trim = around.trims_m.get((leg.edge.index, leg.reverse), 0.0)
             if trim >= 0.05:
                 section = around.section(leg)
-                to_left_m, to_right_m = section.left_m, section.right_m
+                left, right = section.left_m, section.right_m
                 ways.append(leg.xy_m)
-                stop_m.append(trim + 0.05)
-                edges_m.append(
-                    (-to_right_m, -to_left_m) if leg.reverse else (to_left_m, to_right_m)
-                )
+                edges = (-right, -left) if leg.reverse else (left, right)
+                spans_m.append((trim + 0.05, *edges))
                 owners.append(i)
         for index in sorted(cluster.inner & around.edges.keys()):
             section = around.sections[index]
             ways.append(around.edges[index].xy_m)
-            stop_m.append(math.inf)
-            edges_m.append((section.left_m, section.right_m))
+            spans_m.append((math.inf, section.left_m, section.right_m))
             owners.append(i)
     if not ways:
         return np.array([], dtype=object), owners
     lines = without_repeats(Polylines.of(ways))
-    stop = np.minimum(np.array(stop_m), lines.length_m)
-    lines = cut(lines, np.zeros(len(ways)), stop)
-    left_m, right_m = np.array(edges_m).T
-    left, right = offset(lines, left_m).split(), offset(lines, right_m).split()
-    return polygons(
-        [np.concatenate([b, a[::-1]]) for a, b in zip(left, right, strict=True)]
-    ), owners
+    stop_m, left_m, right_m = np.array(spans_m).T
+    lines = cut(lines, np.zeros(len(ways)), np.minimum(stop_m, lines.length_m))
+    sides = zip(offset(lines, left_m).split(), offset(lines, right_m).split(), strict=True)
+    return polygons_of_rings([np.concatenate([b, a[::-1]]) for a, b in sides]), owners
 
 
 def _node_discs(around: Surroundings, done: frozenset[int]) -> tuple[np.ndarray, list[int]]:
@@ -215,30 +185,23 @@ def _junction_areas(
 ) -> dict[str, Area]:
     """Return for each whole junction its places, and the ring between them, as one area."""
     found: dict[str, Area] = {}
-    pieces: dict[str, list[Polygon]] = {}
+    pieces: dict[str, list[Polygon]] = defaultdict(list)
     for cluster, shape, areas_there in zip(paved.place_of, paved.places, of_place, strict=True):
         if cluster.whole and cluster.junction is not None and areas_there:
             name = cluster.junction.summary.id
             if not cluster.ring and len(cluster.nodes) == len(cluster.junction.nodes):
                 found[name] = msgspec.structs.replace(areas_there[0], id=f"junction:{name}")
             else:
-                pieces.setdefault(name, []).append(shape)
-    ring_of: dict[int, Junction] = {
-        i: junction
-        for junction in around.junctions
-        for i in junction.inner
-        if i in around.ring_edges
-    }
+                pieces[name].append(shape)
+    inner = ((i, junction) for junction in around.junctions for i in junction.inner)
+    ring_of: dict[int, Junction] = {i: it for i, it in inner if i in around.ring_edges}
     edge_of = {lane.road_id: lane.key.edge for lane in lanes.lanes.values()}
     for road, shape in zip(lanes.roads, paved.roads, strict=True):
         junction = ring_of.get(edge_of.get(road.id, -1))
         if junction is not None:
-            pieces.setdefault(junction.summary.id, []).append(shape)
+            pieces[junction.summary.id].append(shape)
     names = list(pieces)
     whole = np.array([shapely.union_all(pieces[name]) for name in names], dtype=object)
-    parts = areas_of(
-        [f"junction:{name}" for name in names],
-        shapely.set_precision(whole, GRID_M),
-        smallest_m2=SMALLEST_M2,
-    )
+    whole = shapely.set_precision(whole, GRID_M)
+    parts = areas_of([f"junction:{name}" for name in names], whole, smallest_m2=SMALLEST_M2)
     return found | {name: mine[0] for name, mine in zip(names, parts, strict=True) if mine}

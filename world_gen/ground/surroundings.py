@@ -10,7 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Area, Building
 from foretwin.world_gen.buildings.footprints import buildings_in_frame
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
-from foretwin.world_gen.ground.map_islands import mapped_islands
+from foretwin.world_gen.ground.islands import mapped_islands
 from foretwin.world_gen.ground.road_surface import areas
 from foretwin.world_gen.ground.sidewalks import sidewalk_areas
 from foretwin.world_gen.junctions.map_index import MapIndex

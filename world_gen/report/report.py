@@ -17,6 +17,8 @@ _OBJECT = re.compile(r"^(way|node|relation|building|intersection) [-\w.]+: ")
 _ID = re.compile(r"\b(way|node|relation|building|ways|nodes) -?\d+\b|\b[wrn]-?\d[\w.-]*\b")
 _NUMBER = re.compile(r"-?\d+(?:[.,]\d+)?")
 _EXAMPLES = 3
+_OF_SUMMARY = ("id", "name", "kind", "control", "lat", "lon", "arms")
+"""What a report of a junction takes from the junction's summary."""
 
 
 class NoteCount(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,15 +101,9 @@ def report_of(world: World) -> WorldReport:
 
 def _junction(at: Neighbourhood, junction: WorldJunction) -> JunctionReport:
     subjects = junction_subjects(at, junction)
-    place = junction.summary
+    place = msgspec.structs.asdict(junction.summary)
     return JunctionReport(
-        id=place.id,
-        name=place.name,
-        kind=place.kind,
-        control=place.control,
-        lat=place.lat,
-        lon=place.lon,
-        arms=place.arms,
+        **{field: place[field] for field in _OF_SUMMARY},
         confidence=_confidence(subjects),
         subjects=subjects,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 
 import msgspec
@@ -40,6 +40,12 @@ _RULES: Mapping[YieldRule, str] = {
     "merge_order": "merging lanes",
     "order": "no rule says; a fixed order",
 }
+_CONTROLS = {
+    "signal": "stops at a signal",
+    "stop": "stops at a sign",
+    "give_way": "gives way at a sign",
+    "none": "no sign or signal",
+}
 
 
 class Neighbourhood:
@@ -49,26 +55,25 @@ class Neighbourhood:
         self.roads = {road.id: road for road in world.roads}
         self.lanes = {lane.id: lane for lane in world.lanes}
         self.connections = {c.id: c for c in world.connections}
-        self.of_junction: dict[str, list[Connection]] = {}
+        self.of_junction: dict[str, list[Connection]] = defaultdict(list)
         for connection in world.connections:
-            self.of_junction.setdefault(connection.junction_id, []).append(connection)
-        self.lines: dict[str, list[StopLine]] = {}
+            self.of_junction[connection.junction_id].append(connection)
+        self.lines: dict[str, list[StopLine]] = defaultdict(list)
         for line in world.stop_lines:
-            self.lines.setdefault(line.lane_id, []).append(line)
-        self.heads: dict[str, list[Signal]] = {}
+            self.lines[line.lane_id].append(line)
+        self.heads: dict[str, list[Signal]] = defaultdict(list)
         for head in world.signals:
             for lane in head.lane_ids:
-                self.heads.setdefault(lane, []).append(head)
-        self.conflicts: dict[str, list[Conflict]] = {}
+                self.heads[lane].append(head)
+        self.conflicts: dict[str, list[Conflict]] = defaultdict(list)
         for conflict in world.conflicts:
-            junction = self.connections[conflict.first_id].junction_id
-            self.conflicts.setdefault(junction, []).append(conflict)
+            self.conflicts[self.connections[conflict.first_id].junction_id].append(conflict)
         self.crossings = _crossings_by_junction(world)
 
-    def road_name(self, lane: Lane) -> str:
+    def road_name(self, lane_id: str) -> str:
         """Return what to call the road of a lane."""
-        road = self.roads.get(lane.road_id)
-        return _called(lane.name, lane.osm_way, road)
+        lane = self.lanes[lane_id]
+        return _called(lane.name, lane.osm_way, self.roads.get(lane.road_id))
 
 
 def _called(name: str, osm_way: int, road: Road | None) -> str:
@@ -79,7 +84,7 @@ def _called(name: str, osm_way: int, road: Road | None) -> str:
 
 
 def _crossings_by_junction(world: World) -> dict[str, list[Crossing]]:
-    found: dict[str, list[Crossing]] = {}
+    found: dict[str, list[Crossing]] = defaultdict(list)
     places = [
         (j.summary.id, j.area.outline.mean(axis=0)) for j in world.junctions if j.area is not None
     ]
@@ -90,32 +95,32 @@ def _crossings_by_junction(world: World) -> dict[str, list[Crossing]]:
         away = np.hypot(*(centres - crossing.line.mean(axis=0)).T)
         nearest = int(away.argmin())
         if away[nearest] <= CROSSING_REACH_M:
-            found.setdefault(places[nearest][0], []).append(crossing)
+            found[places[nearest][0]].append(crossing)
     return found
 
 
 def junction_subjects(at: Neighbourhood, junction: WorldJunction) -> tuple[SubjectReport, ...]:
     """Return all subjects of one junction that have values."""
     place = junction.summary.id
-    connections = at.of_junction.get(place, [])
+    connections = at.of_junction[place]
     entering = _lanes(at, (c.from_lane_id for c in connections))
     touching = _lanes(at, (i for c in connections for i in (c.from_lane_id, c.to_lane_id)))
     roads = {lane.road_id: at.roads[lane.road_id] for lane in touching if lane.road_id in at.roads}
-    heads = {head.id: head for lane in entering for head in at.heads.get(lane.id, ())}
-    lines = [line for lane in entering for line in at.lines.get(lane.id, ())]
-    reports = (
-        subject_report("kind", _kind(junction)),
-        subject_report("lane counts", _lane_counts(roads.values())),
-        subject_report("lane widths", [_width(at, lane) for lane in touching]),
-        subject_report("turns", [_turns(at, lane) for lane in entering]),
-        subject_report("directions", [_direction(at, lane) for lane in touching]),
-        subject_report("speed limits", [_speed(at, lane) for lane in touching]),
-        subject_report("control", [_line(at, line) for line in lines]),
-        subject_report("signals", _signals(at, junction, heads.values())),
-        subject_report("right of way", _right_of_way(at, at.conflicts.get(place, ()))),
-        subject_report("crossings", _crossings(at.crossings.get(place, ()))),
-    )
-    return tuple(r for r in reports if r.confidence is not None)
+    heads = {head.id: head for lane in entering for head in at.heads[lane.id]}
+    lines = [line for lane in entering for line in at.lines[lane.id]]
+    values = {
+        "kind": _kind(junction),
+        "lane counts": _lane_counts(roads.values()),
+        "lane widths": [_width(at, lane) for lane in touching],
+        "turns": [_turns(at, lane) for lane in entering],
+        "directions": [_direction(at, lane) for lane in touching],
+        "speed limits": [_speed(at, lane) for lane in touching],
+        "control": [_line(at, line) for line in lines],
+        "signals": _signals(at, junction, heads.values()),
+        "right of way": [_right_of_way(at, conflict) for conflict in at.conflicts[place]],
+        "crossings": _crossings(at.crossings[place]),
+    }
+    return tuple(subject_report(subject, found) for subject, found in values.items() if found)
 
 
 def building_subject(buildings: Sequence[Building]) -> SubjectReport:
@@ -125,17 +130,13 @@ def building_subject(buildings: Sequence[Building]) -> SubjectReport:
         for b in buildings
         if b.height_m.source != "tagged"
     )
-    report = subject_report(
-        "building heights", [Value("", "", b.height_m.source) for b in buildings]
-    )
+    values = [Value("", "", b.height_m.source) for b in buildings]
     reason = {"inferred": "from their levels", "default": "default"}
-    return msgspec.structs.replace(
-        report,
-        guessed=tuple(
-            f"{n} building{'s' if n > 1 else ''}: {words}, {reason[source]}"
-            for (words, source), n in sorted(alike.items(), key=lambda i: (i[0][1], -i[1], i[0][0]))
-        ),
+    guessed = tuple(
+        f"{n} building{'s' if n > 1 else ''}: {words}, {reason[source]}"
+        for (words, source), n in sorted(alike.items(), key=lambda i: (i[0][1], -i[1], i[0][0]))
     )
+    return msgspec.structs.replace(subject_report("building heights", values), guessed=guessed)
 
 
 def _lanes(at: Neighbourhood, ids: Iterable[str]) -> list[Lane]:
@@ -149,82 +150,64 @@ def _kind(junction: WorldJunction) -> list[Value]:
     for arm in junction.arms:
         one = len(arm.osm_ways) == 1
         words = "one arm" if one else f"one arm made of {len(arm.osm_ways)} ways"
-        found.append(
-            Value(arm.name or f"way {arm.osm_ways[0]}", words, "tagged" if one else "inferred")
-        )
+        name = arm.name or f"way {arm.osm_ways[0]}"
+        found.append(Value(name, words, "tagged" if one else "inferred"))
     return found
 
 
 def _lane_counts(roads: Iterable[Road]) -> list[Value]:
     ways = {road.osm_way: road for road in roads}
-    return [
-        Value(
-            _called(road.name, road.osm_way, road),
-            f"{len(road.lane_ids)} lane{'s' if len(road.lane_ids) != 1 else ''}",
-            road.lane_count_source,
-        )
-        for road in ways.values()
-    ]
+    found = []
+    for road in ways.values():
+        words = f"{len(road.lane_ids)} lane{'s' if len(road.lane_ids) != 1 else ''}"
+        name = _called(road.name, road.osm_way, road)
+        found.append(Value(name, words, road.lane_count_source))
+    return found
 
 
 def _width(at: Neighbourhood, lane: Lane) -> Value:
-    return Value(at.road_name(lane), f"lane {lane.width_m.value:.2f} m wide", lane.width_m.source)
+    width = lane.width_m
+    return Value(at.road_name(lane.id), f"lane {width.value:.2f} m wide", width.source)
 
 
 def _turns(at: Neighbourhood, lane: Lane) -> Value:
     turns = sorted(lane.turns, key=_FROM_LEFT.index)
     words = ", ".join(turn.replace("_", "-") for turn in turns) or "no turn"
-    return Value(at.road_name(lane), f"lane for {words}", lane.turns_source)
+    return Value(at.road_name(lane.id), f"lane for {words}", lane.turns_source)
 
 
 def _direction(at: Neighbourhood, lane: Lane) -> Value:
     road = at.roads.get(lane.road_id)
     ways = {at.lanes[i].reverse for i in road.lane_ids if i in at.lanes} if road else {lane.reverse}
     words = "traffic both ways" if len(ways) == 2 else "one-way traffic"
-    return Value(at.road_name(lane), words, lane.direction_source)
+    return Value(at.road_name(lane.id), words, lane.direction_source)
 
 
 def _speed(at: Neighbourhood, lane: Lane) -> Value:
     limit = lane.speed_limit_mps
-    return Value(at.road_name(lane), f"{limit.value * _MPS_TO_KMPH:.0f} km/h", limit.source)
+    return Value(at.road_name(lane.id), f"{limit.value * _MPS_TO_KMPH:.0f} km/h", limit.source)
 
 
 def _line(at: Neighbourhood, line: StopLine) -> Value:
-    words = {
-        "signal": "stops at a signal",
-        "stop": "stops at a sign",
-        "give_way": "gives way at a sign",
-        "none": "no sign or signal",
-    }
-    told = words.get(line.control.value, line.control.value)
+    words = _CONTROLS.get(line.control.value, line.control.value)
     onto = at.connections.get(line.connection_id or "")
     if onto is not None:
-        told = f"{told} on the way into {at.road_name(at.lanes[onto.to_lane_id])}"
-    return Value(at.road_name(at.lanes[line.lane_id]), told, line.control.source)
+        words = f"{words} on the way into {at.road_name(onto.to_lane_id)}"
+    return Value(at.road_name(line.lane_id), words, line.control.source)
 
 
 def _signals(at: Neighbourhood, junction: WorldJunction, heads: Iterable[Signal]) -> list[Value]:
-    found = [
-        Value(at.road_name(at.lanes[head.lane_ids[0]]), "signal head", head.source)
-        for head in heads
-    ]
+    found = [Value(at.road_name(head.lane_ids[0]), "signal head", head.source) for head in heads]
     plan = junction.plan
     if plan is not None:
-        words = f"signal plan of {len(plan.phases)} phases"
-        found.append(Value("junction", words, plan.source))
+        found.append(Value("junction", f"signal plan of {len(plan.phases)} phases", plan.source))
     return found
 
 
-def _right_of_way(at: Neighbourhood, conflicts: Iterable[Conflict]) -> list[Value]:
-    found = []
-    for conflict in conflicts:
-        waits = at.connections[conflict.yields_id]
-        goes = at.connections[conflict.goes_id]
-        waits_road = at.road_name(at.lanes[waits.from_lane_id])
-        goes_road = at.road_name(at.lanes[goes.from_lane_id])
-        words = f"waits for {goes_road} ({_RULES[conflict.rule]})"
-        found.append(Value(waits_road, words, conflict.source))
-    return found
+def _right_of_way(at: Neighbourhood, conflict: Conflict) -> Value:
+    waits, goes = at.connections[conflict.yields_id], at.connections[conflict.goes_id]
+    words = f"waits for {at.road_name(goes.from_lane_id)} ({_RULES[conflict.rule]})"
+    return Value(at.road_name(waits.from_lane_id), words, conflict.source)
 
 
 def _crossings(crossings: Iterable[Crossing]) -> list[Value]:

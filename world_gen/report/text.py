@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from foretwin.world_gen.report.values import SOURCE_CONFIDENCE, SubjectReport
@@ -27,10 +28,11 @@ def as_text(report: WorldReport) -> str:
         *_wrapped(EXPLANATION, ""),
     ]
     for junction in report.junctions:
-        lines += ["", *_wrapped(_title(junction), ""), *_table(junction.subjects)]
+        lines += ["", *_wrapped(_title(junction), ""), *subject_table(junction.subjects)]
         for subject in junction.subjects:
             lines += _sentences(subject)
-    lines += ["", "Surroundings", *_table((report.buildings,)), *_sentences(report.buildings)]
+    around = report.buildings
+    lines += ["", "Surroundings", *subject_table((around,)), *_sentences(around)]
     lines += ["", f"Notes: {sum(note.count for note in report.notes)}"]
     for note in report.notes:
         lines += _wrapped(f"{note.count:5}  {note.kind}", " " * 7)
@@ -69,13 +71,22 @@ def _title(junction: JunctionReport) -> str:
     )
 
 
-def _table(subjects: tuple[SubjectReport, ...]) -> list[str]:
-    lines = [f"  {'':18}{'tagged':>8}{'inferred':>10}{'default':>9}{'confidence':>12}"]
-    lines += [
-        f"  {s.subject:18}{s.tagged:8}{s.inferred:10}{s.default:9}{_figure(s.confidence):>12}"
-        for s in subjects
+def subject_table(
+    subjects: Sequence[SubjectReport], *, head: str = "  ", width: int = 20
+) -> list[str]:
+    """Return lines that count the values of each subject by where they are from.
+
+    The first column is `width` wide, under `head`, and indented as that is.
+    """
+    indent = " " * (len(head) - len(head.lstrip()))
+    return [
+        f"{head:{width}}{'tagged':>8}{'inferred':>10}{'default':>9}{'confidence':>12}",
+        *(
+            f"{indent + s.subject:{width}}{s.tagged:8}{s.inferred:10}{s.default:9}"
+            f"{_figure(s.confidence):>12}"
+            for s in subjects
+        ),
     ]
-    return lines
 
 
 def _sentences(subject: SubjectReport) -> list[str]:
@@ -87,7 +98,7 @@ def _sentences(subject: SubjectReport) -> list[str]:
     return lines
 
 
-def _markdown(subjects: tuple[SubjectReport, ...]) -> list[str]:
+def _markdown(subjects: Sequence[SubjectReport]) -> list[str]:
     lines = ["| subject | tagged | inferred | default | confidence |", "|---|---:|---:|---:|---:|"]
     lines += [
         f"| {s.subject} | {s.tagged} | {s.inferred} | {s.default} | {_figure(s.confidence)} |"

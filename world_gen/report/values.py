@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
@@ -54,22 +54,18 @@ class Value(msgspec.Struct, frozen=True):
     source: Provenance
 
 
-def subject_report(subject: str, values: Iterable[Value]) -> SubjectReport:
+def subject_report(subject: str, values: Sequence[Value]) -> SubjectReport:
     """Count values by source, and put those that were guessed into sentences."""
-    values = list(values)
     count = Counter(value.source for value in values)
     worth = sum(SOURCE_CONFIDENCE[source] * n for source, n in count.items())
     alike = Counter((v.of, v.words, v.source) for v in values if v.source != "tagged")
+    order = sorted(alike, key=lambda key: (-PROVENANCES.index(key[2]), *key[:2]))
     return SubjectReport(
         subject=subject,
-        tagged=count["tagged"],
-        inferred=count["inferred"],
-        default=count["default"],
+        **{source: count[source] for source in PROVENANCES},
         confidence=round(worth / len(values), 2) if values else None,
         guessed=tuple(
             f"{of}: {words}, {source}" + (f" ({n} times)" if n > 1 else "")
-            for (of, words, source), n in sorted(
-                alike.items(), key=lambda item: (PROVENANCES.index(item[0][2]) * -1, *item[0][:2])
-            )
+            for (of, words, source), n in ((key, alike[key]) for key in order)
         ),
     )

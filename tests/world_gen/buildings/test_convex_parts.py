@@ -67,9 +67,11 @@ def test_no_outline_has_no_parts():
 
 
 def test_a_pocket_behind_a_thin_spike_stays_free():
-    spiked = [[0, 0], [10.88, -22.97], [-2.85, -29.44], [1.87, -39.4], [15.63, -32.92],
-              [13.87, -29.2], [27.83, -22.63], [13.99, 6.59]]  # fmt: skip
-    _assert_silhouette_kept(Polygon(spiked), convex_parts(np.array(spiked, dtype=np.float64)))
+    spiked = shapely.from_wkt(
+        "POLYGON ((0 0, 10.88 -22.97, -2.85 -29.44, 1.87 -39.4, 15.63 -32.92, 13.87 -29.2, "
+        "27.83 -22.63, 13.99 6.59, 0 0))"
+    )
+    _assert_silhouette_kept(spiked, convex_parts(shapely.get_coordinates(spiked)[:-1]))
 
 
 def _assert_silhouette_kept(whole: Polygon, parts: list[np.ndarray]) -> None:

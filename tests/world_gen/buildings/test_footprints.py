@@ -23,6 +23,10 @@ from foretwin.world_gen.buildings.parts import Footprint
 from foretwin.world_gen.osm.osm_map import OsmMap
 from tests.world_gen.drawn_maps import drawn_map
 
+COVERS = (
+    "foretwin.world_gen.buildings.outlines",
+    "foretwin.world_gen.buildings.parts",
+)
 SQUARE = {1: (0.0, 0.0), 2: (20.0, 0.0), 3: (20.0, 20.0), 4: (0.0, 20.0)}
 YARD = {5: (5.0, 5.0), 6: (15.0, 5.0), 7: (15.0, 15.0), 8: (5.0, 15.0)}
 HALVES = SQUARE | {9: (10.0, 0.0), 10: (10.0, 20.0)}
@@ -118,8 +122,9 @@ def test_below_an_overhang_is_open():
 def test_a_part_without_a_height_has_its_outlines():
     osm = drawn_map(HALVES, [OUTLINE, (21, [1, 9, 10, 4, 1], {"building:part": "yes"})])
     assert [f.height_m for f in footprints(osm, [])] == [
-        Quantity(10.0, "tagged"), Quantity(10.0, "inferred"),
-    ]  # fmt: skip
+        Quantity(10.0, "tagged"),
+        Quantity(10.0, "inferred"),
+    ]
 
 
 def test_a_part_without_an_outline_is_a_building():

@@ -19,11 +19,22 @@ from foretwin.world_gen.buildings.tags import (
 @pytest.mark.parametrize(
     ("text", "height_m"),
     [
-        ("12", 12.0), ("12.5 m", 12.5), ("8,4", 8.4), ("40'", 12.192), ("40' 6\"", 12.3444),
-        ("40 ft", 12.192), ("40ft 6in", 12.3444), ("6 feet", 1.8288), ("tall", None), ("-3", None),
-        ("1e9", None), ("99999", None), ("", None), (None, None),
+        ("12", 12.0),
+        ("12.5 m", 12.5),
+        ("8,4", 8.4),
+        ("40'", 12.192),
+        ("40' 6\"", 12.3444),
+        ("40 ft", 12.192),
+        ("40ft 6in", 12.3444),
+        ("6 feet", 1.8288),
+        ("tall", None),
+        ("-3", None),
+        ("1e9", None),
+        ("99999", None),
+        ("", None),
+        (None, None),
     ],
-)  # fmt: skip
+)
 def test_heights_are_read_or_refused(text, height_m):
     assert height_in_m(text) == (None if height_m is None else pytest.approx(height_m))
 
@@ -88,13 +99,18 @@ def test_values_that_say_nothing_are_named():
 @pytest.mark.parametrize(
     ("tags", "stands"),
     [
-        ({"building": "yes"}, True), ({"building": "no"}, False), ({"highway": "service"}, False),
-        ({"building": "demolished"}, False), ({"building": "yes", "layer": "1"}, True),
-        ({"building": "yes", "layer": "-1"}, False), ({"building": "yes", "layer": "-0"}, True),
+        ({"building": "yes"}, True),
+        ({"building": "no"}, False),
+        ({"highway": "service"}, False),
+        ({"building": "demolished"}, False),
+        ({"building": "yes", "layer": "1"}, True),
+        ({"building": "yes", "layer": "-1"}, False),
+        ({"building": "yes", "layer": "-0"}, True),
         ({"building": "yes", "location": "underground"}, False),
-        ({"building": "yes", "tunnel": "yes"}, False), ({"building:part": "yes"}, True),
+        ({"building": "yes", "tunnel": "yes"}, False),
+        ({"building:part": "yes"}, True),
     ],
-)  # fmt: skip
+)
 def test_what_is_not_built_or_below_the_road_is_no_building(tags, stands):
     assert stands_above_ground(tags) is stands
 
@@ -105,8 +121,16 @@ def test_a_part_is_what_is_no_building_itself():
     assert not is_part({"building:part": "yes", "building": "yes"})
 
 
-_KEYS = [*sorted(HEIGHT_KEYS), "building", "building:part", "layer", "location", "tunnel", "wall",
-         "bridge"]  # fmt: skip
+_KEYS = [
+    *sorted(HEIGHT_KEYS),
+    "building",
+    "building:part",
+    "layer",
+    "location",
+    "tunnel",
+    "wall",
+    "bridge",
+]
 _VALUES = st.one_of(
     st.sampled_from(["yes", "no", "roof", "carport", "bridge", "-1", "--1", "-x", "0", "3;4"]),
     st.floats(-10.0, 1e6).map(str),

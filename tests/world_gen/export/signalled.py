@@ -41,12 +41,18 @@ def signalled_crossing() -> World:
     )
     conflicts = tuple(
         Conflict(
-            first_id=c.id, second_id=other, kind="crossing", point=np.zeros(2),
-            area=np.zeros((0, 2)), yields_id=c.id, rule="order", source="default",
+            first_id=c.id,
+            second_id=other,
+            kind="crossing",
+            point=np.zeros(2),
+            area=np.zeros((0, 2)),
+            yields_id=c.id,
+            rule="order",
+            source="default",
         )
         for c in connections
         for other in c.yields_to
-    )  # fmt: skip
+    )
     return msgspec.structs.replace(
         plain,
         connections=tuple(connections),

@@ -17,13 +17,17 @@ from lxml import etree
 
 from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
-from foretwin.contracts.world import ATTRIBUTION, Building, Crossing, StopLine, World
+from foretwin.contracts.world import ATTRIBUTION, Building, StopLine, World
 from foretwin.world_gen.export.commonroad import write_commonroad
-from foretwin.world_gen.export.commonroad_lights import cycle
+from foretwin.world_gen.export.commonroad_controls import cycle
 from tests.world_gen.drawn_maps import roundabout, world_of
-from tests.world_gen.export.drawn_world import road, world
+from tests.world_gen.export.drawn_world import ZEBRA, road, world
 from tests.world_gen.export.signalled import signalled_crossing
 
+COVERS = (
+    "foretwin.world_gen.export.commonroad_controls",
+    "foretwin.world_gen.export.commonroad_intersections",
+)
 DAY = datetime.date(2025, 6, 1)
 STRAIGHT = [(0.0, 0.0), (50.0, 0.0)]
 
@@ -169,8 +173,10 @@ def test_a_cycle_is_as_long_as_its_plan(
             SignalPhase(green_s=green, green_group_ids=("g",) if flag else ())
             for green, flag in zip(greens_s, flags, strict=True)
         ),
-        amber_s=amber_s, all_red_s=all_red_s, source="default",
-    )  # fmt: skip
+        amber_s=amber_s,
+        all_red_s=all_red_s,
+        source="default",
+    )
     shown = cycle(plan, "g")
     total = sum(greens_s) + len(greens_s) * (amber_s + all_red_s)
     assert sum(e.duration_s for e in shown) == pytest.approx(total)
@@ -205,7 +211,9 @@ def test_signs_are_those_of_the_country(
     one, other = road("a", STRAIGHT, ahead=[3.0, 3.0]), road("b", [(0, 20), (50, 20)], ahead=[3.0])
     lines = [
         StopLine(
-            id=f"{lane}:stop", lane_id=lane, ends=np.array([[49.0, y], [49.0, y - 3.0]]),
+            id=f"{lane}:stop",
+            lane_id=lane,
+            ends=np.array([[49.0, y], [49.0, y - 3.0]]),
             control=Choice(control, source),  # type: ignore[arg-type]
         )
         for lane, y, control, source in (
@@ -213,7 +221,7 @@ def test_signs_are_those_of_the_country(
             ("a.f1", -3.0, "stop", "tagged"),
             ("b.f0", 20.0, "give_way", "inferred"),
         )
-    ]  # fmt: skip
+    ]
     root = written(world(one, other, stop_lines=tuple(lines)), tmp_path, country=country)
     wanted = [(stop, "false"), (give_way, "true")]
     assert [s for s in sign_ids(root) if s[0] != "B14"] == [s for s in wanted if s[0]]
@@ -269,11 +277,7 @@ def test_buildings_are_obstacles_unless_one_drives_under_them(tmp_path: Path) ->
 
 
 def test_crossings_are_crosswalks_for_pedestrians_both_ways(tmp_path: Path) -> None:
-    zebra = Crossing(
-        id="x", line=np.array([[20.0, -3.0], [20.0, 3.0]]), width_m=Quantity(4.0, "default"),
-        kind=Choice("zebra", "tagged"),
-    )  # fmt: skip
-    root = written(world(road("r", STRAIGHT, ahead=[3.0]), crossings=(zebra,)), tmp_path)
+    root = written(world(road("r", STRAIGHT, ahead=[3.0]), crossings=(ZEBRA,)), tmp_path)
     lanelet = list(root.iterfind("lanelet"))[-1]
     assert lanelet.findtext("laneletType") == "crosswalk"
     assert lanelet.findtext("userBidirectional") == "pedestrian"

@@ -30,30 +30,46 @@ def built(origin: GeoPoint | None = None) -> World:
         world,
         buildings=(
             Building(
-                id="w20", outline=square, holes=(square[::-1] * 0.5 + 15.0,),
+                id="w20",
+                outline=square,
+                holes=(square[::-1] * 0.5 + 15.0,),
                 height_m=Quantity(12.0, "tagged"),
             ),
         ),
         crossings=(
             Crossing(
-                id="c", line=np.array([[8.0, -3.0], [8.0, 3.0]]), width_m=Quantity(4.0, "default"),
-                kind=Choice("zebra", "tagged"), osm_node=7,
+                id="c",
+                line=np.array([[8.0, -3.0], [8.0, 3.0]]),
+                width_m=Quantity(4.0, "default"),
+                kind=Choice("zebra", "tagged"),
+                osm_node=7,
             ),
         ),
         signals=(
             Signal(
-                id="h", osm_node=1, group_id="g", lane_ids=(world.lanes[0].id,),
-                position=np.array([6.0, 4.0, 3.0]), yaw_rad=0.5, source="inferred",
+                id="h",
+                osm_node=1,
+                group_id="g",
+                lane_ids=(world.lanes[0].id,),
+                position=np.array([6.0, 4.0, 3.0]),
+                yaw_rad=0.5,
+                source="inferred",
             ),
         ),
         sidewalks=(Area(id="walk", outline=square[::-1], source="tagged"),),
         conflicts=(
             Conflict(
-                first_id=first.id, second_id=second.id, kind="crossing", point=np.zeros(2),
-                area=square / 20.0, yields_id=first.id, rule="near_side", source="inferred",
+                first_id=first.id,
+                second_id=second.id,
+                kind="crossing",
+                point=np.zeros(2),
+                area=square / 20.0,
+                yields_id=first.id,
+                rule="near_side",
+                source="inferred",
             ),
         ),
-    )  # fmt: skip
+    )
 
 
 def features(world: World, folder: Path) -> dict[str, list[Any]]:
@@ -78,12 +94,18 @@ def test_each_thing_of_the_world_is_a_feature(tmp_path: Path) -> None:
     world = built()
     found = features(world, tmp_path)
     for kind, things in (
-        ("lane", world.lanes), ("connection", world.connections), ("stop_line", world.stop_lines),
-        ("crossing", world.crossings), ("signal", world.signals), ("road", world.roads),
-        ("conflict", world.conflicts), ("building", world.buildings),
-        ("junction", world.junctions), ("road_surface", world.road_surface),
+        ("lane", world.lanes),
+        ("connection", world.connections),
+        ("stop_line", world.stop_lines),
+        ("crossing", world.crossings),
+        ("signal", world.signals),
+        ("road", world.roads),
+        ("conflict", world.conflicts),
+        ("building", world.buildings),
+        ("junction", world.junctions),
+        ("road_surface", world.road_surface),
         ("sidewalk", world.sidewalks),
-    ):  # fmt: skip
+    ):
         assert len(things) > 0, kind
         assert len(found[kind]) == len(things), kind
     names = [feature["id"] for group in found.values() for feature in group]
@@ -139,8 +161,10 @@ def test_values_say_where_they_come_from(tmp_path: Path) -> None:
     assert conflict["rule"] == "near_side"
     lane = found["lane"][0]["properties"]
     assert {lane[key] for key in lane if key.endswith("_source")} <= {
-        "tagged", "inferred", "default"
-    }  # fmt: skip
+        "tagged",
+        "inferred",
+        "default",
+    }
     assert len([key for key in lane if key.endswith("_source")]) == 5
     assert found["junction"][0]["properties"]["control"] == "uncontrolled"
     assert len(found["junction"][0]["properties"]["arms"]) == 4

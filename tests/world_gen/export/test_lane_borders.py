@@ -19,6 +19,7 @@ from tests.world_gen.drawn_maps import roundabout, world_of
 from tests.world_gen.export.drawn_world import connection, leading_to, road, world
 from tests.world_gen.path_shape import rounded, turn_curve
 
+COVERS = ("foretwin.world_gen.export.parallels",)
 WIDTHS = st.lists(st.floats(2.0, 5.0), min_size=1, max_size=4)
 STRAIGHT = [(0.0, 0.0), (50.0, 0.0)]
 

@@ -24,6 +24,14 @@ from tests.world_gen.export.drawn_world import road, world
 from tests.world_gen.export.lanelet2_file import assert_closed, read, written
 from tests.world_gen.export.signalled import signalled_crossing
 
+COVERS = (
+    "foretwin.world_gen.export.lanelet2_orientation",
+    "foretwin.world_gen.export.lanelet2_primitives",
+    "foretwin.world_gen.export.lanelet2_surroundings",
+    "foretwin.world_gen.export.lanelets",
+    "foretwin.world_gen.export.road_heights",
+)
+
 
 @pytest.mark.parametrize("drawn", [signalled_crossing(), world_of(roundabout())], ids=["x", "o"])
 def test_ids_are_unique_and_references_closed(drawn: World, tmp_path: Path) -> None:
@@ -52,9 +60,12 @@ def test_the_projector_file_gives_back_the_local_coordinates(tmp_path: Path) -> 
     assert values["projector_type"] == "TransverseMercator"
     assert values["vertical_datum"] == "WGS84"
     projection = pyproj.Proj(
-        proj="tmerc", lat_0=float(values["latitude"]), lon_0=float(values["longitude"]),
-        k_0=float(values["scale_factor"]), ellps="WGS84",
-    )  # fmt: skip
+        proj="tmerc",
+        lat_0=float(values["latitude"]),
+        lon_0=float(values["longitude"]),
+        k_0=float(values["scale_factor"]),
+        ellps="WGS84",
+    )
     for node in read(tmp_path / "map.osm").nodes.values():
         x, y = projection(float(node["lon"]), float(node["lat"]))
         assert x == pytest.approx(float(node["local_x"]), abs=0.001)

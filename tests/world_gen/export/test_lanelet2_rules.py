@@ -8,11 +8,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from foretwin.contracts.provenance import Choice, Quantity
 from foretwin.contracts.signals import Signal
-from foretwin.contracts.world import Crossing, WorldJunction
+from foretwin.contracts.world import WorldJunction
 from tests.world_gen.drawn_maps import crossing, world_of
-from tests.world_gen.export.drawn_world import road, world
+from tests.world_gen.export.drawn_world import ZEBRA, road, world
 from tests.world_gen.export.lanelet2_file import written
 from tests.world_gen.export.signalled import signalled_crossing
 
@@ -22,8 +21,12 @@ def test_lights_stand_at_height_and_name_their_stop_line(tmp_path: Path) -> None
     found = written(drawn, tmp_path)
     rules = found.rules("traffic_light")
     assert len(rules) == 4
-    named = [ref for members, _ in found.relations.values() for _, ref, role in members
-             if role == "regulatory_element"]  # fmt: skip
+    named = [
+        ref
+        for members, _ in found.relations.values()
+        for _, ref, role in members
+        if role == "regulatory_element"
+    ]
     for rule, members, _ in rules:
         roles = {role: ref for _, ref, role in members}
         light, tags = found.ways[roles["refers"]]
@@ -37,9 +40,14 @@ def test_lights_stand_at_height_and_name_their_stop_line(tmp_path: Path) -> None
 
 def test_a_light_lies_from_left_to_right_as_its_driver_sees_it(tmp_path: Path) -> None:
     head = Signal(
-        id="s", osm_node=None, group_id="g", lane_ids=("a.f0",),
-        position=np.array([50.0, -5.0, 3.0]), yaw_rad=math.pi, source="inferred",
-    )  # fmt: skip
+        id="s",
+        osm_node=None,
+        group_id="g",
+        lane_ids=("a.f0",),
+        position=np.array([50.0, -5.0, 3.0]),
+        yaw_rad=math.pi,
+        source="inferred",
+    )
     drawn = world(road("a", [(0.0, 0.0), (49.0, 0.0)], ahead=[3.0]), signals=(head,))
     found = written(drawn, tmp_path)
     edge = next(nodes for nodes, tags in found.ways.values() if tags["type"] == "traffic_light")
@@ -92,12 +100,8 @@ def test_an_all_way_stop_lists_a_line_for_each_lane(tmp_path: Path) -> None:
 
 
 def test_a_crosswalk_is_a_lanelet_as_wide_as_it_is(tmp_path: Path) -> None:
-    zebra = Crossing(
-        id="x", line=np.array([[20.0, -3.0], [20.0, 3.0]]), width_m=Quantity(4.0, "default"),
-        kind=Choice("zebra", "tagged"),
-    )  # fmt: skip
     one = road("a", [(0.0, 0.0), (50.0, 0.0)], ahead=[3.0], against=[3.0])
-    drawn = world(one, crossings=(zebra,))
+    drawn = world(one, crossings=(ZEBRA,))
     found = written(drawn, tmp_path)
     members, tags = found.lanelet("x")
     assert tags["subtype"] == "crosswalk"

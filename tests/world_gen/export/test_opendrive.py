@@ -28,6 +28,12 @@ from tests.world_gen.drawn_maps import (
 )
 from tests.world_gen.export.read_opendrive import OpenDriveFile, bend_rad, gap_m
 
+COVERS = (
+    "foretwin.world_gen.export.opendrive_elements",
+    "foretwin.world_gen.export.opendrive_places",
+    "foretwin.world_gen.export.opendrive_roads",
+    "foretwin.world_gen.export.opendrive_tapers",
+)
 PRIMARY = {"highway": "primary", "name": "Avenue", "lanes": "4"}
 
 

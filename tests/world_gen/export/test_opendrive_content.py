@@ -26,6 +26,12 @@ from tests.world_gen.drawn_maps import (
 from tests.world_gen.export import drawn_world
 from tests.world_gen.export.test_opendrive import check_closed, plain, written
 
+COVERS = (
+    "foretwin.world_gen.export.opendrive_objects",
+    "foretwin.world_gen.export.opendrive_sidewalks",
+    "foretwin.world_gen.export.opendrive_signals",
+)
+
 
 def test_who_waits_is_written_for_every_conflict(tmp_path: Path) -> None:
     world = plain()
@@ -97,9 +103,12 @@ def test_outlines_stand_where_the_world_has_them(tmp_path: Path) -> None:
     corner = np.array([[20.0, 20.0], [45.0, 22.0], [44.0, 40.0], [21.0, 38.0]])
     court = np.array([[28.0, 26.0], [28.0, 32.0], [35.0, 32.0], [35.0, 26.0]])
     house = Building(
-        id="house", outline=corner, holes=(court,), height_m=Quantity(9.0, "tagged"),
+        id="house",
+        outline=corner,
+        holes=(court,),
+        height_m=Quantity(9.0, "tagged"),
         min_height_m=3.0,
-    )  # fmt: skip
+    )
     island = Area(id="refuge", outline=np.array([[-30.0, -1.0], [-25.0, -1.0], [-25.0, 1.0]]))
     world = msgspec.structs.replace(plain(), buildings=(house,), islands=(island,))
     file = written(world, tmp_path)

@@ -37,10 +37,12 @@ def test_a_curve_stays_by_its_polyline_and_never_runs_back(steps) -> None:
     # Evaluated as readers do, each step is about as long as the length says.
     steps_m = np.hypot(*np.diff(at, axis=0).T)
     assert steps_m.min() > 0.2 * curve.length_m / 400
-    turns = np.abs(np.arctan2(
-        headings[:-1, 0] * headings[1:, 1] - headings[:-1, 1] * headings[1:, 0],
-        (headings[:-1] * headings[1:]).sum(axis=1),
-    ))  # fmt: skip
+    turns = np.abs(
+        np.arctan2(
+            headings[:-1, 0] * headings[1:, 1] - headings[:-1, 1] * headings[1:, 0],
+            (headings[:-1] * headings[1:]).sum(axis=1),
+        )
+    )
     assert turns.max() < math.radians(90.0)
 
 

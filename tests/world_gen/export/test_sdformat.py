@@ -25,20 +25,43 @@ from foretwin.world_gen.export.sdformat_shapes import extrusions
 from foretwin.world_gen.export.sdformat_vehicles import SdfVehicle, place_vehicles
 from tests.world_gen.drawn_maps import GERMANY, crossing, roundabout, world_of
 
+COVERS = (
+    "foretwin.world_gen.export.sdformat_plugins",
+    "foretwin.world_gen.export.sdformat_shapes",
+    "foretwin.world_gen.export.sdformat_vehicles",
+)
 _CAR = {
-    "mass_kg": 1100.0, "yaw_inertia_kgm2": 1800.0, "wheelbase_m": 2.6,
-    "cog_from_rear_axle_m": 1.4, "cog_height_m": 0.6, "front_cornering_stiffness_npr": 1.3e5,
-    "rear_cornering_stiffness_npr": 1.1e5, "friction": 1.05, "steering_ratio": 16.0,
-    "steering_offset_rad": 0.0, "steering_delay_s": 0.1, "max_tire_angle_rad": 0.6,
-    "max_tire_rate_radps": 0.4, "drag_npv2": 0.4, "rolling_resistance_n": 100.0,
-    "drive_gain": 1.0, "brake_gain": 1.0, "max_drive_accel_mps2": 4.0,
-    "max_brake_decel_mps2": 9.0, "wheel_inertia_mass_factor": 1.05, "length_m": 4.5,
-    "width_m": 1.8, "height_m": 1.4, "rear_overhang_m": 0.9,
-}  # fmt: skip
+    "mass_kg": 1100.0,
+    "yaw_inertia_kgm2": 1800.0,
+    "wheelbase_m": 2.6,
+    "cog_from_rear_axle_m": 1.4,
+    "cog_height_m": 0.6,
+    "front_cornering_stiffness_npr": 1.3e5,
+    "rear_cornering_stiffness_npr": 1.1e5,
+    "friction": 1.05,
+    "steering_ratio": 16.0,
+    "steering_offset_rad": 0.0,
+    "steering_delay_s": 0.1,
+    "max_tire_angle_rad": 0.6,
+    "max_tire_rate_radps": 0.4,
+    "drag_npv2": 0.4,
+    "rolling_resistance_n": 100.0,
+    "drive_gain": 1.0,
+    "brake_gain": 1.0,
+    "max_drive_accel_mps2": 4.0,
+    "max_brake_decel_mps2": 9.0,
+    "wheel_inertia_mass_factor": 1.05,
+    "length_m": 4.5,
+    "width_m": 1.8,
+    "height_m": 1.4,
+    "rear_overhang_m": 0.9,
+}
 CAR = VehicleParameters(name="car", **{key: Parameter(value) for key, value in _CAR.items()})
 ALL_KINDS: tuple[tuple[str, VehicleKind], ...] = (
-    ("ego", "twin"), ("real", "shadow"), ("thought", "ghost")
-)  # fmt: skip
+    ("ego", "twin"),
+    ("real", "shadow"),
+    ("thought", "ghost"),
+)
 COURTYARD = np.array([[20.0, 20.0], [50.0, 20.0], [50.0, 50.0], [20.0, 50.0]])
 YARD = np.array([[30.0, 30.0], [30.0, 40.0], [40.0, 40.0], [40.0, 30.0]])
 
@@ -47,17 +70,27 @@ def built() -> World:
     """Return a crossing with a house around a courtyard, a signal and its line."""
     world = world_of(crossing())
     house = Building(
-        id="w20", outline=COURTYARD, holes=(YARD,), height_m=Quantity(12.0, "tagged"),
+        id="w20",
+        outline=COURTYARD,
+        holes=(YARD,),
+        height_m=Quantity(12.0, "tagged"),
         min_height_m=3.0,
-    )  # fmt: skip
+    )
     line = StopLine(
-        id="s", lane_id=world.lanes[0].id, ends=np.array([[6.0, 3.0], [6.0, 0.0]]),
+        id="s",
+        lane_id=world.lanes[0].id,
+        ends=np.array([[6.0, 3.0], [6.0, 0.0]]),
         control=Choice("signal", "tagged"),
-    )  # fmt: skip
+    )
     signal = Signal(
-        id="h", osm_node=1, group_id="g", lane_ids=(world.lanes[0].id,),
-        position=np.array([6.0, 4.0, 3.0]), yaw_rad=0.5, source="tagged",
-    )  # fmt: skip
+        id="h",
+        osm_node=1,
+        group_id="g",
+        lane_ids=(world.lanes[0].id,),
+        position=np.array([6.0, 4.0, 3.0]),
+        yaw_rad=0.5,
+        source="tagged",
+    )
     return msgspec.structs.replace(world, buildings=(house,), stop_lines=(line,), signals=(signal,))
 
 
@@ -129,9 +162,9 @@ def test_road_markings_and_signals_are_seen_and_never_touched(tmp_path: Path) ->
     for name in ("road", "markings", "signals"):
         assert root.find(f"world/model[@name='{name}']/link/visual") is not None
         assert root.find(f"world/model[@name='{name}']/link/collision") is None
-    road = union_all([
-        shape_outline(part) for part in root.findall("world/model[@name='road']/link/visual")
-    ])  # fmt: skip
+    road = union_all(
+        [shape_outline(part) for part in root.findall("world/model[@name='road']/link/visual")]
+    )
     surface = union_all([Polygon(area.outline, area.holes) for area in world.road_surface])
     assert road.symmetric_difference(surface).area < 0.01 * surface.area
     line = root.find("world/model[@name='markings']/link/visual")
@@ -208,8 +241,10 @@ def test_vehicles_begin_apart_on_lanes_in_driving_direction() -> None:
     gaps = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     assert gaps[~np.eye(9, dtype=bool)].min() > 5.0
     for vehicle in placed:
-        lane = min(world.lanes, key=lambda lane: np.hypot(
-            *(lane.centerline - [vehicle.x_m, vehicle.y_m]).T).min())  # fmt: skip
+        lane = min(
+            world.lanes,
+            key=lambda lane: np.hypot(*(lane.centerline - [vehicle.x_m, vehicle.y_m]).T).min(),
+        )
         ahead = np.array([math.cos(vehicle.yaw_rad), math.sin(vehicle.yaw_rad)])
         assert ahead @ (lane.centerline[-1] - lane.centerline[0]) > 0.0
 
@@ -223,11 +258,9 @@ def test_wrong_vehicles_and_simulators_are_named(tmp_path: Path) -> None:
 
 
 @given(
-    holes=st.lists(
-        st.tuples(st.integers(1, 8), st.integers(1, 8)), max_size=6, unique=True
-    ),
+    holes=st.lists(st.tuples(st.integers(1, 8), st.integers(1, 8)), max_size=6, unique=True),
     size=st.floats(0.3, 0.8),
-)  # fmt: skip
+)
 def test_extrusions_cover_a_polygon_and_none_of_its_holes(
     holes: list[tuple[int, int]], size: float
 ) -> None:

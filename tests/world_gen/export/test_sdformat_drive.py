@@ -57,10 +57,12 @@ def twin_model(sdf: Path) -> mujoco.MjModel:
             body = add(parent).add_body(name=name, pos=place - pose_of(links[parent])[0])
             limit = float(joint.findtext("axis/limit/upper"))
             body.add_joint(
-                name=joint.get("name"), axis=[float(v) for v in joint.findtext("axis/xyz").split()],
+                name=joint.get("name"),
+                axis=[float(v) for v in joint.findtext("axis/xyz").split()],
                 damping=[float(joint.findtext("axis/dynamics/damping") or 0.0), 0, 0],
-                range=[-limit, limit] if limit < 10 else [0, 0], limited=limit < 10,
-            )  # fmt: skip
+                range=[-limit, limit] if limit < 10 else [0, 0],
+                limited=limit < 10,
+            )
         body.explicitinertial = True
         body.mass = float(link.findtext("inertial/mass"))
         body.ipos = pose_of(link.find("inertial"))[0]
@@ -74,10 +76,14 @@ def twin_model(sdf: Path) -> mujoco.MjModel:
                 quaternion = np.zeros(4)
                 mujoco.mju_euler2Quat(quaternion, turned, "XYZ")
                 body.add_geom(
-                    type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[float(radius), length / 2, 0],
-                    pos=at, quat=quaternion, contype=0, conaffinity=1,
+                    type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+                    size=[float(radius), length / 2, 0],
+                    pos=at,
+                    quat=quaternion,
+                    contype=0,
+                    conaffinity=1,
                     friction=[float(part.findtext("surface/friction/ode/mu")), 0.005, 0.0001],
-                )  # fmt: skip
+                )
         bodies[name] = body
         return body
 

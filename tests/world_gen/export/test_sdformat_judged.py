@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+import shapely
 
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Building
@@ -56,17 +57,21 @@ def test_libsdformat_takes_the_sample(judge: Path, tmp_path: Path, data_dir: Pat
 
 
 def test_eight_hundred_buildings_are_checked_in_three_seconds(judge: Path, tmp_path: Path) -> None:
-    corners = np.array([[0, 0], [9, 0], [9, 4], [13, 4], [13, 9], [9, 9], [9, 14], [5, 14],
-                        [5, 11], [2, 11], [2, 7], [0, 7]], dtype=float)  # fmt: skip
+    house = shapely.from_wkt(
+        "POLYGON ((0 0, 9 0, 9 4, 13 4, 13 9, 9 9, 9 14, 5 14, 5 11, 2 11, 2 7, 0 7, 0 0))"
+    )
+    corners = shapely.get_coordinates(house)[:-1]
     yard = np.array([[4.0, 5.0], [4.0, 7.0], [7.0, 7.0], [7.0, 5.0]])
     buildings = tuple(
         Building(
-            id=f"w{i}", outline=corners + at, holes=(yard + at,) if i % 20 == 0 else (),
+            id=f"w{i}",
+            outline=corners + at,
+            holes=(yard + at,) if i % 20 == 0 else (),
             height_m=Quantity(9.0, "default"),
         )
         for i in range(800)
         for at in [np.array([20.0 + 18.0 * (i % 40), 20.0 + 18.0 * (i // 40)])]
-    )  # fmt: skip
+    )
     path = tmp_path / "town.sdf"
     world = msgspec.structs.replace(world_of(crossing()), buildings=buildings)
     write_sdf(world, path, vehicles=place_vehicles(world, ALL_KINDS, CAR))

@@ -12,6 +12,11 @@ from foretwin.world_gen.report.report import JunctionReport, note_kind, report_o
 from foretwin.world_gen.report.values import SOURCE_CONFIDENCE, SUBJECT_WEIGHT, SubjectReport
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
 
+COVERS = (
+    "foretwin.world_gen.report.subjects",
+    "foretwin.world_gen.report.text",
+    "foretwin.world_gen.report.values",
+)
 SQUARE = {20: (20.0, 20.0), 21: (35.0, 20.0), 22: (35.0, 35.0), 23: (20.0, 35.0)}
 
 
@@ -20,12 +25,17 @@ def world() -> World:
     return world_of(
         crossing(
             street={"highway": "residential", "name": "Street", "lanes": "3", "maxspeed": "30"},
-            avenue={"highway": "residential", "name": "Avenue", "oneway": "yes", "lanes": "2",
-                    "turn:lanes": "left|through;right"},
+            avenue={
+                "highway": "residential",
+                "name": "Avenue",
+                "oneway": "yes",
+                "lanes": "2",
+                "turn:lanes": "left|through;right",
+            },
             extra_nodes=SQUARE,
             extra_ways=[(20, [20, 21, 22, 23, 20], {"building": "yes"})],
         )
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -79,10 +89,19 @@ def test_confidence_is_the_stated_formula(world, junction):
 
 def test_a_map_that_says_more_is_trusted_more():
     bare = report_of(world_of(crossing(street={"highway": "road"}, avenue={"highway": "road"})))
-    told = {"highway": "tertiary", "name": "S", "lanes": "2", "lanes:forward": "1",
-            "lanes:backward": "1", "maxspeed": "50", "oneway": "no",
-            "turn:lanes:forward": "through", "turn:lanes:backward": "through",
-            "width:lanes:forward": "3.2", "width:lanes:backward": "3.2"}  # fmt: skip
+    told = {
+        "highway": "tertiary",
+        "name": "S",
+        "lanes": "2",
+        "lanes:forward": "1",
+        "lanes:backward": "1",
+        "maxspeed": "50",
+        "oneway": "no",
+        "turn:lanes:forward": "through",
+        "turn:lanes:backward": "through",
+        "width:lanes:forward": "3.2",
+        "width:lanes:backward": "3.2",
+    }
     full = report_of(world_of(crossing(street=told, avenue=told)))
     assert full.junctions[0].confidence > bare.junctions[0].confidence + 0.1
 
@@ -121,14 +140,20 @@ def test_names_from_the_map_cannot_break_a_page():
 @pytest.mark.parametrize(
     ("note", "kind"),
     [
-        ("way 12: room for a radius of 4.0 m alone into way 34 (right)",
-         "room for a radius of … m alone into way (right)"),
-        ("buildings cut back where a lane passes: w1, w2-1",
-         "buildings cut back where a lane passes"),
-        ("way 5: building outline is not closed; left out",
-         "building outline is not closed; left out"),
+        (
+            "way 12: room for a radius of 4.0 m alone into way 34 (right)",
+            "room for a radius of … m alone into way (right)",
+        ),
+        (
+            "buildings cut back where a lane passes: w1, w2-1",
+            "buildings cut back where a lane passes",
+        ),
+        (
+            "way 5: building outline is not closed; left out",
+            "building outline is not closed; left out",
+        ),
     ],
-)  # fmt: skip
+)
 def test_notes_of_one_kind_are_told_apart_from_others(note, kind):
     assert note_kind(note) == kind
 

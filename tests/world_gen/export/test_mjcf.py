@@ -3,35 +3,43 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Any
 
 import msgspec
 import mujoco
 import numpy as np
 import pytest
+import shapely
 from lxml import etree
 
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.world_gen.export.mjcf import ROAD_USER, STATIC, VEHICLE, world_spec, write_mjcf
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
 
-L_BUILDING = {
-    "extra_nodes": {
-        20: (20.0, 20.0), 21: (50.0, 20.0), 22: (50.0, 30.0), 23: (30.0, 30.0),
-        24: (30.0, 50.0), 25: (20.0, 50.0), 30: (20.0, -40.0), 31: (30.0, -40.0),
-        32: (30.0, -30.0), 33: (20.0, -30.0), 40: (-80.0, 60.0), 41: (-70.0, 60.0),
-        42: (-70.0, 70.0), 43: (-80.0, 70.0),
-    },
-    "extra_ways": [
-        (20, [20, 21, 22, 23, 24, 25, 20], {"building": "yes", "height": "12"}),
-        (21, [30, 31, 32, 33, 30], {"building": "yes", "height": "12", "min_height": "5"}),
-        (22, [40, 41, 42, 43, 40], {"building": "yes", "height": "12"}),
-    ],
-}  # fmt: skip
+COVERS = ("foretwin.world_gen.export.solids",)
+HOUSES = {
+    20: "POLYGON ((20 20, 50 20, 50 30, 30 30, 30 50, 20 50, 20 20))",
+    30: "POLYGON ((20 -40, 30 -40, 30 -30, 20 -30, 20 -40))",
+    40: "POLYGON ((-80 60, -70 60, -70 70, -80 70, -80 60))",
+}
+"""Outlines by the number of their first node: an L, one that begins above a car, and a far one."""
+
+
+def houses() -> dict[str, Any]:
+    """Return what `crossing` takes to have the houses beside it."""
+    nodes, ways = {}, []
+    for first, outline in HOUSES.items():
+        corners = shapely.get_coordinates(shapely.from_wkt(outline))[:-1].tolist()
+        mine = dict(enumerate(map(tuple, corners), start=first))
+        tags = {"building": "yes", "height": "12"} | ({"min_height": "5"} if first == 30 else {})
+        nodes |= mine
+        ways.append((first, [*mine, first], tags))
+    return {"extra_nodes": nodes, "extra_ways": ways}
 
 
 @pytest.fixture(scope="module")
 def world() -> World:
-    return world_of(crossing(**L_BUILDING))
+    return world_of(crossing(**houses()))
 
 
 def _contacts_at(spec: mujoco.MjSpec, x_m: float, y_m: float, *, bits: tuple[int, int]) -> int:
@@ -111,8 +119,8 @@ def test_workers_do_without_the_road_and_far_buildings(world):
     full, worker = world_spec(world).compile(), world_spec(world, visual=False).compile()
     assert mujoco.mj_name2id(full, mujoco.mjtObj.mjOBJ_GEOM, "road") >= 0
     assert mujoco.mj_name2id(worker, mujoco.mjtObj.mjOBJ_GEOM, "road") == -1
-    assert mujoco.mj_name2id(full, mujoco.mjtObj.mjOBJ_GEOM, "building:w22:0") >= 0
-    assert mujoco.mj_name2id(worker, mujoco.mjtObj.mjOBJ_GEOM, "building:w22:0") == -1
+    assert mujoco.mj_name2id(full, mujoco.mjtObj.mjOBJ_GEOM, "building:w40:0") >= 0
+    assert mujoco.mj_name2id(worker, mujoco.mjtObj.mjOBJ_GEOM, "building:w40:0") == -1
 
 
 def test_the_file_loads_and_carries_the_attribution(world, tmp_path):

@@ -17,7 +17,14 @@ from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.world_gen.export.picture import write_picture
 from foretwin.world_gen.report.report import report_of
 from tests.world_gen.drawn_maps import crossing, roundabout, world_of
+from tests.world_gen.export.drawn_world import NOTHING_ELSE
 
+COVERS = (
+    "foretwin.world_gen.export.picture_ground",
+    "foretwin.world_gen.export.picture_marks",
+    "foretwin.world_gen.export.picture_style",
+    "foretwin.world_gen.export.picture_traffic",
+)
 HOUSE = {20: (10.0, 10.0), 21: (30.0, 10.0), 22: (30.0, 30.0), 23: (10.0, 30.0)}
 BRIDGE = {30: (-60.0, 60.0), 31: (60.0, 60.0)}
 
@@ -107,11 +114,8 @@ def test_a_roundabout_shows_who_gives_way(tmp_path):
 
 
 def test_a_world_without_anything_can_be_drawn(world, tmp_path):
-    empty = msgspec.structs.replace(
-        world, lanes=(), connections=(), stop_lines=(), crossings=(), signals=(), islands=(),
-        kerbs=(), road_surface=(), buildings=(), junctions=(), roads=(), conflicts=(),
-        sidewalks=(),
-    )  # fmt: skip
+    network = dict.fromkeys(("lanes", "connections", "junctions", "roads", "conflicts"), ())
+    empty = msgspec.structs.replace(world, sidewalks=(), **network, **NOTHING_ELSE)
     write_picture(empty, tmp_path / "empty.svg")
     assert ATTRIBUTION in _texts(tmp_path / "empty.svg")
 
