@@ -26,6 +26,7 @@ from foretwin.world_gen.rules.control_devices import (
     sign_of,
 )
 from foretwin.world_gen.rules.priority_roads import (
+    LOOK_M,
     Entry,
     Rank,
     Standing,
@@ -167,7 +168,7 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
         nearest = (on_road or lit)[0]
         nearest.signal_nodes = (*nearest.signal_nodes, node)
     for node, leg in behind:
-        out = heading_out(leg, 15.0)
+        out = heading_out(leg, LOOK_M)
         ahead = min(lit, key=lambda item: dot(out, outward(item.toward)))
         ahead.signal_nodes = (*ahead.signal_nodes, node)
 
