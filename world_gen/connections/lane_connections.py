@@ -70,7 +70,7 @@ def connect(
     merging = merges(cluster, ways)
     by_road: dict[tuple[int, bool], list[Movement]] = {}
     for way in ways:
-        by_road.setdefault((way.toward.edge.index, way.toward.reverse), []).append(way)
+        by_road.setdefault(way.toward.key, []).append(way)
     for mine in by_road.values():
         toward = mine[0].toward
         plans = _plans(cluster, toward, around)
