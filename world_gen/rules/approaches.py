@@ -11,8 +11,9 @@ import msgspec
 from foretwin.contracts.provenance import Choice
 from foretwin.contracts.world import LineControl, YieldRule
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.legs import RING_KINDS, Cluster, dot, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.legs import RING_KINDS, dot, heading_out, is_ring_edge
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from foretwin.world_gen.rules.control_devices import (
     Met,
