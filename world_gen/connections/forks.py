@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from foretwin.world_gen.connections.movements import Movement
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft
-from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 _FORK_RAD = math.radians(45.0)

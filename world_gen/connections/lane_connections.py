@@ -12,10 +12,10 @@ from foretwin.geometry.polyline import cross, left_of, unit
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.world_gen.connections.forks import beside_at_fork, merged_ends, merges
 from foretwin.world_gen.connections.movements import Movement
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
 from foretwin.world_gen.lanes.lane_plans import LanePlan
-from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 _UNDRAWN = np.zeros((0, 2))
@@ -70,7 +70,7 @@ def connect(
     merging = merges(cluster, ways)
     by_road: dict[tuple[int, bool], list[Movement]] = {}
     for way in ways:
-        by_road.setdefault((way.toward.edge.index, way.toward.reverse), []).append(way)
+        by_road.setdefault(way.toward.key, []).append(way)
     for mine in by_road.values():
         toward = mine[0].toward
         plans = _plans(cluster, toward, around)

@@ -8,8 +8,9 @@ import math
 import msgspec
 
 from foretwin.contracts.world import DrivingSide, Turn
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.legs import Cluster, Heads, dot, heading_out, is_ring_edge, opposed
+from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, opposed
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 

@@ -116,10 +116,9 @@ def _centre_xy_m(cluster: JunctionCluster, graph: RoadGraph) -> tuple[float, flo
     """Return the mean of the core nodes, of a ring the middle of its line."""
     if cluster.ring is None:
         return graph.middle_of(cluster.core)
-    middles, lengths = [], []
-    for edge in cluster.ring.edges:
-        middles.append((edge.xy_m[1:] + edge.xy_m[:-1]) / 2.0)
-        lengths.append(np.linalg.norm(np.diff(edge.xy_m, axis=0), axis=1))
+    lines = [edge.xy_m for edge in cluster.ring.edges]
+    middles = [(line[1:] + line[:-1]) / 2.0 for line in lines]
+    lengths = [np.linalg.norm(np.diff(line, axis=0), axis=1) for line in lines]
     centre = np.average(np.vstack(middles), axis=0, weights=np.concatenate(lengths))
     return float(centre[0]), float(centre[1])
 

@@ -9,7 +9,7 @@ from itertools import combinations, product
 from foretwin.world_gen.junctions.chains import CarRoads, Chain, Tags
 from foretwin.world_gen.junctions.grouping import Grouping, JunctionCluster
 from foretwin.world_gen.junctions.junction_control import facing
-from foretwin.world_gen.junctions.slip_roads import add_slips, slip_ends
+from foretwin.world_gen.junctions.slip_roads import LOOK_M, add_slips, slip_ends
 from foretwin.world_gen.roads.road_graph import RoadGraph
 
 CLOSE_M = 20.0
@@ -29,6 +29,8 @@ STOP_LINE_M = 30.0
 """Signals stand no farther before the branching that they govern."""
 FLARE_M = 80.0
 """Arms of a roundabout part into entry and exit no farther from it."""
+_ALONG_COS = 0.64
+"""Carriageways of one street, and the ends of one, run along each other within 50 degrees."""
 WIDEST_M = 70.0
 """A junction other than a ring is no wider, but for its slip roads."""
 
@@ -81,7 +83,7 @@ def _links_carriageways(chain: Chain, roads: CarRoads) -> bool:
     """Tell whether a chain leads from one carriageway of a street to the opposite one."""
     sides = (_carriageways(node, chain, roads) for node in (chain.start, chain.end))
     return any(
-        name_a == name_b and math.cos(heading_a - heading_b) < -0.64
+        name_a == name_b and math.cos(heading_a - heading_b) < -_ALONG_COS
         for (name_a, heading_a), (name_b, heading_b) in product(*sides)
     )
 
@@ -92,11 +94,11 @@ def _carriageways(node: int, besides: Chain, roads: CarRoads) -> Iterator[tuple[
     for into in others:
         if not (into.one_way and into.inward):
             continue
-        heading = into.bearing_rad(15.0) + math.pi
+        heading = into.bearing_rad(LOOK_M) + math.pi
         for out in others:
             if out.one_way and out.outward and out.name == into.name:
-                ahead = out.bearing_rad(15.0)
-                if math.cos(ahead - heading) > 0.64:
+                ahead = out.bearing_rad(LOOK_M)
+                if math.cos(ahead - heading) > _ALONG_COS:
                     yield into.name, ahead
 
 
@@ -152,7 +154,7 @@ def _side_road(chain: Chain, roads: CarRoads, node: int) -> float:
     if len(others) != 2 or any(other.one_way for other in (chain, *others)):
         return 0.0
     ahead = chain.bearing_rad(chain.length_m)
-    turns = [math.remainder(other.bearing_rad(15.0) - ahead, math.tau) for other in others]
+    turns = [math.remainder(other.bearing_rad(LOOK_M) - ahead, math.tau) for other in others]
     along = math.pi if at_start else 0.0
     turns.sort(key=lambda turn: abs(math.remainder(turn - along, math.tau)))
     straight = abs(math.remainder(turns[0] - along, math.tau)) < STRAIGHT_RAD

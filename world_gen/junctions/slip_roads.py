@@ -14,7 +14,7 @@ WIDEST_M, WIDEST_WITH_BARE_ENDS_M = 100.0, 170.0
 FLARE_WIDTH_M = 70.0
 THINNEST_CORNER_RAD = math.radians(18.0)
 SMOOTH_RAD, STRAIGHT_RAD = math.radians(60.0), math.radians(12.0)
-_LOOK_M = 15.0
+LOOK_M = 15.0
 """How far along a road its direction is taken."""
 
 
@@ -109,19 +109,19 @@ def _is_bare(cluster: JunctionCluster, roads: CarRoads) -> bool:
 
 def _angle_leaving(slip: Chain, roads: CarRoads) -> float:
     """Return the angle by which the straightest way into a slip road turns."""
-    ahead = slip.bearing_rad(_LOOK_M)
+    ahead = slip.bearing_rad(LOOK_M)
     before = [c for c in roads.chains_from[slip.start] if c.inward and c.key != slip.key]
-    turns = (c.bearing_rad(_LOOK_M) + math.pi - ahead for c in before)
+    turns = (c.bearing_rad(LOOK_M) + math.pi - ahead for c in before)
     return min((abs(math.remainder(turn, math.tau)) for turn in turns), default=math.pi)
 
 
 def _angle_joining(slip: Chain, roads: CarRoads) -> float:
     """Return the angle by which the straightest way out of a slip road turns."""
-    x_m, y_m = slip.point_at(max(0.0, slip.length_m - _LOOK_M))
+    x_m, y_m = slip.point_at(max(0.0, slip.length_m - LOOK_M))
     end_x_m, end_y_m = slip.point_at(slip.length_m)
     ahead = math.atan2(end_y_m - y_m, end_x_m - x_m)
     behind = [c for c in roads.chains_from[slip.end] if c.outward and c.key != slip.key]
-    turns = (c.bearing_rad(_LOOK_M) - ahead for c in behind)
+    turns = (c.bearing_rad(LOOK_M) - ahead for c in behind)
     return min((abs(math.remainder(turn, math.tau)) for turn in turns), default=math.pi)
 
 

@@ -17,9 +17,10 @@ from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.extent import Extent
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.cross_section import cross_section
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
-from foretwin.world_gen.lanes.legs import RING_KINDS, Cluster, Heads, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge

@@ -13,9 +13,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.contracts.world import Lane, LaneKind, Road, Turn
 from foretwin.geometry.polyline_batch import Polylines, offset, without_repeats
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanePlan
-from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.lanes.places import places_led_through, without_dead_places
 from foretwin.world_gen.lanes.reference_lines import Stretch, reference_lines
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge

@@ -13,14 +13,9 @@ from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import Flags
 from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
 from foretwin.geometry.turn_curves import LEAD_M, WANTED_RADIUS_M
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.lane_plans import CrossSection
-from foretwin.world_gen.lanes.legs import (
-    Cluster,
-    Heads,
-    heading_out,
-    is_ring_edge,
-    lateral_positions,
-)
+from foretwin.world_gen.lanes.legs import Heads, heading_out, is_ring_edge, lateral_positions
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 CORNER_M = 3.5

@@ -85,12 +85,8 @@ def assemble_map(
         way: OsmWay(way, nodes[cuts[k] : cuts[k + 1]], objects.way_tags[i])
         for way, (k, i) in zip(ids[order].tolist(), places, strict=True)
     }
-    relations = {}
-    for key, relation in objects.relations.items():
-        if any(way in ways for way in relation.way_ids):
-            relations[key] = relation
-        else:
-            notes.append(f"relation {key}: {NO_WAYS}")
+    of_ways = {k: r for k, r in objects.relations.items() if not ways.keys().isdisjoint(r.way_ids)}
+    notes.extend(f"relation {k}: {NO_WAYS}" for k in objects.relations if k not in of_ways)
     used = np.zeros(len(table.ids), dtype=bool)
     used[sound.rows] = True
     tagged = np.array(list(objects.node_tags), dtype=np.int64)
@@ -115,7 +111,7 @@ def assemble_map(
         locations=locations,
         node_tags=objects.node_tags,
         ways=ways,
-        relations=relations,
+        relations=of_ways,
         notes=tuple(dict.fromkeys(notes)),
         note_places=note_places,
     )

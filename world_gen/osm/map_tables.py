@@ -95,12 +95,8 @@ class TableReader:
 
     def cells_of(self, ways: Sequence[int]) -> set[int]:
         """Return the cells in which ways stand that relations name."""
-        found = set()
-        for way in ways:
-            row = self._db.execute("SELECT cell FROM member_way WHERE id = ?", (way,)).fetchone()
-            if row is not None:
-                found.add(row[0])
-        return found
+        select = "SELECT cell FROM member_way WHERE id = ?"
+        return {cell for way in ways for (cell,) in self._db.execute(select, (way,))}
 
     def close(self) -> None:
         """Close the file."""

@@ -46,10 +46,10 @@ def _close(writer: Any) -> None:
 
 
 def main(form: str, options: str) -> None:
-    """Decode; standard error gets the header as JSON, or a fault as plain text."""
+    """Decode; the last line of standard error is the header as JSON, or a fault as plain text."""
     try:
         header = decode(osmium.io.File("-", form), osmium.io.File("-", options))
-        os.write(2, json.dumps(header).encode())
+        os.write(2, b"\n" + json.dumps(header).encode())
     except Exception as error:
         os.write(2, " ".join(str(error).split()).encode(errors="replace"))
         os._exit(3)  # a writer that has failed ends the process by itself when it is destroyed

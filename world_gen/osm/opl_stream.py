@@ -75,7 +75,7 @@ class OplStream(contextlib.ExitStack):
         if code != 0:
             reason = answer.decode(errors="replace") or f"decoder ended with {code}"
             raise unreadable(self.path, RuntimeError(reason))
-        self.header = MapHeader.of(**json.loads(answer))
+        self.header = MapHeader.of(**json.loads(answer.splitlines()[-1]))
 
     def _feed(self) -> None:
         target = _pipe(self._process.stdin)

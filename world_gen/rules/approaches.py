@@ -11,8 +11,9 @@ import msgspec
 from foretwin.contracts.provenance import Choice
 from foretwin.contracts.world import LineControl, YieldRule
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.legs import RING_KINDS, Cluster, dot, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.legs import RING_KINDS, dot, heading_out, is_ring_edge
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from foretwin.world_gen.rules.control_devices import (
     Met,
@@ -26,6 +27,7 @@ from foretwin.world_gen.rules.control_devices import (
     sign_of,
 )
 from foretwin.world_gen.rules.priority_roads import (
+    LOOK_M,
     Entry,
     Rank,
     Standing,
@@ -167,7 +169,7 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
         nearest = (on_road or lit)[0]
         nearest.signal_nodes = (*nearest.signal_nodes, node)
     for node, leg in behind:
-        out = heading_out(leg, 15.0)
+        out = heading_out(leg, LOOK_M)
         ahead = min(lit, key=lambda item: dot(out, outward(item.toward)))
         ahead.signal_nodes = (*ahead.signal_nodes, node)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from foretwin.contracts.world import YieldRule
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.polyline_batch import Polylines
-from foretwin.world_gen.lanes.legs import Cluster
+from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 LOOK_BACK_M = 40.0
