@@ -18,7 +18,7 @@ from foretwin.geometry.polyline import arc_lengths, points_at
 from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.relations import ways_over
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
+from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way, whole_way
 
 _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
 _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")
@@ -217,9 +217,10 @@ class _Bay:
             ]
         )
         arc = arc_lengths(xy)
-        ego = _way(f"into a bay at {self._lane.id}", xy, self._limit_mps, arc[2], arc[-1])
+        name, limit_mps = f"into a bay at {self._lane.id}", self._limit_mps
+        ego = whole_way(name, xy, float(arc[2]), float(arc[-1]), limit_mps=limit_mps)
         line = self._at(self._middle_m + np.array([-20.0, 0.0, 20.0]), self._to_near * self.shift_m)
-        bay = _way("in the bays beside it", line, self._limit_mps, 20.0, 20.0)
+        bay = whole_way("in the bays beside it", line, 20.0, 20.0, limit_mps=limit_mps)
         across = self._at(self._middle_m, self._to_near * np.array([-1.0, self.shift_m + 2.0]))
         ways = tuple(
             tuple(ways_over(across, "straight", ego, network.near_sign, where="behind the bay"))
@@ -228,17 +229,3 @@ class _Bay:
             for part in scenario.actors
         )
         return _place(scenario, network, ego)._replace(actor_ways=ways, reverse=True)
-
-
-def _way(name: str, xy: Array, limit_mps: float, entry_m: float, exit_m: float) -> Way:
-    limit = np.full(len(xy), limit_mps)
-    return Way(
-        name=name,
-        xy_m=xy,
-        speed_limit_mps=limit,
-        path=FrenetPath(xy, limit),
-        entry_m=float(entry_m),
-        exit_m=float(exit_m),
-        first_m=0.0,
-        last_m=float(arc_lengths(xy)[-1]),
-    )

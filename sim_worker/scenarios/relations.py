@@ -15,7 +15,7 @@ from foretwin.contracts.world import Crossing
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import length
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
-from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.scenarios.ways import Way, whole_way
 
 SIDE_RAD = (math.radians(30.0), math.radians(150.0))
 """Arms at these angles to the ego's own count as side arms."""
@@ -170,17 +170,7 @@ def ways_over(
 
 
 def _walk(name: str, xy_m: Array, entry_m: float, exit_m: float) -> Way:
-    path = FrenetPath(xy_m)
-    return Way(
-        name=name,
-        xy_m=xy_m,
-        speed_limit_mps=np.full(len(xy_m), np.inf),
-        path=path,
-        entry_m=entry_m,
-        exit_m=exit_m,
-        first_m=0.0,
-        last_m=path.length_m,
-    )
+    return whole_way(name, xy_m, entry_m, exit_m, limit_mps=math.inf)
 
 
 def _along_the_road(way: Way, ego_way: Way, away: float) -> Way:
