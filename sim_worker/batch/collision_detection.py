@@ -54,7 +54,7 @@ class Touches(NamedTuple):
     from_start: Flags
 
 
-_NOBODY = Touches(
+_NO_TOUCHES = Touches(
     future=np.zeros(0, np.intp),
     user=np.zeros(0, np.intp),
     time_s=np.zeros(0),
@@ -66,7 +66,7 @@ _NOBODY = Touches(
     normal=np.zeros((0, 2)),
     from_start=np.zeros(0, dtype=bool),
 )
-"""What is found where nobody else is on the road."""
+"""What is found where there are no other road users."""
 
 
 def first_touches(
@@ -78,7 +78,7 @@ def first_touches(
     centres, NaN where absent, `user_size_m` (S, R, 2) length and width.
     """
     if not users.shape[2]:
-        return _NOBODY
+        return _NO_TOUCHES
     motion = _may_touch(vehicle, states, users, user_size_m, tick_s=tick_s)
     steps = _steps(tick_s)
     if not len(motion.future):

@@ -1,4 +1,4 @@
-"""Drives the cars of a scene: planners look, decide, and the stage moves everybody on."""
+"""Drives the cars of a scene: planners look, decide, and the stage moves all on."""
 
 from __future__ import annotations
 

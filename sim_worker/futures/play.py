@@ -21,7 +21,7 @@ on the inner side gets on faster than it drives."""
 
 
 class Play:
-    """The cars of a scene on a stage, and everybody else on their paths.
+    """The cars of a scene on a stage, and all other road users on their paths.
 
     Each tick is a `look` followed by an `act`. `scene.traffic` and the stage hold what is now.
     """
@@ -90,7 +90,7 @@ class Play:
         return self._view(ticks, np.nan, now, place)
 
     def act(self, time_s: float | Array, answer: PlannerOutput) -> None:
-        """Move everybody on by one control tick; `time_s` is one, or (S, 1)."""
+        """Advance by one control tick; `time_s` is one, or (S, 1)."""
         scene, stage = self.scene, self.stage
         accel, angle = scene.numbers.spoil(answer)
         stage.step(Controls(accel, angle))
@@ -105,7 +105,7 @@ class Play:
         return place
 
     def _decide(self, red_arcs_m: Array, now: Array, place: FrenetPoint) -> None:
-        """Look at the lights, and let the law-abiding look at everybody."""
+        """Update the lights, and let law-abiding road users decide."""
         scene, self._red = self.scene, red_arcs_m
         if scene.traffic is None or not scene.traffic.reacts:
             return

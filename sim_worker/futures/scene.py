@@ -56,7 +56,7 @@ class Aims(NamedTuple):
 
 
 class JobScene(NamedTuple):
-    """All that S futures of a job begin with; `traffic` is None where nobody else is on the road.
+    """All that S futures of a job begin with; `traffic` is None without other road users.
 
     `limit_share` (M,) at the path's nodes is how far limits lie below that at the start.
     """
@@ -98,9 +98,9 @@ class Lights(NamedTuple):
     by_plan: bool
 
     def at(self, time_s: float) -> dict[str, SignalColour]:
-        """Return colours by group: those heard, kept, and by option those of the World's plans.
+        """Return colours by group: those received, kept, and by option those of the World's plans.
 
-        A plan that no map tells is a guess: cars that follow a real one do not stop for it.
+        A plan that no map holds is a guess: cars that follow a real one do not stop for it.
         """
         drive_s = self.start_s + time_s
         found = world_colours_at(self.world, drive_s) if self.by_plan else {}

@@ -19,7 +19,7 @@ class GapAcceptance:
     """Drives as `PurePursuitIdm` does, and waits where it has to give way until a gap is enough.
 
     It also stops for those who walk over its path, and before ground that it could not leave.
-    Driving a job, it decides every 0.2 s, as people do not faster; asked without memory, always.
+    Driving a job, it decides every 0.2 s, no faster than people do; without memory, at every tick.
     """
 
     def plan(self, view: PlannerView) -> PlannerOutput:
@@ -32,7 +32,7 @@ class GapAcceptance:
 
 
 class GivingWayDriver:
-    """Keeps in mind where to wait, and for whom on foot, from one decision to the next."""
+    """Remembers where to wait, and for which pedestrians, from one decision to the next."""
 
     remarks: Mapping[int, str] = {}
 

@@ -105,8 +105,8 @@ def _stretches(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
 def _laps(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
     """Yield the way along each race track: round once and on, or as far as the World has it.
 
-    Of a track on which nothing else meets, the map tells not where it begins: lanes whose ends lie
-    at another's start go on there, connected or not.
+    Of a track on which nothing else meets, the map does not say where it begins: lanes whose ends
+    lie at another's start go on there, connected or not.
     """
     left = {lane.id: lane for lane in sorted(lanes, key=lambda lane: lane.id)}
     onward = {id_: _onward(left[id_], left, network) for id_ in left}

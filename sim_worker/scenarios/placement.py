@@ -94,7 +94,7 @@ def _at_junction(
     if not passages:
         return iter(()), f"no way through it for an ego that {_TURNS[scenario.ego.turn]}"
     found = (place for passage in passages for place in _places_of(scenario, network, passage))
-    return found, _nobody(scenario)
+    return found, _no_way_reason(scenario)
 
 
 _TURNS = {"straight": "goes straight on", "across": "turns across", "near": "turns near"}
@@ -109,7 +109,7 @@ def _refused(scenario: Scenario, summary: IntersectionSummary) -> str:
     return ""
 
 
-def _nobody(scenario: Scenario) -> str:
+def _no_way_reason(scenario: Scenario) -> str:
     parts = [a for a in scenario.actors if a.relation not in ALONG]
     what = " and ".join(
         f"{part.relation.replace('_', ' ')} {part.turn}".replace(" straight", " straight on")

@@ -27,7 +27,7 @@ _CROSSING_AROUND_M = (12.0, 25.0)
 _KERB_M, _CORNER_M = 1.2, 2.0
 """Who comes along the road does so at this distance from the kerb, and cuts the corner by this."""
 _BEYOND_MOUTH_M = 4.0
-"""Where nobody mapped a crossing, people cross so far from the junction."""
+"""Where no crossing is mapped, people cross so far from the junction."""
 
 _JUNCTION_RELATIONS: tuple[Relation, ...] = ("oncoming", "from_near", "from_across")
 

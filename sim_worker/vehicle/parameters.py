@@ -17,7 +17,7 @@ MAX_VEHICLE_DELAY_S = 0.6
 """Futures add up to 0.4 s, and the sample buffer of the steering actuator holds 1 s."""
 
 MAX_FORCE_DELAY_S = 1.0
-"""Beyond it, nobody would speak of an actuator's dead time."""
+"""Longer delays are no actuator's dead time."""
 
 _RESISTANCES = ("drag_npv2", "rolling_resistance_n")
 _LAGS = ("steering_delay_s", "drive_lag_s", "brake_lag_s", "accel_delay_s", "steering_lag_s")
