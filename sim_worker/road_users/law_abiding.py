@@ -32,8 +32,9 @@ class Now(NamedTuple):
 
 
 class _Pairs(NamedTuple):
-    """Pairs of which one may have to wait, (N,) each: places among the law-abiding, futures, columns
-    of the others, the ego first; and the ground they share as in `PathRules.meetings` (N, 4)."""
+    """Pairs of which one may have to wait, (N,) each: places among the lawful ones, futures,
+    columns of the others, the ego first; and the ground they share as in `PathRules.meetings`
+    (N, 4)."""
 
     who: Indices
     future: Indices

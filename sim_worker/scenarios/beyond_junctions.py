@@ -50,7 +50,8 @@ def other_places(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Sce
         if way.last_m - way.first_m >= _LEAST_M[setting]
         and (setting != "motorway" or _least_radius_m(way) >= _LEAST_RADIUS_M)
     )
-    places = (_place(scenario, network, way) for way in fitting)
+    none = [()] * len(scenario.actors)
+    places = (network.place(scenario.id, way.name, way, none) for way in fitting)
     why = f"each {_WORDS[setting]} is shorter than {_LEAST_M[setting]:g} m"
     if setting == "motorway":
         why += f" or has a bend tighter than {_LEAST_RADIUS_M:g} m"
@@ -80,18 +81,6 @@ def _least_radius_m(way: Way) -> float:
     arcs = np.arange(way.first_m, way.last_m, 1.0)
     curvature = way.path.at_nodes(way.path.curvature_pm, arcs)
     return 1.0 / max(float(np.abs(curvature).max()), 1e-6)
-
-
-def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> ScenarioPlace:
-    return ScenarioPlace(
-        scenario_id=scenario.id,
-        junction_id=network.world.intersection.id,
-        name=way.name,
-        driving_side=network.driving_side,
-        ego=way,
-        actor_ways=tuple(() for _ in scenario.actors),
-        walls=network.walls,
-    )
 
 
 def _stretches(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
@@ -228,4 +217,4 @@ class _Bay:
             else (bay,)
             for part in scenario.actors
         )
-        return _place(scenario, network, ego)._replace(actor_ways=ways, reverse=True)
+        return network.place(scenario.id, name, ego, ways)._replace(reverse=True)

@@ -51,15 +51,13 @@ def cast(
     *,
     vehicle: VehicleParameters,
     ego_arc_m: float | None = None,
-    ego_speed_mps: float | None = None,
 ) -> StagedCase | Unplaced:
     """Return one case at one place, or why these values cannot be played there.
 
-    Live, `ego_arc_m` (of base_link on the place's ego path) and `ego_speed_mps` are the car's;
-    without them the ego starts `lead_time_s` before the impact with the speed in `values`, later
-    where its lane begins later.
+    The ego starts `lead_time_s` before the impact with the speed in `values`, later where its lane
+    begins later; or at `ego_arc_m` (of base_link on the place's ego path), where that is given.
     """
-    return _cast(scenario, values, place, vehicle, ego_arc_m, ego_speed_mps, {})
+    return _cast(scenario, values, place, vehicle, ego_arc_m, {})
 
 
 def cast_all(
@@ -69,13 +67,10 @@ def cast_all(
     *,
     vehicle: VehicleParameters,
     ego_arc_m: float | None = None,
-    ego_speed_mps: float | None = None,
 ) -> tuple[StagedCase | Unplaced, ...]:
     """Return what `cast` does for each case; cases that differ elsewhere share the search."""
     met: _Met = {}
-    return tuple(
-        _cast(scenario, values, place, vehicle, ego_arc_m, ego_speed_mps, met) for values in cases
-    )
+    return tuple(_cast(scenario, values, place, vehicle, ego_arc_m, met) for values in cases)
 
 
 def _cast(
@@ -84,12 +79,10 @@ def _cast(
     place: ScenarioPlace,
     vehicle: VehicleParameters,
     ego_arc_m: float | None,
-    ego_speed_mps: float | None,
     met: _Met,
 ) -> StagedCase | Unplaced:
-    wished_mps = values[f"{EGO}.speed_mps"]
-    speed = wished_mps if ego_speed_mps is None else ego_speed_mps
-    speed = max(speed, min(LEAST_START_MPS, wished_mps) or LEAST_START_MPS)
+    # A car that stands sets off.
+    speed = values[f"{EGO}.speed_mps"] or LEAST_START_MPS
     shift = values[f"{EGO}.lateral_shift_m"]
     ego = ego_box(vehicle, place.ego.path, speed, shift, reverse=place.reverse)
     staging = Staging(scenario, values, place, ego)

@@ -134,14 +134,9 @@ def _places_of(
         chosen = ways.copy()
         if way is not None:
             chosen[needs[0]] = (way,)
-        yield ScenarioPlace(
-            scenario_id=scenario.id,
+        name = passage.name if way is None else f"{passage.name}/{way.name}"
+        yield network.place(scenario.id, name, ego, chosen)._replace(
             junction_id=passage.junction_id,
-            name=passage.name if way is None else f"{passage.name}/{way.name}",
-            driving_side=network.driving_side,
-            ego=ego,
-            actor_ways=tuple(chosen),
-            walls=network.walls,
             edges_m=network.edges_beside(passage.connections[0].from_lane_id),
         )
 
