@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -51,7 +51,7 @@ def other_places(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Sce
         and (setting != "motorway" or _least_radius_m(way) >= _LEAST_RADIUS_M)
     )
     none = [()] * len(scenario.actors)
-    places = (network.place(scenario.id, way.name, way, none) for way in fitting)
+    places = (place_in(network, scenario, way.name, way, none) for way in fitting)
     why = f"each {_WORDS[setting]} is shorter than {_LEAST_M[setting]:g} m"
     if setting == "motorway":
         why += f" or has a bend tighter than {_LEAST_RADIUS_M:g} m"
@@ -81,6 +81,25 @@ def _least_radius_m(way: Way) -> float:
     arcs = np.arange(way.first_m, way.last_m, 1.0)
     curvature = way.path.at_nodes(way.path.curvature_pm, arcs)
     return 1.0 / max(float(np.abs(curvature).max()), 1e-6)
+
+
+def place_in(
+    network: RoadNetwork,
+    scenario: Scenario,
+    name: str,
+    ego: Way,
+    actor_ways: Sequence[tuple[Way, ...]],
+) -> ScenarioPlace:
+    """Return a place of a scenario in a World, at its own junction or road."""
+    return ScenarioPlace(
+        scenario_id=scenario.id,
+        junction_id=network.world.intersection.id,
+        name=name,
+        driving_side=network.driving_side,
+        ego=ego,
+        actor_ways=tuple(actor_ways),
+        walls=network.walls,
+    )
 
 
 def _stretches(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
@@ -217,4 +236,4 @@ class _Bay:
             else (bay,)
             for part in scenario.actors
         )
-        return network.place(scenario.id, name, ego, ways)._replace(reverse=True)
+        return place_in(network, scenario, name, ego, ways)._replace(reverse=True)

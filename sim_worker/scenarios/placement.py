@@ -14,7 +14,7 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import IntersectionSummary, World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.scenarios.beyond_junctions import other_places
+from foretwin.sim_worker.scenarios.beyond_junctions import other_places, place_in
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.places import Placement, ScenarioPlace, Unplaced
@@ -135,7 +135,7 @@ def _places_of(
         if way is not None:
             chosen[needs[0]] = (way,)
         name = passage.name if way is None else f"{passage.name}/{way.name}"
-        yield network.place(scenario.id, name, ego, chosen)._replace(
+        yield place_in(network, scenario, name, ego, chosen)._replace(
             junction_id=passage.junction_id,
             edges_m=network.edges_beside(passage.connections[0].from_lane_id),
         )

@@ -13,7 +13,6 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import TrafficTurn
 from foretwin.contracts.world import Connection, DrivingSide, Lane, World
 from foretwin.geometry.polyline import apart, arc_lengths, length
-from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.walls import Walls
 from foretwin.sim_worker.scenarios.ways import (
     APPROACH_M,
@@ -277,20 +276,6 @@ class RoadNetwork:
             chain.append(min(more, key=bend))
             walked += length(self._line(chain[-1]))
         return chain[::-1] if back else chain
-
-    def place(
-        self, scenario_id: str, name: str, ego: Way, actor_ways: Sequence[tuple[Way, ...]]
-    ) -> ScenarioPlace:
-        """Return a place of a scenario in the World, at its own junction or road."""
-        return ScenarioPlace(
-            scenario_id=scenario_id,
-            junction_id=self.world.intersection.id,
-            name=name,
-            driving_side=self.driving_side,
-            ego=ego,
-            actor_ways=tuple(actor_ways),
-            walls=self.walls,
-        )
 
     def after(self, id_: str) -> tuple[str, ...]:
         """Return the lanes and connections that begin where a lane or connection ends."""
