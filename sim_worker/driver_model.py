@@ -45,6 +45,8 @@ LAG_S, LEAD_S = 1.0, 0.5
 less than the lead before it is entered. Chosen."""
 STANDING_MPS = 0.5
 """Who is slower stands, in the eyes of others. Chosen: half of a slow walk."""
+DECIDE_EVERY_S = 0.2
+"""How often drivers decide, under test or law-abiding in traffic. Chosen: about as people do."""
 HOLD_SPEED_MPS, HOLD_MPS2 = 0.3, -2.0
 """Who is slower and means to stop holds the brake like this. Chosen: enough on any road's grade."""
 ALONG_COS = 0.5

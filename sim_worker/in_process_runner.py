@@ -12,7 +12,7 @@ from foretwin.sim_worker.worker import FuturesWorker
 
 
 class InProcessRunner:
-    """Plays what was submitted, the oldest first, whenever an answer is asked for; see Runner.
+    """Plays what was submitted, the oldest first, when an answer is taken; see Runner.
 
     What any worker process would answer: the same code on the same setup.
     """

@@ -2,7 +2,7 @@
 
 Road users are no part of a stage's physics; from the touch on, the car and the one it met are both
 bodies with mass, spin and friction, in a Batch of their own with all accidents of a job side by
-side. Planar: nobody is thrown up or run over, and cars do not deform.
+side. Planar: nothing is thrown up or run over, and cars do not deform.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def run_accidents(
 ) -> Accidents:
     """Run each of A touches on for `duration_s` with both bodies moving freely.
 
-    `kinds` of the road users touched, one for each, of whom none brakes; `friction_factor` of the
+    `kinds` of the road users touched, one for each, without brakes; `friction_factor` of the
     ground, one for all or (A,). Results are `step_s` apart. Without `ground` nothing but the impact
     acts. Raises ValueError where the numbers of touches and kinds differ, or where `duration_s` is
     no multiple of `step_s`.

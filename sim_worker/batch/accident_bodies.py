@@ -127,7 +127,7 @@ def accident_bodies(
 
 
 class GroundForces(NamedTuple):
-    """What the ground may exert until asked again, each (3, 2, A).
+    """What the ground may exert until the next look, each (3, 2, A).
 
     Damping in N s/m and limit in N of what resists sliding: sideways at the front axle, sideways
     at the rear axle, and along the body.

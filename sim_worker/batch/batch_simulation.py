@@ -41,7 +41,7 @@ class Stage:
     """A compiled World with one vehicle, times `nsim`.
 
     Other road users are no part of it: kinematic bodies have infinite mass and would throw the
-    car. Who touches whom is found from their outlines.
+    car. Touches are found from outlines.
 
     Belongs to one thread. Seeding with S ≤ nsim states uses the first S simulations. A result
     depends on the seeds and commands alone, not on what the stage did before.

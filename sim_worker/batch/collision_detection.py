@@ -54,21 +54,6 @@ class Touches(NamedTuple):
     from_start: Flags
 
 
-_NOBODY = Touches(
-    future=np.zeros(0, np.intp),
-    user=np.zeros(0, np.intp),
-    time_s=np.zeros(0),
-    ego_states=np.zeros((0, 8)),
-    user_poses=np.zeros((0, 3)),
-    user_velocities=np.zeros((0, 3)),
-    user_size_m=np.zeros((0, 2)),
-    point_m=np.zeros((0, 2)),
-    normal=np.zeros((0, 2)),
-    from_start=np.zeros(0, dtype=bool),
-)
-"""What is found where nobody else is on the road."""
-
-
 def first_touches(
     vehicle: VehicleParameters, states: Array, users: Array, user_size_m: Array, *, tick_s: float
 ) -> Touches:
@@ -77,8 +62,6 @@ def first_touches(
     `states` (S, T, 8) of base_link at control ticks, `users` (S, T, R, 3) x, y, yaw of box
     centres, NaN where absent, `user_size_m` (S, R, 2) length and width.
     """
-    if not users.shape[2]:
-        return _NOBODY
     motion = _may_touch(vehicle, states, users, user_size_m, tick_s=tick_s)
     steps = _steps(tick_s)
     if not len(motion.future):

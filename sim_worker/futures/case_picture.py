@@ -105,7 +105,7 @@ def _draw_outline(axes: Axes, box: Rectangles, colour: str, **style: float) -> N
     draw_box(axes, box, facecolor="none", edgecolor=colour, **style)
 
 
-def told(played: StagedCase, heedless: Run, planned: Run | None, planner: str) -> str:
+def caption(played: StagedCase, heedless: Run, planned: Run | None, planner: str) -> str:
     """Say in one line each who is how fast, what is planned, and what the planner makes of it."""
     moving = [
         f"ego {3.6 * played.ego_speed_mps:.0f} km/h{' backwards' if played.place.reverse else ''}"
@@ -146,7 +146,7 @@ def write_case_picture(
     draw_case(axes, played, world, heedless, planned, aspect=0.96 * 9.0 / 7.7)
     where = world.intersection.name or played.place.junction_id
     figure.text(0.02, 0.965, f"{scenario.title}: {where}", fontsize=13, weight="bold")
-    words = told(played, heedless, planned, planner)
+    words = caption(played, heedless, planned, planner)
     figure.text(0.02, 0.88, f"{scenario.shows}\n{words}", fontsize=9.5)
     draw_case_legend(figure, planner if planned is not None else "", ncols=3)
     write_upright(figure, path, world)

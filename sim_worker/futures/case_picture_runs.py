@@ -28,7 +28,7 @@ class Run(NamedTuple):
     """One drive of a case at instants `time_s` (N,): the ego's boxes, and those of R others.
 
     `others` holds poses (N, R, 3) of box centres, NaN where there is none. `moment` is the instant
-    of the first touch, else that at which somebody is nearest, `clearance_m` away.
+    of the first touch, else that of the least clearance, `clearance_m` away.
     """
 
     time_s: Array
@@ -37,12 +37,12 @@ class Run(NamedTuple):
     moment: int
     clearance_m: float
     collision_s: float
-    """When the ego touches somebody or something, not a number where it does not."""
+    """When the ego collides, not a number where it does not."""
     collision_with: str
 
 
 def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: float) -> Run:
-    """Drive a case as planned: the ego keeps its speed, and so does everybody who is heedless.
+    """Drive a case as planned: the ego keeps its speed, and so do all heedless road users.
 
     It ends with the planned impact, where one is planned.
     """
@@ -87,7 +87,7 @@ def _job(played: StagedCase, scenario: Scenario, world: World, planner: str) -> 
         values=dict(played.values),
         place=played.place.name,
     )
-    # Where the case begins is told by its place; the car is anywhere.
+    # The place of the case says where it begins; the car is anywhere.
     motion = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
     anywhere: dict[str, Any] = dict.fromkeys(motion, 0.0)
     return Job(

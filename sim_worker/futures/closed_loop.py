@@ -1,4 +1,4 @@
-"""Drives the cars of a scene: planners look, decide, and the stage moves everybody on."""
+"""Drives the cars of a scene: planners look, decide, and the stage moves all on."""
 
 from __future__ import annotations
 
@@ -42,76 +42,49 @@ class DriveRecord(NamedTuple):
 
 def drive(scene: JobScene, stage: Stage, *, ticks: int) -> DriveRecord:
     """Seed the stage with the scene's starts and drive for a number of control ticks."""
-    loop = _Loop(scene, stage, ticks)
+    play, planners = Play(scene, stage), _Planners(scene.planners)
+    count, traffic = len(scene.starts), scene.traffic
+    most = 0 if traffic is None else traffic.arc_m.shape[1]
+    states = np.empty((count, ticks + 1, 8))
+    contact = np.zeros((count, ticks + 1), dtype=bool)
+    valid, sound = np.ones((count, ticks + 1), dtype=bool), True
+    users, user_speed = np.empty((count, ticks + 1, most, 3)), np.empty((count, ticks + 1, most))
+
+    def keep(tick: int) -> None:
+        states[:, tick] = stage.states
+        if stage.looked:
+            contact[:, tick] = stage.static_contact
+        if traffic is not None:
+            users[:, tick], user_speed[:, tick] = traffic.poses, traffic.speed_mps
+
+    keep(0)
     for tick in range(ticks):
-        loop.advance(tick)
-    return loop.record()
-
-
-class _Loop:
-    def __init__(self, scene: JobScene, stage: Stage, ticks: int) -> None:
-        self._play = Play(scene, stage)
-        self._scene, self._stage = scene, stage
-        count = len(scene.starts)
-        self._planners = _Planners(scene.planners)
-        self._states = np.empty((count, ticks + 1, 8))
-        self._states[:, 0] = stage.states
-        self._contact = np.zeros((count, ticks + 1), dtype=bool)
-        self._valid = np.ones((count, ticks + 1), dtype=bool)
-        self._sound = True
-        traffic = scene.traffic
-        most = 0 if traffic is None else traffic.arc_m.shape[1]
-        self._users = np.empty((count, ticks + 1, most, 3))
-        self._user_speed = np.empty((count, ticks + 1, most))
-        self._note_users(0)
-
-    def advance(self, tick: int) -> None:
-        scene, stage = self._scene, self._stage
-        now = stage.states
-        if self._sound:
-            view = self._play.look(tick, now, stage.heading)
+        if sound:
+            view = play.look(tick, stage.states, stage.heading)
         else:
             # What has failed is not shown to planners: one bad future must not spoil the job.
-            now = np.where(self._valid[:, tick, None], now, scene.starts)
-            view = self._play.look(tick, now)
-        answer = self._planners.plan(view)
-        self._play.act(tick * stage.control_dt_s, answer)
-        self._keep(tick + 1)
-
-    def _keep(self, tick: int) -> None:
-        stage = self._stage
-        self._states[:, tick] = stage.states
-        if stage.looked:
-            self._contact[:, tick] = stage.static_contact
-        self._note_users(tick)
-        if not self._sound or self._planners.any_failed or stage.any_diverged():
-            well = ~stage.diverged() & ~self._planners.failed
-            self._valid[:, tick] = self._valid[:, tick - 1] & well
-            self._sound = bool(self._valid[:, tick].all())
-
-    def _note_users(self, tick: int) -> None:
-        traffic = self._scene.traffic
-        if traffic is not None:
-            self._users[:, tick] = traffic.poses
-            self._user_speed[:, tick] = traffic.speed_mps
-
-    def record(self) -> DriveRecord:
-        scene = self._scene
-        ends = np.where(self._valid[:, -1:], self._states[:, -1, :2], scene.starts[:, :2])
-        end = scene.path.locate(ends, near_arc_m=self._play.arc_m).arc_m
-        return DriveRecord(
-            self._states,
-            self._contact,
-            self._valid,
-            end - scene.start_arc_m,
-            self._users,
-            self._user_speed,
-            tuple(
-                self._planners.reasons[row] or ("" if self._valid[row, -1] else "diverged")
-                for row in range(len(scene.starts))
-            ),
-            tuple(self._planners.remarks()),
-        )
+            view = play.look(tick, np.where(valid[:, tick, None], stage.states, scene.starts))
+        play.act(tick * stage.control_dt_s, planners.plan(view))
+        keep(tick + 1)
+        if not sound or planners.any_failed or stage.any_diverged():
+            valid[:, tick + 1] = valid[:, tick] & ~stage.diverged() & ~planners.failed
+            sound = bool(valid[:, tick + 1].all())
+    ends = np.where(valid[:, -1:], states[:, -1, :2], scene.starts[:, :2])
+    progress = scene.path.locate(ends, near_arc_m=play.arc_m).arc_m - scene.start_arc_m
+    failures = [
+        reason or ("" if well else "diverged")
+        for reason, well in zip(planners.reasons, valid[:, -1], strict=True)
+    ]
+    return DriveRecord(
+        states,
+        contact,
+        valid,
+        progress,
+        users,
+        user_speed,
+        tuple(failures),
+        tuple(planners.remarks()),
+    )
 
 
 class _Planners:

@@ -1,4 +1,4 @@
-"""Cases as a real car meets them: cast on the line that it drives when nobody intervenes.
+"""Cases as a real car meets them: cast on the line that it drives alone.
 
 A car cuts and runs wide in bends, where its path is a line without inertia. So the ego drives
 alone first, and who is to meet it is cast on the line that it left, at the time it came by.
@@ -46,7 +46,7 @@ _AFTER_S = 1.0
 
 
 class _Ego(NamedTuple):
-    """How an ego drives when nobody intervenes; all egos of a job that do so share one line.
+    """How an ego drives alone; all egos of a job that do so share one line.
 
     Where they start matters from where the path bends on; before it, `start_m` is None.
     """
@@ -86,7 +86,7 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, StagedC
             scenario, cases, place, stage.vehicle, ego_way=way, ego_arc_m=ego.start_m
         )
         for row, met in zip(rows, again, strict=True):
-            # Where no car can drive like that, nobody can say when it meets somebody.
+            # Where no car can drive like that, there is no time of an impact.
             played[row] = _unplanned(bent[row])
             meant = bent[row].impact_with
             if (
@@ -195,7 +195,7 @@ def _lines(
 def _drive_alone(
     job: Job, cases: list[StagedCase], stage: Stage, maker: SceneMaker, ticks: int
 ) -> Array:
-    """Return states (S, T, 8) of egos that nobody meets."""
+    """Return states (S, T, 8) of egos without other road users."""
     futures = tuple(
         Future(
             index=index,

@@ -1,4 +1,4 @@
-"""A future as it was driven, seen from above: the ego, everybody else, and where they met."""
+"""A future as it was driven, seen from above: the ego, all other road users, and where they met."""
 
 from __future__ import annotations
 

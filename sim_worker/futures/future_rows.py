@@ -74,9 +74,9 @@ def future_rows(job: Job, result: FuturesResult | None, *, job_sha256: str) -> l
     unplaced = {} if result is None else dict(result.unplaced)
     rows = []
     for future in job.futures:
-        row = _asked(job, future, job_sha256)
+        row = _job_columns(job, future, job_sha256)
         if result is not None and future.index in places:
-            row |= _played(job, future, result, places[future.index])
+            row |= _result_columns(job, future, result, places[future.index])
         elif result is not None:
             row["left_out"] = unplaced[future.index]
         rows.append(row)
@@ -100,7 +100,7 @@ _OF_JOB = ("round_id", "job_index", "world_id", "vehicle_version", "seed", "hori
 _OF_ACCIDENT = ("time_s", "angle_rad", "closing_mps", "ego_delta_v_mps", "user_delta_v_mps")
 
 
-def _asked(job: Job, future: Future, job_sha256: str) -> Row:
+def _job_columns(job: Job, future: Future, job_sha256: str) -> Row:
     return {
         **{name: getattr(job, name) for name in _OF_JOB},
         **numbers_of(future),
@@ -119,7 +119,7 @@ def _asked(job: Job, future: Future, job_sha256: str) -> Row:
     }
 
 
-def _played(job: Job, future: Future, result: FuturesResult, place: int) -> Row:
+def _result_columns(job: Job, future: Future, result: FuturesResult, place: int) -> Row:
     outcome, planned = result.outcome, result.planned
     states = np.ascontiguousarray(result.trajectory.states[place])
     users = np.ascontiguousarray(result.road_users.poses[place])

@@ -22,7 +22,7 @@ CLEARANCE = "min_clearance"
 
 
 class JobMetrics(NamedTuple):
-    """Metrics that the job names, each (S,), and the least clearance (S,), infinite for nobody."""
+    """Metrics that the job names, each (S,), and clearances (S,), infinite without others."""
 
     values: dict[str, Array]
     clearance_m: Array

@@ -69,12 +69,15 @@ def with_collisions(
     """
     found = np.array(states)
     times = step_s * np.arange(states.shape[1])
-    for row in np.flatnonzero(np.asarray(outcome.collision_with) == ROAD_USER):
+    computed: dict[int, int] = {}
+    if accidents is not None:
+        computed = {int(accidents.future[i]): int(i) for i in np.flatnonzero(accidents.valid)}
+    for row in np.flatnonzero(np.asarray(outcome.collision_with) == ROAD_USER).tolist():
         first = int(np.ceil(outcome.collision_time_s[row] / step_s - 1e-6))
         first = min(first, len(times) - 1)
         after, end = found[row, first:], found[row, first].astype(np.float64)
-        one = _accident_of(int(row), accidents)
-        if accidents is not None and one is not None:
+        if accidents is not None and row in computed:
+            one = computed[row]
             known = accidents.time_s[one] + accidents.after_time_s
             motion = accidents.ego_states[one]
             for column in range(8):
@@ -84,11 +87,3 @@ def with_collisions(
         after[:] = end
         after[:, [3, 4, 5, 7]] = 0.0
     return found
-
-
-def _accident_of(row: int, accidents: Accidents | None) -> int | None:
-    """Return the place of a future's accident, if it has one that was computed."""
-    if accidents is None:
-        return None
-    found = np.flatnonzero((accidents.future == row) & accidents.valid)
-    return int(found[0]) if len(found) else None

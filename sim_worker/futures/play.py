@@ -7,28 +7,25 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
+from foretwin.sim_worker.driver_model import DECIDE_EVERY_S
 from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.road_users.crowd import EgoBoxes
 from foretwin.sim_worker.road_users.perception import Lead
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 
-DECIDE_EVERY_S = 0.2
-"""How often law-abiding road users think again."""
 _MAX_PACE_MPS = 80.0
 """No car gets on faster along its path: much more than any drives, since one that is beside a bend
 on the inner side gets on faster than it drives."""
 
 
 class Play:
-    """The cars of a scene on a stage, and everybody else on their paths.
+    """The cars of a scene on a stage, and all other road users on their paths.
 
     Each tick is a `look` followed by an `act`. `scene.traffic` and the stage hold what is now.
     """
 
-    def __init__(
-        self, scene: JobScene, stage: Stage, *, decide_every_s: float = DECIDE_EVERY_S
-    ) -> None:
+    def __init__(self, scene: JobScene, stage: Stage) -> None:
         """Seed the stage with the scene's starts."""
         self.scene, self.stage = scene, stage
         count = len(scene.starts)
@@ -42,7 +39,7 @@ class Play:
         self._lead = Lead(np.full(count, np.inf), np.zeros(count))
         self.centre_m = box_centre_from_base_m(stage.vehicle)
         self.front_m = self.centre_m + stage.vehicle.length_m.value / 2.0
-        self._decide_every = max(round(decide_every_s / stage.control_dt_s), 1)
+        self._decide_every = max(round(DECIDE_EVERY_S / stage.control_dt_s), 1)
         self._tick_reach_m = _MAX_PACE_MPS * stage.control_dt_s
         self._red = np.full((1, 0), np.inf)
 
@@ -90,7 +87,7 @@ class Play:
         return self._view(ticks, np.nan, now, place)
 
     def act(self, time_s: float | Array, answer: PlannerOutput) -> None:
-        """Move everybody on by one control tick; `time_s` is one, or (S, 1)."""
+        """Advance by one control tick; `time_s` is one, or (S, 1)."""
         scene, stage = self.scene, self.stage
         accel, angle = scene.numbers.spoil(answer)
         stage.step(Controls(accel, angle))
@@ -105,7 +102,7 @@ class Play:
         return place
 
     def _decide(self, red_arcs_m: Array, now: Array, place: FrenetPoint) -> None:
-        """Look at the lights, and let the law-abiding look at everybody."""
+        """Update the lights, and let law-abiding road users decide."""
         scene, self._red = self.scene, red_arcs_m
         if scene.traffic is None or not scene.traffic.reacts:
             return

@@ -57,7 +57,7 @@ def run_job(
 ) -> FuturesResult:
     """Simulate a job on a stage that holds the job's World; `scenes` are those of that World.
 
-    A staged future whose case has no place there is not played, and told in `unplaced`. Raises
+    A staged future whose case has no place there is not played, but listed in `unplaced`. Raises
     ValueError for another World, more futures than simulations, an unknown planner, scenario or
     number, a step that is no multiple of the control tick, or a state that is not finite.
     """
@@ -129,7 +129,7 @@ def _play(
     ran_on = _accidents(job, scene, stage, touches) if job.accidents else None
     motion = ran_on if job.accident_motion else None
     states = with_collisions(states, outcome, motion, step_s=job.step_s)
-    accidents = () if ran_on is None else _told(ran_on)
+    accidents = () if ran_on is None else _accident_messages(ran_on)
     planned = planned_impacts(staged, states, accidents, stage.vehicle, step_s=job.step_s)
     tracks = _tracks(scene, record, sizes, every)
     return _Played(states, tracks, outcome, measured.values, accidents, scene.left_out, planned)
@@ -175,7 +175,7 @@ def _placed(
 
 def _nothing_played(job: Job, instants: int) -> _Played:
     none, flags = np.zeros(0), np.zeros(0, dtype=bool)
-    nobody = RoadUserTracks(
+    tracks = RoadUserTracks(
         poses=np.zeros((0, instants, 0, 3), np.float32),
         speed_mps=np.zeros((0, instants, 0), np.float32),
         size_m=np.zeros((0, 0, 2), np.float32),
@@ -191,7 +191,7 @@ def _nothing_played(job: Job, instants: int) -> _Played:
         valid=flags,
     )
     states = np.zeros((0, instants, 8), np.float32)
-    return _Played(states, nobody, outcome, dict.fromkeys(job.metrics, none))
+    return _Played(states, tracks, outcome, dict.fromkeys(job.metrics, none))
 
 
 def result_digest(result: FuturesResult) -> str:
@@ -258,7 +258,7 @@ def _accidents(job: Job, scene: JobScene, stage: Stage, touches: Touches) -> Acc
     )
 
 
-def _told(accidents: Accidents) -> tuple[Accident, ...]:
+def _accident_messages(accidents: Accidents) -> tuple[Accident, ...]:
     return tuple(
         Accident(
             future=int(accidents.future[i]),

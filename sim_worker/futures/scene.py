@@ -11,6 +11,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.futures import Future, Job
+from foretwin.contracts.numbers import Quantity
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -38,6 +39,14 @@ _CAR_WITHIN_M = 60.0
 """The car is looked for on this much of the path's beginning."""
 
 
+_PERCEPTION: tuple[Quantity, ...] = (
+    "perception.delay_s",
+    "perception.lost_from_s",
+    "perception.lost_for_s",
+)
+"""In the order of `PerceptionFaults`."""
+
+
 class Aims(NamedTuple):
     """What each of S futures aims at; all (S,)."""
 
@@ -47,7 +56,7 @@ class Aims(NamedTuple):
 
 
 class JobScene(NamedTuple):
-    """All that S futures of a job begin with; `traffic` is None where nobody else is on the road.
+    """All that S futures of a job begin with; `traffic` is None without other road users.
 
     `limit_share` (M,) at the path's nodes is how far limits lie below that at the start.
     """
@@ -89,9 +98,9 @@ class Lights(NamedTuple):
     by_plan: bool
 
     def at(self, time_s: float) -> dict[str, SignalColour]:
-        """Return colours by group: those heard, kept, and by option those of the World's plans.
+        """Return colours by group: those received, kept, and by option those of the World's plans.
 
-        A plan that no map tells is a guess: cars that follow a real one do not stop for it.
+        A plan that no map holds is a guess: cars that follow a real one do not stop for it.
         """
         drive_s = self.start_s + time_s
         found = world_colours_at(self.world, drive_s) if self.by_plan else {}
@@ -138,19 +147,18 @@ class SceneMaker:
         scenario_of = [_scenario_of(future, scenarios) for future in job.futures]
         if staged is None:
             staged = self.staged_cases(job, vehicle)
+        cases = {row: case for row, case in staged.items() if isinstance(case, StagedCase)}
         if job.starts is None:
             starts = np.repeat(local_state(job.state, self.world.frame, vehicle)[None], count, 0)
-            for row, played in staged.items():
-                if isinstance(played, StagedCase):
-                    starts[row] = staged_start(played, vehicle)
+            for row, case in cases.items():
+                starts[row] = staged_start(case, vehicle)
         else:
             starts = np.array(job.starts, dtype=np.float64)
         place = path.locate(starts[:, :2], upto_arc_m=_CAR_WITHIN_M)
         if staged and start_arc_m is None:
             start_arc_m = place.arc_m
-            for row, played in staged.items():
-                if isinstance(played, StagedCase):
-                    start_arc_m[row] = played.ego_arc_m
+            for row, case in cases.items():
+                start_arc_m[row] = case.ego_arc_m
         if start_arc_m is not None:
             # Ways may be long, and cross themselves.
             place = path.locate(starts[:, :2], near_arc_m=start_arc_m)
@@ -193,11 +201,7 @@ class SceneMaker:
                 traffic,
                 table.along(path),
                 vehicle,
-                PerceptionFaults(
-                    numbers.applied("perception.delay_s", 0.0),
-                    numbers.applied("perception.lost_from_s", 0.0),
-                    numbers.applied("perception.lost_for_s", 0.0),
-                ),
+                PerceptionFaults._make(numbers.applied(what, 0.0) for what in _PERCEPTION),
                 tick_s=tick_s,
             )
         heard = {state.group_id: LiveColour(0.0, state.colour) for state in job.signals}

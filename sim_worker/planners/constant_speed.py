@@ -1,4 +1,4 @@
-"""A planner that tracks the path at its target speed and sees nobody: the careless driver."""
+"""A planner that tracks the path at its target speed, ignoring all others: the careless driver."""
 
 from __future__ import annotations
 

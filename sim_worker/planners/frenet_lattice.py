@@ -27,7 +27,7 @@ from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 
 REPLAN_S = 0.5
 _AT_ONCE_S, _LEAD_BRAKES_MPS2 = 0.15, 2.5
-"""Sooner where somebody ahead brakes harder than this."""
+"""Sooner where the lead brakes harder than this."""
 _TURNS_RADPS, _GAINS_MPS = 0.15, 1.0
 """Who turns or drives otherwise by more than when a motion was chosen is looked at again."""
 MotionPair = tuple[Motions, Motions]
@@ -39,7 +39,7 @@ _SPEED_GAIN, _PLACE_GAIN = 1.2, 0.3
 class FrenetLattice:
     """Evades within its lane, follows, stops for lights and others, and gives way.
 
-    Asked without memory, it plans at every tick; driving a job it does so every half second.
+    Without memory, it plans at every tick; driving a job it does so every half second.
     """
 
     def plan(self, view: PlannerView) -> PlannerOutput:
@@ -109,7 +109,7 @@ class LatticeDriver:
         passed_s: Array,
         changing: Changes | None,
     ) -> Flags:
-        """Return (S,) who chooses anew: everybody at the same times, some in between."""
+        """Return (S,) which cars choose anew: all at the same times, some in between."""
         if view.time_s > self._next_s - 1e-6:
             return np.ones(len(passed_s), dtype=bool)
         due = np.zeros(len(passed_s), dtype=bool)
@@ -135,7 +135,7 @@ class LatticeDriver:
         changing: Changes | None,
         open_: Flags,
     ) -> Flags:
-        """Return (S,) of the `open_` ones whose motion leads into somebody who drives otherwise
+        """Return (S,) of the `open_` ones whose motion leads into a road user that drives otherwise
         than when that was looked at last."""
         endangered = np.zeros(len(view.arc_m), dtype=bool)
         users, known = view.users, self._known

@@ -7,19 +7,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.sim_worker.driver_model import DECIDE_EVERY_S
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs, walker_gap_m
 from foretwin.sim_worker.planners.pure_pursuit_idm import PurePursuitIdm
 from foretwin.sim_worker.planners.tracking import front_from_base_m
-
-DECIDE_S = 0.2
 
 
 class GapAcceptance:
     """Drives as `PurePursuitIdm` does, and waits where it has to give way until a gap is enough.
 
     It also stops for those who walk over its path, and before ground that it could not leave.
-    Driving a job, it decides every 0.2 s, as people do not faster; asked without memory, always.
+    Driving a job, it decides every 0.2 s, no faster than people do; without memory, at every tick.
     """
 
     def plan(self, view: PlannerView) -> PlannerOutput:
@@ -32,7 +31,7 @@ class GapAcceptance:
 
 
 class GivingWayDriver:
-    """Keeps in mind where to wait, and for whom on foot, from one decision to the next."""
+    """Remembers where to wait, and for which pedestrians, from one decision to the next."""
 
     remarks: Mapping[int, str] = {}
 
@@ -46,7 +45,7 @@ class GivingWayDriver:
         """Answer one control tick."""
         front = view.arc_m + front_from_base_m(view.vehicle)
         if view.time_s > self._next_s - 1e-6:
-            self._next_s = view.time_s + DECIDE_S
+            self._next_s = view.time_s + DECIDE_EVERY_S
             self._wait_arc_m = wait_arcs(view)
             self._walker_arc_m = walker_gap_m(view) + front
         return self._driver.plan(self._as_seen(view, front))

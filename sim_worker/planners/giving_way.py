@@ -97,7 +97,7 @@ def _no_room_beyond(view: PlannerView, lines: GroundLines, front_arc_m: Array) -
 
 
 def _taken(view: PlannerView, ground: SharedGround, front_arc_m: Array) -> Flags:
-    """(S, C) bool: whether somebody with priority needs the ground too soon."""
+    """(S, C) bool: whether a road user with priority needs the ground too soon."""
     users = view.users
     assert users is not None
     taken = np.zeros((len(front_arc_m), len(ground.enter_arc_m)), dtype=bool)
@@ -202,7 +202,7 @@ def _courses(
 
 
 def walker_gap_m(view: PlannerView) -> Array:
-    """Return (S,) from the front to whoever walks or rides over the path, infinite for nobody.
+    """Return (S,) from the front to who walks or rides over the path, infinite where it is free.
 
     It counts who is in the car's way, or will be within 4 s and before the car has passed.
     """

@@ -34,7 +34,7 @@ def main() -> None:
     """Load the planner, say whether that worked, and answer until the link is closed."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--link", type=int, required=True, help="file descriptor of the link")
-    parser.add_argument("--parent", type=int, required=True, help="process that asks")
+    parser.add_argument("--parent", type=int, required=True, help="process of the worker")
     parser.add_argument("--name", required=True)
     parser.add_argument("--object", required=True, help="package.module:Class")
     arguments = parser.parse_args()
@@ -44,7 +44,7 @@ def main() -> None:
     try:
         planner = load(arguments.name, arguments.object)
     except BaseException as error:
-        send(link, FAILURE, _told(error))
+        send(link, FAILURE, _error_text(error))
         return
     send(link, READY, b"")
     try:
@@ -81,7 +81,7 @@ def _answer(link: socket.socket, planner: Any) -> None:
             answer = driver.plan(question.view._replace(**shared))
             body = pack_answer(answer, dict(getattr(driver, "remarks", {})))
         except Exception as error:
-            send(link, FAILURE, _told(error))
+            send(link, FAILURE, _error_text(error))
             continue
         send(link, ANSWER, body)
 
@@ -94,7 +94,7 @@ def _driver(planner: Any, count: int) -> Planner:
     return planner  # type: ignore[no-any-return]
 
 
-def _told(error: BaseException) -> bytes:
+def _error_text(error: BaseException) -> bytes:
     return f"{type(error).__name__}: {' '.join(str(error).split())}".encode()
 
 

@@ -1,6 +1,6 @@
 """Planners that are not foretwin's own: each lives in a process of its own and answers in time.
 
-One that blocks, exits or crashes fails its futures of the present job and nobody else's; its
+One that blocks, exits or crashes fails its own futures of the present job; its
 process is ended and a new one is ready for the next job.
 """
 

@@ -77,7 +77,7 @@ def rate_across(view: PlannerView, across: Motions, speed: Array) -> tuple[Float
 def still_free(
     view: PlannerView, along: Motions, across: Motions, now_s: Array, changing: Changes | None
 ) -> Flags:
-    """Return (S,) whether motions that began `now_s` (S,) ago go on to touch nobody."""
+    """Return (S,) whether motions that began `now_s` (S,) ago stay free of collisions."""
     later = now_s + _INSTANTS_S[:, None]
     place, speed, _ = along.at(later)
     place = place - view.arc_m
@@ -94,7 +94,7 @@ def collisions(
     What would follow on the first touch counts for nothing. Boxes along the path; between two
     instants each may be half a step farther. Whether two overlap is a product of overlaps along
     and across, summed over others and instants: of digits to a base that no instant's sum reaches,
-    so that the highest one tells the first instant.
+    so that the highest one gives the first instant.
     """
     found = courses(view, _INSTANTS_S, nearest=_NEAREST, changing=changing)
     if found is None:

@@ -67,14 +67,14 @@ class CarPlanner(Protocol):
 
 @runtime_checkable
 class AnswersOne(Protocol):
-    """What tells a planner of one car by its method."""
+    """A planner of one car, recognised by its method."""
 
     def plan_one(self, view: CarView) -> tuple[float, float]:
         """Answer one control tick of one car."""
 
 
 class OneAtATime:
-    """Asks a planner of one car for each car in turn; where it raises, that car's answer is NaN.
+    """Calls a planner of one car for each car in turn; where it raises, that car's answer is NaN.
 
     The planner is one object for all cars: what it remembers between calls is its own affair.
     """

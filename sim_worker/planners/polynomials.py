@@ -106,7 +106,7 @@ def to_place(
 
 
 def braked(place: Floats, speed: Floats, *, decel: float) -> Motions:
-    """Return motions that brake evenly from now on until they stand; their jerk is not told."""
+    """Return motions that brake evenly from now on until they stand; their jerk is left out."""
     c = np.zeros((6, *np.broadcast_shapes(place.shape, speed.shape)))
     c[0], c[1], c[2] = place, speed, -0.5 * decel
     return Motions(c, np.broadcast_to(speed / decel, c.shape[1:]))

@@ -67,7 +67,7 @@ def _may_meet(view: PlannerView, users: SeenUsers, within_s: float) -> Flags:
 def courses(
     view: PlannerView, instants_s: Array, *, nearest: int, changing: Changes | None = None
 ) -> Courses | None:
-    """Predict the `nearest` others of each car at even instants; None where nobody is near.
+    """Predict the `nearest` others of each car at even instants; None where there is none near.
 
     Those along the path keep their angle to it, as lanes do; the rest go straight on, and those
     seen `changing` brake, and turn on for a while or else not any more. Who follows in the car's
@@ -128,7 +128,7 @@ class _Boxes(NamedTuple):
 def _either_way(now: _Boxes, path: FrenetPath) -> _Boxes:
     """Return the boxes with those that turn off the road twice: they may turn on, or go straight.
 
-    Nobody sees where a turn ends before it has.
+    Where a turn ends is not known before it has.
     """
     bend = _bend(now.arc_m, path)
     along = _along(now.turned_rad, bend, now.offset_m)

@@ -139,7 +139,7 @@ class PurePursuitIdm:
         return np.asarray(np.maximum(following, self._stopping(view, view.stop_arc_m, speed)))
 
     def _stopping(self, view: PlannerView, stop_arc_m: Array, speed: Array) -> Array:
-        """IDM deceleration for a line, as for somebody who stands a little behind it."""
+        """IDM deceleration for a line, as for a standing lead a little behind it."""
         ahead = np.maximum(stop_arc_m - view.arc_m - front_from_base_m(view.vehicle), 0.1)
         wanted = driver.STANDSTILL_GAP_M + speed * (
             driver.CALM_TIME_GAP_S

@@ -68,7 +68,7 @@ def check_planner(name: str) -> None:
 
 def in_another_process(name: str) -> bool:
     """Return whether a planner answers from a process that is not foretwin's own."""
-    return name == "remote" or name not in _BUILT_IN
+    return name == REMOTE or name not in _BUILT_IN
 
 
 def planner_origin(name: str) -> PlannerOrigin:

@@ -1,8 +1,8 @@
 """A driving stack in another process, over the bus, in lock step.
 
-Each 0.1 s of a future the stack is shown where everybody is and has until a deadline to say where
-it would drive; cars track that. Where it says nothing of use, a named planner acts instead and the
-future is marked.
+Each 0.1 s of a future the stack gets the poses of all road users and has until a deadline to say
+where it would drive; cars track that. Where it says nothing of use, a named planner acts instead
+and the future is marked.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class RemotePlanner:
 
 
 class RemoteDriver:
-    """Asks, waits, and tracks what came; `remarks` say where the fallback had to act."""
+    """Requests, waits, and tracks the answer; `remarks` say where the fallback had to act."""
 
     def __init__(
         self, planner: RemotePlanner, connection: _Connection | None, job: int, count: int

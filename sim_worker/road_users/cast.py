@@ -42,7 +42,7 @@ class Player(NamedTuple):
 class RoadUserArrays(NamedTuple):
     """The crowd of a job, and the paths that it moves on.
 
-    `paths` are all that anybody drives on, the ego's first; `replay` has where those are who come
+    `paths` are all that are driven on, the ego's first; `replay` has where those are who come
     first in every future, if they were recorded.
     """
 
@@ -80,7 +80,7 @@ def casting(
     for player in players:
         paths.setdefault(id(player.path), player.path)
     places = {path: place for place, path in enumerate(paths)}
-    rows = [_NOBODY, *(_player_row(player, places[id(player.path)]) for player in players)]
+    rows = [_ABSENT, *(_player_row(player, places[id(player.path)]) for player in players)]
     which[:, :first] = len(rows) + np.arange(first)
     rows += [_row(user.kind, user.size_m, len(paths) + k) for k, user in enumerate(replayed)]
     columns = np.moveaxis(np.array(rows)[which], -1, 0).copy()
@@ -97,7 +97,7 @@ _Row = tuple[float, ...]
 """Of one player: 1 where present, lawful and walking, places of path and kind, and the columns of
 `Crowd` from its length on, without the path."""
 _STILL: _Row = (0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
-_NOBODY: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, *_STILL)
+_ABSENT: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, *_STILL)
 
 
 def _row(

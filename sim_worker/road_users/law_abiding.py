@@ -32,8 +32,9 @@ class Now(NamedTuple):
 
 
 class _Pairs(NamedTuple):
-    """Who may have to wait for whom, (N,) each: places among the law-abiding, futures, columns of
-    the others, the ego first; and the ground they share as in `PathRules.meetings` (N, 4)."""
+    """Pairs of which one may have to wait, (N,) each: places among the lawful ones, futures,
+    columns of the others, the ego first; and the ground they share as in `PathRules.meetings`
+    (N, 4)."""
 
     who: Indices
     future: Indices
@@ -84,7 +85,7 @@ class LawAbiding:
         return np.asarray((there - here) / _CURVE_AHEAD_M)
 
     def _leader(self, now: Now, ego: EgoBoxes, bend: Array) -> tuple[Array, Array]:
-        """Return the gap to whoever is ahead in the own lane, infinite for nobody, and its speed.
+        """Return the gap to the lead in the own lane, infinite without one, and its speed.
 
         Others are looked for beside the parabola that the own path bends along.
         """
@@ -118,7 +119,7 @@ class LawAbiding:
         return nearest, np.maximum(speed, 0.0)
 
     def _wait(self, now: Now, ego: EgoBoxes, arc: Array, speed: Array) -> Array:
-        """Return how far ground lies ahead that must be left to somebody else, else infinite."""
+        """Return how far ground lies ahead that must be left to others, else infinite."""
         k, row, o, ground = self._pairs_with(ego.path_of)
         ahead = ground[:, 0] - arc[k] - self._half[k]
         # Whoever has entered, or can no more stop before, goes on.
@@ -146,10 +147,10 @@ class LawAbiding:
         return gap
 
     def _pairs_with(self, ego_path: int) -> _Pairs:
-        """Return who may have to wait for whom, found once: nobody changes paths."""
+        """Return the pairs of which one may have to wait, found once: paths do not change."""
         if self._pairs is None or self._pairs[0] != ego_path:
             meetings, crowd = self._rules.meetings, self._crowd
-            # One more row and column than paths: who is not there takes the last, and meets nobody.
+            # One more row and column than paths: absent road users take the last, without meetings.
             waits = np.pad(np.isfinite(meetings[..., 0]), (0, 1))
             there = _with_ego(ego_path, np.where(crowd.present, crowd.path_of, len(meetings)))
             k, o = np.nonzero(waits[self._path[:, None], there[self.rows]])
@@ -169,10 +170,10 @@ class LawAbiding:
 
 
 def _in_front(xs: Array, ys: Array, futures: Indices, mine: Array, part: slice) -> Indices:
-    """Return (2, N) who of a part of (K,) has whom of (R + 1, S) ahead, near its own parabola.
+    """Return (2, N) pairs of a part of (K,) and of (R + 1, S) ahead of it, near its parabola.
 
     `mine` (6, K) is x, y, cosine and sine of its yaw, half its bend, and how far beside counts.
-    Everybody's x and y come with one row for each of the others: so the inner loops are long.
+    All x and y come with one row for each of the others: so the inner loops are long.
     """
     x, y, cos, sin, half_bend, within_m = mine[:, part]
     future = futures[part]

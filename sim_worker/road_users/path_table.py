@@ -31,8 +31,8 @@ class PathTable:
     """The nodes of P paths in one array, so that look-ups for all road users are one call.
 
     Beyond a path's ends, places stay at the end. After the paths come `tracks` of poses (N, 3)
-    without jumps of yaw, whose nodes are those of a clock instead of an arc length: who knows the
-    time says where on them somebody is.
+    without jumps of yaw, whose nodes are those of a clock instead of an arc length: the
+    time gives the place on them.
     """
 
     def __init__(self, paths: Sequence[FrenetPath], tracks: Sequence[Array] = ()) -> None:

@@ -21,7 +21,7 @@ _ROUNDING_M = 1e-6
 
 
 class PerceptionFaults(NamedTuple):
-    """Each (S,): how late everybody else is seen, and from when for how long nobody is."""
+    """Each (S,): how late others are perceived, and from when for how long not at all."""
 
     delay_s: Array
     lost_from_s: Array
@@ -50,7 +50,7 @@ class Sight:
     ) -> None:
         """`along` projects the traffic's paths on the ego's.
 
-        What was seen is remembered for as long as anybody sees late, or for `kept` ticks.
+        What was seen is remembered for the longest delay, or for `kept` ticks.
         """
         crowd = traffic.crowd
         self._crowd, self._along, self._vehicle = crowd, along, vehicle
@@ -117,7 +117,7 @@ class Sight:
         return SeenUsers(poses, speed, self._size, on_arc, offset, self._crowd.walks, turned)
 
     def _unseen(self, tick: int | Indices, poses: Array, eyes_xy_m: Array) -> Flags | None:
-        """(S, R) bool: who is away, lost or hidden; None where everybody is seen."""
+        """(S, R) bool: which are absent, lost or hidden; None where all are seen."""
         if self._all_there and not self._ever_lost and not self.anybody_hidden:
             return None
         unseen = np.isnan(poses[..., 0])

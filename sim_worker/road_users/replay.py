@@ -48,7 +48,7 @@ class Replay:
         self._gone_after[self._begin + counts - 1] = True
         self._first_s = self._time_s[self._begin]
         self._end_s = self._time_s[self._begin + counts - 1]
-        # One search for all: everybody's times are moved behind those of the one before.
+        # One search for all: each one's times are moved behind those of the one before.
         span_s = float(self._end_s.max() - self._first_s.min()) + 1.0
         self._moved_s = np.arange(len(users)) * span_s
         self._sorted_s = self._time_s + np.repeat(self._moved_s, counts)
@@ -57,7 +57,7 @@ class Replay:
         return len(self.tracks)
 
     def at(self, time_s: float | Array) -> ReplayMoment:
-        """Return where everybody is at a time, or at times (S, 1), from the job's state."""
+        """Return where all are at a time, or at times (S, 1), from the job's state."""
         now = np.asarray(time_s, dtype=np.float64).reshape(-1, 1)
         inside = np.minimum(np.maximum(now, self._first_s), self._end_s)
         node = np.searchsorted(self._sorted_s, inside + self._moved_s, side="right") - 1
@@ -65,7 +65,7 @@ class Replay:
         before = self._begin + node
         after = np.minimum(before + 1, len(self._time_s) - 1)
         since, step = inside - self._time_s[before], self._time_s[after] - self._time_s[before]
-        # Who has one sample alone has no next one: what comes after is somebody else's.
+        # A track of one sample has no next one: what comes after is another's.
         share = np.minimum(np.maximum(since / np.where(step > 0.0, step, np.inf), 0.0), 1.0)
         between = (since > _AT_SAMPLE_S) & (since < step - _AT_SAMPLE_S)
         gone = np.abs(now - inside) > _AT_SAMPLE_S

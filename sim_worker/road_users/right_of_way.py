@@ -1,4 +1,4 @@
-"""Where paths of road users meet stop lines and each other, and who waits for whom there."""
+"""Where paths of road users meet stop lines and each other, and which one waits there."""
 
 from __future__ import annotations
 

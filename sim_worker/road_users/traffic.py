@@ -37,7 +37,7 @@ class Traffic:
         self._brakes = bool(np.isfinite(crowd.brakes_at_s[crowd.present]).any())
         self._lawful = LawAbiding(crowd, table, rules)
         self.reacts = len(self._lawful.rows) > 0
-        """Whether anybody does anything but keep a speed."""
+        """Whether any of them does anything but keep a speed."""
 
     def _put(self) -> None:
         self.place = self.table.place(self._on, self.arc_m)

@@ -32,7 +32,7 @@ corner that is brushed between two ticks of the search would go unseen."""
 
 
 class Touched(NamedTuple):
-    """When, where and at which share of its front the ego touches somebody."""
+    """When, where and at which share of its front the ego touches a road user."""
 
     time_s: float
     point_m: Array
@@ -109,7 +109,7 @@ def _touch(
 
 
 def stands_in_the_way(actor: StagedActor, staging: Staging) -> bool:
-    """Return whether the ego touches somebody beside its path, with whatever side.
+    """Return whether the ego touches a road user beside its path, with any side.
 
     One that backs into a bay goes no farther than its way, and needs room for being off it.
     """
@@ -123,7 +123,7 @@ def stands_in_the_way(actor: StagedActor, staging: Staging) -> bool:
     return bool(np.isfinite(touch.time_s[0]))
 
 
-def backs_into_a_house(staging: Staging) -> bool:
+def backs_into_a_building(staging: Staging) -> bool:
     """Return whether an ego that keeps to its line into a bay touches a building, or nearly so."""
     walls, path = staging.place.walls, staging.place.ego.path
     if walls is None or not staging.place.reverse:
@@ -133,8 +133,8 @@ def backs_into_a_house(staging: Staging) -> bool:
     return any(walls.meet(shapely.Polygon(outline)) for outline in outlines)
 
 
-def stands_in_a_house(actor: StagedActor, staging: Staging) -> bool:
-    """Return whether somebody parked would stand in a building."""
+def stands_in_a_building(actor: StagedActor, staging: Staging) -> bool:
+    """Return whether a parked vehicle would stand in a building."""
     walls, way = staging.place.walls, staging.place.way_named(actor.way)
     arc, half = actor.start_on(way), actor.traits.length_m / 2.0
     return walls is not None and walls.block(

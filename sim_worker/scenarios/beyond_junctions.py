@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -18,7 +18,7 @@ from foretwin.geometry.polyline import arc_lengths, points_at
 from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.relations import ways_over
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
+from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way, whole_way
 
 _CLASSES = {"motorway": ("motorway", "trunk"), "circuit": ("raceway",)}
 _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")
@@ -50,7 +50,8 @@ def other_places(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Sce
         if way.last_m - way.first_m >= _LEAST_M[setting]
         and (setting != "motorway" or _least_radius_m(way) >= _LEAST_RADIUS_M)
     )
-    places = (_place(scenario, network, way) for way in fitting)
+    none = [()] * len(scenario.actors)
+    places = (place_in(network, scenario, way.name, way, none) for way in fitting)
     why = f"each {_WORDS[setting]} is shorter than {_LEAST_M[setting]:g} m"
     if setting == "motorway":
         why += f" or has a bend tighter than {_LEAST_RADIUS_M:g} m"
@@ -82,14 +83,21 @@ def _least_radius_m(way: Way) -> float:
     return 1.0 / max(float(np.abs(curvature).max()), 1e-6)
 
 
-def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> ScenarioPlace:
+def place_in(
+    network: RoadNetwork,
+    scenario: Scenario,
+    name: str,
+    ego: Way,
+    actor_ways: Sequence[tuple[Way, ...]],
+) -> ScenarioPlace:
+    """Return a place of a scenario in a World, at its own junction or road."""
     return ScenarioPlace(
         scenario_id=scenario.id,
         junction_id=network.world.intersection.id,
-        name=way.name,
+        name=name,
         driving_side=network.driving_side,
-        ego=way,
-        actor_ways=tuple(() for _ in scenario.actors),
+        ego=ego,
+        actor_ways=tuple(actor_ways),
         walls=network.walls,
     )
 
@@ -105,8 +113,8 @@ def _stretches(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
 def _laps(network: RoadNetwork, lanes: list[Lane]) -> Iterator[Way]:
     """Yield the way along each race track: round once and on, or as far as the World has it.
 
-    Of a track on which nothing else meets, the map tells not where it begins: lanes whose ends lie
-    at another's start go on there, connected or not.
+    Of a track on which nothing else meets, the map does not say where it begins: lanes whose ends
+    lie at another's start go on there, connected or not.
     """
     left = {lane.id: lane for lane in sorted(lanes, key=lambda lane: lane.id)}
     onward = {id_: _onward(left[id_], left, network) for id_ in left}
@@ -217,9 +225,10 @@ class _Bay:
             ]
         )
         arc = arc_lengths(xy)
-        ego = _way(f"into a bay at {self._lane.id}", xy, self._limit_mps, arc[2], arc[-1])
+        name, limit_mps = f"into a bay at {self._lane.id}", self._limit_mps
+        ego = whole_way(name, xy, float(arc[2]), float(arc[-1]), limit_mps=limit_mps)
         line = self._at(self._middle_m + np.array([-20.0, 0.0, 20.0]), self._to_near * self.shift_m)
-        bay = _way("in the bays beside it", line, self._limit_mps, 20.0, 20.0)
+        bay = whole_way("in the bays beside it", line, 20.0, 20.0, limit_mps=limit_mps)
         across = self._at(self._middle_m, self._to_near * np.array([-1.0, self.shift_m + 2.0]))
         ways = tuple(
             tuple(ways_over(across, "straight", ego, network.near_sign, where="behind the bay"))
@@ -227,18 +236,4 @@ class _Bay:
             else (bay,)
             for part in scenario.actors
         )
-        return _place(scenario, network, ego)._replace(actor_ways=ways, reverse=True)
-
-
-def _way(name: str, xy: Array, limit_mps: float, entry_m: float, exit_m: float) -> Way:
-    limit = np.full(len(xy), limit_mps)
-    return Way(
-        name=name,
-        xy_m=xy,
-        speed_limit_mps=limit,
-        path=FrenetPath(xy, limit),
-        entry_m=float(entry_m),
-        exit_m=float(exit_m),
-        first_m=0.0,
-        last_m=float(arc_lengths(xy)[-1]),
-    )
+        return place_in(network, scenario, name, ego, ways)._replace(reverse=True)

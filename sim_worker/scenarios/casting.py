@@ -13,11 +13,11 @@ from foretwin.sim_worker.driver_model import LEAST_START_MPS
 from foretwin.sim_worker.scenarios.alongside import (
     Touched,
     along,
-    backs_into_a_house,
+    backs_into_a_building,
     beside_bay,
     closing_time_s,
     run_into,
-    stands_in_a_house,
+    stands_in_a_building,
     stands_in_the_way,
 )
 from foretwin.sim_worker.scenarios.drawing import Values
@@ -51,15 +51,13 @@ def cast(
     *,
     vehicle: VehicleParameters,
     ego_arc_m: float | None = None,
-    ego_speed_mps: float | None = None,
 ) -> StagedCase | Unplaced:
     """Return one case at one place, or why these values cannot be played there.
 
-    Live, `ego_arc_m` (of base_link on the place's ego path) and `ego_speed_mps` are the car's;
-    without them the ego starts `lead_time_s` before the impact with the speed in `values`, later
-    where its lane begins later.
+    The ego starts `lead_time_s` before the impact with the speed in `values`, later where its lane
+    begins later; or at `ego_arc_m` (of base_link on the place's ego path), where that is given.
     """
-    return _cast(scenario, values, place, vehicle, ego_arc_m, ego_speed_mps, {})
+    return _cast(scenario, values, place, vehicle, ego_arc_m, {})
 
 
 def cast_all(
@@ -69,13 +67,10 @@ def cast_all(
     *,
     vehicle: VehicleParameters,
     ego_arc_m: float | None = None,
-    ego_speed_mps: float | None = None,
 ) -> tuple[StagedCase | Unplaced, ...]:
     """Return what `cast` does for each case; cases that differ elsewhere share the search."""
     met: _Met = {}
-    return tuple(
-        _cast(scenario, values, place, vehicle, ego_arc_m, ego_speed_mps, met) for values in cases
-    )
+    return tuple(_cast(scenario, values, place, vehicle, ego_arc_m, met) for values in cases)
 
 
 def _cast(
@@ -84,12 +79,10 @@ def _cast(
     place: ScenarioPlace,
     vehicle: VehicleParameters,
     ego_arc_m: float | None,
-    ego_speed_mps: float | None,
     met: _Met,
 ) -> StagedCase | Unplaced:
-    wished_mps = values[f"{EGO}.speed_mps"]
-    speed = wished_mps if ego_speed_mps is None else ego_speed_mps
-    speed = max(speed, min(LEAST_START_MPS, wished_mps) or LEAST_START_MPS)
+    # A car that stands sets off.
+    speed = values[f"{EGO}.speed_mps"] or LEAST_START_MPS
     shift = values[f"{EGO}.lateral_shift_m"]
     ego = ego_box(vehicle, place.ego.path, speed, shift, reverse=place.reverse)
     staging = Staging(scenario, values, place, ego)
@@ -144,8 +137,8 @@ def _cast(
 def _start_arc(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
     """Return where base_link starts: so long before the impact, or the junction, as is meant.
 
-    It starts later where its lane begins later, or where it would begin in a bend that nobody
-    drives through so fast.
+    It starts later where its lane begins later, or where it would begin in a bend that is
+    too tight for its speed.
     """
     scenario, place, ego = staging.scenario, staging.place, staging.ego
     end, time_s = place.ego.entry_m - staging.ego.front_m, scenario.lead_time_s
@@ -162,7 +155,7 @@ def _start_arc(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
 
 
 def _past_bend(ego: MovingBox, start_m: float, latest_m: float) -> float:
-    """Return where a bend ends in which nobody can begin at that speed; else the start itself."""
+    """Return where a bend ends that is too tight to begin in; else the start itself."""
     arcs = np.arange(start_m, latest_m, 1.0)
     curvature = ego.path.at_nodes(ego.path.curvature_pm, arcs)
     free = np.abs(curvature) * ego.speed_mps**2 <= _LATERAL_ACCEL_MPS2
@@ -172,7 +165,7 @@ def _past_bend(ego: MovingBox, start_m: float, latest_m: float) -> float:
 def _first_touched(
     staging: Staging, actors: tuple[StagedActor, ...], meetings: dict[str, PlannedMeeting]
 ) -> tuple[Touched, str]:
-    """Return the planned touch and with whom; not a number where nobody is to be touched."""
+    """Return the planned touch and the name of the other; NaN where none is planned."""
     for part in staging.scenario.actors:
         if part.name in meetings and staging.number(part, "arrives_after_s") == 0.0:
             impact = meetings[part.name].impact
@@ -193,9 +186,9 @@ def _in_the_way(staging: Staging, actors: tuple[StagedActor, ...], met: str) -> 
         stands |= staging.place.reverse and actor.conduct == "parked"
         if stands and stands_in_the_way(actor, staging):
             return f"{actor.name} would stand in the ego's way"
-        if actor.conduct == "parked" and stands_in_a_house(actor, staging):
+        if actor.conduct == "parked" and stands_in_a_building(actor, staging):
             return f"{actor.name} would stand in a building"
-    if backs_into_a_house(staging):
+    if backs_into_a_building(staging):
         return "the ego would touch a building on its way into the bay"
     return ""
 

@@ -23,21 +23,21 @@ def draw_cases(scenario: Scenario, *, seed: int | None = None) -> tuple[Values, 
     """
     found = tuple(numbers(scenario))
     fixed = {n.name: float(n.value) for n in found if not isinstance(n.value, Distribution)}
-    listed = [
-        (n.name, n.value.values)
+    listed = {
+        n.name: map(float, n.value.values)
         for n in found
         if isinstance(n.value, Distribution) and n.value.values
-    ]
+    }
     ranged = [n for n in found if isinstance(n.value, Distribution) and not n.value.values]
-    combinations = list(itertools.product(*(values for _, values in listed)))
+    chosen = [
+        dict(zip(listed, values, strict=True)) for values in itertools.product(*listed.values())
+    ]
     samples = scenario.samples if ranged else 1
-    draws = _draws(ranged, len(combinations) * samples, scenario.seed if seed is None else seed)
+    draws = _draws(ranged, len(chosen) * samples, scenario.seed if seed is None else seed)
     cases = []
-    for index in range(len(combinations) * samples):
-        case = dict(fixed)
-        chosen = combinations[index // samples]
-        case.update((name, float(v)) for (name, _), v in zip(listed, chosen, strict=True))
-        case.update((n.name, float(v)) for n, v in zip(ranged, draws[index], strict=True))
+    for index, drawn in enumerate(draws.tolist()):
+        names = (n.name for n in ranged)
+        case = fixed | chosen[index // samples] | dict(zip(names, drawn, strict=True))
         cases.append({n.name: case[n.name] for n in found})
     return tuple(cases)
 

@@ -3,7 +3,7 @@
 Neither slows down nor swerves: both follow their paths at their speeds. The point of the front
 that is to be hit draws a curve along the ego's path, each point of the other's outline one along
 the other's; where two such curves cross, the two points can meet. Of all such meetings those
-count before which the boxes touch nowhere else, which a simulation in closed form tells.
+count before which the boxes touch nowhere else, which a simulation in closed form finds.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The scenarios of a World as jobs play them: at named places, or around a car as it drives.
 
 Places are named, as a placement names them, so that a case can be written down and staged again
-anywhere; there the case says where everybody begins. Live, where two paths meet does not change
+anywhere; there the case says where all begin. Live, where two paths meet does not change
 while a car approaches; only when it gets there does. So a case is cast once for each place, and for
 each new state all that come from elsewhere are moved along their ways by the time that the car is
 early or late.
@@ -135,7 +135,7 @@ class PathScenarios(NamedTuple):
         if not places:
             return Unplaced(junction, "the scenario does not apply on this path", False)
         place = places[place_rank % len(places)]
-        # Cast with nobody early or late: who is so is moved along its way below.
+        # Cast on time: who is early or late is moved along its way below.
         punctual = {name: 0.0 if name.endswith(_LATE) else v for name, v in values.items()}
         (played,) = self.known.cast(scenario, [punctual], place, self.vehicle)
         if isinstance(played, Unplaced):

@@ -13,7 +13,7 @@ LEAST_TIME_S = 0.8
 _SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)
 """Points of the front to meet where the wished one cannot be met first."""
 _AROUND_M, _MOUTH_M = 40.0, 15.0
-"""How far from the junction the ego may meet somebody, and how far behind an arm's mouth."""
+"""How far from the junction the ego may meet others, and how far behind an arm's mouth."""
 
 
 def meet(
@@ -21,7 +21,7 @@ def meet(
 ) -> PlannedMeeting | str:
     """Return where and by which way an actor meets the ego, as near the wished share as can be.
 
-    Nobody on foot comes through a building. Says why, where there is no such way.
+    Pedestrians do not come through buildings. Says why, where there is no such way.
     """
     place, ego = staging.place, staging.ego
     low, high = place.ego.entry_m - _AROUND_M, place.ego.exit_m + _AROUND_M

@@ -3,7 +3,7 @@
 Positions are those of the World, which the OpenDRIVE file of the same World shares. The ego
 follows its path at its speed until another driver is put in its place; others move as the case
 says. Who keeps its speed follows a timed trajectory, so that the planned impact happens; who
-stops follows a path and is told to brake, so that its numbers may be changed.
+stops follows a path and gets an event to brake, so that its numbers may be changed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How everybody starts and moves in an OpenSCENARIO file: teleports, trajectories, braking."""
+"""How entities start and move in an OpenSCENARIO file: teleports, trajectories, braking."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def ego_motion(played: StagedCase, *, horizon_s: float) -> EntityMotion:
     """Return the ego's motion along its path.
 
     It is timed backwards, as speeds have no sign there, and where the path has kinks, along which
-    nobody moves as fast as an arc length says.
+    no car moves as fast as an arc length says.
     """
     path, speed = FrenetPath(played.place.ego.xy_m), played.ego_speed_mps
     along = _spaced(speed * horizon_s)
@@ -72,7 +72,7 @@ def ego_motion(played: StagedCase, *, horizon_s: float) -> EntityMotion:
 
 
 def actor_motion(actor: StagedActor, *, horizon_s: float) -> EntityMotion:
-    """Return another road user's motion as its conduct has it, were nobody to react."""
+    """Return another road user's motion as its conduct has it without reactions."""
     path, speed = FrenetPath(actor.xy_m), actor.speed_mps
     behind = reference_behind_centre_m(actor.kind)
     stops = actor.conduct == "stops" and speed > 0.0

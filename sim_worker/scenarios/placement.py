@@ -14,7 +14,7 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import IntersectionSummary, World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.scenarios.beyond_junctions import other_places
+from foretwin.sim_worker.scenarios.beyond_junctions import other_places, place_in
 from foretwin.sim_worker.scenarios.casting import cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.places import Placement, ScenarioPlace, Unplaced
@@ -94,7 +94,7 @@ def _at_junction(
     if not passages:
         return iter(()), f"no way through it for an ego that {_TURNS[scenario.ego.turn]}"
     found = (place for passage in passages for place in _places_of(scenario, network, passage))
-    return found, _nobody(scenario)
+    return found, _no_way_reason(scenario)
 
 
 _TURNS = {"straight": "goes straight on", "across": "turns across", "near": "turns near"}
@@ -109,7 +109,7 @@ def _refused(scenario: Scenario, summary: IntersectionSummary) -> str:
     return ""
 
 
-def _nobody(scenario: Scenario) -> str:
+def _no_way_reason(scenario: Scenario) -> str:
     parts = [a for a in scenario.actors if a.relation not in ALONG]
     what = " and ".join(
         f"{part.relation.replace('_', ' ')} {part.turn}".replace(" straight", " straight on")
@@ -134,14 +134,9 @@ def _places_of(
         chosen = ways.copy()
         if way is not None:
             chosen[needs[0]] = (way,)
-        yield ScenarioPlace(
-            scenario_id=scenario.id,
+        name = passage.name if way is None else f"{passage.name}/{way.name}"
+        yield place_in(network, scenario, name, ego, chosen)._replace(
             junction_id=passage.junction_id,
-            name=passage.name if way is None else f"{passage.name}/{way.name}",
-            driving_side=network.driving_side,
-            ego=ego,
-            actor_ways=tuple(chosen),
-            walls=network.walls,
             edges_m=network.edges_beside(passage.connections[0].from_lane_id),
         )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import re
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args, get_origin
@@ -25,6 +24,7 @@ from foretwin.contracts.scenario import (
     Scenario,
     Where,
 )
+from foretwin.contracts.toml_file import read_toml
 
 CATALOGUE = Path(__file__).with_name("catalogue")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -64,22 +64,7 @@ def read_scenario(path: Path) -> Scenario:
     Raises FileNotFoundError for a missing file and UserError, in one line with the file, the
     field and what would be right, for anything that is no scenario.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (FileNotFoundError, IsADirectoryError) as error:
-        raise FileNotFoundError(f"no scenario file {path}") from error
-    except UnicodeDecodeError as error:
-        raise UserError(f"scenario file {path} is no UTF-8 text") from error
-    try:
-        scenario = msgspec.convert(tomllib.loads(text), Scenario)
-        check_scenario(scenario)
-    except tomllib.TOMLDecodeError as error:
-        raise UserError(f"scenario file {path} is no TOML: {error}") from error
-    except msgspec.ValidationError as error:
-        raise UserError(f"scenario file {path}: {_words(str(error))}") from error
-    except ValueError as error:
-        raise UserError(f"scenario file {path}: {error}") from error
-    return scenario
+    return read_toml(path, Scenario, what="scenario", check=check_scenario, words=_words)
 
 
 def numbers(scenario: Scenario) -> Iterator[NamedNumber]:

@@ -15,7 +15,7 @@ from foretwin.contracts.world import Crossing
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import length
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
-from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.scenarios.ways import Way, whole_way
 
 SIDE_RAD = (math.radians(30.0), math.radians(150.0))
 """Arms at these angles to the ego's own count as side arms."""
@@ -27,7 +27,7 @@ _CROSSING_AROUND_M = (12.0, 25.0)
 _KERB_M, _CORNER_M = 1.2, 2.0
 """Who comes along the road does so at this distance from the kerb, and cuts the corner by this."""
 _BEYOND_MOUTH_M = 4.0
-"""Where nobody mapped a crossing, people cross so far from the junction."""
+"""Where no crossing is mapped, people cross so far from the junction."""
 
 _JUNCTION_RELATIONS: tuple[Relation, ...] = ("oncoming", "from_near", "from_across")
 
@@ -170,17 +170,7 @@ def ways_over(
 
 
 def _walk(name: str, xy_m: Array, entry_m: float, exit_m: float) -> Way:
-    path = FrenetPath(xy_m)
-    return Way(
-        name=name,
-        xy_m=xy_m,
-        speed_limit_mps=np.full(len(xy_m), np.inf),
-        path=path,
-        entry_m=entry_m,
-        exit_m=exit_m,
-        first_m=0.0,
-        last_m=path.length_m,
-    )
+    return whole_way(name, xy_m, entry_m, exit_m, limit_mps=math.inf)
 
 
 def _along_the_road(way: Way, ego_way: Way, away: float) -> Way:

@@ -68,7 +68,7 @@ class StagedActor(NamedTuple):
 
 
 class StagedCase(NamedTuple):
-    """Everybody's start in one case, in the World's frame.
+    """All starts in one case, in the World's frame.
 
     The ego's base_link starts at `ego_arc_m` of its way, `ego_lateral_m` to its left. Where a touch
     is planned, an ego that keeps its speed touches the first road user after `impact_time_s` with

@@ -1,4 +1,4 @@
-"""The buildings of a World: nobody comes out of their walls, and nobody parks in them."""
+"""The buildings of a World: nothing comes out of their walls or parks in them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 
 
 class Walls:
-    """Where a World's buildings stand, ready to be asked."""
+    """An index of a World's buildings."""
 
     def __init__(self, world: World) -> None:
         self._tree = shapely.STRtree([shapely.Polygon(b.outline) for b in world.buildings])

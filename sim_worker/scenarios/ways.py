@@ -38,6 +38,13 @@ class Way(NamedTuple):
     last_m: float
 
 
+def whole_way(name: str, xy: Array, entry_m: float, exit_m: float, *, limit_mps: float) -> Way:
+    """Return the way along a polyline as it is, of one limit."""
+    limit = np.full(len(xy), limit_mps)
+    path = FrenetPath(xy, limit)
+    return Way(name, xy, limit, path, entry_m, exit_m, first_m=0.0, last_m=path.length_m)
+
+
 def lengthened(name: str, xy: Array, limit: Array, entry_m: float, exit_m: float) -> Way:
     """Return the way along a polyline, led straight on at either end as far as ways go."""
     arc = arc_lengths(xy)

@@ -23,15 +23,15 @@ from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 
 
-def places_in(world: World, asked: PlaceRequest, vehicle: VehicleParameters) -> WorldPlaces:
-    """Return where the scenarios asked for take place in a World, for a vehicle."""
+def places_in(world: World, request: PlaceRequest, vehicle: VehicleParameters) -> WorldPlaces:
+    """Return where the requested scenarios take place in a World, for a vehicle."""
     network = RoadNetwork(world)
-    if asked.starts:
-        return _places_recorded(network, asked, vehicle)
+    if request.starts:
+        return _places_recorded(network, request, vehicle)
     placed, unplaced = [], []
     ways: dict[str, PathAhead] = {}
-    for scenario in asked.scenarios:
-        found = places(scenario, world, network=network, vehicle=vehicle, most=asked.most)
+    for scenario in request.scenarios:
+        found = places(scenario, world, network=network, vehicle=vehicle, most=request.most)
         for here in found.places:
             ego = here.ego
             placed.append(_placed(scenario, here.junction_id, here.name, ego.name))
@@ -41,21 +41,21 @@ def places_in(world: World, asked: PlaceRequest, vehicle: VehicleParameters) -> 
 
 
 def _places_recorded(
-    network: RoadNetwork, asked: PlaceRequest, vehicle: VehicleParameters
+    network: RoadNetwork, request: PlaceRequest, vehicle: VehicleParameters
 ) -> WorldPlaces:
     """Return which scenarios can happen on the ways that a recorded car took from its starts."""
     world, known = network.world, KnownScenarios(network)
     placed, unplaced = [], []
-    for number, start in asked.starts:
+    for number, start in request.starts:
         path = FrenetPath(start.path(world.frame).xy_m)
         position = start.state.position
         here = local_from_geo(world.frame, position.lat_deg, position.lon_deg)
         arc = path.locate(np.asarray(here)[None])
         passage = known.on(path, float(arc.arc_m[0]), vehicle).passage
-        for scenario in asked.scenarios:
+        for scenario in request.scenarios:
             name = f"round {start.round_id}"
             found = () if passage is None else known.places(scenario, passage)
-            names = [f"{name}: {place.name}" for place in found[: asked.most]]
+            names = [f"{name}: {place.name}" for place in found[: request.most]]
             if scenario.id == AS_RECORDED:
                 names = [name]
             elif not found:

@@ -1,7 +1,7 @@
 """Takes the Python clock out of MuJoCo's step, which then costs a third less.
 
 The bindings install a Python function as the timer callback `mjcb_time`; each step calls it
-several times only to fill profiling fields that nobody reads here. `mujoco.set_mjcb_time(None)`
+several times only to fill profiling fields that are not read here. `mujoco.set_mjcb_time(None)`
 restores that same clock, so the C symbol itself is cleared.
 """
 

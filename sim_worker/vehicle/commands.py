@@ -20,7 +20,7 @@ _STANDS_MPS = 0.05
 
 
 class TwinCommand(NamedTuple):
-    """What the twin is told from `stamp_ns` on."""
+    """The command of the twin from `stamp_ns` on."""
 
     stamp_ns: int
     accel_mps2: float

@@ -12,7 +12,7 @@ from foretwin.contracts.vehicle import Parameter, VehicleParameters
 
 
 class ForceLag:
-    """What drive and brakes of S vehicles exert, tick by tick, of what they were told to.
+    """What drive and brakes of S vehicles exert, tick by tick, of what was commanded.
 
     Commands change once a tick. Within one, the mean of the exponential is what acts, so that
     speeds after a tick are exact; dead times need not be whole ticks.

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 
 import msgspec
 
-from foretwin.contracts.errors import UserError
+from foretwin.contracts.toml_file import read_toml
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 
 _FOLDER = Path(__file__).parent
@@ -18,7 +17,7 @@ MAX_VEHICLE_DELAY_S = 0.6
 """Futures add up to 0.4 s, and the sample buffer of the steering actuator holds 1 s."""
 
 MAX_FORCE_DELAY_S = 1.0
-"""Beyond it, nobody would speak of an actuator's dead time."""
+"""Longer delays are no actuator's dead time."""
 
 _RESISTANCES = ("drag_npv2", "rolling_resistance_n")
 _LAGS = ("steering_delay_s", "drive_lag_s", "brake_lag_s", "accel_delay_s", "steering_lag_s")
@@ -41,24 +40,10 @@ def load_vehicle(path: Path | str | None = None) -> VehicleParameters:
     if str(source) in bundled_vehicles():
         source = _FOLDER / f"{source}.toml"
     try:
-        text = source.read_text(encoding="utf-8")
-    except (FileNotFoundError, IsADirectoryError) as error:
+        return read_toml(source, VehicleParameters, what="vehicle", check=check_vehicle)
+    except FileNotFoundError as error:
         names = ", ".join(bundled_vehicles())
-        raise FileNotFoundError(
-            f"no vehicle file {source}, and no bundled vehicle of that name: {names}"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise UserError(f"vehicle file {source} is no UTF-8 text") from error
-    try:
-        vehicle = msgspec.convert(tomllib.loads(text), VehicleParameters)
-    except tomllib.TOMLDecodeError as error:
-        raise UserError(f"vehicle file {source} is no TOML: {error}") from error
-    except msgspec.ValidationError as error:
-        raise UserError(f"vehicle file {source}: {error}") from error
-    try:
-        return check_vehicle(vehicle)
-    except ValueError as error:
-        raise UserError(f"vehicle file {source}: {error}") from error
+        raise FileNotFoundError(f"{error}, and no bundled vehicle of that name: {names}") from error
 
 
 def check_vehicle(vehicle: VehicleParameters) -> VehicleParameters:

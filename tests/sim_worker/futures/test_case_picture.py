@@ -9,7 +9,7 @@ import pytest
 
 from foretwin.geometry.rectangles import clearance
 from foretwin.sim_worker.batch.batch_simulation import Stage
-from foretwin.sim_worker.futures.case_picture import told, write_case_picture
+from foretwin.sim_worker.futures.case_picture import caption, write_case_picture
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
 from foretwin.sim_worker.futures.future_mix import plan_futures
 from foretwin.sim_worker.futures.future_picture import write_future_picture
@@ -63,8 +63,8 @@ def test_a_planner_drives_the_case_from_the_same_start() -> None:
         np.testing.assert_allclose(mine.centre_m[0], theirs.centre_m[0], atol=0.01)
     assert run.collision_with == ""
     assert run.clearance_m > 0.5
-    assert "hits lead" in told(played, heedless, run, "pure_pursuit_idm")
-    assert told(played, heedless, run, "it").endswith(f"{run.clearance_m:.1f} m to the nearest")
+    assert "hits lead" in caption(played, heedless, run, "pure_pursuit_idm")
+    assert caption(played, heedless, run, "it").endswith(f"{run.clearance_m:.1f} m to the nearest")
 
 
 def test_a_case_is_drawn_with_the_name_of_its_map(tmp_path: Path) -> None:

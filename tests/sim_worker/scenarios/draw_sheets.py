@@ -30,9 +30,9 @@ from foretwin.sim_worker.futures.case_picture import (
     OTHERS,
     PLANNED,
     STANDING,
+    caption,
     draw_case,
     draw_case_legend,
-    told,
 )
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
@@ -199,7 +199,7 @@ def draw_sheet(ids: tuple[str, ...], tiles: dict[str, list[Tile]], usual: str) -
                 axes, tile.played, tile.world, heedless, planned, aspect=wide / high,
                 view=whole_lap(tile, wide / high) if scenario.where.setting == "circuit" else None,
             )  # fmt: skip
-            words = f"{tile.where}\n{told(tile.played, heedless, planned, planner)}"
+            words = f"{tile.where}\n{caption(tile.played, heedless, planned, planner)}"
             figure.text(left, bottom - 0.05 / height, words, fontsize=8.8, va="top",
                         linespacing=1.15)  # fmt: skip
             print(f"{id_} | {words}".replace("\n", " | "), flush=True)

@@ -213,9 +213,8 @@ def test_somebody_off_the_road_is_refused() -> None:
 def test_an_impact_after_the_end_is_refused() -> None:
     scenario = catalogue()["scp"]
     place = places(scenario, cross(), vehicle=VEHICLE).places[0]
-    far = cast(
-        scenario, draw_cases(scenario)[0], place, vehicle=VEHICLE, ego_arc_m=0.0, ego_speed_mps=5.0
-    )
+    values = {**draw_cases(scenario)[0], "ego.speed_mps": 5.0}
+    far = cast(scenario, values, place, vehicle=VEHICLE, ego_arc_m=0.0)
     assert isinstance(far, Unplaced)
     assert "after the end at 8 s" in far.reason
 
@@ -223,11 +222,8 @@ def test_an_impact_after_the_end_is_refused() -> None:
 def test_a_standing_car_is_taken_to_set_off() -> None:
     scenario = catalogue()["scp"]
     place = places(scenario, cross(), vehicle=VEHICLE).places[0]
-    values = draw_cases(scenario)[0]
-    near = cast(
-        scenario, values, place, vehicle=VEHICLE, ego_arc_m=place.ego.entry_m - 8.0,
-        ego_speed_mps=0.0,
-    )  # fmt: skip
+    values = {**draw_cases(scenario)[0], "ego.speed_mps": 0.0}
+    near = cast(scenario, values, place, vehicle=VEHICLE, ego_arc_m=place.ego.entry_m - 8.0)
     assert isinstance(near, StagedCase)
     assert near.ego_speed_mps == 2.0
     check_impact(near)
