@@ -15,7 +15,7 @@ from foretwin.telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
 from foretwin.telemetry.standin.driver import Driver, DriverCommand
 from foretwin.telemetry.standin.parameters import StandinParameters
 from foretwin.telemetry.standin.path import DrivenPath
-from foretwin.telemetry.standin.sensors import SCHEDULE, Sensors, planned_trajectory, status
+from foretwin.telemetry.standin.sensors import PERIOD_MS, Sensors, planned_trajectory, status
 
 START_STAMP_NS = 1_767_225_600_000_000_000
 """2026-01-01T00:00:00Z: every stand-in drive begins then, so that its stamps repeat."""
@@ -70,7 +70,7 @@ class StandinSource:
             source="stand-in car: CommonRoad multi-body model, BMW 320i",
             reference_point="GNSS antenna",
             body_from_antenna_m=parameters.sensors.body_from_antenna_m,
-            sends=tuple(row.channel for row in SCHEDULE),
+            sends=tuple(PERIOD_MS),
         )
 
     @property
@@ -94,9 +94,9 @@ class StandinSource:
                 self._truth.append(motion)
             # Time goes on before samples leave: a caller may stop between two of them.
             due = [
-                row.channel
-                for row in SCHEDULE
-                if self._tick * _TICK_NS % (row.period_ms * 1_000_000) == 0
+                channel
+                for channel, period_ms in PERIOD_MS.items()
+                if self._tick * _TICK_NS % (period_ms * 1_000_000) == 0
             ]
             samples = [(channel, self._sample(channel, stamp_ns, motion)) for channel in due]
             self._car.step(
