@@ -51,41 +51,9 @@ class Outwards:
         return [row for row in self._rows if row.source == source]
 
     def warm_up(self) -> None:
-        """Make what the first message of each type needs: a tenth of a second nobody shall wait."""
-        at = self._drive_frame.origin
-        user = drive.RoadUser(
-            user_id="none",
-            kind="car",
-            position=at,
-            yaw_rad=0.0,
-            speed_mps=0.0,
-            length_m=1.0,
-            width_m=1.0,
-        )
-        car = drive.VehicleState(
-            vehicle_id="none",
-            stamp_ns=0,
-            position=at,
-            yaw_rad=0.0,
-            speed_mps=0.0,
-            yaw_rate_radps=0.0,
-            accel_mps2=0.0,
-        )
-        command = VehicleCommand(
-            stamp_ns=0, sent_mono_ns=0, tire_angle_rad=0.0, accel_mps2=0.0, speed_mps=0.0
-        )
+        """Compile the types that go out: tens of milliseconds, which no first message waits for."""
         for row in self._rows:
-            match row.source:
-                case "state" | "twin":
-                    self.state(car)
-                case "virtual_objects":
-                    self.objects(drive.RoadUsers(stamp_ns=0, users=(user,)), row.type)
-                case "diagnostics":
-                    self.diagnostics(0, [Level("none", 0, "", {})])
-                case "clock":
-                    self.clock(0)
-                case "vehicle_command":
-                    self.command(command, row.type, stamp_ns=0)
+            _cdr(ros_message(row.type), row.type)
 
     def state(self, message: drive.VehicleState) -> bytes:
         """Return the Odometry of a state."""
