@@ -281,13 +281,8 @@ class MotionTrack:
         if self._fix is None:
             raise ValueError("no position has come yet: there is no state")
         self._advance(stamp_ns)
-        unmoved = unmoved_state(
-            self._measured,
-            vehicle_id=self._info.vehicle_id,
-            stamp_ns=stamp_ns,
-            position=self._position_out(fix),
-            position_std_m=self._fix.std_m,
-        )
+        here, vehicle_id = self._position_out(fix), self._info.vehicle_id
+        unmoved = unmoved_state(self._measured, vehicle_id, stamp_ns, here, self._fix.std_m)
         if self._filter is None:
             return unmoved
         return moving_state(

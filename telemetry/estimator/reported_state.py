@@ -24,7 +24,6 @@ from foretwin.telemetry.estimator.measured import MotionSamples
 
 def unmoved_state(
     measured: MotionSamples,
-    *,
     vehicle_id: str,
     stamp_ns: int,
     position: GeoPoint,
