@@ -9,19 +9,11 @@ from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.contracts.towards_vehicle import VehicleCommand
 from foretwin.telemetry.ros2.mapping import DIAGNOSTICS, Mapping, OutRow, Source
+from foretwin.telemetry.ros_messages import parts
 from foretwin.telemetry.ros_messages.commands import ackermann_from_command, control_from_command
 from foretwin.telemetry.ros_messages.motion import odometry_from_state
 from foretwin.telemetry.ros_messages.objects import detected_from_users, predicted_from_users
-from foretwin.telemetry.ros_messages.parts import (
-    CLOCK,
-    CONTROL,
-    DETECTED_OBJECTS,
-    ODOMETRY,
-    header_from,
-    ros_message,
-    time_from,
-    typestore,
-)
+from foretwin.telemetry.ros_messages.parts import ros_message
 
 DRIVE_FRAME = "foretwin_drive"
 """The frame of what goes out where the mapping does not place `map`: the drive's own plane."""
@@ -58,7 +50,7 @@ class Outwards:
     def state(self, message: drive.VehicleState) -> bytes:
         """Return the Odometry of a state."""
         frame = self._map or self._drive_frame
-        return _cdr(self._framed(odometry_from_state(message, frame)), ODOMETRY)
+        return _cdr(self._framed(odometry_from_state(message, frame)), parts.ODOMETRY)
 
     def twin(self, message: MirrorSample) -> bytes:
         """Return the Odometry of the twin."""
@@ -80,12 +72,12 @@ class Outwards:
 
     def objects(self, message: drive.RoadUsers, kind: str) -> bytes:
         """Return DetectedObjects or PredictedObjects."""
-        convert = detected_from_users if kind == DETECTED_OBJECTS else predicted_from_users
+        convert = detected_from_users if kind == parts.DETECTED_OBJECTS else predicted_from_users
         return _cdr(self._framed(convert(message, self._map or self._drive_frame)), kind)
 
     def clock(self, stamp_ns: int) -> bytes:
         """Return a Clock."""
-        return _cdr(ros_message(CLOCK, clock=time_from(stamp_ns)), CLOCK)
+        return _cdr(ros_message(parts.CLOCK, clock=parts.time_from(stamp_ns)), parts.CLOCK)
 
     def diagnostics(self, stamp_ns: int, levels: list[Level]) -> bytes:
         """Return a DiagnosticArray."""
@@ -101,7 +93,7 @@ class Outwards:
             )
             for one in levels
         ]
-        array = ros_message(DIAGNOSTICS, header=header_from(stamp_ns, ""), status=status)
+        array = ros_message(DIAGNOSTICS, header=parts.header_from(stamp_ns, ""), status=status)
         return _cdr(array, DIAGNOSTICS)
 
     def command(self, message: VehicleCommand, kind: str, *, stamp_ns: int) -> bytes:
@@ -114,7 +106,7 @@ class Outwards:
             accel_mps2=message.accel_mps2,
             tire_angle_rad=message.tire_angle_rad,
         )
-        convert = control_from_command if kind == CONTROL else ackermann_from_command
+        convert = control_from_command if kind == parts.CONTROL else ackermann_from_command
         return _cdr(convert(command, speed_mps=message.speed_mps), kind)
 
     def _framed(self, ros: Any) -> Any:
@@ -124,4 +116,4 @@ class Outwards:
 
 
 def _cdr(ros: Any, kind: str) -> bytes:
-    return bytes(typestore().serialize_cdr(ros, kind))
+    return bytes(parts.typestore().serialize_cdr(ros, kind))
