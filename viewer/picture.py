@@ -16,12 +16,7 @@ from rerun.experimental import ViewerClient
 from foretwin.contracts.ports import free_port
 from foretwin.viewer import blueprint
 from foretwin.viewer.blueprint import DetailView, MainView
-from foretwin.viewer.live_viewer import (
-    NoViewerError,
-    address,
-    start_program,
-    wait_until_it_answers,
-)
+from foretwin.viewer.live_viewer import NoViewerError, address, start_program, wait_until_it_answers
 from foretwin.viewer.recordings import copy_with_blueprint
 from foretwin.viewer.rows import TIMELINE
 

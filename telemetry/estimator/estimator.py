@@ -11,15 +11,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from foretwin.contracts.drive import (
-    GnssFix,
-    HeadingSample,
-    ImuSample,
-    SpeedSample,
-    SteeringSample,
-    VehicleInfo,
-    VehicleState,
-)
+from foretwin.contracts.drive import VehicleInfo, VehicleState
+from foretwin.contracts.keys import CHANNELS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.clock_steps import ClockStep, ClockSteps
@@ -29,13 +22,9 @@ from foretwin.telemetry.estimator.reordering import Reordering
 from foretwin.telemetry.estimator.staleness import Staleness
 
 _STATE_PERIOD_NS = 20_000_000
-_KINDS: dict[str, type] = {
-    "gnss": GnssFix,
-    "imu": ImuSample,
-    "speed": SpeedSample,
-    "heading": HeadingSample,
-    "steering": SteeringSample,
-}
+_MOTION = ("gnss", "imu", "speed", "heading", "steering")
+"""Channels that say how the car moves."""
+_KINDS: dict[str, type] = {name: CHANNELS[name].kind for name in _MOTION}
 
 
 class ClockReport(NamedTuple):

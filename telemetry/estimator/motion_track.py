@@ -18,7 +18,7 @@ from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
 from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_corrections import STANDING_MPS, MotionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate
-from foretwin.telemetry.estimator.reported_state import StateHeader, moving_state, unmoved_state
+from foretwin.telemetry.estimator.reported_state import moving_state, unmoved_state
 
 _WANDER_M = 0.5
 _WHITE_SHARE = 0.1
@@ -281,13 +281,13 @@ class MotionTrack:
         if self._fix is None:
             raise ValueError("no position has come yet: there is no state")
         self._advance(stamp_ns)
-        header = StateHeader(self._info.vehicle_id, stamp_ns, self._position_out(fix))
+        here, vehicle_id = self._position_out(fix), self._info.vehicle_id
+        unmoved = unmoved_state(self._measured, vehicle_id, stamp_ns, here, self._fix.std_m)
         if self._filter is None:
-            return unmoved_state(self._measured, header, position_std_m=self._fix.std_m)
+            return unmoved
         return moving_state(
+            unmoved,
             self._filter,
-            self._measured,
-            header,
             convergence_rad=self._convergence_rad,
             wheelbase_m=self._wheelbase_m,
             standing=self._standing,

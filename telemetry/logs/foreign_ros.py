@@ -16,13 +16,7 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
-from foretwin.telemetry.logs.log import (
-    FILE_CUT_SHORT,
-    UNREADABLE_ROW,
-    Log,
-    LogError,
-    Sample,
-)
+from foretwin.telemetry.logs.log import FILE_CUT_SHORT, UNREADABLE_ROW, Log, LogError, Sample
 from foretwin.telemetry.logs.map_origin import RecordingDeclaration
 from foretwin.telemetry.logs.mcap_records import Contents, Record
 from foretwin.telemetry.logs.merge import reordered

@@ -59,7 +59,7 @@ def read_contents(path: Path) -> Contents:
             summary = reader.get_summary()
             if summary is not None and summary.statistics is not None and summary.chunk_indexes:
                 statistics = summary.statistics
-                schemas, counts = _by_topic(
+                schemas, counts = by_topic(
                     (
                         channel.topic,
                         summary.schemas.get(channel.schema_id),
@@ -111,7 +111,7 @@ def _read_through(path: Path) -> Contents:
             continue
         seen[item.topic, item.kind] += 1
         first_ns, last_ns = min(first_ns, item.log_time_ns), max(last_ns, item.log_time_ns)
-    schemas, counts = _by_topic(
+    schemas, counts = by_topic(
         (topic, linear.schemas[topic, kind], count) for (topic, kind), count in seen.items()
     )
     return Contents(
@@ -125,7 +125,7 @@ def _read_through(path: Path) -> Contents:
     )
 
 
-def _by_topic(
+def by_topic(
     channels: Iterable[tuple[str, Schema | None, int]],
 ) -> tuple[dict[str, Schema], dict[str, int]]:
     """Return schema and count by topic, of the schema with the most messages."""

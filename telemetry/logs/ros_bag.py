@@ -15,7 +15,7 @@ from rosbags.rosbag2 import Reader as Reader2
 from rosbags.rosbag2 import ReaderError as Error2
 
 from foretwin.telemetry.logs.log import FILE_CUT_SHORT, LogError
-from foretwin.telemetry.logs.mcap_records import Contents, Record
+from foretwin.telemetry.logs.mcap_records import Contents, Record, by_topic
 from foretwin.telemetry.logs.ros_recording import NO_DEFINITION, ROS1, RosRecording
 
 _ENCODINGS = {
@@ -56,20 +56,10 @@ def bag_recording(path: Path) -> RosRecording:
 
 
 def _contents(reader: Any, *, ros1: bool) -> Contents:
-    schemas: dict[str, Schema] = {}
-    counts: dict[str, int] = {}
-    by_kind: Counter[tuple[str, str]] = Counter()
-    for one in reader.connections:
-        by_kind[one.topic, one.msgtype] += one.msgcount
-    for one in reader.connections:
-        count = by_kind[one.topic, one.msgtype]
-        if count <= counts.get(one.topic, -1):
-            continue
-        counts[one.topic] = count
-        encoding = ROS1 if ros1 else _ENCODINGS[one.msgdef.format]
-        schemas[one.topic] = Schema(
-            id=one.id, name=one.msgtype, encoding=encoding, data=one.msgdef.data.encode()
-        )
+    # Of types with as many messages the first counts.
+    schemas, counts = by_topic(
+        (one.topic, _schema(one, ros1=ros1), one.msgcount) for one in reversed(reader.connections)
+    )
     empty = not reader.message_count
     return Contents(
         schemas=schemas,
@@ -80,3 +70,10 @@ def _contents(reader: Any, *, ros1: bool) -> Contents:
         indexed=False,
         cut_short=False,
     )
+
+
+def _schema(connection: Any, *, ros1: bool) -> Schema:
+    definition = connection.msgdef
+    encoding = ROS1 if ros1 else _ENCODINGS[definition.format]
+    data = definition.data.encode()
+    return Schema(id=connection.id, name=connection.msgtype, encoding=encoding, data=data)

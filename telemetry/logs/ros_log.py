@@ -16,13 +16,7 @@ import msgspec
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign, time_base_of
-from foretwin.telemetry.logs.log import (
-    FILE_CUT_SHORT,
-    VALUE_NOT_FINITE,
-    Log,
-    LogError,
-    Sample,
-)
+from foretwin.telemetry.logs.log import FILE_CUT_SHORT, VALUE_NOT_FINITE, Log, LogError, Sample
 from foretwin.telemetry.logs.map_origin import declared_of
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.logs.ros_bag import bag_recording

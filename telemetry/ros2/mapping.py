@@ -22,17 +22,8 @@ from foretwin.telemetry.ros2.mirrored import Mirrored
 from foretwin.telemetry.ros2.names import Dialect, check_topic, dds_type
 from foretwin.telemetry.ros2.safety import CommandLimits
 from foretwin.telemetry.ros2.virtual_objects import PlacedObject
+from foretwin.telemetry.ros_messages import parts
 from foretwin.telemetry.ros_messages.foreign import FOREIGN
-from foretwin.telemetry.ros_messages.parts import (
-    ACKERMANN,
-    CLOCK,
-    CONTROL,
-    DETECTED_OBJECTS,
-    LANELET_ROUTE,
-    ODOMETRY,
-    PREDICTED_OBJECTS,
-    TF,
-)
 from foretwin.telemetry.ros_messages.table import TOPIC_PREFIX as OWN_PREFIX
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
@@ -40,14 +31,14 @@ AUTOWARE = Path(__file__).with_name("autoware.toml")
 
 Source = Literal["state", "twin", "virtual_objects", "diagnostics", "clock", "vehicle_command"]
 _TYPES_OF_SOURCE: dict[Source, tuple[str, ...]] = {
-    "state": (ODOMETRY,),
-    "twin": (ODOMETRY,),
-    "virtual_objects": (PREDICTED_OBJECTS, DETECTED_OBJECTS),
+    "state": (parts.ODOMETRY,),
+    "twin": (parts.ODOMETRY,),
+    "virtual_objects": (parts.PREDICTED_OBJECTS, parts.DETECTED_OBJECTS),
     "diagnostics": (DIAGNOSTICS,),
-    "clock": (CLOCK,),
-    "vehicle_command": (CONTROL, ACKERMANN),
+    "clock": (parts.CLOCK,),
+    "vehicle_command": (parts.CONTROL, parts.ACKERMANN),
 }
-CHANNEL_OF_OTHERS = {TF: "transforms", CLOCK: "clock", LANELET_ROUTE: "route"}
+CHANNEL_OF_OTHERS = {parts.TF: "transforms", parts.CLOCK: "clock", parts.LANELET_ROUTE: "route"}
 """Types that are taken in but are no samples of the vehicle's telemetry."""
 
 
@@ -93,7 +84,7 @@ class InRow(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     @property
     def is_latched(self) -> bool:
         """Whether ROS says it once and keeps it for who comes later (transient local)."""
-        return self.type in (TF, LANELET_ROUTE)
+        return self.type in (parts.TF, parts.LANELET_ROUTE)
 
     @property
     def stream(self) -> str:

@@ -9,19 +9,11 @@ from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.contracts.towards_vehicle import VehicleCommand
 from foretwin.telemetry.ros2.mapping import DIAGNOSTICS, Mapping, OutRow, Source
+from foretwin.telemetry.ros_messages import parts
 from foretwin.telemetry.ros_messages.commands import ackermann_from_command, control_from_command
 from foretwin.telemetry.ros_messages.motion import odometry_from_state
 from foretwin.telemetry.ros_messages.objects import detected_from_users, predicted_from_users
-from foretwin.telemetry.ros_messages.parts import (
-    CLOCK,
-    CONTROL,
-    DETECTED_OBJECTS,
-    ODOMETRY,
-    header_from,
-    ros_message,
-    time_from,
-    typestore,
-)
+from foretwin.telemetry.ros_messages.parts import ros_message
 
 DRIVE_FRAME = "foretwin_drive"
 """The frame of what goes out where the mapping does not place `map`: the drive's own plane."""
@@ -51,46 +43,14 @@ class Outwards:
         return [row for row in self._rows if row.source == source]
 
     def warm_up(self) -> None:
-        """Make what the first message of each type needs: a tenth of a second nobody shall wait."""
-        at = self._drive_frame.origin
-        user = drive.RoadUser(
-            user_id="none",
-            kind="car",
-            position=at,
-            yaw_rad=0.0,
-            speed_mps=0.0,
-            length_m=1.0,
-            width_m=1.0,
-        )
-        car = drive.VehicleState(
-            vehicle_id="none",
-            stamp_ns=0,
-            position=at,
-            yaw_rad=0.0,
-            speed_mps=0.0,
-            yaw_rate_radps=0.0,
-            accel_mps2=0.0,
-        )
-        command = VehicleCommand(
-            stamp_ns=0, sent_mono_ns=0, tire_angle_rad=0.0, accel_mps2=0.0, speed_mps=0.0
-        )
+        """Compile the types that go out: tens of milliseconds, which no first message waits for."""
         for row in self._rows:
-            match row.source:
-                case "state" | "twin":
-                    self.state(car)
-                case "virtual_objects":
-                    self.objects(drive.RoadUsers(stamp_ns=0, users=(user,)), row.type)
-                case "diagnostics":
-                    self.diagnostics(0, [Level("none", 0, "", {})])
-                case "clock":
-                    self.clock(0)
-                case "vehicle_command":
-                    self.command(command, row.type, stamp_ns=0)
+            _cdr(ros_message(row.type), row.type)
 
     def state(self, message: drive.VehicleState) -> bytes:
         """Return the Odometry of a state."""
         frame = self._map or self._drive_frame
-        return _cdr(self._framed(odometry_from_state(message, frame)), ODOMETRY)
+        return _cdr(self._framed(odometry_from_state(message, frame)), parts.ODOMETRY)
 
     def twin(self, message: MirrorSample) -> bytes:
         """Return the Odometry of the twin."""
@@ -112,12 +72,12 @@ class Outwards:
 
     def objects(self, message: drive.RoadUsers, kind: str) -> bytes:
         """Return DetectedObjects or PredictedObjects."""
-        convert = detected_from_users if kind == DETECTED_OBJECTS else predicted_from_users
+        convert = detected_from_users if kind == parts.DETECTED_OBJECTS else predicted_from_users
         return _cdr(self._framed(convert(message, self._map or self._drive_frame)), kind)
 
     def clock(self, stamp_ns: int) -> bytes:
         """Return a Clock."""
-        return _cdr(ros_message(CLOCK, clock=time_from(stamp_ns)), CLOCK)
+        return _cdr(ros_message(parts.CLOCK, clock=parts.time_from(stamp_ns)), parts.CLOCK)
 
     def diagnostics(self, stamp_ns: int, levels: list[Level]) -> bytes:
         """Return a DiagnosticArray."""
@@ -133,7 +93,7 @@ class Outwards:
             )
             for one in levels
         ]
-        array = ros_message(DIAGNOSTICS, header=header_from(stamp_ns, ""), status=status)
+        array = ros_message(DIAGNOSTICS, header=parts.header_from(stamp_ns, ""), status=status)
         return _cdr(array, DIAGNOSTICS)
 
     def command(self, message: VehicleCommand, kind: str, *, stamp_ns: int) -> bytes:
@@ -146,7 +106,7 @@ class Outwards:
             accel_mps2=message.accel_mps2,
             tire_angle_rad=message.tire_angle_rad,
         )
-        convert = control_from_command if kind == CONTROL else ackermann_from_command
+        convert = control_from_command if kind == parts.CONTROL else ackermann_from_command
         return _cdr(convert(command, speed_mps=message.speed_mps), kind)
 
     def _framed(self, ros: Any) -> Any:
@@ -156,4 +116,4 @@ class Outwards:
 
 
 def _cdr(ros: Any, kind: str) -> bytes:
-    return bytes(typestore().serialize_cdr(ros, kind))
+    return bytes(parts.typestore().serialize_cdr(ros, kind))

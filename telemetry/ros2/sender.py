@@ -9,16 +9,9 @@ from collections.abc import Callable, Iterable
 import msgspec
 
 from foretwin.contracts.foreign_bus import ForeignBus
+from foretwin.telemetry.ros2 import names
 from foretwin.telemetry.ros2.attachment import Attachment, pack
 from foretwin.telemetry.ros2.mapping import InRow, Mapping, OutRow
-from foretwin.telemetry.ros2.names import (
-    Entity,
-    EntityKind,
-    bridge_key,
-    rmw_key,
-    token,
-    type_hash,
-)
 
 NODE = "foretwin"
 
@@ -38,7 +31,7 @@ class RosSender:
         """Declare the tokens of node and ends, so that ROS lists them; the bridge needs none."""
         if self._mapping.dialect == "ros2dds":
             return
-        node = Entity(
+        node = names.Entity(
             domain=self._mapping.domain,
             session=self._session,
             node_id=0,
@@ -47,9 +40,9 @@ class RosSender:
             namespace="/",
             node=NODE,
         )
-        self._foreign.declare_alive(token(node))
+        self._foreign.declare_alive(names.token(node))
         for number, row in enumerate(rows, 1):
-            entity: EntityKind = "MS" if isinstance(row, InRow) else "MP"
+            entity: names.EntityKind = "MS" if isinstance(row, InRow) else "MP"
             end = msgspec.structs.replace(
                 node,
                 entity_id=number,
@@ -58,17 +51,17 @@ class RosSender:
                 kind=row.type,
                 transient_local=isinstance(row, InRow) and row.is_latched,
             )
-            self._foreign.declare_alive(token(end))
+            self._foreign.declare_alive(names.token(end))
 
     def put(self, row: OutRow, payload: bytes) -> None:
         """Send one message."""
         mapping = self._mapping
         self.sent[row.topic] += 1
         if mapping.dialect == "ros2dds":
-            self._foreign.put(bridge_key(row.topic, namespace=mapping.namespace), payload)
+            self._foreign.put(names.bridge_key(row.topic, namespace=mapping.namespace), payload)
             return
-        hash_text = type_hash(row.type)
-        key = rmw_key(row.topic, row.type, domain=mapping.domain, type_hash=hash_text)
+        hash_text = names.type_hash(row.type)
+        key = names.rmw_key(row.topic, row.type, domain=mapping.domain, type_hash=hash_text)
         gid = hashlib.blake2b(f"{self._session}{row.topic}".encode(), digest_size=16).digest()
         attached = Attachment(self.sent[row.topic], self._wall_ns(), gid)
         self._foreign.put(key, payload, pack(attached))

@@ -46,32 +46,31 @@ def stamp_of(ros: Any) -> int:
     return parts.stamp_ns_of(ros.stamp) if hasattr(ros, "stamp") else 0
 
 
-def _fix(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+def _sample(channel: str, read: Callable[[Any, int], msgspec.Struct], stream: str = "") -> Foreign:
+    """Return how messages are read that hold one sample each, and need no frame."""
+    return Foreign(stream or channel, (channel,), lambda ros, stamp_ns, _: (read(ros, stamp_ns),))
+
+
+def _fix(ros: Any, stamp_ns: int) -> drive.GnssFix:
     if ros.status.status < 0:
         raise UnusableError(NO_FIX)
     known = ros.position_covariance_type != 0
     variance = max(float(ros.position_covariance[0] + ros.position_covariance[4]) / 2.0, 0.0)
     # NavSatFix: "NaN if no altitude is available".
     alt_m = ros.altitude if ros.altitude == ros.altitude else 0.0
-    return (
-        drive.GnssFix(
-            stamp_ns=stamp_ns,
-            position=GeoPoint(ros.latitude, ros.longitude, alt_m),
-            std_m=variance**0.5 if known else None,
-        ),
-    )
+    position = GeoPoint(ros.latitude, ros.longitude, alt_m)
+    std_m = variance**0.5 if known else None
+    return drive.GnssFix(stamp_ns=stamp_ns, position=position, std_m=std_m)
 
 
-def _imu(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+def _imu(ros: Any, stamp_ns: int) -> drive.ImuSample:
     if ros.angular_velocity_covariance[0] == -1 or ros.linear_acceleration_covariance[0] == -1:
         raise UnusableError("imu without values")
     accel, rate = ros.linear_acceleration, ros.angular_velocity
-    return (
-        drive.ImuSample(
-            stamp_ns=stamp_ns,
-            accel_mps2=(accel.x, accel.y, accel.z),
-            rate_radps=(rate.x, rate.y, rate.z),
-        ),
+    return drive.ImuSample(
+        stamp_ns=stamp_ns,
+        accel_mps2=(accel.x, accel.y, accel.z),
+        rate_radps=(rate.x, rate.y, rate.z),
     )
 
 
@@ -90,25 +89,24 @@ def _pose(ros: Any, stamp_ns: int, frame: LocalFrame | None) -> Messages:
 
 
 def _speed_by(forward_mps: Callable[[Any], float]) -> Foreign:
-    def read(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
-        return (drive.SpeedSample(stamp_ns=stamp_ns, speed_mps=float(forward_mps(ros))),)
+    def read(ros: Any, stamp_ns: int) -> drive.SpeedSample:
+        return drive.SpeedSample(stamp_ns=stamp_ns, speed_mps=float(forward_mps(ros)))
 
-    return Foreign("speed", ("speed",), read)
-
-
-def _steering(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
-    angle = float(ros.steering_tire_angle)
-    return (drive.SteeringSample(stamp_ns=stamp_ns, tire_angle_rad=angle),)
+    return _sample("speed", read)
 
 
-def _control(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+def _steering(ros: Any, stamp_ns: int) -> drive.SteeringSample:
+    return drive.SteeringSample(stamp_ns=stamp_ns, tire_angle_rad=float(ros.steering_tire_angle))
+
+
+def _control(ros: Any, stamp_ns: int) -> drive.ControlCommand:
     accel, angle = float(ros.longitudinal.acceleration), float(ros.lateral.steering_tire_angle)
-    return (drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle),)
+    return drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle)
 
 
-def _ackermann(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+def _ackermann(ros: Any, stamp_ns: int) -> drive.ControlCommand:
     accel, angle = float(ros.drive.acceleration), float(ros.drive.steering_angle)
-    return (drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle),)
+    return drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle)
 
 
 def _plan(ros: Any, _stamp_ns: int, frame: LocalFrame | None) -> Messages:
@@ -132,24 +130,18 @@ def _users_by(convert: Callable[..., drive.RoadUsers]) -> Foreign:
     return Foreign("objects", ("objects",), read)
 
 
-def _status(name: str, convert: Callable[[Any, int], drive.VehicleStatus]) -> Foreign:
-    return Foreign(
-        f"status/{name}", ("status",), lambda ros, stamp_ns, _: (convert(ros, stamp_ns),)
-    )
-
-
 def _signals(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
     return status.signals_from_ros(ros, stamp_ns)
 
 
 _VELOCITY = _speed_by(lambda ros: ros.longitudinal_velocity)
-_STEERING = Foreign("steering", ("steering",), _steering)
-_CONTROL = Foreign("control", ("control",), _control)
+_STEERING = _sample("steering", _steering)
+_CONTROL = _sample("control", _control)
 _PLAN = Foreign("plan", ("plan",), _plan)
 
 FOREIGN: dict[str, Foreign] = {
-    parts.NAV_SAT_FIX: Foreign("gnss", ("gnss",), _fix),
-    parts.IMU: Foreign("imu", ("imu",), _imu),
+    parts.NAV_SAT_FIX: _sample("gnss", _fix),
+    parts.IMU: _sample("imu", _imu),
     parts.VELOCITY_REPORT: _VELOCITY,
     "autoware_auto_vehicle_msgs/msg/VelocityReport": _VELOCITY,
     parts.TWIST_STAMPED: _speed_by(lambda ros: ros.twist.linear.x),
@@ -159,12 +151,12 @@ FOREIGN: dict[str, Foreign] = {
     "autoware_auto_vehicle_msgs/msg/SteeringReport": _STEERING,
     parts.CONTROL: _CONTROL,
     "autoware_auto_control_msgs/msg/AckermannControlCommand": _CONTROL,
-    parts.ACKERMANN: Foreign("control", ("control",), _ackermann),
+    parts.ACKERMANN: _sample("control", _ackermann),
     parts.TRAJECTORY: _PLAN,
     "autoware_auto_planning_msgs/msg/Trajectory": _PLAN,
-    parts.CONTROL_MODE_REPORT: _status("mode", status.mode_from_ros),
-    parts.GEAR_REPORT: _status("gear", status.gear_from_ros),
-    parts.TURN_INDICATORS_REPORT: _status("indicator", status.indicator_from_ros),
+    parts.CONTROL_MODE_REPORT: _sample("status", status.mode_from_ros, "status/mode"),
+    parts.GEAR_REPORT: _sample("status", status.gear_from_ros, "status/gear"),
+    parts.TURN_INDICATORS_REPORT: _sample("status", status.indicator_from_ros, "status/indicator"),
     # Predicted before detected: they have identities, and lie in `map`.
     parts.PREDICTED_OBJECTS: _users_by(objects.users_from_predicted),
     parts.DETECTED_OBJECTS: _users_by(objects.users_from_detected),

@@ -33,16 +33,12 @@ def ros_from_gnss(message: drive.GnssFix, _frame: LocalFrame | None) -> Any:
     )
 
 
-def gnss_from_ros(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> tuple[drive.GnssFix]:
+def gnss_from_ros(ros: Any, stamp_ns: int) -> drive.GnssFix:
     """Return the gnss message of `ros_from_gnss`, to the last bit of its standard deviation."""
     known = ros.position_covariance_type != _UNKNOWN
-    return (
-        drive.GnssFix(
-            stamp_ns=stamp_ns,
-            position=GeoPoint(ros.latitude, ros.longitude, ros.altitude),
-            std_m=math.sqrt(max(ros.position_covariance[0], 0.0)) if known else None,
-        ),
-    )
+    position = GeoPoint(ros.latitude, ros.longitude, ros.altitude)
+    std_m = math.sqrt(max(ros.position_covariance[0], 0.0)) if known else None
+    return drive.GnssFix(stamp_ns=stamp_ns, position=position, std_m=std_m)
 
 
 def ros_from_imu(message: drive.ImuSample, _frame: LocalFrame | None) -> Any:
@@ -79,14 +75,11 @@ def ros_from_heading(message: drive.HeadingSample, _frame: LocalFrame | None) ->
     )
 
 
-def heading_from_ros(
-    ros: Any, stamp_ns: int, _frame: LocalFrame | None
-) -> tuple[drive.HeadingSample]:
+def heading_from_ros(ros: Any, stamp_ns: int) -> drive.HeadingSample:
     """Return the heading message of `ros_from_heading`."""
     measured = ros.angular_velocity_covariance[0] != _ABSENT
-    yaw_rate_radps = ros.angular_velocity.z if measured else None
-    yaw_rad = parts.yaw_of(ros.orientation)
-    return (drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw_rad, yaw_rate_radps=yaw_rate_radps),)
+    rate, yaw = ros.angular_velocity.z if measured else None, parts.yaw_of(ros.orientation)
+    return drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=yaw, yaw_rate_radps=rate)
 
 
 def ros_from_steering(message: drive.SteeringSample, _frame: LocalFrame | None) -> Any:
@@ -101,13 +94,11 @@ def ros_from_steering(message: drive.SteeringSample, _frame: LocalFrame | None) 
     )
 
 
-def steering_from_ros(
-    ros: Any, stamp_ns: int, _frame: LocalFrame | None
-) -> tuple[drive.SteeringSample]:
+def steering_from_ros(ros: Any, stamp_ns: int) -> drive.SteeringSample:
     """Return the steering message of `ros_from_steering`."""
     angles = dict(zip(ros.name, ros.position.tolist(), strict=True))
     wheel, tire = angles.get(WHEEL_JOINT), angles.get(TIRE_JOINT)
-    return (drive.SteeringSample(stamp_ns=stamp_ns, steering_wheel_rad=wheel, tire_angle_rad=tire),)
+    return drive.SteeringSample(stamp_ns=stamp_ns, steering_wheel_rad=wheel, tire_angle_rad=tire)
 
 
 def steering_report(message: drive.SteeringSample, _frame: LocalFrame | None) -> Any:

@@ -57,14 +57,23 @@ def _typed(name: str, kind: str, write: Callable[[Any, LocalFrame | None], Any])
     return _Topic(name, kind, write, FOREIGN[kind].read)
 
 
+def _exact(
+    name: str,
+    kind: str,
+    write: Callable[[Any, LocalFrame | None], Any],
+    read: Callable[[Any, int], msgspec.Struct],
+) -> _Topic:
+    return _Topic(name, kind, write, lambda ros, stamp_ns, _: (read(ros, stamp_ns),))
+
+
 _TOPICS: dict[str, tuple[_Topic, ...]] = {
     **{channel: (_json(channel, channel),) for channel in TELEMETRY_CHANNELS},
-    "gnss": (_Topic("gnss", parts.NAV_SAT_FIX, sensors.ros_from_gnss, sensors.gnss_from_ros),),
+    "gnss": (_exact("gnss", parts.NAV_SAT_FIX, sensors.ros_from_gnss, sensors.gnss_from_ros),),
     "imu": (_typed("imu", parts.IMU, sensors.ros_from_imu),),
     "speed": (_typed("speed", parts.TWIST_STAMPED, sensors.ros_from_speed),),
-    "heading": (_Topic("heading", parts.IMU, sensors.ros_from_heading, sensors.heading_from_ros),),
+    "heading": (_exact("heading", parts.IMU, sensors.ros_from_heading, sensors.heading_from_ros),),
     "steering": (
-        _Topic("steering", parts.JOINT_STATE, sensors.ros_from_steering, sensors.steering_from_ros),
+        _exact("steering", parts.JOINT_STATE, sensors.ros_from_steering, sensors.steering_from_ros),
         _Topic("steering_report", parts.STEERING_REPORT, sensors.steering_report),
     ),
     "control": (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,24 +23,16 @@ from foretwin.telemetry.standin.driver import PlanPoint
 from foretwin.telemetry.standin.parameters import CarParameters, SensorParameters
 from foretwin.telemetry.standin.path import DrivenPath
 
-
-class Period(NamedTuple):
-    """A channel and its period in milliseconds."""
-
-    channel: str
-    period_ms: int
-
-
-SCHEDULE = (
-    Period("imu", 10),
-    Period("speed", 20),
-    Period("steering", 20),
-    Period("control", 20),
-    Period("status", 100),
-    Period("plan", 100),
-    Period("gnss", 100),
-)
-"""In the order of publishing at one stamp."""
+PERIOD_MS = {
+    "imu": 10,
+    "speed": 20,
+    "steering": 20,
+    "control": 20,
+    "status": 100,
+    "plan": 100,
+    "gnss": 100,
+}
+"""By channel, in the order of publishing at one stamp."""
 
 
 class Sensors:
@@ -60,14 +51,12 @@ class Sensors:
         """Return the antenna's position with noise."""
         forward, left, up = self._parameters.body_from_antenna_m
         cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-        xy = np.array(
-            [
-                motion.x_m + cos * forward - sin * left,
-                motion.y_m + sin * forward + cos * left,
-            ]
-        )
+        x_m = motion.x_m + cos * forward - sin * left
+        y_m = motion.y_m + sin * forward + cos * left
         std = self._parameters.gnss_std_m
-        lat, lon = geo_from_local(self._frame, xy + self._gnss.normal(0.0, std, 2))
+        lat, lon = geo_from_local(
+            self._frame, np.array([x_m, y_m]) + self._gnss.normal(0.0, std, 2)
+        )
         height = up
         if motion.altitude_m:
             # Receivers know their height about half as well as their place.

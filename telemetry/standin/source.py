@@ -5,23 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import msgspec
-import numpy as np
-
-from foretwin.contracts.drive import ControlCommand, VehicleInfo, VehicleState
+from foretwin.contracts.drive import ControlCommand, VehicleInfo
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
 from foretwin.telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
 from foretwin.telemetry.standin.driver import Driver, DriverCommand
 from foretwin.telemetry.standin.parameters import StandinParameters
 from foretwin.telemetry.standin.path import DrivenPath
-from foretwin.telemetry.standin.sensors import SCHEDULE, Sensors, planned_trajectory, status
+from foretwin.telemetry.standin.sensors import PERIOD_MS, Sensors, planned_trajectory, status
 
 START_STAMP_NS = 1_767_225_600_000_000_000
 """2026-01-01T00:00:00Z: every stand-in drive begins then, so that its stamps repeat."""
 _TICK_NS = round(STEP_S * 1e9)
 _CONTROL_TICKS = round(0.020 / STEP_S)
-_TRUTH_TICKS = round(0.010 / STEP_S)
 
 
 class StandinSource:
@@ -58,7 +53,6 @@ class StandinSource:
         self._command = DriverCommand(0.0, 0.0)
         self._tick = 0
         self._last_tick = None if end_s is None else round(end_s / STEP_S)
-        self._truth: list[CarMotion] = []
         self.first_stamp_ns = START_STAMP_NS
         self.ended = False
         self.skipped_invalid = 0
@@ -70,13 +64,8 @@ class StandinSource:
             source="stand-in car: CommonRoad multi-body model, BMW 320i",
             reference_point="GNSS antenna",
             body_from_antenna_m=parameters.sensors.body_from_antenna_m,
-            sends=tuple(row.channel for row in SCHEDULE),
+            sends=tuple(PERIOD_MS),
         )
-
-    @property
-    def wheelbase_m(self) -> float:
-        """The true wheelbase."""
-        return self._car.wheelbase_m
 
     def advance(self, until_stamp_ns: int) -> Iterator[tuple[str, Any]]:
         """Simulate up to and including the stamp; yield every sample once, in stamp order."""
@@ -90,13 +79,11 @@ class StandinSource:
                 )
             if self._tick % _CONTROL_TICKS == 0:
                 self._command = self._driver.command(motion)
-            if self._tick % _TRUTH_TICKS == 0:
-                self._truth.append(motion)
             # Time goes on before samples leave: a caller may stop between two of them.
             due = [
-                row.channel
-                for row in SCHEDULE
-                if self._tick * _TICK_NS % (row.period_ms * 1_000_000) == 0
+                channel
+                for channel, period_ms in PERIOD_MS.items()
+                if self._tick * _TICK_NS % (period_ms * 1_000_000) == 0
             ]
             samples = [(channel, self._sample(channel, stamp_ns, motion)) for channel in due]
             self._car.step(
@@ -128,38 +115,3 @@ class StandinSource:
                 return status(stamp_ns)
             case _:
                 return getattr(self._sensors, channel)(stamp_ns, motion)
-
-    def change_tyres(self, *, softness_rad_per_mps2: float = 0.0, stiffness: float = 1.0) -> None:
-        """Drive on with softer front tyres, or with another stiffness of all four."""
-        self._car.become(
-            msgspec.structs.replace(
-                self._parameters.car,
-                steering_compliance_rad_per_mps2=softness_rad_per_mps2,
-                tyre_stiffness=stiffness,
-            )
-        )
-
-    def truth(self, stamp_ns: int) -> VehicleState:
-        """Return the true state of base_link, without noise or lag; linear between 10 ms instants.
-
-        Raises ValueError outside of what has been simulated.
-        """
-        at = (stamp_ns - START_STAMP_NS) / (_TRUTH_TICKS * _TICK_NS)
-        index = int(at)
-        if not 0 <= at <= len(self._truth) - 1:
-            raise ValueError(f"no truth at stamp {stamp_ns}: not simulated")
-        before = np.array(self._truth[index])
-        after = np.array(self._truth[min(index + 1, len(self._truth) - 1)])
-        motion = CarMotion(*(before + (at - index) * (after - before)).tolist())
-        xy = np.array([motion.x_m, motion.y_m])
-        lat, lon = geo_from_local(self._path.frame, xy)
-        return VehicleState(
-            vehicle_id=self.info.vehicle_id,
-            stamp_ns=stamp_ns,
-            position=GeoPoint(float(lat), float(lon)),
-            yaw_rad=float(geo_from_local_yaw(self._path.frame, motion.yaw_rad, xy)),
-            speed_mps=motion.vx_mps,
-            yaw_rate_radps=motion.yaw_rate_radps,
-            accel_mps2=motion.accel_x_mps2,
-            tire_angle_rad=motion.tire_angle_rad,
-        )

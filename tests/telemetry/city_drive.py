@@ -14,7 +14,8 @@ from foretwin.contracts.drive import GnssFix, VehicleState
 from foretwin.contracts.frames import GeoPoint, geo_from_local, local_from_geo, local_from_geo_yaw
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath
-from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.telemetry.standin.source import START_STAMP_NS
+from tests.telemetry.known_standin import KnownStandin
 from tests.telemetry.standin_drive import FRAME, Drive
 
 Sample = tuple[str, Any]
@@ -64,7 +65,7 @@ def city_drive(
     way_m = np.arange(len(points))
     heights = hill_m * (1.0 - np.cos(2.0 * math.pi * way_m / 150.0)) / 2.0 if hill_m else None
     path = DrivenPath(geo[:, 0], geo[:, 1], wish, driver=parameters.driver, altitude_m=heights)
-    source = StandinSource(path, parameters, vehicle_id="standin", seed=seed)
+    source = KnownStandin(path, parameters, vehicle_id="standin", seed=seed)
     return Drive(source, list(source.advance(START_STAMP_NS + 200_000_000_000)))
 
 

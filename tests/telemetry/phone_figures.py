@@ -22,8 +22,9 @@ from foretwin.telemetry.estimator.motion_noise import GNSS_CORRELATION_S, SPEED_
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath
-from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.telemetry.city_drive import antenna_xy, phone_positions, xy_of
+from tests.telemetry.known_standin import KnownStandin
 from tests.telemetry.standin_drive import FRAME, Drive
 from tests.telemetry.town_map import Leg, MapSeer, seer
 
@@ -93,7 +94,7 @@ def town_drive(seed: int, duration_s: float = DURATION_S) -> Drive:
     geo = geo_from_local(FRAME, streets.xy_m)
     parameters = read_parameters()
     path = DrivenPath(geo[:, 0], geo[:, 1], streets.wish_mps, driver=parameters.driver)
-    source = StandinSource(path, parameters, vehicle_id="standin", seed=seed)
+    source = KnownStandin(path, parameters, vehicle_id="standin", seed=seed)
     samples = source.advance(START_STAMP_NS + round(duration_s * 1e9))
     heard = ("gnss", "imu", "speed", "steering")
     return Drive(source, [sample for sample in samples if sample[0] in heard])

@@ -12,7 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath
-from foretwin.telemetry.standin.source import StandinSource
+from tests.telemetry.known_standin import KnownStandin
 
 FRAME = LocalFrame(GeoPoint(52.51, 13.39))
 STOP_AT_M = 75.0
@@ -52,17 +52,17 @@ def wished_path(*, speed_mps: float = 9.0, stop: bool = True) -> Wish:
     return Wish(geo[:, 0], geo[:, 1], speed)
 
 
-def new_source(*, seed: int = 1, **options: Any) -> StandinSource:
+def new_source(*, seed: int = 1, **options: Any) -> KnownStandin:
     """Return a car at the beginning of the path."""
     parameters = read_parameters()
     path = DrivenPath(*wished_path(), driver=parameters.driver)
-    return StandinSource(path, parameters, vehicle_id="standin", seed=seed, **options)
+    return KnownStandin(path, parameters, vehicle_id="standin", seed=seed, **options)
 
 
 class Drive(NamedTuple):
     """A car that has arrived, and everything that it sent."""
 
-    source: StandinSource
+    source: KnownStandin
     samples: list[tuple[str, Any]]
 
 

@@ -19,7 +19,7 @@ from foretwin.sim_worker.analysis.identify.tuner import Tuner
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
 from foretwin.sim_worker.vehicle.parameters import load_vehicle, understeer_gradient
 from foretwin.telemetry.standin.parameters import read_parameters
-from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
+from foretwin.telemetry.standin.source import START_STAMP_NS
 from tests.sim_worker.analysis.identify.coverage import own_gradient, random_path
 from tests.sim_worker.standin_drives import (
     city_minute,
@@ -29,6 +29,7 @@ from tests.sim_worker.standin_drives import (
     straight_minute,
 )
 from tests.telemetry.city_drive import city_drive
+from tests.telemetry.known_standin import KnownStandin
 
 CAR = read_parameters().car
 Sample = tuple[str, Any]
@@ -164,7 +165,7 @@ def test_tyres_changed_in_mid_drive_are_noticed_and_identified_anew(seed: int) -
     random = np.random.default_rng(1000 + seed)
     parameters = read_parameters()
     path = random_path(random, parameters, length_m=1500.0)
-    source = StandinSource(path, parameters, vehicle_id="standin", seed=seed, end_s=end_s)
+    source = KnownStandin(path, parameters, vehicle_id="standin", seed=seed, end_s=end_s)
     change_ns = START_STAMP_NS + round(change_s * 1e9)
     samples = list(source.advance(change_ns))
     source.change_tyres(softness_rad_per_mps2=softer)
@@ -185,7 +186,7 @@ def test_tyres_changed_in_mid_drive_are_noticed_and_identified_anew(seed: int) -
 def test_tyres_softer_on_both_axles_in_mid_drive_are_noticed(seed: int) -> None:
     parameters = read_parameters()
     path = random_path(np.random.default_rng(1000 + seed), parameters, length_m=1500.0)
-    source = StandinSource(path, parameters, vehicle_id="standin", seed=seed, end_s=110.0)
+    source = KnownStandin(path, parameters, vehicle_id="standin", seed=seed, end_s=110.0)
     change_ns = START_STAMP_NS + 70_000_000_000
     samples = list(source.advance(change_ns))
     source.change_tyres(stiffness=0.7)
