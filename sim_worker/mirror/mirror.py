@@ -13,7 +13,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.sim_worker.mirror.casting import Casting, FreeTwin
 from foretwin.sim_worker.mirror.member import STEP_NS, CastMember
-from foretwin.sim_worker.mirror.mirror_world import GHOST, SHADOW, MirrorWorld
+from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.mirror.samples import plane_state
 from foretwin.sim_worker.vehicle.commands import (
     STEP_BACK_NS,
@@ -50,7 +50,7 @@ class Mirror:
         vehicle_id: str = "ego",
         cast: MirrorCast = _ALONE,
     ) -> None:
-        self._vehicle = vehicle
+        self._vehicle_id, self._vehicle = vehicle_id, vehicle
         self._drive_frame = drive_frame
         self._window_ns = round(window_s * 1e9)
         self._period_ns = 1e9 / rate_hz
@@ -60,7 +60,7 @@ class Mirror:
         self._pending_vehicles: list[tuple[int, VehicleParameters]] = []
         self._world_id: str | None = None
         self._frame = drive_frame
-        self._scene = self._build(None)
+        self._build(None)
         self._casting = Casting(
             CastMember(vehicle_id, vehicle, commands_recorded),
             cast,
@@ -76,12 +76,12 @@ class Mirror:
         self._first_stamp_ns: int | None = None
         self._last_index = -1
 
-    def _build(self, world: World | None) -> MirrorWorld:
-        return MirrorWorld(
-            world,
-            self._vehicle,
-            steering_delay_s=None if self._recorded else 0.0,
-        )
+    def _build(self, world: World | None) -> None:
+        name = self._vehicle_id
+        commanded = frozenset({name} if self._recorded else ())
+        self._world = RoleWorld(world, {name: self._vehicle}, commanded=commanded)
+        self._world.set_role(name, "all")
+        self._twin = self._world.twins[name]
 
     def set_world(self, world: World | None, *, from_stamp_ns: int = 0) -> None:
         """Use `world`, or open ground, from the first state at or after `from_stamp_ns` on."""
@@ -130,9 +130,8 @@ class Mirror:
         else:
             self._advance(measured, state.stamp_ns)
         self._measured, self._measured_stamp_ns = measured, state.stamp_ns
-        self._scene.place(SHADOW, measured[:3])
-        self._scene.place(GHOST, measured[:3])
-        if not self._sound():
+        self._world.place(self._vehicle_id, measured[:3])
+        if not np.isfinite(self._twin.state).all():
             self._seed(measured, state.stamp_ns)
         self._casting.advance(state.stamp_ns)
         sample = self._sample(state, measured) if self._due(state.stamp_ns) else None
@@ -147,7 +146,7 @@ class Mirror:
         self._pending_vehicles = [one for one in self._pending_vehicles if one[0] > stamp_ns]
         self._vehicle = due[-1]
         self._commands.use_vehicle(self._vehicle)
-        self._scene.use_vehicle(self._vehicle)
+        self._world.use_vehicle(self._vehicle_id, self._vehicle)
         self._casting.use_vehicle(self._vehicle)
 
     def _change_world(self, stamp_ns: int) -> None:
@@ -161,18 +160,17 @@ class Mirror:
             return
         self._world_id = world_id
         self._frame = self._drive_frame if world is None else world.frame
-        self._scene = self._build(world)
+        self._build(world)
         self._casting.change_world(world, self._frame)
         self._measured = None
 
     def _seed(self, measured: Array, stamp_ns: int) -> None:
-        scene = self._scene
         history = self._commands.angles_before(
-            stamp_ns, count=scene.history_samples, step_ns=STEP_NS
+            stamp_ns, count=self._twin.history_samples, step_ns=STEP_NS
         )
-        scene.place(SHADOW, measured[:3])
-        scene.place(GHOST, measured[:3])
-        scene.seed_twin(measured, steering_history_rad=history)
+        self._world.place(self._vehicle_id, measured[:3])
+        self._world.reset()
+        self._twin.seed(measured, steering_history_rad=history)
         self._seed_stamp_ns, self._steps = stamp_ns, 0
         self._seed_map_shift_m = self._map_shift_m
         self._casting.start_anew(stamp_ns)
@@ -198,9 +196,10 @@ class Mirror:
             command = self._command(now_ns, guess)
             share = (now_ns + STEP_NS - start_ns) / (stamp_ns - start_ns)
             pose = before[:3] + min(max(share, 0.0), 1.0) * moved
-            self._scene.place(SHADOW, pose)
-            self._scene.place(GHOST, pose)
-            self._scene.step(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
+            self._world.place(self._vehicle_id, pose)
+            self._twin.command(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
+            self._world.step()
+            self._twin.read()
             self._steps += 1
         self._commands.forget_before(stamp_ns)
 
@@ -215,10 +214,7 @@ class Mirror:
         if self._measured is None:
             return None
         stamp_ns = self._seed_stamp_ns + self._steps * STEP_NS
-        return FreeTwin(self._scene.twin_state, stamp_ns)
-
-    def _sound(self) -> bool:
-        return bool(np.isfinite(self._scene.twin_state).all())
+        return FreeTwin(self._twin.state, stamp_ns)
 
     def _due(self, stamp_ns: int) -> bool:
         if self._first_stamp_ns is None:
@@ -230,8 +226,7 @@ class Mirror:
 
     def _sample(self, state: VehicleState, measured: Array) -> MirrorSample:
         twin = self._twin_at(state.stamp_ns)
-        shadow = self._scene.measured_pose(SHADOW)
-        ghost = self._scene.measured_pose(GHOST)
+        box = self._in_drive_frame(self._world.box_pose(self._vehicle_id), measured[3])
         # What a map has moved the position by since is no motion that the twin lacks.
         shift = self._map_shift_m - self._seed_map_shift_m
         dx, dy = twin[:2] - measured[:2] + shift
@@ -241,8 +236,8 @@ class Mirror:
             world_id=self._world_id,
             real=self._in_drive_frame(measured[:3], measured[3]),
             twin=self._in_drive_frame(twin[:3], twin[3]),
-            shadow=self._in_drive_frame(shadow, measured[3]),
-            ghost=self._in_drive_frame(ghost, measured[3]),
+            shadow=box,
+            ghost=box,
             gap_m=float(np.hypot(dx, dy)),
             gap_along_m=float(cos * dx + sin * dy),
             gap_across_m=float(cos * dy - sin * dx),
@@ -256,7 +251,7 @@ class Mirror:
 
     def _twin_at(self, stamp_ns: int) -> Array:
         """Return the twin's state (8,), carried on by the part of a step that is left."""
-        twin = self._scene.twin_state
+        twin = self._twin.state
         left_s = (stamp_ns - self._seed_stamp_ns) / 1e9 - self._steps * TIMESTEP_S
         cos, sin = np.cos(twin[2]), np.sin(twin[2])
         twin[0] += left_s * (cos * twin[3] - sin * twin[4])

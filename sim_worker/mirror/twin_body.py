@@ -8,7 +8,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.vehicle.actuation import Actuation, actuator_ids
-from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S, check_steering_delay
+from foretwin.sim_worker.vehicle.planar import JOINTS, TIMESTEP_S
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
 _REFRESH_STEPS = 2
@@ -28,15 +28,10 @@ class TwinBody:
         vehicle: VehicleParameters,
         *,
         prefix: str,
-        steering_delay_s: float | None = None,
     ) -> None:
-        """`steering_delay_s` replaces the vehicle's."""
         self._model, self._data, self._vehicle = model, data, vehicle
-        self._actuators = ids = actuator_ids(model, prefix)
-        if steering_delay_s is not None:
-            check_steering_delay(steering_delay_s)
-            model.actuator_delay[ids.steer] = steering_delay_s
-        self._steer = ids.steer
+        self._actuators = actuator_ids(model, prefix)
+        self._steer = self._actuators.steer
         self._joints = np.array([model.joint(prefix + name).qposadr[0] for name in JOINTS])
         self._dofs = np.array([model.joint(prefix + name).dofadr[0] for name in JOINTS])
         self._state = np.zeros((1, 8))
@@ -44,16 +39,10 @@ class TwinBody:
         self._steps = 0
         self._actuation = self._fresh_actuation()
 
-    def use_vehicle(
-        self, vehicle: VehicleParameters, *, steering_delay_s: float | None = None
-    ) -> None:
+    def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Go on from here with other parameters, which the model has already."""
         self._vehicle = vehicle
-        if steering_delay_s is not None:
-            self._model.actuator_delay[self._steer] = steering_delay_s
-        wheels = self._data.qvel[self._dofs[3]]
-        self._write()
-        self._data.qvel[self._dofs[3]] = wheels
+        self._move()
         self._actuation = self._fresh_actuation()
 
     def _fresh_actuation(self) -> Actuation:
@@ -130,6 +119,10 @@ class TwinBody:
         state[1] += sin * moved[0] + cos * moved[1]
         state[2] += moved[2]
         state[3] += faster_mps
+        self._move()
+
+    def _move(self) -> None:
+        """Write the state, the steered wheels turning on as they did."""
         wheels = self._data.qvel[self._dofs[3]]
         self._write()
         self._data.qvel[self._dofs[3]] = wheels
