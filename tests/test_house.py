@@ -9,10 +9,7 @@ import pytest
 
 from tests.test_layout import ROOT, tracked_files
 
-TWICE = frozenset({
-    "Cast", "Casting", "Course", "Follower", "Impact", "Measured", "Meeting", "Motion", "Pairs",
-    "Place", "Scene", "SteeringSignals",
-})  # fmt: skip
+TWICE = frozenset({"Impact", "Place"})
 """Names of two classes still, all in sim_worker; only to become fewer."""
 
 

@@ -7,8 +7,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.geometry import compiled
 from foretwin.sim_worker.metrics.displacement import known, nowhere
-from foretwin.sim_worker.metrics.rollout import Measure
-from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 
 def cheapest_walks(curves: Array, reference: Array) -> Array:
@@ -26,20 +25,20 @@ def cheapest_walks(curves: Array, reference: Array) -> Array:
     return found
 
 
-def frechet(scene: Scene) -> Measure:
+def frechet(view: RolloutView) -> Measure:
     """Discrete Fréchet distance (S,) from the reference's course."""
-    found = scene.keep(_from_reference)
-    return scene.measure(found[0]) if found is not None else nowhere(scene)
+    found = view.keep(_from_reference)
+    return view.measure(found[0]) if found is not None else nowhere(view)
 
 
-def dtw(scene: Scene) -> Measure:
+def dtw(view: RolloutView) -> Measure:
     """Time warping distance (S,) from the reference's course, a sum over pairs of points."""
-    found = scene.keep(_from_reference)
-    return scene.measure(found[1]) if found is not None else nowhere(scene)
+    found = view.keep(_from_reference)
+    return view.measure(found[1]) if found is not None else nowhere(view)
 
 
-def _from_reference(scene: Scene) -> Array | None:
-    predicted, reference = known(scene)
+def _from_reference(view: RolloutView) -> Array | None:
+    predicted, reference = known(view)
     if not len(reference):
         return None
     return cheapest_walks(predicted[..., :2], reference[:, :2])

@@ -18,8 +18,7 @@ from foretwin.sim_worker.metrics import (
     time_to_collision,
     violations,
 )
-from foretwin.sim_worker.metrics.rollout import Measure, Rollout
-from foretwin.sim_worker.metrics.scene import Context, Scene
+from foretwin.sim_worker.metrics.rollout import Context, Measure, Rollout, RolloutView
 
 Need = Literal["path", "ground", "rules", "reference", "user_mass_kg"]
 """Fields of `Context` without which a metric cannot be computed."""
@@ -30,7 +29,7 @@ class Metric(NamedTuple):
     """One row: how it is computed, its unit ("1" for counts, shares and verdicts), which direction
     is better, what it needs, and whether it has a value for each instant (S, N)."""
 
-    compute: Callable[[Scene], Measure]
+    compute: Callable[[RolloutView], Measure]
     unit: str
     better: Better
     needs: tuple[Need, ...] = ()
@@ -119,8 +118,8 @@ def evaluate(
     for name in chosen:
         if missing := _missing(name, given):
             raise ValueError(f"metric {name} needs {', '.join(missing)}, which is not given")
-    scene = Scene(rollout, given)
-    return {name: METRICS[name].compute(scene) for name in chosen}
+    view = RolloutView(rollout, given)
+    return {name: METRICS[name].compute(view) for name in chosen}
 
 
 def _missing(name: str, context: Context) -> tuple[Need, ...]:

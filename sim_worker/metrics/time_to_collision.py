@@ -8,14 +8,13 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.metrics import compiled_pairs
-from foretwin.sim_worker.metrics.rollout import Measure
-from foretwin.sim_worker.metrics.scene import Scene
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 EXPOSED_BELOW_S = 1.5
 """Threshold τ* of the exposed and integrated times: Minderhoud and Bovy (2001), section 5."""
 
 
-class Meeting(NamedTuple):
+class TouchInterval(NamedTuple):
     """When two moving boxes touch (…): first at `from_s`, last at `until_s`; no touch where later
     than that. Either may be negative, which is in the past."""
 
@@ -23,7 +22,7 @@ class Meeting(NamedTuple):
     until_s: Array
 
 
-class Pairs(NamedTuple):
+class BoxPairs(NamedTuple):
     """Two boxes each, in the axes of the first: the second's centre, velocity and turn (…).
 
     Half lengths and half widths broadcast against them.
@@ -39,7 +38,7 @@ class Pairs(NamedTuple):
     second_half_m: tuple[Array, Array]
 
 
-def meeting(pairs: Pairs) -> Meeting:
+def meeting(pairs: BoxPairs) -> TouchInterval:
     """Return when boxes that only translate touch each other.
 
     Separating axes of moving convex shapes: Eberly (2001), Intersection of Convex Objects: The
@@ -62,7 +61,7 @@ def meeting(pairs: Pairs) -> Meeting:
         pairs.cos * y - pairs.sin * x, pairs.cos * vy - pairs.sin * vx,
         sin * length + cos * width + other_width,
     )  # fmt: skip
-    return Meeting(first, last)
+    return TouchInterval(first, last)
 
 
 def _interval(distance: Array, speed: Array, reach: Array) -> tuple[Array, Array]:
@@ -82,43 +81,43 @@ def _narrow(first: Array, last: Array, distance: Array, speed: Array, reach: Arr
     np.minimum(last, end, out=last)
 
 
-def ttc_series(scene: Scene) -> Measure:
+def ttc_series(view: RolloutView) -> Measure:
     """Least time to collision with anybody at each instant (S, N), infinite where with nobody."""
-    return scene.measure(scene.keep(_least_at_each_instant))
+    return view.measure(view.keep(_least_at_each_instant))
 
 
-def ttc(scene: Scene) -> Measure:
+def ttc(view: RolloutView) -> Measure:
     """Least time to collision of each future (S,)."""
-    return scene.measure(scene.keep(_least_at_each_instant).min(axis=1))
+    return view.measure(view.keep(_least_at_each_instant).min(axis=1))
 
 
-def time_exposed(scene: Scene) -> Measure:
+def time_exposed(view: RolloutView) -> Measure:
     """Seconds (S,) with a time to collision below 1.5 s.
 
     TET of Minderhoud and Bovy (2001), Extended time-to-collision measures, equation 3.
     """
-    below = scene.keep(_least_at_each_instant)[:, :-1] <= EXPOSED_BELOW_S
-    return scene.measure((below * np.diff(scene.time_s)).sum(axis=1))
+    below = view.keep(_least_at_each_instant)[:, :-1] <= EXPOSED_BELOW_S
+    return view.measure((below * np.diff(view.time_s)).sum(axis=1))
 
 
-def time_integrated(scene: Scene) -> Measure:
+def time_integrated(view: RolloutView) -> Measure:
     """By how much and how long (S,), in s², time to collision is below 1.5 s.
 
     TIT of Minderhoud and Bovy (2001), Extended time-to-collision measures, equation 6.
     """
-    short = np.maximum(EXPOSED_BELOW_S - scene.keep(_least_at_each_instant)[:, :-1], 0.0)
-    return scene.measure((short * np.diff(scene.time_s)).sum(axis=1))
+    short = np.maximum(EXPOSED_BELOW_S - view.keep(_least_at_each_instant)[:, :-1], 0.0)
+    return view.measure((short * np.diff(view.time_s)).sum(axis=1))
 
 
-def _least_at_each_instant(scene: Scene) -> Array:
+def _least_at_each_instant(view: RolloutView) -> Array:
     """Return (S, N) seconds until any road user is touched, infinite where none ever is.
 
     Hayward (1972), Near-miss determination through use of a scale of danger, with the shapes of
     the road users instead of a common lane: both keep their velocity and heading.
     """
-    seen = scene.relative
+    seen = view.relative
     least = np.full(seen.ahead_m.shape[:2], np.inf)
     compiled_pairs.least_until_touch(
-        seen[:6], *scene.user_half_m, scene.half_length_m, scene.half_width_m, least
+        seen[:6], *view.user_half_m, view.half_length_m, view.half_width_m, least
     )
     return least

@@ -12,7 +12,7 @@ from foretwin.contracts.frames import LocalFrame, wrap_angle
 from foretwin.contracts.roles import FollowLimits, Role
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.mirror.follower import plane_follower
-from foretwin.sim_worker.mirror.track import Measured, Track
+from foretwin.sim_worker.mirror.track import MeasuredPose, Track
 from foretwin.sim_worker.mirror.twin_body import TwinBody
 from foretwin.sim_worker.vehicle.commands import CommandMemory
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
@@ -24,7 +24,7 @@ _ROLLS_MPS = 0.5
 """Below it a brake that holds would eat what is passed over."""
 
 
-class CastMember(NamedTuple):
+class GroupMember(NamedTuple):
     """A vehicle and its parameters; `commanded` where its own commands are known."""
 
     vehicle_id: str
@@ -35,17 +35,17 @@ class CastMember(NamedTuple):
 class Member:
     """Twin and box of one vehicle; a role says which of them others see and meet.
 
-    Whoever is no longer moved by physics keeps pose and speed, and drifts to where it is measured
-    under the limits of correction; whoever begins to be starts with the pose and speed it had.
+    A vehicle no longer moved by physics keeps pose and speed, and drifts to where it is measured
+    under the limits of correction; one that begins to be starts with the pose and speed it had.
     """
 
     def __init__(
-        self, who: CastMember, body: TwinBody, frame: LocalFrame, limits: FollowLimits
+        self, spec: GroupMember, body: TwinBody, frame: LocalFrame, limits: FollowLimits
     ) -> None:
-        self.who = who
+        self.spec = spec
         self.body = body
-        self.track = Track(who.vehicle, frame)
-        self.commands = CommandMemory(who.vehicle, keep_s=MAX_STEERING_DELAY_S + 1.0)
+        self.track = Track(spec.vehicle, frame)
+        self.commands = CommandMemory(spec.vehicle, keep_s=MAX_STEERING_DELAY_S + 1.0)
         self.role: Role = "ghost"
         self.present = False
         self.touching = False
@@ -68,7 +68,7 @@ class Member:
 
     def take_command(self, command: ControlCommand) -> None:
         """Take a command of the vehicle; ignored where none are expected."""
-        if self.who.commanded:
+        if self.spec.commanded:
             self.commands.add(command)
 
     def start_anew(self, stamp_ns: int) -> None:
@@ -107,7 +107,7 @@ class Member:
         self.drawn.velocity = np.array([0.0, across - state[4], box.rate[2] - state[5]])
         self.put(state, stamp_ns)
 
-    def _leave_twin(self, twin: Measured, measured: Measured) -> None:
+    def _leave_twin(self, twin: MeasuredPose, measured: MeasuredPose) -> None:
         yaw = measured.pose[2]
         self.offset[:2] = _into(yaw, twin.pose[:2] - measured.pose[:2])
         self.offset[2] = wrap_angle(twin.pose[2] - yaw)
@@ -124,15 +124,15 @@ class Member:
         )
         self.body.seed(state, steering_history_rad=history)
 
-    def twin(self) -> Measured:
+    def twin(self) -> MeasuredPose:
         """Return the twin's pose and how it changes, correction included."""
         state = self.body.state
         velocity = state[3:6] + self.drawn.velocity
         rate = np.empty(3)
         rate[:2], rate[2] = _out_of(state[2], velocity[:2]), velocity[2]
-        return Measured(state[:3], rate)
+        return MeasuredPose(state[:3], rate)
 
-    def box(self, measured: Measured) -> Measured:
+    def box(self, measured: MeasuredPose) -> MeasuredPose:
         """Return the box's pose and how it changes, where the vehicle is `measured`."""
         yaw, turning = measured.pose[2], measured.rate[2]
         aside = _out_of(yaw, self.offset[:2])
@@ -140,7 +140,7 @@ class Member:
         pose[:2] = measured.pose[:2] + aside
         rate[:2] = measured.rate[:2] + _out_of(yaw, self.settling.velocity[:2])
         rate[:2] += turning * np.array([-aside[1], aside[0]])
-        return Measured(pose, rate)
+        return MeasuredPose(pose, rate)
 
     def settle(self) -> None:
         """Let the box drift on towards where it is measured, for one step."""
@@ -150,12 +150,12 @@ class Member:
         if np.abs([self.offset, self.settling.velocity, self.settling.acceleration]).max() < 1e-4:
             self.stand_as_measured()
 
-    def tell_twin(self, stamp_ns: int) -> None:
+    def command_twin(self, stamp_ns: int) -> None:
         """Command the twin for the step from `stamp_ns` on: as its vehicle was, or as it moved."""
         command = self.commands.at(stamp_ns) or self.track.command()
         self.body.command(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
 
-    def draw(self, measured: Measured, stamp_ns: int, *, follow: bool) -> None:
+    def draw(self, measured: MeasuredPose, stamp_ns: int, *, follow: bool) -> None:
         """Correct the twin after a step: towards `measured`, or less and less.
 
         In contact with something it is left to physics. Too far away it starts anew.

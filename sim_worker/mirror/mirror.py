@@ -11,8 +11,8 @@ from foretwin.contracts.roles import MirrorCast, OtherVehicle, UseRoles
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
-from foretwin.sim_worker.mirror.casting import Casting, FreeTwin
-from foretwin.sim_worker.mirror.member import STEP_NS, CastMember
+from foretwin.sim_worker.mirror.member import STEP_NS, GroupMember
+from foretwin.sim_worker.mirror.role_manager import FreeTwin, RoleManager
 from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.mirror.samples import plane_state
 from foretwin.sim_worker.vehicle.commands import (
@@ -34,9 +34,9 @@ class Mirror:
 
     The free twin starts from the measured state, runs on commands alone, and starts anew after each
     `window_s`, in each new World and where its physics diverged; it never teleports otherwise. All
-    gaps are its own. Roles, corrections and other vehicles need a `Cast` beside it, which is there
-    only as long as something asks for it. States must come in time order; a command counts from its
-    stamp on and should come before the first state after it.
+    gaps are its own. Roles, corrections and other vehicles need a `VehicleGroup` beside it, which
+    is there only as long as something asks for it. States must come in time order; a command counts
+    from its stamp on and should come before the first state after it.
     """
 
     def __init__(
@@ -61,8 +61,8 @@ class Mirror:
         self._world_id: str | None = None
         self._frame = drive_frame
         self._build(None)
-        self._casting = Casting(
-            CastMember(vehicle_id, vehicle, commands_recorded),
+        self._role_manager = RoleManager(
+            GroupMember(vehicle_id, vehicle, commands_recorded),
             cast,
             drive_frame=drive_frame,
             commands=self._commands,
@@ -98,11 +98,11 @@ class Mirror:
 
     def set_roles(self, use: UseRoles) -> None:
         """Let roles and correction count from the first state at or after their stamp on."""
-        self._casting.set_roles(use)
+        self._role_manager.set_roles(use)
 
     def handle_other(self, other: OtherVehicle) -> None:
-        """Take where another vehicle was measured, and what it was told."""
-        self._casting.take_other(other)
+        """Take where another vehicle was measured, and what was commanded."""
+        self._role_manager.take_other(other)
 
     def handle_state(self, state: VehicleState) -> MirrorSample | None:
         """Step the twin up to the state; returns a sample where one is due.
@@ -124,7 +124,7 @@ class Mirror:
         measured = local_state(state, self._frame, self._vehicle)
         self._map_shift_m = np.array(state.map_shift_m or (0.0, 0.0))
         gap_ns = state.stamp_ns - self._measured_stamp_ns
-        self._casting.before(state, self._free_twin)
+        self._role_manager.before(state, self._free_twin)
         if self._measured is None or gap_ns > self._window_ns:
             self._seed(measured, state.stamp_ns)
         else:
@@ -133,7 +133,7 @@ class Mirror:
         self._world.place(self._vehicle_id, measured[:3])
         if not np.isfinite(self._twin.state).all():
             self._seed(measured, state.stamp_ns)
-        self._casting.advance(state.stamp_ns)
+        self._role_manager.advance(state.stamp_ns)
         sample = self._sample(state, measured) if self._due(state.stamp_ns) else None
         if state.stamp_ns - self._seed_stamp_ns >= self._window_ns:
             self._seed(measured, state.stamp_ns)
@@ -147,7 +147,7 @@ class Mirror:
         self._vehicle = due[-1]
         self._commands.use_vehicle(self._vehicle)
         self._world.use_vehicle(self._vehicle_id, self._vehicle)
-        self._casting.use_vehicle(self._vehicle)
+        self._role_manager.use_vehicle(self._vehicle)
 
     def _change_world(self, stamp_ns: int) -> None:
         due = [world for stamp, world in self._pending if stamp <= stamp_ns]
@@ -161,7 +161,7 @@ class Mirror:
         self._world_id = world_id
         self._frame = self._drive_frame if world is None else world.frame
         self._build(world)
-        self._casting.change_world(world, self._frame)
+        self._role_manager.change_world(world, self._frame)
         self._measured = None
 
     def _seed(self, measured: Array, stamp_ns: int) -> None:
@@ -173,7 +173,7 @@ class Mirror:
         self._twin.seed(measured, steering_history_rad=history)
         self._seed_stamp_ns, self._steps = stamp_ns, 0
         self._seed_map_shift_m = self._map_shift_m
-        self._casting.start_anew(stamp_ns)
+        self._role_manager.start_anew(stamp_ns)
         self._independent = self._recorded and history is not None and not self._commands.estimated
 
     def _advance(self, measured: Array, stamp_ns: int) -> None:
@@ -247,7 +247,7 @@ class Mirror:
             independent=self._independent,
             twin_yaw_rate_radps=float(twin[5]),
         )
-        return self._casting.told(sample)
+        return self._role_manager.completed(sample)
 
     def _twin_at(self, stamp_ns: int) -> Array:
         """Return the twin's state (8,), carried on by the part of a step that is left."""

@@ -32,7 +32,7 @@ class MirrorWorker:
     """Feeds a Mirror from messages; a message that cannot be used is logged and passed over.
 
     In lock step a state waits until the commands up to its stamp are there: they come from
-    another process, and results must not depend on who is faster. So it does for the other
+    another process, and results must not depend on which is faster. So it does for the other
     vehicles: the bus keeps no order between keys.
     """
 

@@ -33,7 +33,7 @@ class RoleWorld:
     """The bodies of `vehicles` in one World; poses are those of base_link in its frame.
 
     Twins meet what stands, other vehicles' twins and other vehicles' shadows; a vehicle's own
-    shadow it passes through. Boxes of shadows move as they are told, whatever stands in their way.
+    shadow it passes through. Boxes of shadows move as they are placed, whatever stands in the way.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class RoleWorld:
         mujoco.mj_step(self._model, self._data)
 
     def contacts(self) -> set[tuple[str, str]]:
-        """Return who met whom in the last step, as sorted pairs of names, `world` among them."""
+        """Return which met in the last step, as sorted pairs of names, `world` among them."""
         pairs = set()
         for index in range(self._data.ncon):
             geoms = self._data.contact[index].geom

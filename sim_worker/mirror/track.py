@@ -14,12 +14,12 @@ from foretwin.sim_worker.vehicle.commands import TwinCommand, estimated_command
 from foretwin.sim_worker.vehicle.seeding import local_state
 
 LOST_AFTER_NS = 1_000_000_000
-"""Who has not been measured for longer is not there any more."""
+"""A vehicle not measured for longer is not there any more."""
 _CONTINUOUS_NS = 2_000_000_000
 """Between two states farther apart, nothing says how the vehicle moved."""
 
 
-class Measured(NamedTuple):
+class MeasuredPose(NamedTuple):
     """A pose x, y, yaw (3,) of base_link and how it changes (3,), in the world's frame."""
 
     pose: Array
@@ -27,7 +27,7 @@ class Measured(NamedTuple):
 
 
 class Track:
-    """The last two states of a vehicle in one frame; knows nothing of what comes later."""
+    """The last two states of a vehicle in one frame, and nothing of what comes later."""
 
     def __init__(self, vehicle: VehicleParameters, frame: LocalFrame) -> None:
         self._vehicle, self._frame = vehicle, frame
@@ -54,7 +54,7 @@ class Track:
         """Return the newest measured state (8,)."""
         return self._rows[-1][1]
 
-    def at(self, stamp_ns: int) -> Measured:
+    def at(self, stamp_ns: int) -> MeasuredPose:
         """Return the pose at `stamp_ns`: evenly between two states, else on from the nearest.
 
         Beyond the newest state the vehicle goes on at its speed and yaw rate.
@@ -69,13 +69,13 @@ class Track:
                 moved[2] = wrap_angle(moved[2])
                 row = oldest + share * (newest - oldest)
                 row[:3] = oldest[:3] + share * moved
-                return Measured(row[:3], _rate(row))
+                return MeasuredPose(row[:3], _rate(row))
         ahead_s = max(0.0, (stamp_ns - newest_ns) / 1e9)
         row = newest.copy()
         row[2] += 0.5 * ahead_s * newest[5]
         row[:2] += ahead_s * _rate(row)[:2]
         row[2] = newest[2] + ahead_s * newest[5]
-        return Measured(row[:3], _rate(row))
+        return MeasuredPose(row[:3], _rate(row))
 
     def command(self) -> TwinCommand:
         """Return the command that turned the last state but one into the last; see commands."""

@@ -18,7 +18,7 @@ _REFRESH_STEPS = 2
 class TwinBody:
     """The vehicle attached under `prefix` to a compiled model; states are those of base_link.
 
-    Whoever steps the model calls `command` before and `read` after each step.
+    `command` has to be called before and `read` after each step of the model.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class TwinBody:
         self._actuation = self._fresh_actuation()
 
     def command(self, *, accel_mps2: float, tire_angle_rad: float) -> None:
-        """Set what the vehicle is told for the next step."""
+        """Set the vehicle's command for the next step."""
         if self._steps % _REFRESH_STEPS == 0:
             self._actuation.apply(speed_mps=self._state[:, 3], accel_mps2=np.array([accel_mps2]))
         self._steps += 1

@@ -14,9 +14,8 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.metrics.ground import DrivableGround
-from foretwin.sim_worker.metrics.rollout import Flags, Rollout
+from foretwin.sim_worker.metrics.rollout import Context, Flags, Rollout, RolloutView
 from foretwin.sim_worker.metrics.route_rules import LineAhead, RouteRules
-from foretwin.sim_worker.metrics.scene import Context, Scene
 from foretwin.sim_worker.metrics.table import METRICS
 from foretwin.sim_worker.metrics.violations import line_crossings
 
@@ -113,22 +112,22 @@ class Court:
             valid=np.ones(count, dtype=bool),
             vehicle=self._vehicle,
         )
-        scene = Scene(rollout, Context(ground=self._ground))
-        cos, sin = scene.heading
-        front = scene.centre_m + scene.half_length_m * np.stack([cos, sin], axis=-1)
+        view = RolloutView(rollout, Context(ground=self._ground))
+        cos, sin = view.heading
+        front = view.centre_m + view.half_length_m * np.stack([cos, sin], axis=-1)
         red, unstopped = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
         for line in self._rules.lines:
             if line.control == "signal":
                 self._at_red(front, line, red)
             elif line.control == "stop":
-                self._without_stop(front, line, scene.speed_mps, unstopped)
+                self._without_stop(front, line, view.speed_mps, unstopped)
         return np.column_stack(
             [
-                METRICS["min_clearance"].compute(scene).values < LEAST_CLEARANCE_M,
-                METRICS["on_road"].compute(scene).values < 0.5,
+                METRICS["min_clearance"].compute(view).values < LEAST_CLEARANCE_M,
+                METRICS["on_road"].compute(view).values < 0.5,
                 red,
                 unstopped,
-                METRICS["comfortable"].compute(scene).values < 0.5,
+                METRICS["comfortable"].compute(view).values < 0.5,
             ]
         )
 

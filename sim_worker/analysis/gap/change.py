@@ -6,7 +6,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.gap.consistency import Consistency
-from foretwin.sim_worker.analysis.gap.pairs import Pairs
+from foretwin.sim_worker.analysis.gap.pairs import SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
 _SHARE = 0.25
@@ -14,7 +14,7 @@ _SHARE = 0.25
 _USUAL_LAG_S = 0.1
 
 
-def began_ns(pairs: Pairs, seen: Consistency, evidence: str) -> int:
+def began_ns(pairs: SignalPairs, seen: Consistency, evidence: str) -> int:
     """Return since when the pair behind a piece of evidence has departed from agreement.
 
     The change point of Page's test (1954): where the sum of what departs beyond its allowance was

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.fitting import Follower, Line, follower, line_through
-from foretwin.sim_worker.analysis.gap.pairs import MIN_TURN_RAD, Pairs
+from foretwin.sim_worker.analysis.gap.fitting import DelayedLine, Line, delayed_line, line_through
+from foretwin.sim_worker.analysis.gap.pairs import MIN_TURN_RAD, SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
 _MIN_CURVATURE_PM = 0.006
@@ -37,8 +37,8 @@ class Consistency(NamedTuple):
 
     gyro_by_course: Line | None
     speed_by_gnss: Line | None
-    measured_by_command: Follower | None
-    model_by_command: Follower | None
+    measured_by_command: DelayedLine | None
+    model_by_command: DelayedLine | None
     model_stops_at_rad: float
     """The tyre angle that the model holds while commands and car go beyond, NaN where none."""
     motion_by_measured: Line | None
@@ -55,13 +55,13 @@ class Consistency(NamedTuple):
     moved_s: float
 
 
-def consistency_of(pairs: Pairs) -> Consistency:
+def consistency_of(pairs: SignalPairs) -> Consistency:
     """Compare the signals of one stretch (some seconds) pair by pair."""
     measured = model = angle = None
     if _varies(pairs.asked_rad) or _varies(pairs.done_rad):
-        measured = follower(pairs.asked_rad, pairs.done_rad)
+        measured = delayed_line(pairs.asked_rad, pairs.done_rad)
     if _varies(pairs.commanded_rad):
-        model = follower(pairs.commanded_rad, pairs.model_tire_rad)
+        model = delayed_line(pairs.commanded_rad, pairs.model_tire_rad)
     if _varies(pairs.done_rad):
         angle = _line(pairs.done_rad, pairs.arc_rad)
     real, by_measured = pairs.curvature_pm, pairs.by_measured_pm
@@ -115,7 +115,7 @@ def _turning(model: Array, real: Array) -> Line | None:
     return _line(model, real) if widest > _MIN_CURVATURE_PM else None
 
 
-def _turn_rates(pairs: Pairs) -> Line | None:
+def _turn_rates(pairs: SignalPairs) -> Line | None:
     """Fit how the gyro goes with the course's rate; without a bend its bias alone."""
     course, gyro = pairs.course_radps[::_EVERY], pairs.gyro_radps[::_EVERY]
     known = np.isfinite(course) & np.isfinite(gyro)
@@ -141,7 +141,7 @@ def _turn_rates(pairs: Pairs) -> Line | None:
     return Line(1.0, np.inf, offset, std / np.sqrt(heard), std, 0.0)
 
 
-def _missing(pairs: Pairs) -> float:
+def _missing(pairs: SignalPairs) -> float:
     """Return the RMS of the lateral acceleration between model and car in bends, NaN in none."""
     apart = (pairs.curvature_pm - pairs.by_measured_pm) * pairs.speed_mps**2
     apart = apart[pairs.excited & np.isfinite(apart)]
@@ -174,7 +174,7 @@ def _lag(model: Array, real: Array) -> Lag | None:
     known = np.isfinite(model) & np.isfinite(real)
     if known.sum() < 10 or float(np.ptp(model[known])) < _LEAST_SWING_PM:
         return None
-    pair = follower(real, model, longest_s=_LONGEST_LAG_S)
+    pair = delayed_line(real, model, longest_s=_LONGEST_LAG_S)
     at_once = _line(real, model)
     changes = _line(real, np.gradient(real) / PERIOD_S)
     if pair is None or at_once is None or changes is None:

@@ -15,7 +15,7 @@ from foretwin.sim_worker.analysis.gap.free_run import (
     FreeRunner,
     accel_commands_from_motion,
     start_states,
-    steering_signals,
+    tire_angles,
 )
 from foretwin.sim_worker.analysis.gap.manoeuvres import MANOEUVRES, manoeuvre_of
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
@@ -92,7 +92,7 @@ class GapMeter:
         known = motion.known
         found: list[GapSample] = []
         vehicle, runner = self._runner.vehicle, self._runner
-        signals = steering_signals(record, vehicle)
+        signals = tire_angles(record, vehicle)
         recorded = np.isfinite(signals.commanded_rad) & np.isfinite(record.command_accel_mps2)
         independent = bool(recorded[starts].mean() > 0.9)
         tire = signals.measured_rad

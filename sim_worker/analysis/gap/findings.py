@@ -7,7 +7,7 @@ import math
 from foretwin.contracts.gap import Evidence
 from foretwin.sim_worker.analysis.gap.consistency import Consistency, Lag
 from foretwin.sim_worker.analysis.gap.finding import Finding
-from foretwin.sim_worker.analysis.gap.fitting import Follower, Line
+from foretwin.sim_worker.analysis.gap.fitting import DelayedLine, Line
 
 _DEGREES = 180.0 / math.pi
 _GAIN, _GAIN_SHARP = 0.2, 0.1
@@ -105,7 +105,7 @@ def _model_without_commands(seen: Consistency) -> Finding | None:
     return found._replace(culprit="undecided", text=text)
 
 
-def _actuator(seen: Consistency, pair: Follower) -> Finding | None:
+def _actuator(seen: Consistency, pair: DelayedLine) -> Finding | None:
     line, by_command = pair.line, seen.motion_by_command
     own = f"measured steering is {line.gain:.3f} times the commanded, {pair.delay_s:.2f} s later"
     evidence = [_of("measured_by_command", line, own)]

@@ -27,7 +27,7 @@ class Line(NamedTuple):
     """Share of the variance of y, 0 to 1."""
 
 
-class Follower(NamedTuple):
+class DelayedLine(NamedTuple):
     """How y follows x: the line after the best delay, and the plateau of y where there is one."""
 
     line: Line
@@ -61,9 +61,9 @@ def line_through(x: Array, y: Array, *, independent: float) -> Line | None:
     )
 
 
-def follower(
+def delayed_line(
     x: Array, y: Array, *, longest_s: float = 0.8, together_s: float = 0.3
-) -> Follower | None:
+) -> DelayedLine | None:
     """Fit how y follows x, both (N,) on the grid, with delays from 0 to `longest_s`.
 
     None where too little is known of both.
@@ -83,7 +83,7 @@ def follower(
     line = line_through(late[shift], done, independent=len(done) * PERIOD_S / together_s)
     if line is None:
         return None
-    return Follower(line, shift * PERIOD_S, _plateau(late[shift], done, line))
+    return DelayedLine(line, shift * PERIOD_S, _plateau(late[shift], done, line))
 
 
 def _residuals(x: Array, y: Array) -> Array:

@@ -20,14 +20,14 @@ _TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1
 _SPEED_GAIN_PS = 4.0
 
 
-class SteeringSignals(NamedTuple):
+class TireAngles(NamedTuple):
     """Tyre angles (N,) as the model reads them: commanded and measured; NaN where unknown."""
 
     commanded_rad: Array
     measured_rad: Array
 
 
-def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> SteeringSignals:
+def tire_angles(record: MotionRecord, vehicle: VehicleParameters) -> TireAngles:
     """Return the tyre angles that the record's steering means to the model."""
     column = column_of(vehicle)
 
@@ -39,7 +39,7 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         record.command_tire_rad + column.offset_rad,
         column.tire_rad(record.command_wheel_rad),
     )
-    return SteeringSignals(commanded, read(record.tire_rad, record.wheel_rad))
+    return TireAngles(commanded, read(record.tire_rad, record.wheel_rad))
 
 
 class FreeRunner:

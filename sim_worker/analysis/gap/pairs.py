@@ -17,7 +17,7 @@ from foretwin.sim_worker.analysis.gap.free_run import (
     Flags,
     FreeRunner,
     start_states,
-    steering_signals,
+    tire_angles,
 )
 from foretwin.sim_worker.analysis.gap.run_memory import Rows, RunMemory
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
@@ -34,7 +34,7 @@ _FASTEST_MPS = 80.0
 MIN_TURN_RAD = 0.012
 
 
-class Pairs(NamedTuple):
+class SignalPairs(NamedTuple):
     """Signals on the grid, each (N,) and NaN where unknown; steering in tyre angles.
 
     `asked_rad` and `done_rad` are steering as commanded and as measured, from the steering wheel
@@ -72,7 +72,7 @@ class Pairs(NamedTuple):
         lost = ~known & ~(self.speed_mps < MOVES_MPS)
         return bool(lost[int(np.argmax(known)) :].any()) if known.any() else False
 
-    def latest(self, seconds: float) -> Pairs:
+    def latest(self, seconds: float) -> SignalPairs:
         """Return the signals of the latest seconds, with all of the pushes."""
         kept = slice(max(0, len(self.stamp_ns) - round(seconds / PERIOD_S)), None)
         columns = {name: getattr(self, name)[kept] for name in self._fields if name != "pushes"}
@@ -86,13 +86,13 @@ def pairs_of(
     antenna_ahead_m: float = 0.0,
     precise_positions: bool = True,
     memory: RunMemory | None = None,
-) -> Pairs:
+) -> SignalPairs:
     """Lay the signals of some seconds side by side and run the model over them.
 
     `memory` is that of earlier stretches of the same drive with the same runner. Without precise
     positions no sensor is compared with them: a telephone's are smoothed and late.
     """
-    signals = steering_signals(record, runner.vehicle)
+    signals = tire_angles(record, runner.vehicle)
     speed, rate = record.speed_mps, record.yaw_rate_radps
     moves = np.isfinite(speed) & (speed > MOVES_MPS)
     turn = np.nanmax(np.stack([np.abs(np.nan_to_num(x)) for x in signals]), axis=0)
@@ -108,7 +108,7 @@ def pairs_of(
         sensors = _sensors(record, antenna_ahead_m)
     course, gyro, ground, wheels = sensors
     by_measured, by_command, tire, pushes = _runs(record, runner, memory or RunMemory())
-    return Pairs(
+    return SignalPairs(
         stamp_ns=record.stamp_ns, moves=moves, excited=moves & (turn > MIN_TURN_RAD),
         course_radps=course, gyro_radps=gyro, ground_mps=ground, wheel_mps=wheels,
         asked_rad=np.where(moves, asked, np.nan), done_rad=np.where(moves, done, np.nan),
@@ -162,7 +162,7 @@ def _runs(
     Runs overlap so that their ends tile the stretch, back from its own end.
     """
     speed, rate, accel = record.speed_mps, record.yaw_rate_radps, record.command_accel_mps2
-    signals = steering_signals(record, runner.vehicle)
+    signals = tire_angles(record, runner.vehicle)
     count = len(speed)
     eased = smooth(speed, _SMOOTH_HALF)
     eased = np.where(np.isfinite(eased), eased, speed)

@@ -19,7 +19,7 @@ from foretwin.sim_worker.analysis.gap.consistency import Consistency, consistenc
 from foretwin.sim_worker.analysis.gap.finding import Finding
 from foretwin.sim_worker.analysis.gap.findings import findings_of
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.pairs import Pairs, pairs_of
+from foretwin.sim_worker.analysis.gap.pairs import SignalPairs, pairs_of
 from foretwin.sim_worker.analysis.gap.run_memory import RunMemory
 from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
 
@@ -149,7 +149,7 @@ class Judge:
         )
 
 
-def _found_in(pairs: Pairs, seen: Consistency) -> Finding | None:
+def _found_in(pairs: SignalPairs, seen: Consistency) -> Finding | None:
     found = findings_of(seen)
     if found is None:
         return None

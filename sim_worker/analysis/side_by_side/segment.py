@@ -25,7 +25,7 @@ _GRAVEST: tuple[DisagreementKind, ...] = (
 )  # fmt: skip
 
 
-class Place(NamedTuple):
+class DrivePlace(NamedTuple):
     """Where the car was: `junction_id` it was at or had before it, `route_m` along its route."""
 
     position: GeoPoint
@@ -39,11 +39,11 @@ class Waiting(NamedTuple):
     stamp_ns: int
     stamps_ns: Array
     planned: Array
-    place: Place
+    place: DrivePlace
 
 
 @dataclass(slots=True)
-class Course:
+class AspectWatch:
     """One aspect of a segment: whether human and ADS disagree, with hysteresis."""
 
     vehicle_id: str
@@ -59,7 +59,7 @@ class Course:
         kind: DisagreementKind | None,
         within: bool,
         found: Departure,
-        place: Place,
+        place: DrivePlace,
     ) -> list[Disagreement]:
         """Take one compared plan; `within` says that it lies below the lowered limits, too."""
         ended = []
@@ -85,7 +85,7 @@ class Course:
         return [replace(now, over=True)]
 
     def _joined(
-        self, stamp_ns: int, kind: DisagreementKind | None, found: Departure, place: Place
+        self, stamp_ns: int, kind: DisagreementKind | None, found: Departure, place: DrivePlace
     ) -> Disagreement:
         old = self._now
         if old is None:
@@ -114,7 +114,7 @@ class Segment:
     number: int
     mode: ControlMode
     from_ns: int
-    courses: tuple[Course, Course]
+    aspects: tuple[AspectWatch, AspectWatch]
     until_ns: int | None = None
     """The takeover that ended it."""
     waiting: deque[Waiting] = field(default_factory=deque)

@@ -20,7 +20,12 @@ from foretwin.sim_worker.analysis.side_by_side.departure import (
     pace_kind,
     way_kind,
 )
-from foretwin.sim_worker.analysis.side_by_side.segment import Course, Place, Segment, Waiting
+from foretwin.sim_worker.analysis.side_by_side.segment import (
+    AspectWatch,
+    DrivePlace,
+    Segment,
+    Waiting,
+)
 
 HORIZON_S = 4.0
 """How much of a plan is compared: beyond, both have seen what nobody knew."""
@@ -45,7 +50,7 @@ class SideBySide:
         frame: LocalFrame,
         *,
         vehicle_id: str,
-        place: Callable[[], Place],
+        place: Callable[[], DrivePlace],
         limits: Limits | None = None,
     ) -> None:
         self._frame = frame
@@ -135,8 +140,8 @@ class SideBySide:
 
     def _begin(self, mode: ControlMode, stamp_ns: int) -> None:
         number = len(self._done) + len(self._open)
-        way = Course(self._vehicle_id, number, "way")
-        pace = Course(self._vehicle_id, number, "pace")
+        way = AspectWatch(self._vehicle_id, number, "way")
+        pace = AspectWatch(self._vehicle_id, number, "pace")
         self._open.append(Segment(number, mode, stamp_ns, (way, pace), last_ns=stamp_ns))
 
     def _settle(self, now_ns: int) -> list[Disagreement]:
@@ -172,10 +177,10 @@ class SideBySide:
         if segment.mode != "manual":
             return []
         told: list[Disagreement] = []
-        for course, kind_of in zip(segment.courses, (way_kind, pace_kind), strict=True):
+        for aspect, kind_of in zip(segment.aspects, (way_kind, pace_kind), strict=True):
             kind = kind_of(found, self._limits)
             within = kind_of(found, self._lowered) is None
-            told += course.take(plan.stamp_ns, kind, within, found, plan.place)
+            told += aspect.take(plan.stamp_ns, kind, within, found, plan.place)
         segment.disagreements += sum(one.over for one in told)
         return told
 
@@ -210,7 +215,7 @@ class SideBySide:
 
 
 def _ended(segment: Segment) -> list[Disagreement]:
-    found = [one for course in segment.courses for one in course.finish()]
+    found = [one for aspect in segment.aspects for one in aspect.finish()]
     segment.disagreements += len(found)
     return found
 

@@ -14,8 +14,8 @@ from foretwin.contracts.signals import SignalGroup, SignalPhase, SignalPlan
 from foretwin.contracts.world import Arm, Conflict, StopLine, World, WorldJunction
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.rollout import Context
 from foretwin.sim_worker.metrics.route_rules import RouteRules
-from foretwin.sim_worker.metrics.scene import Context
 from tests.sim_worker.places import crossroads, straight_path
 
 GREEN_S, AMBER_S, ALL_RED_S = 10.0, 3.0, 2.0

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.metrics import compiled_pairs, encroachment, following
-from foretwin.sim_worker.metrics.rollout import Rollout
-from foretwin.sim_worker.metrics.scene import Scene
-from foretwin.sim_worker.metrics.time_to_collision import Pairs, meeting, ttc_series
+from foretwin.sim_worker.metrics.rollout import Rollout, RolloutView
+from foretwin.sim_worker.metrics.time_to_collision import BoxPairs, meeting, ttc_series
 from tests.sim_worker.metrics.motions import VEHICLE, times
 
 FUTURES, USERS = 3, 4
@@ -18,7 +17,7 @@ seeds = st.integers(0, 2**32 - 1)
 drawn = settings(deadline=None, max_examples=30)
 
 
-def scene(seed: int) -> Scene:
+def scene(seed: int) -> RolloutView:
     """Everybody in bends and at every angle within 40 m; somebody comes, and somebody goes."""
     random, time_s = np.random.default_rng(seed), times(4.0)
 
@@ -35,7 +34,7 @@ def scene(seed: int) -> Scene:
     nothing = np.zeros_like(x)
     users = np.stack(motions(FUTURES, USERS), axis=-1).transpose(0, 2, 1, 3)
     users[:, : len(time_s) // 2, 0, :3] = users[:, len(time_s) // 2 :, 1, :3] = np.nan
-    return Scene(
+    return RolloutView(
         Rollout(
             time_s=time_s,
             states=np.stack([x, y, yaw, speed, nothing, rate, nothing, nothing], axis=-1),
@@ -52,7 +51,7 @@ def test_time_to_collision_is_that_of_all_pairs_to_the_bit(seed: int) -> None:
     driven = scene(seed)
     seen = driven.relative
     touch = meeting(
-        Pairs(
+        BoxPairs(
             seen.ahead_m, seen.left_m, seen.ahead_mps, seen.left_mps, seen.cos, seen.sin,
             (driven.half_length_m, driven.half_width_m), driven.user_half_m,
         )

@@ -16,7 +16,7 @@ from foretwin.sim_worker.metrics.displacement import (
     displacements,
     relative_pose_error,
 )
-from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.rollout import Context
 from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import Mover, rollout, steady_poses, times
 

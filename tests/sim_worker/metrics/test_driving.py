@@ -14,8 +14,7 @@ from foretwin.contracts.world import Area
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics import comfort
 from foretwin.sim_worker.metrics.ground import DrivableGround
-from foretwin.sim_worker.metrics.rollout import Rollout
-from foretwin.sim_worker.metrics.scene import Context
+from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.table import METRICS, computable, evaluate
 from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context
 from tests.sim_worker.metrics.motions import LENGTH_M, Mover, rollout, times

@@ -12,7 +12,7 @@ from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushBlocks
 from foretwin.sim_worker.analysis.gap.consistency import consistency_of
 from foretwin.sim_worker.analysis.gap.finding import Finding
 from foretwin.sim_worker.analysis.gap.findings import findings_of
-from foretwin.sim_worker.analysis.gap.pairs import Pairs
+from foretwin.sim_worker.analysis.gap.pairs import SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
 TIME_S = np.arange(301) * PERIOD_S
@@ -25,11 +25,11 @@ def shifted(values: Array, seconds: float) -> Array:
 
 def turning(
     *, real_pm: Array, model_pm: Array, asked_rad: Array = TYRES_RAD, model_rad: Array | None = None
-) -> Pairs:
+) -> SignalPairs:
     """Six seconds of an obedient car at 5 m/s, whose gyro is right."""
     unknown = np.full(len(TIME_S), np.nan)
     speed = np.full(len(TIME_S), 5.0)
-    return Pairs(
+    return SignalPairs(
         stamp_ns=np.round(TIME_S * 1e9).astype(np.int64),
         moves=np.ones(len(TIME_S), dtype=np.bool_),
         excited=np.abs(asked_rad) > 0.01,
@@ -42,7 +42,7 @@ def turning(
     )  # fmt: skip
 
 
-def into_a_bend(*, offset_pm: float) -> Pairs:
+def into_a_bend(*, offset_pm: float) -> SignalPairs:
     """Out of one bend, straight on, and the first second of the next, ever tighter.
 
     As in the embedded drive 53 s after its beginning, where the car's offset of 0.23° at the tyres
@@ -117,5 +117,5 @@ def test_a_stretch_is_broken_where_steering_was_lost_but_not_where_the_car_stood
     assert not pairs._replace(asked_rad=np.full(len(TIME_S), np.nan)).broken
 
 
-def _found(pairs: Pairs) -> Finding | None:
+def _found(pairs: SignalPairs) -> Finding | None:
     return findings_of(consistency_of(pairs))

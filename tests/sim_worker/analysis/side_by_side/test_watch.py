@@ -18,7 +18,7 @@ from foretwin.contracts.frames import (
     geo_from_local_yaw,
 )
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
-from foretwin.sim_worker.analysis.side_by_side.segment import Place
+from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
 from foretwin.sim_worker.analysis.side_by_side.watch import HORIZON_S, SideBySide
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
@@ -67,9 +67,9 @@ def side_by_side(
     until_s: float = 20.0,
 ) -> tuple[list[Disagreement], list[DrivenSegment]]:
     """Drive a course at 10 Hz; `planned` gives the rows of the plan made at a time."""
-    here = Place(GeoPoint(0.0, 0.0))
+    here = DrivePlace(GeoPoint(0.0, 0.0))
 
-    def place() -> Place:
+    def place() -> DrivePlace:
         return here
 
     watch = SideBySide(FRAME, vehicle_id="ego", place=place)
@@ -82,7 +82,7 @@ def side_by_side(
             status = VehicleStatus(stamp_ns=START_NS + round(at_s * 1e9), control_mode=modes[at_s])
             watch.take_status(status)
         state = state_at(at_s, driven(np.array([at_s]))[0])
-        here = Place(state.position, "junction", 100.0 + at_s)
+        here = DrivePlace(state.position, "junction", 100.0 + at_s)
         watch.take_plan(plan_at(at_s, planned(at_s, ahead), ahead))
         found += watch.take_state(state)
     return [one for one in found + watch.finish() if one.over], watch.segments
