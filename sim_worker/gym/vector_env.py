@@ -16,11 +16,12 @@ from gymnasium.vector.utils import batch_space
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
 from foretwin.sim_worker.futures.play import Rows
-from foretwin.sim_worker.gym.course import CASE, Course, Source, told
+from foretwin.sim_worker.gym.course import info_of
+from foretwin.sim_worker.gym.episodes import CASE
 from foretwin.sim_worker.gym.observation import Observation
 from foretwin.sim_worker.gym.picture import Picture, draw_row
 from foretwin.sim_worker.gym.rows import Flags
-from foretwin.sim_worker.gym.spaces import action_space, observation_space, split_settings
+from foretwin.sim_worker.gym.spaces import action_space, course_of, observation_space
 
 MASK = "reset_mask"
 
@@ -47,10 +48,7 @@ class JunctionVectorEnv(VectorEnv[Observation, npt.NDArray[np.float32], npt.NDAr
 
         Raises UserError for settings that do not fit.
         """
-        if render_mode not in (None, "rgb_array"):
-            raise UserError(f"render_mode {render_mode!r} is not rgb_array")
-        of_source, of_course = split_settings(settings)
-        self.course = Course(Source(world, **of_source), count=num_envs, **of_course)
+        self.course = course_of(world, settings, count=num_envs, render_mode=render_mode)
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {
@@ -134,7 +132,7 @@ class JunctionVectorEnv(VectorEnv[Observation, npt.NDArray[np.float32], npt.NDAr
         truncated = self.course.over_time() & ~facts.terminated & ~before
         self._over = terminated | truncated
         infos: dict[str, Any] = {}
-        for name, values in told(facts).items():
+        for name, values in info_of(facts).items():
             infos[name] = np.where(before, np.zeros_like(values), values)
             infos[f"_{name}"] = ~before
         if before.any():
