@@ -13,6 +13,15 @@ Array = npt.NDArray[np.float64]
 Array32 = npt.NDArray[np.float32]
 """Float32 array, for trajectories on the wire."""
 
+Flags = npt.NDArray[np.bool_]
+"""Booleans of an array's elements or rows."""
+
+Indices = npt.NDArray[np.intp]
+"""Places in another array."""
+
+Stamps = npt.NDArray[np.int64]
+"""Nanoseconds of a vehicle's clock."""
+
 _FLOAT64 = np.dtype("<f8")
 _WIRE_TYPES = ("<f8", "<f4", "<i8", "<i4", "|u1", "|b1")
 

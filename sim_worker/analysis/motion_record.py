@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Stamps
 from foretwin.contracts.drive import (
     ControlCommand,
     GnssFix,
@@ -36,7 +36,7 @@ class MotionRecord(NamedTuple):
     says where a human drives.
     """
 
-    stamp_ns: np.ndarray[Any, np.dtype[np.int64]]
+    stamp_ns: Stamps
     x_m: Array
     y_m: Array
     altitude_m: Array
@@ -50,7 +50,7 @@ class MotionRecord(NamedTuple):
     command_accel_mps2: Array
     command_wheel_rad: Array
     command_tire_rad: Array
-    manual: np.ndarray[Any, np.dtype[np.bool_]]
+    manual: Flags
 
     @property
     def time_s(self) -> Array:

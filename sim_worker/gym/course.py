@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.futures.play import Rows
@@ -15,7 +15,7 @@ from foretwin.sim_worker.gym.actions import Control, action_size, commands
 from foretwin.sim_worker.gym.episodes import Source
 from foretwin.sim_worker.gym.observation import Observation, feature_names, observe
 from foretwin.sim_worker.gym.reward import Reward, default_reward
-from foretwin.sim_worker.gym.rows import EpisodeRows, Flags, StepFacts
+from foretwin.sim_worker.gym.rows import EpisodeRows, StepFacts
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import Stage
@@ -20,8 +19,6 @@ from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
 from foretwin.sim_worker.road_users.cast import Casting
 from foretwin.world_gen.rules.signal_state import cycle_s
-
-Flags = npt.NDArray[np.bool_]
 
 OFF_PATH_M = 6.0
 """Who is so far beside the path has left it."""

@@ -13,6 +13,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from foretwin.contracts.arrays import Flags
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
 from foretwin.sim_worker.futures.play import Rows
@@ -20,7 +21,6 @@ from foretwin.sim_worker.gym.course import info_of
 from foretwin.sim_worker.gym.episodes import CASE
 from foretwin.sim_worker.gym.observation import Observation
 from foretwin.sim_worker.gym.picture import Picture, draw_row
-from foretwin.sim_worker.gym.rows import Flags
 from foretwin.sim_worker.gym.spaces import action_space, course_of, observation_space
 
 MASK = "reset_mask"

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.metrics.rollout import Flags, Measure, RolloutView
+from foretwin.contracts.arrays import Array, Flags
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 BOUNDS = MappingProxyType(
     {

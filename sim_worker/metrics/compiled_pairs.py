@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.compiled import REAL, WHOLE, given, kernel, types
 
 _ALL, _SIZES, _ROWS, _LINE = given(3, "C"), given(3), given(2), given(1)
 _PICKED, _OUT_ROWS = types.Array(WHOLE, 1, "A", readonly=True), REAL[:, ::1]
 NEVER_ZERO = 1e-300
 """Added to speeds before division: standing still becomes a very long time."""
-Indices = npt.NDArray[np.intp]
 
 
 @kernel(types.void, types.UniTuple(_ALL, 6), _SIZES, _SIZES, REAL, REAL, _OUT_ROWS)

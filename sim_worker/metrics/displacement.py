@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.simulation import HorizonError
-from foretwin.sim_worker.metrics.rollout import Flags, Measure, RolloutView
+from foretwin.geometry import compiled
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 _Summary = Callable[["Displacements"], Array]
 _SEED_S = 1e-6
@@ -163,3 +164,37 @@ def _steps_in_own_axes(poses: Array) -> Array:
     return np.stack(
         [cos * step[..., 0] + sin * step[..., 1], cos * step[..., 1] - sin * step[..., 0]], axis=-1
     )
+
+
+def cheapest_walks(curves: Array, reference: Array) -> Array:
+    """Return (2, S) metres: of curves (S, N, 2) from one (M, 2), the discrete Fréchet distances
+    (Eiter and Mannila 1994, Computing Discrete Fréchet Distance, table 1) and the least sums.
+
+    Both are of the walks along the pairs of points that never go back and have the least of it.
+    The sums are dynamic time warping: Sakoe and Chiba (1978), Dynamic Programming Algorithm
+    Optimization for Spoken Word Recognition, equation 11, weight 1 for every pair and no window.
+    """
+    x, y = (np.ascontiguousarray(curves[..., k], dtype=np.float64) for k in range(2))
+    to_x, to_y = (np.ascontiguousarray(reference[:, k], dtype=np.float64) for k in range(2))
+    found = np.empty((2, len(x)))
+    compiled.cheapest_walks(x, y, to_x, to_y, found)
+    return found
+
+
+def frechet(view: RolloutView) -> Measure:
+    """Discrete Fréchet distance (S,) from the reference's course."""
+    found = view.keep(_from_reference)
+    return view.measure(found[0]) if found is not None else nowhere(view)
+
+
+def dtw(view: RolloutView) -> Measure:
+    """Time warping distance (S,) from the reference's course, a sum over pairs of points."""
+    found = view.keep(_from_reference)
+    return view.measure(found[1]) if found is not None else nowhere(view)
+
+
+def _from_reference(view: RolloutView) -> Array | None:
+    predicted, reference = known(view)
+    if not len(reference):
+        return None
+    return cheapest_walks(predicted[..., :2], reference[:, :2])

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.sim_worker.metrics import compiled_pairs
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
@@ -16,7 +15,6 @@ _CHUNK = 8
 _PARALLEL_SIN = 0.17
 """Ways that never differ by 10° follow or meet each other; they do not cross."""
 _HALF_STEP = 0.5 + 1e-9
-Indices = npt.NDArray[np.intp]
 
 
 class Crossings(NamedTuple):

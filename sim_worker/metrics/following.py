@@ -9,15 +9,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.sim_worker.driver_model import ALONG_COS, STANDING_MPS
 from foretwin.sim_worker.metrics import compiled_pairs
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
-Indices = npt.NDArray[np.intp]
 _SLOW_MPS = 1.0
 """Below this speed a yaw rate says nothing about the course, which is then taken as straight."""
 _MOVES_MPS = 0.1

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
-from foretwin.sim_worker.metrics.rollout import Flags, Measure, RolloutView
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 from foretwin.sim_worker.metrics.time_to_collision import BoxPairs, meeting
 
 _STANDS_MPS = 0.05
 """An ego slower than this stands: nuPlan, no_ego_at_fault_collisions."""
-Indices = npt.NDArray[np.intp]
 
 
 class Impacts(NamedTuple):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.metrics.rollout import Flags, Measure, RolloutView
+from foretwin.contracts.arrays import Array, Flags
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 _LOOK_AGAIN_M = 10.0
 """The path is searched near the place known last, so no farther than this between looks."""

@@ -11,9 +11,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.futures import STATE_COLUMNS
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
@@ -22,7 +21,6 @@ from foretwin.sim_worker.metrics.route_rules import RouteRules
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.world_gen.rules.signal_state import LiveColour
 
-Flags = npt.NDArray[np.bool_]
 _Kept = TypeVar("_Kept")
 _FUTURES_AT_ONCE = 8
 _FAR_M = 1e6

@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 
 from foretwin.sim_worker.metrics import (
     comfort,
-    curves,
     displacement,
     encroachment,
     following,
@@ -47,8 +46,8 @@ METRICS = MappingProxyType(
         "heading": Metric(displacement.heading, "rad", "neither", ("reference",)),
         "ape": Metric(displacement.ape, "m", "lower", ("reference",)),
         "rpe": Metric(displacement.rpe, "m", "lower", ("reference",)),
-        "frechet": Metric(curves.frechet, "m", "lower", ("reference",)),
-        "dtw": Metric(curves.dtw, "m", "lower", ("reference",)),
+        "frechet": Metric(displacement.frechet, "m", "lower", ("reference",)),
+        "dtw": Metric(displacement.dtw, "m", "lower", ("reference",)),
         "ttc": Metric(time_to_collision.ttc, "s", "higher"),
         "ttc_series": Metric(time_to_collision.ttc_series, "s", "higher", series=True),
         "time_exposed": Metric(time_to_collision.time_exposed, "s", "lower"),

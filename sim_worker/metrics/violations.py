@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.drive import SignalColour
 from foretwin.sim_worker.driver_model import ALONG_COS
-from foretwin.sim_worker.metrics.rollout import Flags, Measure, RolloutView
+from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 from foretwin.sim_worker.metrics.route_rules import PriorityConflict, RouteRules
 from foretwin.world_gen.rules.signal_state import colours_at, parts_of_cycle
 
@@ -19,7 +18,6 @@ NARROW_S = 1.0
 _AT_POINT_M = 2.5
 _ON_WAY_M = 2.0
 _STOPS = ("red", "red_amber")
-Indices = npt.NDArray[np.intp]
 
 
 def red_light_violations(view: RolloutView) -> Measure:

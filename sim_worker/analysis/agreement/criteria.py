@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Stamps
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.metrics.ground import DrivableGround
-from foretwin.sim_worker.metrics.rollout import Context, Flags, Rollout, RolloutView
+from foretwin.sim_worker.metrics.rollout import Context, Rollout, RolloutView
 from foretwin.sim_worker.metrics.route_rules import LineAhead, RouteRules
 from foretwin.sim_worker.metrics.table import METRICS
 from foretwin.sim_worker.metrics.violations import line_crossings
@@ -42,7 +41,7 @@ class Users(NamedTuple):
 class Heard(NamedTuple):
     """What a signal group was heard to show: stamps (M,), rising, and colours."""
 
-    stamps_ns: npt.NDArray[np.int64]
+    stamps_ns: Stamps
     colours: tuple[SignalColour, ...]
 
 

@@ -6,12 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.sim_worker.analysis.agreement.criteria import CRITERIA, Court, Users
-from foretwin.sim_worker.metrics.rollout import Flags
 
 DIRECTIONS = ("along", "across", "both")
 MOST_M = 10.0

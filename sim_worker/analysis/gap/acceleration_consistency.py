@@ -10,26 +10,18 @@ else that may be off, and named where nothing else explains as much.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.gap import Culprit, Evidence
-from foretwin.sim_worker.analysis.gap.finding import Finding
-from foretwin.sim_worker.analysis.gap.joint_fit import JointFit, joint_fit
-from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
+from foretwin.sim_worker.analysis.gap.findings import Finding
+from foretwin.sim_worker.analysis.gap.fitting import JointFit, joint_fit
+from foretwin.sim_worker.analysis.gap.pairs import BLOCK_S, PushBlocks
 
-Indices = np.ndarray[Any, np.dtype[np.intp]]
-BLOCK = round(0.2 / PERIOD_S)
-_BLOCK_S = BLOCK * PERIOD_S
-_LAG = round(0.1 / PERIOD_S)
-"""With which a car follows its command, give or take as much."""
-_NOISE_MPS2, _UNEVEN = 0.15, 0.6
-"""Noise of a block's acceleration, and how much counts what another lag would have asked for."""
 _TOGETHER = 2.0
 """Neighbouring blocks err alike: so many count as one."""
 _KEPT, _LEAST, _SURE = 60, 3, 3.0
@@ -38,17 +30,6 @@ _BEFORE, _HARD = 25, 0.7
 _PLATEAU = 2.0
 """What a plateau must explain beyond a gain, for being one more number (Akaike 1974)."""
 _ASKED_MPS2, _FAST_MPS = 0.25, 5.0
-
-
-class PushBlocks(NamedTuple):
-    """Accelerations (K,) over blocks: commanded, the car's, the model's; speeds, deviations."""
-
-    stamp_ns: Array
-    asked_mps2: Array
-    car_mps2: Array
-    model_mps2: Array
-    speed_mps: Array
-    std_mps2: Array
 
 
 class _Kind(NamedTuple):
@@ -84,34 +65,6 @@ class _Part(NamedTuple):
     plateau: float = float("nan")
 
 
-def push_blocks(
-    record: MotionRecord, speed_mps: Array, starts: Indices, model_mps: Array
-) -> PushBlocks:
-    """Return the last two blocks of each run at grid indices `starts` (K,).
-
-    `speed_mps` (N,) is the car's on the grid, `model_mps` (K, steps + 1) the model's of each run.
-    """
-    asked = record.command_accel_mps2
-    rows = []
-    for start, model in zip(starts, model_mps, strict=True):
-        for end in (len(model) - 1 - BLOCK, len(model) - 1):
-            at = int(start) + end
-            soon, due, late = (
-                np.mean(asked[at - BLOCK - k * _LAG : at - k * _LAG]) for k in range(3)
-            )
-            rows.append(
-                (
-                    record.stamp_ns[at],
-                    due,
-                    (speed_mps[at] - speed_mps[at - BLOCK]) / _BLOCK_S,
-                    (model[end] - model[end - BLOCK]) / _BLOCK_S,
-                    speed_mps[at - BLOCK // 2],
-                    math.hypot(_NOISE_MPS2, _UNEVEN * float(soon - late)),
-                )
-            )
-    return PushBlocks(*np.array(rows, dtype=np.float64).reshape(len(rows), 6).T)
-
-
 def _parts(blocks: PushBlocks) -> dict[str, _Part]:
     """Return for each cause what its departure, model minus car, multiplies."""
     asked = blocks.asked_mps2
@@ -141,7 +94,7 @@ class PushTest:
         came = False
         for row in zip(*blocks, strict=True):
             # Half a block of tolerance: stretches begin where the newest sample was.
-            if row[0] > self._latest_ns + 0.5e9 * _BLOCK_S and np.isfinite(row).all():
+            if row[0] > self._latest_ns + 0.5e9 * BLOCK_S and np.isfinite(row).all():
                 self._latest_ns, came = row[0], True
                 self._blocks.append(row)
         return self._judge() if came else ()
@@ -224,7 +177,7 @@ def _explain(
             by_car=_KINDS[cause].usual + float(of_car.sizes[index]),
             off=float(whole.sizes[index]),
             std=float(whole.std[index]),
-            began_ns=begun_ns[cause] - round(_BLOCK_S * 1e9),
+            began_ns=begun_ns[cause] - round(BLOCK_S * 1e9),
         )
         for index, cause in enumerate(named)
     )

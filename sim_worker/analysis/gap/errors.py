@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Indices
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.gap import GapSample, Manoeuvre
 from foretwin.contracts.simulation import HORIZONS_S
@@ -17,8 +18,11 @@ from foretwin.sim_worker.analysis.gap.free_run import (
     start_states,
     tire_angles,
 )
-from foretwin.sim_worker.analysis.gap.manoeuvres import MANOEUVRES, manoeuvre_of
-from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
+from foretwin.sim_worker.analysis.gap.measured_motion import (
+    MANOEUVRES,
+    MeasuredMotion,
+    manoeuvre_of,
+)
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.vehicle.lag import without_lags
 
@@ -83,7 +87,7 @@ class GapMeter:
         self,
         record: MotionRecord,
         motion: MeasuredMotion,
-        starts: np.ndarray[Any, np.dtype[np.intp]],
+        starts: Indices,
         wanted: Sequence[tuple[int, float]],
     ) -> list[GapSample]:
         """Run from each of `starts`; return the gap of each (row, horizon) wanted."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from foretwin.contracts.gap import Evidence
+from foretwin.contracts.gap import Culprit, Evidence
 from foretwin.sim_worker.analysis.gap.consistency import Consistency, Lag
-from foretwin.sim_worker.analysis.gap.finding import Finding
 from foretwin.sim_worker.analysis.gap.fitting import DelayedLine, Line
 
 _DEGREES = 180.0 / math.pi
@@ -213,3 +213,14 @@ def _gyro_confirmed(gyro: Line | None) -> bool:
     if gyro is None:
         return True
     return abs(gyro.gain - 1.0) + gyro.gain_std < _GAIN + 0.05
+
+
+class Finding(NamedTuple):
+    """One departure: who, how, and the comparisons that say so."""
+
+    culprit: Culprit
+    cause: str
+    text: str
+    evidence: tuple[Evidence, ...]
+    since_ns: int = 0
+    """When it began."""

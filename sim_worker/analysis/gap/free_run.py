@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
@@ -15,7 +16,6 @@ from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 from foretwin.sim_worker.vehicle.seeding import kinematic_tire_angle, rear_slip_velocity
 
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
 _TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1
 _SPEED_GAIN_PS = 4.0
 
@@ -56,7 +56,7 @@ class FreeRunner:
         self,
         *,
         states: Array,
-        starts: np.ndarray[Any, np.dtype[np.intp]],
+        starts: Indices,
         steps: int,
         accel_mps2: Array,
         tire_rad: Array,
@@ -141,3 +141,38 @@ def _filled(values: Array) -> Array:
     known = np.isfinite(values)
     index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
     return np.where(index >= 0, values[np.maximum(index, 0)], 0.0)
+
+
+class RunMemory:
+    """Keeps the runs of one vehicle's model by when and how they began.
+
+    Belongs to one FreeRunner; what is kept is no older than the stretch asked for last.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, bool], Array] = {}
+
+    def states(
+        self,
+        *,
+        stamp_ns: Stamps,
+        held: Flags,
+        settled: Flags,
+        from_stamp_ns: int,
+        run: Callable[[Indices], Array],
+    ) -> Array:
+        """Return the states (K, steps + 1, 8) of K runs that began at `stamp_ns`, in both kinds.
+
+        `run` makes those that are not known, by their rows. A run is kept once it is `settled`:
+        until then samples may come that belong into it. Older ones than `from_stamp_ns` are
+        forgotten.
+        """
+        keys = list(zip(stamp_ns.tolist(), held.tolist(), strict=True))
+        missing = np.array([row for row, key in enumerate(keys) if key not in self._known], np.intp)
+        fresh = dict(zip(missing.tolist(), run(missing), strict=True)) if len(missing) else {}
+        states = np.stack(
+            [fresh[row] if row in fresh else self._known[key] for row, key in enumerate(keys)]
+        )
+        self._known = {key: kept for key, kept in self._known.items() if key[0] >= from_stamp_ns}
+        self._known |= {keys[row]: made for row, made in fresh.items() if settled[row]}
+        return states

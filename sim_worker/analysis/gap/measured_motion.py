@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Stamps
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.gap import Manoeuvre
 from foretwin.sim_worker.analysis.motion_record import between_samples
 
 _LONGEST_GAP_S = 0.5
@@ -26,14 +27,14 @@ class MeasuredMotion(NamedTuple):
     accel_mps2: Array
 
     @property
-    def known(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def known(self) -> Flags:
         """Where the motion is known, shape (N,)."""
         return np.isfinite(self.x_m)
 
 
 def motion_on_grid(
     states: Sequence[VehicleState],
-    stamp_ns: np.ndarray[Any, np.dtype[np.int64]],
+    stamp_ns: Stamps,
     *,
     frame: LocalFrame,
 ) -> MeasuredMotion:
@@ -63,3 +64,30 @@ def motion_on_grid(
     return MeasuredMotion(
         *(between_samples(table[:, 0], column, at, gap_s=_LONGEST_GAP_S) for column in columns)
     )
+
+
+MANOEUVRES: tuple[Manoeuvre, ...] = get_args(Manoeuvre)
+_STANDS_MPS = 0.3
+_BRAKES_MPS2, _ACCELERATES_MPS2 = -0.7, 0.7
+_CURVE_RADPS, _CURVE_PM = 0.06, 0.01
+
+
+def manoeuvre_of(
+    *, speed_mps: Array | float, yaw_rate_radps: Array | float, accel_mps2: Array | float
+) -> Manoeuvre:
+    """Name what a stretch of motion is, from its mean speed, yaw rate and acceleration.
+
+    Standing counts first, then the change of speed, then the bend: a car that brakes in a bend
+    is braking.
+    """
+    speed = float(np.mean(np.abs(speed_mps)))
+    rate, accel = float(np.mean(yaw_rate_radps)), float(np.mean(accel_mps2))
+    if speed < _STANDS_MPS:
+        return "standstill"
+    if accel < _BRAKES_MPS2:
+        return "braking"
+    if accel > _ACCELERATES_MPS2:
+        return "accelerating"
+    if abs(rate) > _CURVE_RADPS or abs(rate) / max(speed, 1.0) > _CURVE_PM:
+        return "curve"
+    return "straight"

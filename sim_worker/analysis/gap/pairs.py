@@ -7,21 +7,26 @@ another; ratio and offset only turn steering wheels into tyres.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import math
+from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.acceleration_consistency import BLOCK, PushBlocks, push_blocks
+from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.sim_worker.analysis.gap.free_run import (
-    Flags,
     FreeRunner,
+    RunMemory,
     start_states,
     tire_angles,
 )
-from foretwin.sim_worker.analysis.gap.run_memory import Rows, RunMemory
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 
+BLOCK = round(0.2 / PERIOD_S)
+BLOCK_S = BLOCK * PERIOD_S
+_LAG = round(0.1 / PERIOD_S)
+"""With which a car follows its command, give or take as much."""
+_NOISE_MPS2, _UNEVEN = 0.15, 0.6
+"""Noise of a block's acceleration, and how much counts what another lag would have asked for."""
 _RUN, _TAIL = round(1.0 / PERIOD_S), 2 * BLOCK
 """A run lasts a second, the end of which is compared: where it began is forgotten by then."""
 _SETTLED = round(0.4 / PERIOD_S)
@@ -34,6 +39,17 @@ _FASTEST_MPS = 80.0
 MIN_TURN_RAD = 0.012
 
 
+class PushBlocks(NamedTuple):
+    """Accelerations (K,) over blocks: commanded, the car's, the model's; speeds, deviations."""
+
+    stamp_ns: Array
+    asked_mps2: Array
+    car_mps2: Array
+    model_mps2: Array
+    speed_mps: Array
+    std_mps2: Array
+
+
 class SignalPairs(NamedTuple):
     """Signals on the grid, each (N,) and NaN where unknown; steering in tyre angles.
 
@@ -41,7 +57,7 @@ class SignalPairs(NamedTuple):
     where both are known there, so that no ratio comes in.
     """
 
-    stamp_ns: np.ndarray[Any, np.dtype[np.int64]]
+    stamp_ns: Stamps
     moves: Flags
     excited: Flags
     """Moves and turns."""
@@ -190,7 +206,7 @@ def _runs(
     # One batch for both kinds: the stretch as commanded, then as measured with its speed held.
     held = np.arange(len(at)) < len(measured)
 
-    def run(rows: Rows) -> Array:
+    def run(rows: Indices) -> Array:
         begun, zero = at[rows], np.zeros(len(rows))
         begin = start_states(
             runner.vehicle, x_m=zero, y_m=zero, yaw_rad=zero, speed_mps=eased[begun],
@@ -216,3 +232,31 @@ def _runs(
     tire[at[commanded][:, None] + tail] = states[commanded][:, tail, 6]
     pushes = push_blocks(record, eased, told_starts, states[~held][:, :, 3])
     return by_measured, by_command, tire, pushes
+
+
+def push_blocks(
+    record: MotionRecord, speed_mps: Array, starts: Indices, model_mps: Array
+) -> PushBlocks:
+    """Return the last two blocks of each run at grid indices `starts` (K,).
+
+    `speed_mps` (N,) is the car's on the grid, `model_mps` (K, steps + 1) the model's of each run.
+    """
+    asked = record.command_accel_mps2
+    rows = []
+    for start, model in zip(starts, model_mps, strict=True):
+        for end in (len(model) - 1 - BLOCK, len(model) - 1):
+            at = int(start) + end
+            soon, due, late = (
+                np.mean(asked[at - BLOCK - k * _LAG : at - k * _LAG]) for k in range(3)
+            )
+            rows.append(
+                (
+                    record.stamp_ns[at],
+                    due,
+                    (speed_mps[at] - speed_mps[at - BLOCK]) / BLOCK_S,
+                    (model[end] - model[end - BLOCK]) / BLOCK_S,
+                    speed_mps[at - BLOCK // 2],
+                    math.hypot(_NOISE_MPS2, _UNEVEN * float(soon - late)),
+                )
+            )
+    return PushBlocks(*np.array(rows, dtype=np.float64).reshape(len(rows), 6).T)

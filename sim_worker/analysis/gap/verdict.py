@@ -14,13 +14,10 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import Verdict
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushTest
-from foretwin.sim_worker.analysis.gap.change import began_ns
-from foretwin.sim_worker.analysis.gap.consistency import Consistency, consistency_of
-from foretwin.sim_worker.analysis.gap.finding import Finding
-from foretwin.sim_worker.analysis.gap.findings import findings_of
-from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
+from foretwin.sim_worker.analysis.gap.consistency import Consistency, began_ns, consistency_of
+from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
+from foretwin.sim_worker.analysis.gap.free_run import FreeRunner, RunMemory
 from foretwin.sim_worker.analysis.gap.pairs import SignalPairs, pairs_of
-from foretwin.sim_worker.analysis.gap.run_memory import RunMemory
 from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
 
 WINDOW_S, RECENT_S, EVERY_S = 6.0, 3.0, 0.2

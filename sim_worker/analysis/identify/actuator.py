@@ -14,8 +14,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.identify.regression import Fit, fit_linear
-from foretwin.sim_worker.analysis.identify.smoothing import delayed, smoothed
+from foretwin.sim_worker.analysis.identify.regression import Fit, delayed, fit_linear, smoothed
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 
 WIDTH_S = 0.05

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
+from scipy import ndimage, special
 
 from foretwin.contracts.arrays import Array
 
@@ -154,3 +154,26 @@ def _by_root(normal: Array, grams: Array, moments: Array) -> Array:
     weights = 1.0 / np.sqrt(np.maximum(1.0 - weights, 1e-6))
     turned = np.einsum("gji,gj->gi", axes, moments @ root.T) * weights
     return np.asarray(np.einsum("gij,gj->gi", axes, turned) @ root)
+
+
+def smoothed(values: Array, *, period_s: float, width_s: float, derivative: bool = False) -> Array:
+    """Blur (N,) by a Gaussian of standard deviation `width_s`, or differentiate what it gives.
+
+    NaN wherever a value within three widths is unknown, so that nothing invented enters.
+    """
+    sigma = width_s / period_s
+    known = np.isfinite(values)
+    filled = np.where(known, values, 0.0)
+    order = 1 if derivative else 0
+    result = ndimage.gaussian_filter1d(filled, sigma, order=order, mode="nearest", truncate=4.0)
+    if derivative:
+        result /= period_s
+    unknown = np.concatenate([[True], ~known, [True]])
+    near = ndimage.binary_dilation(unknown, iterations=max(1, round(3.0 * sigma)))[1:-1]
+    return np.asarray(np.where(near, np.nan, result))
+
+
+def delayed(values: Array, *, period_s: float, delay_s: float) -> Array:
+    """Return what (N,) was `delay_s` ago, between instants linearly; NaN before the beginning."""
+    at = np.arange(len(values)) - delay_s / period_s
+    return np.asarray(np.interp(at, np.arange(len(values)), values, left=np.nan, right=np.nan))

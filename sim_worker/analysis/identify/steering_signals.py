@@ -13,17 +13,16 @@ is driven or braked.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.sim_worker.analysis.identify.regression import smoothed
 from foretwin.sim_worker.analysis.identify.single_track import SLOWEST_MPS, sideways
-from foretwin.sim_worker.analysis.identify.smoothing import smoothed
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 
-Indices = np.ndarray[Any, np.dtype[np.int64]]
 WIDTH_S = 0.1
 ALIKE_S = 2.0 * math.sqrt(math.pi) * WIDTH_S
 """For so long, smoothed white noise says one thing only."""

@@ -18,15 +18,15 @@ from foretwin.contracts.tuning import (
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.analysis.identify import longitudinal
 from foretwin.sim_worker.analysis.identify.actuator import fit_following
-from foretwin.sim_worker.analysis.identify.grade import grade_from_altitude
+from foretwin.sim_worker.analysis.identify.longitudinal import grade_from_altitude
 from foretwin.sim_worker.analysis.identify.steering import (
     INVERSE_RATIO,
     OFFSET,
     UNDERSTEER,
     SteeringFit,
     fit_steering,
+    steering_map,
 )
-from foretwin.sim_worker.analysis.identify.steering_map import steering_map
 from foretwin.sim_worker.analysis.identify.step import TURNING_MPS2
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import understeer_gradient

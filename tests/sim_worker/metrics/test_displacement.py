@@ -11,8 +11,8 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foretwin.sim_worker.metrics.curves import cheapest_walks
 from foretwin.sim_worker.metrics.displacement import (
+    cheapest_walks,
     displacements,
     relative_pose_error,
 )

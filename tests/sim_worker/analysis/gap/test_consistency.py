@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushBlocks
 from foretwin.sim_worker.analysis.gap.consistency import consistency_of
-from foretwin.sim_worker.analysis.gap.finding import Finding
-from foretwin.sim_worker.analysis.gap.findings import findings_of
+from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
 from foretwin.sim_worker.analysis.gap.pairs import SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foretwin.sim_worker.analysis.gap.joint_fit import joint_fit
+from foretwin.sim_worker.analysis.gap.fitting import joint_fit
 
 ASKED = np.array([1.4, 1.2, 0.6, 0.0, 0.0, 0.8, 1.4, 0.3])
 LOSS = -np.array([0.2, 0.4, 0.6, 0.8, 0.7, 0.7, 0.9, 1.0])

@@ -6,7 +6,7 @@ import pytest
 
 from foretwin.contracts.gap import GapSample
 from foretwin.sim_worker.analysis.gap.limits import GapLimits
-from foretwin.sim_worker.analysis.gap.manoeuvres import manoeuvre_of
+from foretwin.sim_worker.analysis.gap.measured_motion import manoeuvre_of
 
 
 def sample(across_m: float, *, horizon_s: float = 2.0, independent: bool = True) -> GapSample:

@@ -11,7 +11,7 @@ import pytest
 from foretwin.contracts.drive import ImuSample, SteeringSample
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.tuning import Identification
-from foretwin.sim_worker.analysis.identify.smoothing import smoothed
+from foretwin.sim_worker.analysis.identify.regression import smoothed
 from foretwin.sim_worker.analysis.identify.steering import fit_steering
 from foretwin.sim_worker.analysis.identify.steering_signals import TURNING, steering_signals
 from foretwin.sim_worker.analysis.identify.step import bends_before, find_step

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushBlocks, PushTest
-from foretwin.sim_worker.analysis.gap.change import change_index
-from foretwin.sim_worker.analysis.gap.finding import Finding
+from foretwin.sim_worker.analysis.gap.consistency import change_index
+from foretwin.sim_worker.analysis.gap.findings import Finding
 
 BLOCK_NS = 200_000_000
 

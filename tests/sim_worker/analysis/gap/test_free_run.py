@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.run_memory import Rows, RunMemory
+from foretwin.sim_worker.analysis.gap.free_run import Rows, RunMemory
 
 
 class Runs:
