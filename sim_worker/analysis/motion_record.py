@@ -127,11 +127,7 @@ class MotionRecorder:
             case SteeringSample(steering_wheel_rad=wheel, tire_angle_rad=tire):
                 return _NAN if wheel is None else wheel, _NAN if tire is None else tire
             case ControlCommand(accel_mps2=accel, steering_wheel_rad=wheel, tire_angle_rad=tire):
-                return (
-                    accel,
-                    _NAN if wheel is None else wheel,
-                    _NAN if tire is None else tire,
-                )
+                return (accel, _NAN if wheel is None else wheel, _NAN if tire is None else tire)
             case VehicleStatus(control_mode=mode):
                 return (float(mode == "manual"),)
             case _:

@@ -29,8 +29,11 @@ _UNANNOUNCED_AFTER = 4000
 _CHANNELS = (*SAMPLES, "state")
 """In the order in which messages with one stamp are taken."""
 _FINDINGS: dict[type, str] = {
-    Identification: "identification", GapSample: "gap", GapAlarm: "gap_alarm", Verdict: "verdict",
-}  # fmt: skip
+    Identification: "identification",
+    GapSample: "gap",
+    GapAlarm: "gap_alarm",
+    Verdict: "verdict",
+}
 
 log = logging.getLogger("sim_worker")
 
@@ -97,9 +100,8 @@ class TuningWorker:
         elif received > self._asked_for_info:
             self._asked_for_info = received + _ASK_EVERY
             self._bus.request(
-                "info", InfoRequest(), self._mailbox, timeout_s=5.0,
-                vehicle=self._setup.vehicle_id,
-            )  # fmt: skip
+                "info", InfoRequest(), self._mailbox, timeout_s=5.0, vehicle=self._setup.vehicle_id
+            )
 
     def _begin(self, info: VehicleInfo) -> None:
         if self._watch is not None:

@@ -30,9 +30,16 @@ GROUND_PIECES = 2
 _EGO = ("speed", "slide", "yaw_rate", "tire_angle", "accel", "offset", "heading")
 _WAY = ("target_speed", "bend_speed", "to_end", "lead_gap", "lead_speed", "stop_line", "wait_line")
 _USER = (
-    "present", "ahead", "left", "ahead_speed", "left_speed", "heading_cos", "heading_sin", "length",
+    "present",
+    "ahead",
+    "left",
+    "ahead_speed",
+    "left_speed",
+    "heading_cos",
+    "heading_sin",
+    "length",
     "width",
-)  # fmt: skip
+)
 
 
 def feature_names(nearest: int) -> tuple[str, ...]:

@@ -207,9 +207,12 @@ def scene_of(pool: Scene, cases: Rows) -> Scene:
         traffic = pool.traffic.begun(cases)
         sight = pool.sight.begun(cases, traffic)
         casts = Casting(
-            traffic.crowd, casts.paths, casts.kinds[cases], casts.hidden_by[cases],
+            traffic.crowd,
+            casts.paths,
+            casts.kinds[cases],
+            casts.hidden_by[cases],
             casts.walks[cases],
-        )  # fmt: skip
+        )
     return pool._replace(
         starts=pool.starts[cases],
         start_arc_m=pool.start_arc_m[cases],

@@ -155,8 +155,11 @@ class JunctionVectorEnv(VectorEnv[Observation, npt.NDArray[np.float32], npt.NDAr
         final = {k: np.where(over, v, np.zeros_like(v)) for k, v in infos.items() if k[0] != "_"}
         final.update({f"_{name}": over.copy() for name in final})
         kept: dict[str, Any] = {
-            "final_obs": ended, "_final_obs": over, "final_info": final, "_final_info": over.copy(),
-        }  # fmt: skip
+            "final_obs": ended,
+            "_final_obs": over,
+            "final_info": final,
+            "_final_info": over.copy(),
+        }
         for name, values in infos.items():
             if name[0] != "_":
                 kept[name] = np.where(over, np.zeros_like(values), values)

@@ -94,48 +94,44 @@ def _operator(count: int, step_s: float, window_s: float, derivative: int) -> Ar
     return operator
 
 
-def _kept(view: RolloutView) -> EgoMotion:
-    return view.keep(motion)
-
-
 def max_acceleration(view: RolloutView) -> Measure:
     """Greatest acceleration along the road (S,)."""
-    return view.measure(_kept(view).lon_accel_mps2.max(axis=1))
+    return view.measure(view.keep(motion).lon_accel_mps2.max(axis=1))
 
 
 def max_deceleration(view: RolloutView) -> Measure:
     """Greatest deceleration along the road (S,), positive where it brakes at all."""
-    return view.measure(-_kept(view).lon_accel_mps2.min(axis=1))
+    return view.measure(-view.keep(motion).lon_accel_mps2.min(axis=1))
 
 
 def max_lateral_acceleration(view: RolloutView) -> Measure:
     """Greatest lateral acceleration (S,) to either side."""
-    return view.measure(np.abs(_kept(view).lat_accel_mps2).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).lat_accel_mps2).max(axis=1))
 
 
 def max_jerk(view: RolloutView) -> Measure:
     """Greatest rate of change of the acceleration's size (S,)."""
-    return view.measure(np.abs(_kept(view).jerk_mps3).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).jerk_mps3).max(axis=1))
 
 
 def max_longitudinal_jerk(view: RolloutView) -> Measure:
     """Greatest rate of change of the acceleration along the road (S,)."""
-    return view.measure(np.abs(_kept(view).lon_jerk_mps3).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).lon_jerk_mps3).max(axis=1))
 
 
 def max_yaw_rate(view: RolloutView) -> Measure:
     """Greatest yaw rate (S,) to either side."""
-    return view.measure(np.abs(_kept(view).yaw_rate_radps).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).yaw_rate_radps).max(axis=1))
 
 
 def max_yaw_acceleration(view: RolloutView) -> Measure:
     """Greatest yaw acceleration (S,) to either side."""
-    return view.measure(np.abs(_kept(view).yaw_accel_radps2).max(axis=1))
+    return view.measure(np.abs(view.keep(motion).yaw_accel_radps2).max(axis=1))
 
 
 def comfortable(view: RolloutView) -> Measure:
     """Whether all of `BOUNDS` are kept at all instants (S,): 1 or 0."""
-    found = _kept(view)._asdict()
+    found = view.keep(motion)._asdict()
     kept: Flags = np.ones(len(view.valid), dtype=bool)
     for name, (least, most) in BOUNDS.items():
         kept &= ((found[name] >= least) & (found[name] <= most)).all(axis=1)

@@ -43,20 +43,19 @@ def post_encroachment_time(view: RolloutView) -> Measure:
     """
     found = view.keep(crossings)
     future, user = found.future, found.user
-    half_length, half_width = (half[future, 0, user] for half in view.user_half_m)
-    own_half_length = np.full(len(future), view.half_length_m)
-    own_half_width = np.full(len(future), view.half_width_m)
-    centre = view.centre_m
-    alone = tuple(v[..., None] for v in (centre[..., 0], centre[..., 1], view.states[..., 2]))
+    half_m = tuple(half[future, 0, user] for half in view.user_half_m)
+    own_half_m = tuple(np.full(len(future), half) for half in view.half_m)
+    x, y, yaw = (v[..., None] for v in (*np.moveaxis(view.centre_m, 2, 0), view.states[..., 2]))
+    own_picked = (future, np.zeros_like(user), found.ego_step)
+    picked = (future, user, found.user_step)
     stays = np.empty((4, len(future)))
-    compiled_pairs.stays_on_strips(
-        alone, own_half_length, own_half_width, future, np.zeros_like(user), found.ego_step,
-        found.point_m, found.user_way, half_width, view.time_s, stays[:2],
-    )  # fmt: skip
-    compiled_pairs.stays_on_strips(
-        view.users[:3], half_length, half_width, future, user, found.user_step,
-        found.point_m, found.ego_way, own_half_width, view.time_s, stays[2:],
-    )  # fmt: skip
+    for poses, half, which, way, strip_half, stay in (
+        ((x, y, yaw), own_half_m, own_picked, found.user_way, half_m[1], stays[:2]),
+        (view.users[:3], half_m, picked, found.ego_way, own_half_m[1], stays[2:]),
+    ):
+        compiled_pairs.stays_on_strips(
+            poses, half, which, found.point_m, way, strip_half, view.time_s, stay
+        )
     ego_from, ego_until, other_from, other_until = stays
     between = np.maximum(np.maximum(other_from - ego_until, ego_from - other_until), 0.0)
     least = np.full(len(view.valid), np.inf)
@@ -152,7 +151,4 @@ def _bounds(x: Array, y: Array) -> _Bounds:
             of(found, padded[:, k::_CHUNK], out=found)
         return np.asarray(found)
 
-    return _Bounds(
-        extreme(x, np.minimum), extreme(x, np.maximum),
-        extreme(y, np.minimum), extreme(y, np.maximum),
-    )  # fmt: skip
+    return _Bounds(*(extreme(v, of) for v in (x, y) for of in (np.minimum, np.maximum)))

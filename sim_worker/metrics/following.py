@@ -105,11 +105,9 @@ def leaders(view: RolloutView) -> Leaders:
     curvature = np.clip(curvature, -MAX_CURVATURE_PM, MAX_CURVATURE_PM)
     pairs = np.empty(seen.ahead_m.size, dtype=np.intp)
     found = np.empty((5, len(pairs)))
-    count = compiled_pairs.find_leaders(
-        (*seen[:4], seen.speed_mps), *view.user_half_m, curvature,
-        (view.centre_ahead_m, view.half_length_m, view.half_width_m, ALONG_COS, STANDING_MPS),
-        pairs, found,
-    )  # fmt: skip
+    limits = (view.centre_ahead_m, *view.half_m, ALONG_COS, STANDING_MPS)
+    relative = (*seen[:4], seen.speed_mps)
+    count = compiled_pairs.find_leaders(relative, view.user_half_m, curvature, limits, pairs, found)
     pair = pairs[:count]
     gap, left, reach, turned_cos, turned_sin = found[:, :count]
     row, user = np.divmod(pair, max(seen.ahead_m.shape[2], 1))

@@ -10,7 +10,7 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
-from foretwin.sim_worker.metrics.time_to_collision import BoxPairs, meeting
+from foretwin.sim_worker.metrics.time_to_collision import meeting
 
 _STANDS_MPS = 0.05
 """An ego slower than this stands: nuPlan, no_ego_at_fault_collisions."""
@@ -54,14 +54,18 @@ def minimum_clearance(view: RolloutView) -> Measure:
     x, y, yaw, _ = (values.reshape(-1)[pair] for values in view.users)
     apart = clearance(
         Rectangles(
-            view.centre_m.reshape(-1, 2)[row], view.states[..., 2].reshape(-1)[row],
-            2.0 * view.half_length_m, 2.0 * view.half_width_m,
+            view.centre_m.reshape(-1, 2)[row],
+            view.states[..., 2].reshape(-1)[row],
+            2.0 * view.half_length_m,
+            2.0 * view.half_width_m,
         ),
         Rectangles(
-            np.stack([x, y], axis=-1), yaw,
-            2.0 * half_length[future, 0, user], 2.0 * half_width[future, 0, user],
+            np.stack([x, y], axis=-1),
+            yaw,
+            2.0 * half_length[future, 0, user],
+            2.0 * half_width[future, 0, user],
         ),
-    )  # fmt: skip
+    )
     found = np.where(touched, 0.0, np.inf)
     np.minimum.at(found, future, apart)
     return view.measure(found)
@@ -140,15 +144,11 @@ def impacts(view: RolloutView) -> Impacts:
     move_x, move_y, goes_on, future = move_x[near], move_y[near], goes_on[near], row // instants
     cos, sin = (values.reshape(-1)[row] for values in view.heading)
     half_length, half_width = view.user_half_m
-    touch = meeting(
-        BoxPairs(
-            seen.ahead_m.reshape(-1)[pair], seen.left_m.reshape(-1)[pair],
-            cos * move_x + sin * move_y, cos * move_y - sin * move_x,
-            seen.cos.reshape(-1)[pair], seen.sin.reshape(-1)[pair],
-            (view.half_length_m, view.half_width_m),
-            (half_length[future, 0, user], half_width[future, 0, user]),
-        )
-    )  # fmt: skip
+    position = seen.ahead_m.reshape(-1)[pair], seen.left_m.reshape(-1)[pair]
+    turn = seen.cos.reshape(-1)[pair], seen.sin.reshape(-1)[pair]
+    motion = cos * move_x + sin * move_y, cos * move_y - sin * move_x
+    other_half_m = half_length[future, 0, user], half_width[future, 0, user]
+    touch = meeting((*position, *turn, *motion), view.half_m, other_half_m)
     # In units of the step: 0 at this instant, 1 at the next.
     share = np.maximum(touch.from_s, 0.0)
     hit = (touch.from_s <= touch.until_s) & (touch.until_s >= 0.0)

@@ -97,13 +97,11 @@ class RolloutView:
         self.valid: Flags = np.asarray(rollout.valid, dtype=bool) & whole
         """(S,) whether a future was simulated to its end."""
         self.all_valid = bool(self.valid.all())
-        self.states = states if self.all_valid else np.where(
-            self.valid[:, None, None], states, 0.0
-        )  # fmt: skip
+        self.states = states if self.all_valid else np.where(self.valid[:, None, None], states, 0.0)
         self.time_s = np.asarray(rollout.time_s, dtype=np.float64)
         vehicle = rollout.vehicle
-        self.half_length_m = vehicle.length_m.value / 2.0
-        self.half_width_m = vehicle.width_m.value / 2.0
+        self.half_m = (vehicle.length_m.value / 2.0, vehicle.width_m.value / 2.0)
+        self.half_length_m, self.half_width_m = self.half_m
         self.centre_ahead_m = box_centre_from_base_m(vehicle)
         """How far the middle of the ego's box lies ahead of base_link."""
         self._kept: dict[Callable[[RolloutView], Any], Any] = {}

@@ -57,12 +57,14 @@ class RouteRules:
         entered |= {c.id: None for c in taken}
         self.lines = tuple(
             LineAhead(
-                line.id, np.asarray(line.ends), _control(line.control.value),
+                line.id,
+                np.asarray(line.ends),
+                _control(line.control.value),
                 entered[line.across_id],
             )
             for line in world.stop_lines
             if line.across_id in entered
-        )  # fmt: skip
+        )
         by_id = {c.id: c for c in world.connections}
         own = {c.id for c in taken}
         self.conflicts = tuple(

@@ -79,15 +79,13 @@ METRICS = MappingProxyType(
         "backwards": Metric(progress.backwards, "m", "lower", ("path",)),
         "off_road_share": Metric(progress.off_road_share, "1", "lower", ("ground",)),
         "on_road": Metric(progress.on_road, "1", "higher", ("ground",)),
-        "red_light_violations": Metric(
-            violations.red_light_violations, "1", "lower", ("rules",)
-        ),
+        "red_light_violations": Metric(violations.red_light_violations, "1", "lower", ("rules",)),
         "right_of_way_violations": Metric(
             violations.right_of_way_violations, "1", "lower", ("rules",)
         ),
         "driving_score": Metric(score.driving_score, "1", "higher", _DRIVEN),
     }
-)  # fmt: skip
+)
 
 ROW_METRICS = tuple(
     name for name, row in METRICS.items() if not row.series and "reference" not in row.needs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,45 +23,38 @@ class TouchInterval(NamedTuple):
     until_s: Array
 
 
-class BoxPairs(NamedTuple):
-    """Two boxes each, in the axes of the first: the second's centre, velocity and turn (…).
-
-    Half lengths and half widths broadcast against them.
-    """
-
-    ahead_m: Array
-    left_m: Array
-    ahead_mps: Array
-    left_mps: Array
-    cos: Array
-    sin: Array
-    first_half_m: tuple[float, float]
-    second_half_m: tuple[Array, Array]
-
-
-def meeting(pairs: BoxPairs) -> TouchInterval:
+def meeting(
+    relative: Sequence[Array], half_m: tuple[float, float], other_half_m: tuple[Array, Array]
+) -> TouchInterval:
     """Return when boxes that only translate touch each other.
+
+    `relative` holds six arrays (…) in the order of `Relative`: the other's centre, turn and
+    velocity in the axes of the first. Half lengths and half widths broadcast against them.
 
     Separating axes of moving convex shapes: Eberly (2001), Intersection of Convex Objects: The
     Method of Separating Axes, section 4. On each of the four face normals the projections overlap
     during one interval; the boxes touch while all four do.
     """
-    length, width = pairs.first_half_m
-    other_length, other_width = pairs.second_half_m
-    cos, sin = np.abs(pairs.cos), np.abs(pairs.sin)
-    x, y, vx, vy = pairs.ahead_m, pairs.left_m, pairs.ahead_mps, pairs.left_mps
-    first, last = _interval(x, vx, cos * other_length + sin * other_width + length)
-    _narrow(first, last, y, vy, sin * other_length + cos * other_width + width)
-    _narrow(
-        first, last,
-        pairs.cos * x + pairs.sin * y, pairs.cos * vx + pairs.sin * vy,
-        cos * length + sin * width + other_length,
-    )  # fmt: skip
-    _narrow(
-        first, last,
-        pairs.cos * y - pairs.sin * x, pairs.cos * vy - pairs.sin * vx,
-        sin * length + cos * width + other_width,
-    )  # fmt: skip
+    ahead, left, cos, sin, ahead_mps, left_mps = relative
+    (length, width), (other_length, other_width) = half_m, other_half_m
+    along, across = np.abs(cos), np.abs(sin)
+    first, last = _interval(ahead, ahead_mps, along * other_length + across * other_width + length)
+    for distance, speed, reach in (
+        (left, left_mps, across * other_length + along * other_width + width),
+        (
+            cos * ahead + sin * left,
+            cos * ahead_mps + sin * left_mps,
+            along * length + across * width + other_length,
+        ),
+        (
+            cos * left - sin * ahead,
+            cos * left_mps - sin * ahead_mps,
+            across * length + along * width + other_width,
+        ),
+    ):
+        begin, end = _interval(distance, speed, reach)
+        np.maximum(first, begin, out=first)
+        np.minimum(last, end, out=last)
     return TouchInterval(first, last)
 
 
@@ -73,12 +67,6 @@ def _interval(distance: Array, speed: Array, reach: Array) -> tuple[Array, Array
     last = half - per_speed
     first -= half
     return first, last
-
-
-def _narrow(first: Array, last: Array, distance: Array, speed: Array, reach: Array) -> None:
-    begin, end = _interval(distance, speed, reach)
-    np.maximum(first, begin, out=first)
-    np.minimum(last, end, out=last)
 
 
 def ttc_series(view: RolloutView) -> Measure:
@@ -117,7 +105,5 @@ def _least_at_each_instant(view: RolloutView) -> Array:
     """
     seen = view.relative
     least = np.full(seen.ahead_m.shape[:2], np.inf)
-    compiled_pairs.least_until_touch(
-        seen[:6], *view.user_half_m, view.half_length_m, view.half_width_m, least
-    )
+    compiled_pairs.least_until_touch(seen[:6], view.user_half_m, view.half_m, least)
     return least

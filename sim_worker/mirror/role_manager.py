@@ -156,11 +156,7 @@ class RoleManager:
         if self._group is None:
             return sample
         completed = with_group(
-            sample,
-            self._group,
-            self._car,
-            drive_frame=self._drive_frame,
-            world_frame=self._frame,
+            sample, self._group, self._car, drive_frame=self._drive_frame, world_frame=self._frame
         )
         self._group.forget_touches()
         return completed

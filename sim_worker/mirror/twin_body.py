@@ -22,12 +22,7 @@ class TwinBody:
     """
 
     def __init__(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        vehicle: VehicleParameters,
-        *,
-        prefix: str,
+        self, model: mujoco.MjModel, data: mujoco.MjData, vehicle: VehicleParameters, *, prefix: str
     ) -> None:
         self._model, self._data, self._vehicle = model, data, vehicle
         self._actuators = actuator_ids(model, prefix)

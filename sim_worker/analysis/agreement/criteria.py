@@ -71,11 +71,7 @@ class Court:
     """Judges motion through one window, by the World and the path that `rules` are of."""
 
     def __init__(
-        self,
-        window: Window,
-        rules: RouteRules,
-        ground: DrivableGround,
-        vehicle: VehicleParameters,
+        self, window: Window, rules: RouteRules, ground: DrivableGround, vehicle: VehicleParameters
     ) -> None:
         self._window, self._rules, self._ground, self._vehicle = window, rules, ground, vehicle
 

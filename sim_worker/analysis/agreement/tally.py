@@ -41,9 +41,13 @@ def judged(window: Window, court: Court) -> Judged:
     both = verdicts(window, court)
     gap = gap_between(window.simulated, window.driven)
     found = flips(
-        court, window.simulated, window.simulated_users, gap, both.observable,
+        court,
+        window.simulated,
+        window.simulated_users,
+        gap,
+        both.observable,
         passes=both.simulated_passes,
-    )  # fmt: skip
+    )
     return Judged(window, both, gap.peak_m("along"), gap.peak_m("across"), found)
 
 

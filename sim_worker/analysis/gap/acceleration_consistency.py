@@ -44,9 +44,12 @@ _LEFT_OPEN = {"drag": 0.1, "rolling": 0.1, "drive_gain": 0.1, "brake_gain": 0.1}
 _CLEARLY = 6.63
 """Squared deviations that a cause must explain beyond all others: 1 in 100 does by chance."""
 _PUSH = {
-    "drive_gain": "drive", "saturated_drive": "drive", "brake_gain": "brake",
-    "saturated_brake": "brake", "drag": "drag",
-}  # fmt: skip
+    "drive_gain": "drive",
+    "saturated_drive": "drive",
+    "brake_gain": "brake",
+    "saturated_brake": "brake",
+    "drag": "drag",
+}
 _COMMANDED = " of the commanded acceleration"
 _KINDS = {
     "drive_gain": _Kind(0.25, 1.0, _COMMANDED),
@@ -214,9 +217,14 @@ def _finding(
     said = f"the car does {by_car:.2f} and the model {by_model:.2f}{unit}"
     who = {"vehicle": "the car departs", "model": "the model departs", "both": "both depart"}
     evidence = tuple(
-        Evidence(name=f"{whose}_{cause}", value=does, expected=kind.usual, std=std,
-                 text=f"the {whose}: {does:.2f}{unit}")
+        Evidence(
+            name=f"{whose}_{cause}",
+            value=does,
+            expected=kind.usual,
+            std=std,
+            text=f"the {whose}: {does:.2f}{unit}",
+        )
         for whose, does in (("car", by_car), ("model", by_model))
-    )  # fmt: skip
+    )
     text = f"{said}: {who[culprit]} from the command"
     return Finding(culprit, cause, text, evidence, began_ns)

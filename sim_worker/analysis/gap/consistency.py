@@ -69,22 +69,33 @@ def consistency_of(pairs: SignalPairs) -> Consistency:
     motion = _turning(by_measured, real)
     return Consistency(
         gyro_by_course=_turn_rates(pairs),
-        speed_by_gnss=_mean_ratio(pairs.ground_mps[::_EVERY], pairs.wheel_mps[::_EVERY],
-                                  period_s=_EVERY * PERIOD_S, together_s=0.4, least_s=1.5),
+        speed_by_gnss=_mean_ratio(
+            pairs.ground_mps[::_EVERY],
+            pairs.wheel_mps[::_EVERY],
+            period_s=_EVERY * PERIOD_S,
+            together_s=0.4,
+            least_s=1.5,
+        ),
         measured_by_command=measured,
         model_by_command=model,
         model_stops_at_rad=_stop(pairs.commanded_rad, pairs.done_rad, pairs.model_tire_rad),
         motion_by_measured=motion,
-        motion_by_measured_hard=None if motion is None else _mean_ratio(
-            np.where(hard, by_measured, np.nan), real,
-            period_s=PERIOD_S, together_s=0.4, least_s=0.6),
+        motion_by_measured_hard=None
+        if motion is None
+        else _mean_ratio(
+            np.where(hard, by_measured, np.nan),
+            real,
+            period_s=PERIOD_S,
+            together_s=0.4,
+            least_s=0.6,
+        ),
         missing_mps2=_missing(pairs),
         motion_lag=_lag(by_measured, real),
         motion_by_command=_turning(pairs.by_command_pm, real),
         motion_by_angle=angle,
         excited_s=float(pairs.excited.sum()) * PERIOD_S,
         moved_s=float(pairs.moves.sum()) * PERIOD_S,
-    )  # fmt: skip
+    )
 
 
 def _varies(angle: Array) -> bool:

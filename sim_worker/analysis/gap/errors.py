@@ -116,9 +116,13 @@ class GapMeter:
         begin[:, :2] -= begin[:, :2]  # near the origin, where numbers are exact
         steps = round(max(horizon for _, horizon in wanted) / PERIOD_S)
         runs = runner.run(
-            states=begin, starts=starts, steps=steps, accel_mps2=accel, tire_rad=steer,
+            states=begin,
+            starts=starts,
+            steps=steps,
+            accel_mps2=accel,
+            tire_rad=steer,
             delayed=independent,
-        )  # fmt: skip
+        )
         for row, horizon in wanted:
             start, count = int(starts[row]), round(horizon / PERIOD_S)
             end = start + count

@@ -182,8 +182,13 @@ def _model_turns(seen: Consistency) -> Finding | None:
     if seen.missing_mps2 > _MISSING_MPS2 and hard is not None and line.explained < _FOLLOWS:
         text = f"the model's tyres do not carry what the car's do: {seen.missing_mps2:.1f} m/s² of "
         text += f"lateral acceleration apart, {said}"
-        more = Evidence(name="missing_mps2", value=seen.missing_mps2, expected=0.0, std=0.15,
-                        text=f"{seen.missing_mps2:.2f} m/s² between model and car")  # fmt: skip
+        more = Evidence(
+            name="missing_mps2",
+            value=seen.missing_mps2,
+            expected=0.0,
+            std=0.15,
+            text=f"{seen.missing_mps2:.2f} m/s² between model and car",
+        )
         return accuse("friction", text, more)
     if line.gain_std > 0.1 or line.explained < 0.6:
         return None

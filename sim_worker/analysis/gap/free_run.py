@@ -119,10 +119,15 @@ def start_states(
         speed, rate = float(speed_mps[index]), float(yaw_rate_radps[index])
         tire = float(tire_rad[index])
         rows[index] = (
-            x_m[index], y_m[index], yaw_rad[index], speed, rear_slip_velocity(vehicle, speed, rate),
-            rate, tire if np.isfinite(tire) else kinematic_tire_angle(vehicle, speed, rate),
+            x_m[index],
+            y_m[index],
+            yaw_rad[index],
+            speed,
+            rear_slip_velocity(vehicle, speed, rate),
+            rate,
+            tire if np.isfinite(tire) else kinematic_tire_angle(vehicle, speed, rate),
             accel_mps2[index],
-        )  # fmt: skip
+        )
     return rows
 
 

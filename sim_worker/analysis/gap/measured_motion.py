@@ -33,10 +33,7 @@ class MeasuredMotion(NamedTuple):
 
 
 def motion_on_grid(
-    states: Sequence[VehicleState],
-    stamp_ns: Stamps,
-    *,
-    frame: LocalFrame,
+    states: Sequence[VehicleState], stamp_ns: Stamps, *, frame: LocalFrame
 ) -> MeasuredMotion:
     """Interpolate states with a known heading to `stamp_ns` (N,), which ascend.
 
@@ -48,9 +45,14 @@ def motion_on_grid(
     for state in states:
         place = state.position
         values = (
-            place.lat_deg, place.lon_deg, state.yaw_rad, state.speed_mps, state.yaw_rate_radps,
-            state.accel_mps2, *(state.map_shift_m or (0.0, 0.0)),
-        )  # fmt: skip
+            place.lat_deg,
+            place.lon_deg,
+            state.yaw_rad,
+            state.speed_mps,
+            state.yaw_rate_radps,
+            state.accel_mps2,
+            *(state.map_shift_m or (0.0, 0.0)),
+        )
         time_s = (state.stamp_ns - base_ns) * 1e-9
         if state.yaw_valid and np.isfinite(values).all() and (not rows or time_s > rows[-1][0]):
             rows.append((time_s, *values))

@@ -125,14 +125,24 @@ def pairs_of(
     course, gyro, ground, wheels = sensors
     by_measured, by_command, tire, pushes = _runs(record, runner, memory or RunMemory())
     return SignalPairs(
-        stamp_ns=record.stamp_ns, moves=moves, excited=moves & (turn > MIN_TURN_RAD),
-        course_radps=course, gyro_radps=gyro, ground_mps=ground, wheel_mps=wheels,
-        asked_rad=np.where(moves, asked, np.nan), done_rad=np.where(moves, done, np.nan),
-        arc_rad=np.where(moves, arc, np.nan), speed_mps=speed,
+        stamp_ns=record.stamp_ns,
+        moves=moves,
+        excited=moves & (turn > MIN_TURN_RAD),
+        course_radps=course,
+        gyro_radps=gyro,
+        ground_mps=ground,
+        wheel_mps=wheels,
+        asked_rad=np.where(moves, asked, np.nan),
+        done_rad=np.where(moves, done, np.nan),
+        arc_rad=np.where(moves, arc, np.nan),
+        speed_mps=speed,
         curvature_pm=np.where(moves, rate / np.maximum(speed, MOVES_MPS), np.nan),
-        by_measured_pm=by_measured, by_command_pm=by_command,
-        commanded_rad=signals.commanded_rad, model_tire_rad=tire, pushes=pushes,
-    )  # fmt: skip
+        by_measured_pm=by_measured,
+        by_command_pm=by_command,
+        commanded_rad=signals.commanded_rad,
+        model_tire_rad=tire,
+        pushes=pushes,
+    )
 
 
 def smooth(values: Array, half: int) -> Array:
@@ -209,21 +219,32 @@ def _runs(
     def run(rows: Indices) -> Array:
         begun, zero = at[rows], np.zeros(len(rows))
         begin = start_states(
-            runner.vehicle, x_m=zero, y_m=zero, yaw_rad=zero, speed_mps=eased[begun],
-            yaw_rate_radps=rate[begun], accel_mps2=slope[begun],
+            runner.vehicle,
+            x_m=zero,
+            y_m=zero,
+            yaw_rad=zero,
+            speed_mps=eased[begun],
+            yaw_rate_radps=rate[begun],
+            accel_mps2=slope[begun],
             tire_rad=np.full(len(rows), np.nan),
-        )  # fmt: skip
+        )
         return runner.run(
-            states=begin, starts=np.where(held[rows], begun + count, begun), steps=_RUN,
+            states=begin,
+            starts=np.where(held[rows], begun + count, begun),
+            steps=_RUN,
             accel_mps2=np.concatenate([accel, accel]),
             tire_rad=np.concatenate([signals.commanded_rad, led]),
-            hold_speed_mps=np.concatenate([nothing, eased]), delayed=~held[rows],
-        )  # fmt: skip
+            hold_speed_mps=np.concatenate([nothing, eased]),
+            delayed=~held[rows],
+        )
 
     states = memory.states(
-        stamp_ns=record.stamp_ns[at], held=held, settled=at + _RUN + _SETTLED < count,
-        from_stamp_ns=int(record.stamp_ns[0]), run=run,
-    )  # fmt: skip
+        stamp_ns=record.stamp_ns[at],
+        held=held,
+        settled=at + _RUN + _SETTLED < count,
+        from_stamp_ns=int(record.stamp_ns[0]),
+        run=run,
+    )
     tail = np.arange(_RUN - _TAIL + 1, _RUN + 1)
     curvature = states[:, tail, 5] / np.maximum(states[:, tail, 3], 1.0)
     by_measured[at[held][:, None] + tail] = curvature[held]

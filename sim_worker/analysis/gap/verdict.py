@@ -92,9 +92,12 @@ class Judge:
             return None
         record = without_manual_commands(self._recorder.record(from_ns, to_ns))
         pairs = pairs_of(
-            record, self._runner, antenna_ahead_m=self._ahead_m,
-            precise_positions=self._precise(), memory=self._runs,
-        )  # fmt: skip
+            record,
+            self._runner,
+            antenna_ahead_m=self._ahead_m,
+            precise_positions=self._precise(),
+            memory=self._runs,
+        )
         self.latest = consistency_of(pairs)
         pushed = self._push.handle(pairs.pushes)
         found = _found_in(pairs, self.latest)

@@ -89,10 +89,15 @@ def accepted(
             continue
         changes.append(
             ParameterChange(
-                vehicle_id=told.vehicle_id, stamp_ns=told.stamp_ns, name=name, before=before,
-                value=value, std=std, origin="identified",
+                vehicle_id=told.vehicle_id,
+                stamp_ns=told.stamp_ns,
+                name=name,
+                before=before,
+                value=value,
+                std=std,
+                origin="identified",
             )
-        )  # fmt: skip
+        )
     return vehicle, tuple(changes)
 
 

@@ -63,8 +63,13 @@ def _cornering(record: MotionRecord, vehicle: VehicleParameters, speed_mps: Arra
     rate = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S)
     turning = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S, derivative=True)
     base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
-    side = sideways(vehicle, speed_mps=speed_mps, yaw_rate_radps=rate, yaw_accel_radps2=turning,
-                    period_s=period_s)  # fmt: skip
+    side = sideways(
+        vehicle,
+        speed_mps=speed_mps,
+        yaw_rate_radps=rate,
+        yaw_accel_radps2=turning,
+        period_s=period_s,
+    )
     ahead = np.arctan2(side.speed_mps + (base - rear) * rate, np.maximum(speed_mps, SLOWEST_MPS))
     slip = side.front_mps2 * vehicle.mass_kg.value / vehicle.front_cornering_stiffness_npr.value
     return np.asarray(side.front_mps2 * np.sin(ahead + slip) - rate * side.speed_mps)
@@ -143,13 +148,23 @@ def fit_longitudinal(
     delay_s = best_delay(errors)
     mass = vehicle.mass_kg.value
     centre = np.array(
-        [vehicle.drive_gain.value, vehicle.brake_gain.value, vehicle.drag_npv2.value / mass,
-         vehicle.rolling_resistance_n.value / mass, 0.0]
-    )  # fmt: skip
+        [
+            vehicle.drive_gain.value,
+            vehicle.brake_gain.value,
+            vehicle.drag_npv2.value / mass,
+            vehicle.rolling_resistance_n.value / mass,
+            0.0,
+        ]
+    )
     spread = np.array(
-        [np.inf, np.inf, 2.0 * (vehicle.drag_npv2.std or 0.4) / mass,
-         2.0 * (vehicle.rolling_resistance_n.std or 130.0) / mass, np.inf]
-    )  # fmt: skip
+        [
+            np.inf,
+            np.inf,
+            2.0 * (vehicle.drag_npv2.std or 0.4) / mass,
+            2.0 * (vehicle.rolling_resistance_n.std or 130.0) / mass,
+            np.inf,
+        ]
+    )
     gains = centre[:2]
     fit: Fit | None = None
     for _ in range(4):

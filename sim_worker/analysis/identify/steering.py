@@ -111,15 +111,29 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     used, per_m = signals.used, signals.per_m
     inverse = 1.0 / vehicle.steering_ratio.value
     centre = np.array(
-        [inverse, vehicle.steering_offset_rad.value, understeer_gradient(vehicle),
-         turning_s2(vehicle), signals.gyro_bias_radps, 0.0, 0.0, 0.0]
-    )  # fmt: skip
+        [
+            inverse,
+            vehicle.steering_offset_rad.value,
+            understeer_gradient(vehicle),
+            turning_s2(vehicle),
+            signals.gyro_bias_radps,
+            0.0,
+            0.0,
+            0.0,
+        ]
+    )
     spread = np.array(
-        [_inverse_ratio_std(vehicle), _OFFSET_STD_RAD, _WEAK * understeer_std(vehicle),
-         turning_s2(vehicle), min(signals.gyro_bias_std_radps, _GYRO_BIAS_STD_RADPS),
-         _LAG_STD_S * inverse,
-         _PULL_STD_RAD_PER_MPS2, _PULL_STD_RAD_PER_MPS2]
-    )  # fmt: skip
+        [
+            _inverse_ratio_std(vehicle),
+            _OFFSET_STD_RAD,
+            _WEAK * understeer_std(vehicle),
+            turning_s2(vehicle),
+            min(signals.gyro_bias_std_radps, _GYRO_BIAS_STD_RADPS),
+            _LAG_STD_S * inverse,
+            _PULL_STD_RAD_PER_MPS2,
+            _PULL_STD_RAD_PER_MPS2,
+        ]
+    )
     gaining = signals.given[PULL_DRIVEN, used] + signals.given[PULL_BRAKED, used]
     weights = 1.0 / np.hypot(1.0, signals.speed_mps[used] / _ANGLES_BELOW_MPS)
     weights /= np.hypot(1.0, gaining / _ROLLING_MPS2)
@@ -130,9 +144,15 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
 
     def fitted(values: Array, *, least_std: float, brief: bool) -> Fit:
         apart, slopes = signals.unexplained(values)
-        return fit_linear((slopes * weights).T, (apart + values @ slopes) * weights,
-                          record.time_s[used], prior=centre, prior_std=spread,
-                          least_std=least_std, brief=brief)  # fmt: skip
+        return fit_linear(
+            (slopes * weights).T,
+            (apart + values @ slopes) * weights,
+            record.time_s[used],
+            prior=centre,
+            prior_std=spread,
+            least_std=least_std,
+            brief=brief,
+        )
 
     values = centre
     for _ in range(4):
@@ -202,8 +222,12 @@ def steering_map(record: MotionRecord, fit: SteeringFit) -> tuple[SteeringMapBin
             continue
         bins.append(
             SteeringMapBin(
-                from_mps=low, to_mps=high, ratio=1.0 / inverse, low=1.0 / (inverse + half),
-                high=1.0 / (inverse - half), samples=int(inside.sum()),
+                from_mps=low,
+                to_mps=high,
+                ratio=1.0 / inverse,
+                low=1.0 / (inverse + half),
+                high=1.0 / (inverse - half),
+                samples=int(inside.sum()),
             )
-        )  # fmt: skip
+        )
     return tuple(bins)

@@ -117,8 +117,9 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         smooth(values, derivative=True)
         for values in (record.speed_mps, record.yaw_rate_radps, record.wheel_rad)
     )
-    side = sideways(vehicle, speed_mps=speed, yaw_rate_radps=rate, yaw_accel_radps2=turning,
-                    period_s=period_s)  # fmt: skip
+    side = sideways(
+        vehicle, speed_mps=speed, yaw_rate_radps=rate, yaw_accel_radps2=turning, period_s=period_s
+    )
     known = np.isfinite(wheel) & np.isfinite(side.accel_mps2)
     moving = known & (speed > SLOWEST_MPS) & (np.abs(side.accel_mps2) < _MAX_LATERAL_MPS2)
     if not moving.any():
@@ -137,11 +138,19 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         rear_slip_rad=side.rear_slip_rad,
         lateral_mps2=side.accel_mps2,
         given=np.stack(
-            [wheel, np.ones_like(wheel), -side.accel_mps2, -turning, np.zeros_like(wheel),
-             -steering, np.maximum(gaining, 0.0), np.minimum(gaining, 0.0)]
+            [
+                wheel,
+                np.ones_like(wheel),
+                -side.accel_mps2,
+                -turning,
+                np.zeros_like(wheel),
+                -steering,
+                np.maximum(gaining, 0.0),
+                np.minimum(gaining, 0.0),
+            ]
         ),
         per_m=speed[used] / base,
         wheelbase_m=base,
         gyro_bias_radps=bias,
         gyro_bias_std_radps=bias_std,
-    )  # fmt: skip
+    )

@@ -81,11 +81,7 @@ def turning_s(record: MotionRecord) -> float:
 
 
 def identify(
-    record: MotionRecord,
-    vehicle: VehicleParameters,
-    *,
-    vehicle_id: str,
-    grade: Array | None = None,
+    record: MotionRecord, vehicle: VehicleParameters, *, vehicle_id: str, grade: Array | None = None
 ) -> Identification:
     """Identify what `record` tells of a car whose parameters in force are `vehicle`.
 
@@ -96,11 +92,7 @@ def identify(
 
 
 def examine(
-    record: MotionRecord,
-    vehicle: VehicleParameters,
-    *,
-    vehicle_id: str,
-    grade: Array | None = None,
+    record: MotionRecord, vehicle: VehicleParameters, *, vehicle_id: str, grade: Array | None = None
 ) -> Examined:
     """Identify as `identify` does, and return the steering's fit along."""
     if len(record.stamp_ns) < 2 or record.time_s[-1] < 1.0:

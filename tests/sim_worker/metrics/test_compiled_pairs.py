@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.metrics import compiled_pairs, encroachment, following
 from foretwin.sim_worker.metrics.rollout import Rollout, RolloutView
-from foretwin.sim_worker.metrics.time_to_collision import BoxPairs, meeting, ttc_series
+from foretwin.sim_worker.metrics.time_to_collision import meeting, ttc_series
 from tests.sim_worker.metrics.motions import VEHICLE, times
 
 FUTURES, USERS = 3, 4
@@ -50,12 +50,7 @@ def scene(seed: int) -> RolloutView:
 def test_time_to_collision_is_that_of_all_pairs_to_the_bit(seed: int) -> None:
     driven = scene(seed)
     seen = driven.relative
-    touch = meeting(
-        BoxPairs(
-            seen.ahead_m, seen.left_m, seen.ahead_mps, seen.left_mps, seen.cos, seen.sin,
-            (driven.half_length_m, driven.half_width_m), driven.user_half_m,
-        )
-    )  # fmt: skip
+    touch = meeting(seen[:6], driven.half_m, driven.user_half_m)
     until = np.maximum(touch.from_s, 0.0)
     until[touch.until_s < until] = np.inf
     assert (ttc_series(driven).values == until.min(axis=2)).all()
@@ -104,9 +99,15 @@ def test_a_stay_on_a_strip_lasts_while_a_corner_is_on_it(seed: int) -> None:
     stay = np.empty((2, len(met.user)))
 
     compiled_pairs.stays_on_strips(
-        (x, y, yaw), length, width, met.future, met.user, met.user_step, met.point_m, met.ego_way,
-        strip_half, driven.time_s, stay,
-    )  # fmt: skip
+        (x, y, yaw),
+        (length, width),
+        (met.future, met.user, met.user_step),
+        met.point_m,
+        met.ego_way,
+        strip_half,
+        driven.time_s,
+        stay,
+    )
 
     normal = np.stack([-met.ego_way[:, 1:], met.ego_way[:, :1]])
     track_x, track_y, angle = (values[met.future, :, met.user] for values in (x, y, yaw))
