@@ -33,6 +33,8 @@ _ASKED_MPS2, _FAST_MPS = 0.25, 5.0
 
 
 class _Kind(NamedTuple):
+    push: str
+    """Of the causes of one push one alone is right: a gain or a plateau."""
     limit: float
     """Departures within it are what parameters of the right car leave open."""
     usual: float
@@ -43,20 +45,14 @@ _LEFT_OPEN = {"drag": 0.1, "rolling": 0.1, "drive_gain": 0.1, "brake_gain": 0.1}
 """Standard deviations of what parameters of the right car leave open beside a cause."""
 _CLEARLY = 6.63
 """Squared deviations that a cause must explain beyond all others: 1 in 100 does by chance."""
-_PUSH = {
-    "drive_gain": "drive",
-    "saturated_drive": "drive",
-    "brake_gain": "brake",
-    "saturated_brake": "brake",
-    "drag": "drag",
-}
 _COMMANDED = " of the commanded acceleration"
+_BEYOND = " of what is commanded beyond {plateau:.1f} m/s²"
 _KINDS = {
-    "drive_gain": _Kind(0.25, 1.0, _COMMANDED),
-    "brake_gain": _Kind(0.25, 1.0, _COMMANDED),
-    "saturated_drive": _Kind(0.2, 1.0, " of what is commanded beyond {plateau:.1f} m/s²"),
-    "saturated_brake": _Kind(0.2, 1.0, " of what is commanded beyond {plateau:.1f} m/s²"),
-    "drag": _Kind(0.33, 0.0, " m/s² lost at 10 m/s"),
+    "drive_gain": _Kind("drive", 0.25, 1.0, _COMMANDED),
+    "brake_gain": _Kind("brake", 0.25, 1.0, _COMMANDED),
+    "saturated_drive": _Kind("drive", 0.2, 1.0, _BEYOND),
+    "saturated_brake": _Kind("brake", 0.2, 1.0, _BEYOND),
+    "drag": _Kind("drag", 0.33, 0.0, " m/s² lost at 10 m/s"),
 }
 
 
@@ -165,8 +161,7 @@ def _explain(
         if cost(named) - cost([*named, best]) < _CLEARLY:
             break
         named.append(best)
-        # Of one push a gain or a plateau is wrong.
-        others = [one for one in others if _PUSH[one] != _PUSH[best]]
+        others = [one for one in others if _KINDS[one].push != _KINDS[best].push]
     worse = {one: cost([other for other in named if other != one]) - cost(named) for one in named}
     named = sorted((one for one in named if worse[one] >= _CLEARLY), key=lambda one: -worse[one])
     if not named or cost(named) > 0.7 * float(np.sum(gap**2 / variance)):
@@ -186,21 +181,12 @@ def _explain(
     )
 
 
-def _by_car(blocks: PushBlocks, part: _Part) -> float:
-    """Return how much of a cause's column the car does."""
-    weighted = blocks.std_mps2**-2 * part.column
-    done = float(np.sum(weighted * (blocks.car_mps2 - part.rest)))
-    return done / float(np.sum(weighted * part.column))
-
-
-def _of(blocks: PushBlocks, part: _Part, used: Indices) -> tuple[PushBlocks, _Part]:
-    chosen = PushBlocks(*(one[used] for one in blocks))
-    return chosen, part._replace(column=part.column[used], rest=part.rest[used])
-
-
 def _exceeds(blocks: PushBlocks, part: _Part, used: Indices, off: float, doubt: float) -> bool:
-    """Return whether somebody does more than is asked: who does has come to no end of it."""
-    by_car = _by_car(*_of(blocks, part, used))
+    """Return whether car or model does more than is asked: its push has come to no end."""
+    column = part.column[used]
+    weighted = blocks.std_mps2[used] ** -2 * column
+    done = float(np.sum(weighted * (blocks.car_mps2[used] - part.rest[used])))
+    by_car = done / float(np.sum(weighted * column))
     return max(by_car, by_car + off) > 1.0 + _KINDS["saturated_drive"].limit + 3.0 * doubt
 
 

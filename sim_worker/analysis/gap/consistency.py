@@ -7,15 +7,19 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.fitting import DelayedLine, Line, delayed_line, line_through
+from foretwin.sim_worker.analysis.gap.fitting import (
+    TOGETHER_S,
+    DelayedLine,
+    Line,
+    delayed_line,
+    line_through,
+)
 from foretwin.sim_worker.analysis.gap.pairs import MIN_TURN_RAD, SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
 _MIN_CURVATURE_PM = 0.006
 _HARD_MPS2 = 1.2
 _LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
-_TOGETHER_S = 0.3
-"""Samples nearer to each other than this err alike."""
 _LEAST_STOP_S = 0.3
 _EVERY = 5
 """Smoothed signals need not be compared at every sample."""
@@ -112,9 +116,9 @@ def _stop(asked: Array, done: Array, model: Array) -> float:
     return top if held.sum() * PERIOD_S >= _LEAST_STOP_S else float("nan")
 
 
-def _line(x: Array, y: Array, *, together_s: float = _TOGETHER_S) -> Line | None:
+def _line(x: Array, y: Array) -> Line | None:
     known = np.isfinite(x) & np.isfinite(y)
-    return line_through(x[known], y[known], independent=known.sum() * PERIOD_S / together_s)
+    return line_through(x[known], y[known], independent=known.sum() * PERIOD_S / TOGETHER_S)
 
 
 def _turning(model: Array, real: Array) -> Line | None:
@@ -191,7 +195,7 @@ def _lag(model: Array, real: Array) -> Lag | None:
     if pair is None or at_once is None or changes is None:
         return None
     # What a lag changes beyond what gain and offset could.
-    tells = abs(pair.line.gain) * changes.residual * np.sqrt(known.sum() * PERIOD_S / _TOGETHER_S)
+    tells = abs(pair.line.gain) * changes.residual * np.sqrt(known.sum() * PERIOD_S / TOGETHER_S)
     std_s = pair.line.residual / max(float(tells), 1e-9)
     helps = pair.line.residual**2 < 0.5 * at_once.residual**2
     return Lag(pair.delay_s if helps else 0.0, std_s)

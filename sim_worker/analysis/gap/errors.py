@@ -26,6 +26,7 @@ from foretwin.sim_worker.analysis.gap.measured_motion import (
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.vehicle.lag import without_lags
 
+_EVERY_S = 1.0
 QUANTITIES = ("along_m", "across_m", "yaw_rad", "yaw_rate_radps", "speed_mps", "accel_mps2")
 """Of a sample; a row has `position_m` too, how far apart both are."""
 
@@ -54,20 +55,17 @@ class GapMeter:
         record: MotionRecord,
         motion: MeasuredMotion,
         *,
-        every_s: float = 1.0,
         horizons_s: Sequence[float] = HORIZONS_S,
-        from_index: int = 0,
     ) -> list[GapSample]:
-        """Return the gap at each horizon after each start, `every_s` apart, in time order.
+        """Return the gap at each horizon after each start, 1 s apart, in time order.
 
         Where no commands were recorded, they are estimated from the motion and the samples are
         not independent. Runs that meet a gap in the measured motion are left out.
         """
-        stride = max(1, round(every_s / PERIOD_S))
         known = motion.known
         shortest = round(min(horizons_s) / PERIOD_S)
-        starts = np.arange(from_index, len(known) - shortest, stride)
-        starts = starts[known[starts]] if len(starts) else starts
+        starts = np.arange(0, len(known) - shortest, round(_EVERY_S / PERIOD_S))
+        starts = starts[known[starts]]
         wanted = [(row, horizon) for row in range(len(starts)) for horizon in horizons_s]
         return self._measure(record, motion, starts, wanted)
 

@@ -14,6 +14,9 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
+TOGETHER_S = 0.3
+"""Samples nearer to each other than this err alike."""
+
 
 class Line(NamedTuple):
     """y = gain x + offset; deviations count one independent sample per `together_s`."""
@@ -61,9 +64,7 @@ def line_through(x: Array, y: Array, *, independent: float) -> Line | None:
     )
 
 
-def delayed_line(
-    x: Array, y: Array, *, longest_s: float = 0.8, together_s: float = 0.3
-) -> DelayedLine | None:
+def delayed_line(x: Array, y: Array, *, longest_s: float = 0.8) -> DelayedLine | None:
     """Fit how y follows x, both (N,) on the grid, with delays from 0 to `longest_s`.
 
     None where too little is known of both.
@@ -80,7 +81,7 @@ def delayed_line(
         return None
     late, done = late[:, known], done[known]
     shift = int(np.argmin(_residuals(late, done)))
-    line = line_through(late[shift], done, independent=len(done) * PERIOD_S / together_s)
+    line = line_through(late[shift], done, independent=len(done) * PERIOD_S / TOGETHER_S)
     if line is None:
         return None
     return DelayedLine(line, shift * PERIOD_S, _plateau(late[shift], done, line))

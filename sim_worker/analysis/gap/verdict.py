@@ -12,6 +12,7 @@ import numpy as np
 from foretwin.contracts.drive import GnssFix, VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import Verdict
+from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushTest
 from foretwin.sim_worker.analysis.gap.consistency import Consistency, began_ns, consistency_of
@@ -21,6 +22,8 @@ from foretwin.sim_worker.analysis.gap.pairs import SignalPairs, pairs_of
 from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
 
 WINDOW_S, RECENT_S, EVERY_S = 6.0, 3.0, 0.2
+KEPT_S = HORIZONS_S[-1] + 2.0
+"""Of samples: enough for the longest run of the gap and what the steering was told before it."""
 _EVERY_NS = round(EVERY_S * 1e9)
 _LATEST_S = 0.1
 """Samples of slower channels may still be on their way."""
@@ -44,7 +47,8 @@ class Judge:
         lever = info.body_from_antenna_m
         self._vehicle_id = info.vehicle_id
         self._ahead_m = 0.0 if lever is None else lever[0]
-        self._recorder = MotionRecorder(frame=frame, keep_s=WINDOW_S + 4.0, depth=4000)
+        self.recorder = MotionRecorder(frame=frame, keep_s=KEPT_S, depth=4000)
+        """The samples that are kept."""
         self._runner, self._runs = FreeRunner(vehicle, batch=_AT_ONCE), RunMemory()
         self._first_ns: int | None = None
         self._done = 0
@@ -54,11 +58,6 @@ class Judge:
         self._told: dict[tuple[str, str], int] = {}
         self.latest: Consistency | None = None
         """What the latest stretch said, for those who show it."""
-
-    @property
-    def recorder(self) -> MotionRecorder:
-        """The samples that are kept."""
-        return self._recorder
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Judge a model of other parameters from now on; what was about to be said is forgotten."""
@@ -71,17 +70,16 @@ class Judge:
         stamp_ns = getattr(message, "stamp_ns", None)
         if stamp_ns is None:
             return None
-        newest = self._recorder.newest_stamp_ns
+        newest = self.recorder.newest_stamp_ns
         if newest is not None and stamp_ns < newest - 2_000_000_000:
             return None  # the clock ran back: what is kept would no longer be one motion
-        self._recorder.handle(channel, message)
+        self.recorder.handle(channel, message)
         if isinstance(message, GnssFix):
             self._fixes.append((stamp_ns, np.inf if message.std_m is None else message.std_m))
-        newest = self._recorder.newest_stamp_ns
+        newest = self.recorder.newest_stamp_ns
         if newest is None:
             return None
-        if self._first_ns is None:
-            self._first_ns = newest
+        self._first_ns = newest if self._first_ns is None else self._first_ns
         due = (newest - round(_LATEST_S * 1e9) - self._first_ns) // _EVERY_NS
         if due <= self._done:
             return None
@@ -90,7 +88,7 @@ class Judge:
         from_ns = max(self._first_ns, to_ns - round(WINDOW_S * 1e9))
         if to_ns - from_ns < 1.5e9:
             return None
-        record = without_manual_commands(self._recorder.record(from_ns, to_ns))
+        record = without_manual_commands(self.recorder.record(from_ns, to_ns))
         pairs = pairs_of(
             record,
             self._runner,

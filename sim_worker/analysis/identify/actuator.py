@@ -8,6 +8,7 @@ near the greatest rate of the actuator are left out: there the rate says nothing
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -38,8 +39,17 @@ class FollowingFit(NamedTuple):
     """Seconds in which the command moved."""
 
 
-def best_delay(errors: list[float]) -> float:
-    """Return the delay with the least of errors on a grid of 0.02 s, between its points."""
+def best_delay(columns_at: Callable[[float], Array], target: Array) -> float:
+    """Return the delay with which columns (N, K) explain `target` (N,) best.
+
+    That is the least of errors on a grid of 0.02 s, between its points.
+    """
+    errors = []
+    for delay_s in delays():
+        columns = columns_at(float(delay_s))
+        gram = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
+        left = target - columns @ np.linalg.solve(gram, columns.T @ target)
+        errors.append(float(np.mean(np.square(left))))
     index = int(np.argmin(errors))
     if not 0 < index < len(errors) - 1:
         return index * _GRID_S
@@ -92,26 +102,25 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
     free = np.isfinite(angle) & np.isfinite(rate) & driving & ~record.manual
     free &= np.abs(rate) < _RATE_SHARE * fastest
     free[: round((MAX_DELAY_S + 0.2) / period_s)] = False
-    late = [delayed(asked, period_s=period_s, delay_s=delay_s) for delay_s in delays()]
-    free &= np.isfinite(late[-1]) & np.isfinite(late[0])
+    for delay_s in delays()[[0, -1]]:
+        free &= np.isfinite(delayed(asked, period_s=period_s, delay_s=delay_s))
     used = np.flatnonzero(free)
     moving_s = float(np.sum(np.abs(asking[used]) > 0.1 * fastest / 4.0) * period_s)
     if len(used) < 100:
         raise ValueError("the car did not steer by command")
     w, dw = angle[used], rate[used]
-    errors = []
-    for candidate in late:
-        columns = np.stack([candidate[used], np.ones_like(w), -w], axis=1)
-        solved = np.linalg.solve(columns.T @ columns + 1e-9 * np.eye(3), columns.T @ dw)
-        errors.append(float(np.mean(np.square(dw - columns @ solved))))
-    delay_s = best_delay(errors)
+
+    def plain(delay_s: float) -> Array:
+        due = delayed(asked, period_s=period_s, delay_s=delay_s)[used]
+        return np.stack([due, np.ones_like(w), -w], axis=1)
+
+    delay_s = best_delay(plain, dw)
     fit: Fit | None = None
     for _ in range(4):
-        due = delayed(asked, period_s=period_s, delay_s=delay_s)[used]
         changing = delayed(asking, period_s=period_s, delay_s=delay_s)[used]
-        plain = np.stack([due, np.ones_like(w), -w], axis=1)
-        start = np.linalg.lstsq(plain, dw, rcond=None)[0] if fit is None else fit.values[:3]
-        columns = np.column_stack([plain, -start[0] * changing])
+        columns = plain(delay_s)
+        start = np.linalg.lstsq(columns, dw, rcond=None)[0] if fit is None else fit.values[:3]
+        columns = np.column_stack([columns, -start[0] * changing])
         fit = fit_linear(columns, dw, record.time_s[used])
         delay_s = float(np.clip(delay_s + fit.values[3], 0.0, MAX_DELAY_S))
     assert fit is not None

@@ -127,50 +127,37 @@ def fit_longitudinal(
     effective = vehicle.wheel_inertia_mass_factor.value
     target = effective * accel[used] + bends[used] + GRAVITY_MPS2 * climbing[used]
     v = speed[used]
-    steady = [-np.square(v), -np.ones_like(v)]
-
     slopes = [np.gradient(part, period_s) for part in parts]
     slow_s = _spinning_s(vehicle, v)
 
-    def acting(delay_s: float) -> list[Array]:
-        return [
+    def acting(delay_s: float) -> Array:
+        pushes = [
             delayed(part, period_s=period_s, delay_s=delay_s)[used]
             - slow_s * delayed(slope, period_s=period_s, delay_s=delay_s)[used]
             for part, slope in zip(parts, slopes, strict=True)
         ]
+        return np.stack([*pushes, -np.square(v), -np.ones_like(v)], axis=1)
 
-    errors = []
-    for delay_s in delays():
-        columns = np.stack([*acting(float(delay_s)), *steady], axis=1)
-        gram = columns.T @ columns + 1e-9 * np.eye(4)
-        solved = np.linalg.solve(gram, columns.T @ target)
-        errors.append(float(np.mean(np.square(target - columns @ solved))))
-    delay_s = best_delay(errors)
+    delay_s = best_delay(acting, target)
     mass = vehicle.mass_kg.value
-    centre = np.array(
-        [
-            vehicle.drive_gain.value,
-            vehicle.brake_gain.value,
-            vehicle.drag_npv2.value / mass,
+    # The dead time is a step from the last one; the file tells the losses alone.
+    priors = (
+        (vehicle.drive_gain.value, np.inf),
+        (vehicle.brake_gain.value, np.inf),
+        (vehicle.drag_npv2.value / mass, 2.0 * (vehicle.drag_npv2.std or 0.4) / mass),
+        (
             vehicle.rolling_resistance_n.value / mass,
-            0.0,
-        ]
-    )
-    spread = np.array(
-        [
-            np.inf,
-            np.inf,
-            2.0 * (vehicle.drag_npv2.std or 0.4) / mass,
             2.0 * (vehicle.rolling_resistance_n.std or 130.0) / mass,
-            np.inf,
-        ]
+        ),
+        (0.0, np.inf),
     )
+    centre, spread = np.array(priors).T
     gains = centre[:2]
     fit: Fit | None = None
     for _ in range(4):
         changing = [delayed(slope, period_s=period_s, delay_s=delay_s)[used] for slope in slopes]
         moved = -(gains[0] * changing[0] + gains[1] * changing[1])
-        columns = np.stack([*acting(delay_s), *steady, moved], axis=1)
+        columns = np.column_stack([acting(delay_s), moved])
         fit = fit_linear(
             columns, target, record.time_s[used], prior=centre, prior_std=spread, brief=True
         )
