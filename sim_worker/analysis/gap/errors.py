@@ -107,11 +107,10 @@ class GapMeter:
             accel = accel_commands_from_motion(
                 vehicle, speed_mps=motion.speed_mps, accel_mps2=motion.accel_mps2
             )
-            begin = start_states(vehicle, **motion._asdict(), tire_rad=tire)
+            begin = start_states(vehicle, motion, tire_rad=tire)
             steer = np.where(known, begin[:, 6], np.nan)
-        chosen = {name: values[starts] for name, values in motion._asdict().items()}
-        begin = start_states(vehicle, **chosen, tire_rad=tire[starts])
-        begin[:, :2] -= begin[:, :2]  # near the origin, where numbers are exact
+        begin = start_states(vehicle, motion.at(starts), tire_rad=tire[starts])
+        begin[:, :2] = 0.0  # near the origin, where numbers are exact
         steps = round(max(horizon for _, horizon in wanted) / PERIOD_S)
         runs = runner.run(
             states=begin,
@@ -126,7 +125,7 @@ class GapMeter:
             end = start + count
             if end >= len(known) or not known[start : end + 1].all():
                 continue
-            real = MeasuredMotion(*(column[end] for column in motion))
+            real = motion.at(end)
             model = runs[row, count]
             dx = model[0] + motion.x_m[start] - real.x_m
             dy = model[1] + motion.y_m[start] - real.y_m

@@ -10,6 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.steering import column_of
+from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S
@@ -102,32 +103,14 @@ class FreeRunner:
         return np.concatenate(parts) if parts else np.zeros((0, steps + 1, 8))
 
 
-def start_states(
-    vehicle: VehicleParameters,
-    *,
-    x_m: Array,
-    y_m: Array,
-    yaw_rad: Array,
-    speed_mps: Array,
-    yaw_rate_radps: Array,
-    accel_mps2: Array,
-    tire_rad: Array,
-) -> Array:
+def start_states(vehicle: VehicleParameters, motion: MeasuredMotion, *, tire_rad: Array) -> Array:
     """Return (K, 8) states to start from; a tyre angle that is NaN is that of steady cornering."""
-    rows = np.zeros((len(x_m), 8))
-    for index in range(len(x_m)):
-        speed, rate = float(speed_mps[index]), float(yaw_rate_radps[index])
-        tire = float(tire_rad[index])
-        rows[index] = (
-            x_m[index],
-            y_m[index],
-            yaw_rad[index],
-            speed,
-            rear_slip_velocity(vehicle, speed, rate),
-            rate,
-            tire if np.isfinite(tire) else kinematic_tire_angle(vehicle, speed, rate),
-            accel_mps2[index],
-        )
+    rows = np.zeros((len(tire_rad), 8))
+    for row, pose_and_motion, tire in zip(rows, np.stack(motion, axis=1), tire_rad, strict=True):
+        x, y, yaw, speed, rate, accel = pose_and_motion.tolist()
+        slip = rear_slip_velocity(vehicle, speed, rate)
+        angle = tire if np.isfinite(tire) else kinematic_tire_angle(vehicle, speed, rate)
+        row[:] = x, y, yaw, speed, slip, rate, angle, accel
     return rows
 
 

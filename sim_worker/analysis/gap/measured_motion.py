@@ -7,7 +7,7 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array, Flags, Stamps
+from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.gap import Manoeuvre
@@ -25,6 +25,10 @@ class MeasuredMotion(NamedTuple):
     speed_mps: Array
     yaw_rate_radps: Array
     accel_mps2: Array
+
+    def at(self, index: int | Indices) -> MeasuredMotion:
+        """Return the motion at one instant, or at some."""
+        return MeasuredMotion(*(column[index] for column in self))
 
     @property
     def known(self) -> Flags:

@@ -8,7 +8,7 @@ another; ratio and offset only turn steering wheels into tyres.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from foretwin.sim_worker.analysis.gap.free_run import (
     start_states,
     tire_angles,
 )
+from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 
 BLOCK = round(0.2 / PERIOD_S)
@@ -118,30 +119,21 @@ def pairs_of(
     asked = record.command_wheel_rad / ratio if wheel else signals.commanded_rad
     done = record.wheel_rad / ratio if wheel else signals.measured_rad
     arc = np.arctan(runner.vehicle.wheelbase_m.value * rate / np.maximum(speed, MOVES_MPS))
-    absent = np.full(len(speed), np.nan)
-    sensors = (absent, absent, absent, absent)
+    sensors: dict[str, Any] = dict.fromkeys(_SENSORS, np.full(len(speed), np.nan))
     if precise_positions:
         sensors = _sensors(record, antenna_ahead_m)
-    course, gyro, ground, wheels = sensors
-    by_measured, by_command, tire, pushes = _runs(record, runner, memory or RunMemory())
     return SignalPairs(
         stamp_ns=record.stamp_ns,
         moves=moves,
         excited=moves & (turn > MIN_TURN_RAD),
-        course_radps=course,
-        gyro_radps=gyro,
-        ground_mps=ground,
-        wheel_mps=wheels,
         asked_rad=np.where(moves, asked, np.nan),
         done_rad=np.where(moves, done, np.nan),
         arc_rad=np.where(moves, arc, np.nan),
         speed_mps=speed,
         curvature_pm=np.where(moves, rate / np.maximum(speed, MOVES_MPS), np.nan),
-        by_measured_pm=by_measured,
-        by_command_pm=by_command,
         commanded_rad=signals.commanded_rad,
-        model_tire_rad=tire,
-        pushes=pushes,
+        **sensors,
+        **_runs(record, runner, memory or RunMemory()),
     )
 
 
@@ -154,13 +146,21 @@ def smooth(values: Array, half: int) -> Array:
     return out
 
 
-def _sensors(record: MotionRecord, ahead_m: float) -> tuple[Array, Array, Array, Array]:
-    """Return rate of the course and gyro, speed over ground and of the wheels."""
-    half, count = _COURSE_HALF, len(record.x_m)
-    dx, dy = np.full(count, np.nan), np.full(count, np.nan)
+def _change(values: Array, half: int) -> Array:
+    """Return by how much values (N,) change over 2 half samples around each; NaN at the ends."""
+    out, count = np.full(len(values), np.nan), len(values)
     if count > 2 * half:
-        dx[half : count - half] = record.x_m[2 * half :] - record.x_m[: count - 2 * half]
-        dy[half : count - half] = record.y_m[2 * half :] - record.y_m[: count - 2 * half]
+        out[half : count - half] = values[2 * half :] - values[: count - 2 * half]
+    return out
+
+
+_SENSORS = ("course_radps", "gyro_radps", "ground_mps", "wheel_mps")
+
+
+def _sensors(record: MotionRecord, ahead_m: float) -> dict[str, Any]:
+    """Return rate of the course and gyro, speed over ground and of the wheels."""
+    half = _COURSE_HALF
+    dx, dy = _change(record.x_m, half), _change(record.y_m, half)
     gone = np.hypot(dx, dy) / (2 * half * PERIOD_S)
     leapt = gone > _FASTEST_MPS
     dx[leapt], gone[leapt] = np.nan, np.nan
@@ -170,19 +170,14 @@ def _sensors(record: MotionRecord, ahead_m: float) -> tuple[Array, Array, Array,
     fine = np.isfinite(course) & np.isfinite(rate)
     course[fine] = np.unwrap(course[fine])
     course = course - np.arctan2(ahead_m * smooth(rate, half), gone)
-    turns = np.full(count, np.nan)
-    if count > 2 * _TURN_HALF:
-        turns[_TURN_HALF : count - _TURN_HALF] = (
-            course[2 * _TURN_HALF :] - course[: count - 2 * _TURN_HALF]
-        ) / (2 * _TURN_HALF * PERIOD_S)
+    turns = _change(course, _TURN_HALF) / (2 * _TURN_HALF * PERIOD_S)
     turns = np.where(np.abs(turns) < 1.5, turns, np.nan)
     gyro = smooth(smooth(rate, half), _TURN_HALF)
-    return turns, gyro, np.where(drives, gone, np.nan), smooth(record.speed_mps, half)
+    found = (turns, gyro, np.where(drives, gone, np.nan), smooth(record.speed_mps, half))
+    return dict(zip(_SENSORS, found, strict=True))
 
 
-def _runs(
-    record: MotionRecord, runner: FreeRunner, memory: RunMemory
-) -> tuple[Array, Array, Array, PushBlocks]:
+def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[str, Any]:
     """Return the model's curvature by measured steering and by command, its tyres, and pushes.
 
     Runs overlap so that their ends tile the stretch, back from its own end.
@@ -206,8 +201,13 @@ def _runs(
     turned, told_starts = turns[told], starts[told]
     at = np.concatenate([measured, told_starts])
     by_measured, by_command, tire = (np.full(count, np.nan) for _ in range(3))
+    found: dict[str, Any] = {
+        "by_measured_pm": by_measured,
+        "by_command_pm": by_command,
+        "model_tire_rad": tire,
+    }
     if not len(at):
-        return by_measured, by_command, tire, push_blocks(record, eased, at, np.zeros((0, 1)))
+        return {**found, "pushes": push_blocks(record, eased, at, np.zeros((0, 1)))}
     # What was measured has the actuator's lag in it; the model's own must not come on top.
     led = signals.measured_rad + runner.vehicle.steering_lag_s.value * (
         np.gradient(signals.measured_rad) / PERIOD_S
@@ -218,16 +218,8 @@ def _runs(
 
     def run(rows: Indices) -> Array:
         begun, zero = at[rows], np.zeros(len(rows))
-        begin = start_states(
-            runner.vehicle,
-            x_m=zero,
-            y_m=zero,
-            yaw_rad=zero,
-            speed_mps=eased[begun],
-            yaw_rate_radps=rate[begun],
-            accel_mps2=slope[begun],
-            tire_rad=np.full(len(rows), np.nan),
-        )
+        motion = MeasuredMotion(zero, zero, zero, eased[begun], rate[begun], slope[begun])
+        begin = start_states(runner.vehicle, motion, tire_rad=np.full(len(rows), np.nan))
         return runner.run(
             states=begin,
             starts=np.where(held[rows], begun + count, begun),
@@ -252,7 +244,7 @@ def _runs(
     by_command[at[commanded][:, None] + tail] = curvature[commanded]
     tire[at[commanded][:, None] + tail] = states[commanded][:, tail, 6]
     pushes = push_blocks(record, eased, told_starts, states[~held][:, :, 3])
-    return by_measured, by_command, tire, pushes
+    return {**found, "pushes": pushes}
 
 
 def push_blocks(

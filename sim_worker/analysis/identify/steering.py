@@ -18,21 +18,12 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.identify.regression import Fit, fit_linear
 from foretwin.sim_worker.analysis.identify.steering_signals import (
     ALIKE_S,
-    GYRO_BIAS,
-    INVERSE_RATIO,
-    LAG,
-    OFFSET,
-    PULL_BRAKED,
-    PULL_DRIVEN,
-    TURNING,
-    UNDERSTEER,
     SteeringSignals,
+    Theta,
     steering_signals,
 )
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import understeer_gradient
-
-__all__ = ["GYRO_BIAS", "INVERSE_RATIO", "OFFSET", "UNDERSTEER", "SteeringFit", "fit_steering"]
 
 _WEAK = 3.0
 """Priors count with as many times their standard deviation: what the file says carries what the
@@ -68,8 +59,8 @@ class SteeringFit(NamedTuple):
 
     def ratio(self) -> tuple[float, float, float]:
         """Return value, low and high of the steering ratio."""
-        inverse = float(self.fit.values[INVERSE_RATIO])
-        half = float(self.half_widths[INVERSE_RATIO])
+        inverse = float(self.fit.values[Theta.INVERSE_RATIO])
+        half = float(self.half_widths[Theta.INVERSE_RATIO])
         size, sign = abs(inverse), math.copysign(1.0, inverse)
         # Errors in a regressor only ever flatten its slope.
         most = size / (1.0 - self.hidden_share) + half
@@ -110,31 +101,20 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     signals = steering_signals(record, vehicle)
     used, per_m = signals.used, signals.per_m
     inverse = 1.0 / vehicle.steering_ratio.value
-    centre = np.array(
-        [
-            inverse,
-            vehicle.steering_offset_rad.value,
-            understeer_gradient(vehicle),
-            turning_s2(vehicle),
-            signals.gyro_bias_radps,
-            0.0,
-            0.0,
-            0.0,
-        ]
-    )
-    spread = np.array(
-        [
-            _inverse_ratio_std(vehicle),
-            _OFFSET_STD_RAD,
-            _WEAK * understeer_std(vehicle),
-            turning_s2(vehicle),
-            min(signals.gyro_bias_std_radps, _GYRO_BIAS_STD_RADPS),
-            _LAG_STD_S * inverse,
-            _PULL_STD_RAD_PER_MPS2,
-            _PULL_STD_RAD_PER_MPS2,
-        ]
-    )
-    gaining = signals.given[PULL_DRIVEN, used] + signals.given[PULL_BRAKED, used]
+    turning = turning_s2(vehicle)
+    bias_std = min(signals.gyro_bias_std_radps, _GYRO_BIAS_STD_RADPS)
+    priors = {
+        Theta.INVERSE_RATIO: (inverse, _inverse_ratio_std(vehicle)),
+        Theta.OFFSET: (vehicle.steering_offset_rad.value, _OFFSET_STD_RAD),
+        Theta.UNDERSTEER: (understeer_gradient(vehicle), _WEAK * understeer_std(vehicle)),
+        Theta.TURNING: (turning, turning),
+        Theta.GYRO_BIAS: (signals.gyro_bias_radps, bias_std),
+        Theta.LAG: (0.0, _LAG_STD_S * inverse),
+        Theta.PULL_DRIVEN: (0.0, _PULL_STD_RAD_PER_MPS2),
+        Theta.PULL_BRAKED: (0.0, _PULL_STD_RAD_PER_MPS2),
+    }
+    centre, spread = np.array([priors[index] for index in Theta]).T.copy()
+    gaining = signals.given[Theta.PULL_DRIVEN, used] + signals.given[Theta.PULL_BRAKED, used]
     weights = 1.0 / np.hypot(1.0, signals.speed_mps[used] / _ANGLES_BELOW_MPS)
     weights /= np.hypot(1.0, gaining / _ROLLING_MPS2)
     # Play lasts: instants within the reach of the smoothing share it.
@@ -165,23 +145,26 @@ def fit_steering(record: MotionRecord, vehicle: VehicleParameters) -> SteeringFi
     # other speeds differ: few, each of which errs in its own way.
     brief = fitted(values, least_std=of_bends, brief=True)
     half_widths = brief.half_widths()
-    half_widths[UNDERSTEER] = fit.half_width(UNDERSTEER)
+    half_widths[Theta.UNDERSTEER] = fit.half_width(Theta.UNDERSTEER)
     # The straights tell the offset, where tyres have nothing to be unexplained.
     straight = fitted(values, least_std=play, brief=True)
-    values[OFFSET], half_widths[OFFSET] = straight.values[OFFSET], straight.half_width(OFFSET)
+    values[Theta.OFFSET], half_widths[Theta.OFFSET] = (
+        straight.values[Theta.OFFSET],
+        straight.half_width(Theta.OFFSET),
+    )
     # What is measured is wheelbase over ratio: the doubt of the first is the second's too.
     base = vehicle.wheelbase_m
-    doubt = values[INVERSE_RATIO] * (base.std or 0.0) / base.value
-    half_widths[INVERSE_RATIO] = math.hypot(
-        half_widths[INVERSE_RATIO], brief.quantile[INVERSE_RATIO] * doubt
+    doubt = values[Theta.INVERSE_RATIO] * (base.std or 0.0) / base.value
+    half_widths[Theta.INVERSE_RATIO] = math.hypot(
+        half_widths[Theta.INVERSE_RATIO], brief.quantile[Theta.INVERSE_RATIO] * doubt
     )
     covariance = fit.covariance.copy()
     # How readily the car turns in, and when, every bend's beginning tells, whatever its radius.
-    for index in (TURNING, LAG):
+    for index in (Theta.TURNING, Theta.LAG):
         narrower = math.sqrt(min(straight.covariance[index, index] / covariance[index, index], 1.0))
         covariance[index] *= narrower
         covariance[:, index] *= narrower
-    covariance[INVERSE_RATIO, INVERSE_RATIO] += doubt**2
+    covariance[Theta.INVERSE_RATIO, Theta.INVERSE_RATIO] += doubt**2
     varied = float(np.var(signals.wheel_rad[used] * per_m * weights)) / angles
     return SteeringFit(
         fit=fit._replace(covariance=covariance),

@@ -13,6 +13,7 @@ is driven or braked.
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +32,12 @@ _MAX_LATERAL_MPS2 = 4.0
 """Beyond it, tyres are no longer linear."""
 _LEAST_FEED = 0.2
 """Of 1 + K v²/L, which is zero at the speed where an oversteering car loses its stability."""
-INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING, GYRO_BIAS, LAG, PULL_DRIVEN, PULL_BRAKED = range(8)
-"""The parameters θ: 1/i, δ0, K, T, the gyro's bias, τ/i, p⁺, p⁻."""
+
+
+class Theta(IntEnum):
+    """The parameters θ: 1/i, δ0, K, T, the gyro's bias, τ/i, p⁺, p⁻."""
+
+    INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING, GYRO_BIAS, LAG, PULL_DRIVEN, PULL_BRAKED = range(8)
 
 
 class Unexplained(NamedTuple):
@@ -69,25 +74,29 @@ class SteeringSignals(NamedTuple):
         front = np.clip(values @ asked - slip, -1.2, 1.2)
         slope = per_m * (1.0 + np.square(np.tan(front)))
         # Measured yaw rate stands on both sides: solved for, its noise no longer weighs K.
-        feeds = np.maximum(1.0 + slope * values[UNDERSTEER] * speed, _LEAST_FEED)
-        apart = self.yaw_rate_radps[used] - per_m * (np.tan(front) + slip) - values[GYRO_BIAS]
+        feeds = np.maximum(1.0 + slope * values[Theta.UNDERSTEER] * speed, _LEAST_FEED)
+        apart = self.yaw_rate_radps[used] - per_m * (np.tan(front) + slip) - values[Theta.GYRO_BIAS]
         apart /= feeds
         slopes = asked * slope
-        slopes[UNDERSTEER] += slope * speed * apart
-        slopes[GYRO_BIAS] = 1.0
+        slopes[Theta.UNDERSTEER] += slope * speed * apart
+        slopes[Theta.GYRO_BIAS] = 1.0
         return Unexplained(apart, slopes / feeds)
 
     def steered_rad(self, values: Array) -> Array:
         """Return the tyre angle (N,) that the motion asks the steering wheel for."""
-        turned = self.wheelbase_m * (self.yaw_rate_radps - values[GYRO_BIAS])
+        turned = self.wheelbase_m * (self.yaw_rate_radps - values[Theta.GYRO_BIAS])
         turned /= np.maximum(self.speed_mps, SLOWEST_MPS)
         tyre = np.arctan(turned - self.rear_slip_rad) + self.rear_slip_rad
-        by_wheel = values[INVERSE_RATIO] * self.wheel_rad - values[LAG] * self.wheel_radps
+        by_wheel = (
+            values[Theta.INVERSE_RATIO] * self.wheel_rad - values[Theta.LAG] * self.wheel_radps
+        )
         return np.asarray(tyre - (values @ self.given - by_wheel))
 
     def late_wheel_rad(self, values: Array) -> Array:
         """Return the steering wheel (N,) as the tyres follow it, τ before."""
-        return np.asarray(self.wheel_rad - values[LAG] / values[INVERSE_RATIO] * self.wheel_radps)
+        return np.asarray(
+            self.wheel_rad - values[Theta.LAG] / values[Theta.INVERSE_RATIO] * self.wheel_radps
+        )
 
 
 def _mean(values: Array, *, alike: float) -> tuple[float, float]:

@@ -14,13 +14,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.analysis.identify.acceptance import MUCH_WIDER
 from foretwin.sim_worker.analysis.identify.steering import PLAY_RAD, SteeringFit
-from foretwin.sim_worker.analysis.identify.steering_signals import (
-    INVERSE_RATIO,
-    OFFSET,
-    TURNING,
-    UNDERSTEER,
-    SteeringSignals,
-)
+from foretwin.sim_worker.analysis.identify.steering_signals import SteeringSignals, Theta
 
 STRETCH_S, _LEAST_TURNING_S = 2.0, 1.0
 _LEAST_STRETCHES = 4
@@ -33,7 +27,7 @@ _TELLS = 1.0 / 5.0
 """A stretch tells how readily the car turns in if it leaves no more of that open than this."""
 TURNING_MPS2 = 0.5
 """Sideways acceleration from which the car counts as turning."""
-_CANDIDATES = (INVERSE_RATIO, OFFSET, UNDERSTEER, TURNING)
+_CANDIDATES = (Theta.INVERSE_RATIO, Theta.OFFSET, Theta.UNDERSTEER, Theta.TURNING)
 
 
 class BendsBefore(NamedTuple):
@@ -50,8 +44,8 @@ class BendsBefore(NamedTuple):
     def knows_less(self, other: BendsBefore) -> bool:
         """Return whether it leaves much more open of the understeer gradient than another."""
         mine, known = (
-            self.covariance[UNDERSTEER, UNDERSTEER],
-            other.covariance[UNDERSTEER, UNDERSTEER],
+            self.covariance[Theta.UNDERSTEER, Theta.UNDERSTEER],
+            other.covariance[Theta.UNDERSTEER, Theta.UNDERSTEER],
         )
         return bool(mine > (MUCH_WIDER**2) * known)
 
@@ -59,7 +53,7 @@ class BendsBefore(NamedTuple):
 class Step(NamedTuple):
     """Which parameter departed, from what to about what."""
 
-    parameter: int
+    parameter: Theta
     before: float
     after: float
     sure: bool
@@ -131,7 +125,9 @@ def _stds(told: _Stretches, before: BendsBefore) -> Array:
     """Return how far each departure may be from zero without a step (M, 8)."""
     open_std = np.sqrt(np.einsum("mji,ik,mjk->mj", told.slopes, before.covariance, told.slopes))
     # However alike bends were: the tyres need not stand as the steering wheel says.
-    play_std = np.abs(told.slopes[:, :, OFFSET] * (PLAY_RAD * before.values[INVERSE_RATIO]))
+    play_std = np.abs(
+        told.slopes[:, :, Theta.OFFSET] * (PLAY_RAD * before.values[Theta.INVERSE_RATIO])
+    )
     noise_std = before.noise / np.sqrt(told.squares)
     return np.asarray(np.hypot(np.hypot(noise_std, open_std), play_std))
 
@@ -141,8 +137,8 @@ def _softened(told: _Stretches, before: BendsBefore, stds: Array, count: int) ->
 
     With `count` 1, that either of them speaks of.
     """
-    tells = np.flatnonzero(stds[:, TURNING] < _TELLS * before.values[TURNING])[-2:]
-    sides = told.departures[tells, TURNING] / stds[tells, TURNING]
+    tells = np.flatnonzero(stds[:, Theta.TURNING] < _TELLS * before.values[Theta.TURNING])[-2:]
+    sides = told.departures[tells, Theta.TURNING] / stds[tells, Theta.TURNING]
     if count == 1:
         tells, sides = tells[np.abs(sides) > _STDS][-1:], sides[np.abs(sides) > _STDS][-1:]
     elif np.any(np.abs(sides) < _SEEN_STDS) or abs(float(sides.sum())) < 2.0**0.5 * _TOGETHER_STDS:
@@ -150,7 +146,7 @@ def _softened(told: _Stretches, before: BendsBefore, stds: Array, count: int) ->
     if len(tells) < count:
         return None
     found = _step(told, before, tells, np.ones(len(before.values), dtype=np.bool_))
-    return found if found is not None and found.parameter == TURNING else None
+    return found if found is not None and found.parameter == Theta.TURNING else None
 
 
 def _step(

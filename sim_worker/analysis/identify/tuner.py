@@ -25,12 +25,7 @@ from foretwin.sim_worker.analysis.identify.parameters_in_force import (
     ParametersInForce,
     std_of,
 )
-from foretwin.sim_worker.analysis.identify.steering_signals import (
-    INVERSE_RATIO,
-    OFFSET,
-    UNDERSTEER,
-    steering_signals,
-)
+from foretwin.sim_worker.analysis.identify.steering_signals import Theta, steering_signals
 from foretwin.sim_worker.analysis.identify.step import BendsBefore, Step, bends_before, find_step
 from foretwin.sim_worker.analysis.identify.window import examine
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
@@ -197,11 +192,13 @@ class Tuner(ParametersInForce):
 def _in_words(step: Step) -> dict[str, str]:
     """Return by name what a step changed, in words."""
     before, after = step.before, step.after
-    if step.parameter == INVERSE_RATIO:
+    if step.parameter == Theta.INVERSE_RATIO:
         return {
             "steering_ratio": f"steering_ratio went from {1 / before:.4g} to about {1 / after:.4g}"
         }
-    name = {OFFSET: "steering_offset_rad", UNDERSTEER: UNDERSTEER_GRADIENT}.get(step.parameter)
+    name = {Theta.OFFSET: "steering_offset_rad", Theta.UNDERSTEER: UNDERSTEER_GRADIENT}.get(
+        step.parameter
+    )
     if name is None:
         return {
             UNDERSTEER_GRADIENT: "the tyres' stiffness: the tyre angle that turning needs went "

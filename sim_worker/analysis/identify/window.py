@@ -20,14 +20,8 @@ from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.analysis.identify import longitudinal
 from foretwin.sim_worker.analysis.identify.actuator import fit_following
 from foretwin.sim_worker.analysis.identify.longitudinal import grade_from_altitude
-from foretwin.sim_worker.analysis.identify.steering import (
-    INVERSE_RATIO,
-    OFFSET,
-    UNDERSTEER,
-    SteeringFit,
-    fit_steering,
-    steering_map,
-)
+from foretwin.sim_worker.analysis.identify.steering import SteeringFit, fit_steering, steering_map
+from foretwin.sim_worker.analysis.identify.steering_signals import Theta
 from foretwin.sim_worker.analysis.identify.step import TURNING_MPS2
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import understeer_gradient
@@ -142,8 +136,9 @@ def _steering(
             f"(over {TURNING_MPS2:g} m/s² sideways); {LEAST_TURNING_S:g} s are needed"
         )
     covariance = fit.fit.covariance
-    alike = covariance[INVERSE_RATIO, UNDERSTEER] / math.sqrt(
-        covariance[INVERSE_RATIO, INVERSE_RATIO] * covariance[UNDERSTEER, UNDERSTEER]
+    alike = covariance[Theta.INVERSE_RATIO, Theta.UNDERSTEER] / math.sqrt(
+        covariance[Theta.INVERSE_RATIO, Theta.INVERSE_RATIO]
+        * covariance[Theta.UNDERSTEER, Theta.UNDERSTEER]
     )
     parted = "more bends would narrow it"
     if abs(alike) > 0.8:
@@ -161,8 +156,8 @@ def _steering(
     # In the order of the priors: the interval, and whether it is too wide.
     found = (
         (ratio, not half <= _WIDE_RATIO * abs(ratio[0])),
-        (fit.interval(OFFSET), fit.half_widths[OFFSET] > _WIDE_OFFSET_RAD),
-        (fit.interval(UNDERSTEER), fit.half_widths[UNDERSTEER] > _WIDE_UNDERSTEER),
+        (fit.interval(Theta.OFFSET), fit.half_widths[Theta.OFFSET] > _WIDE_OFFSET_RAD),
+        (fit.interval(Theta.UNDERSTEER), fit.half_widths[Theta.UNDERSTEER] > _WIDE_UNDERSTEER),
     )
     return [
         _estimate(name, prior, interval, still, f"the interval is wide: {parted}" if wide else "")

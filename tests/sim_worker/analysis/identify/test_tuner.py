@@ -13,7 +13,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.tuning import Identification
 from foretwin.sim_worker.analysis.identify.regression import smoothed
 from foretwin.sim_worker.analysis.identify.steering import fit_steering
-from foretwin.sim_worker.analysis.identify.steering_signals import TURNING, steering_signals
+from foretwin.sim_worker.analysis.identify.steering_signals import Theta, steering_signals
 from foretwin.sim_worker.analysis.identify.step import bends_before, find_step
 from foretwin.sim_worker.analysis.identify.tuner import Tuner
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
@@ -152,7 +152,7 @@ def test_softer_tyres_on_both_axles_show_where_bends_begin_and_end() -> None:
     other = find_step(steering_signals(record._replace(wheel_rad=softer), load_vehicle()), before)
     assert alike is None
     assert other is not None
-    assert other.parameter == TURNING
+    assert other.parameter == Theta.TURNING
     assert other.after - other.before == pytest.approx(0.006, rel=0.3)
 
 
