@@ -28,12 +28,13 @@ _UNANNOUNCED_AFTER = 4000
 """Samples after which a vehicle that does not answer is taken as it is."""
 _CHANNELS = (*SAMPLES, "state")
 """In the order in which messages with one stamp are taken."""
-_FINDINGS: dict[type, str] = {
-    Identification: "identification",
-    GapSample: "gap",
-    GapAlarm: "gap_alarm",
-    Verdict: "verdict",
+_FINDINGS: dict[type, tuple[str, str]] = {
+    Identification: ("identification", "identifications"),
+    GapSample: ("gap", "gaps"),
+    GapAlarm: ("gap_alarm", "alarms"),
+    Verdict: ("verdict", "verdicts"),
 }
+"""The channel of each kind of finding, and its field in the answer to a `tune` question."""
 
 log = logging.getLogger("sim_worker")
 
@@ -130,7 +131,7 @@ class TuningWorker:
             log.exception("%s at %s passed over", channel, message.stamp_ns)
             return []
         for one in found:
-            self._bus.publish(_FINDINGS[type(one)], one, run=self._setup.run_id)
+            self._bus.publish(_FINDINGS[type(one)][0], one, run=self._setup.run_id)
         return found
 
     def _answer_if_all_is_there(self) -> None:
@@ -143,17 +144,11 @@ class TuningWorker:
             return
         question, self._question = self._question, None
         held, self._held = sorted(self._held, key=lambda one: one[0]), []
-        found = [
-            finding for _, channel, message in held for finding in self._weigh(channel, message)
-        ]
-        question.reply(
-            TuneReply(
-                identifications=tuple(one for one in found if isinstance(one, Identification)),
-                gaps=tuple(one for one in found if isinstance(one, GapSample)),
-                alarms=tuple(one for one in found if isinstance(one, GapAlarm)),
-                verdicts=tuple(one for one in found if isinstance(one, Verdict)),
-            )
-        )
+        by_field: dict[str, list[Any]] = {field: [] for _, field in _FINDINGS.values()}
+        for _, channel, message in held:
+            for finding in self._weigh(channel, message):
+                by_field[_FINDINGS[type(finding)][1]].append(finding)
+        question.reply(TuneReply(**{field: tuple(one) for field, one in by_field.items()}))
 
 
 def serve_tuning(setup: TuningSetup, bus: Bus, life: ProcessLife) -> None:

@@ -8,15 +8,13 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any
 
-import msgspec
-
 from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.tuning import Identification, UseVehicle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.monitor import GapMonitor
-from foretwin.sim_worker.analysis.identify.acceptance import in_force
+from foretwin.sim_worker.analysis.identify.acceptance import with_priors
 from foretwin.sim_worker.analysis.identify.tuner import Tuner
 from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS
 
@@ -65,15 +63,8 @@ class VehicleWatch:
         if told is not None:
             # Taken here in any case: a later step is one from what was found, applied or not.
             self._tuner.take(told)
-            found.append(self._against_what_counts(told))
+            found.append(with_priors(told, self._in_force))
         return found
-
-    def _against_what_counts(self, told: Identification) -> Identification:
-        estimates = tuple(
-            msgspec.structs.replace(one, prior=in_force(self._in_force, one.name))
-            for one in told.estimates
-        )
-        return msgspec.structs.replace(told, estimates=estimates)
 
     def use(self, message: UseVehicle) -> None:
         """Compare with these parameters from now on."""

@@ -29,13 +29,14 @@ from tests.sim_worker.standin_drives import (
     straight_minute,
 )
 from tests.telemetry.city_drive import city_drive
+from tests.telemetry.standin_drive import FRAME
 
 CAR = read_parameters().car
 Sample = tuple[str, Any]
 
 
 def tuner(**options: float) -> Tuner:
-    return Tuner(vehicle=load_vehicle(), vehicle_id="standin", **options)  # type: ignore[arg-type]
+    return Tuner(vehicle=load_vehicle(), vehicle_id="standin", frame=FRAME, **options)  # type: ignore[arg-type]
 
 
 def through(taken: Tuner, samples: list[Sample]) -> list[Identification]:
