@@ -15,14 +15,13 @@ from foretwin.sim_worker.mirror.member import STEP_NS, GroupMember
 from foretwin.sim_worker.mirror.role_manager import FreeTwin, RoleManager
 from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.mirror.samples import plane_state
+from foretwin.sim_worker.mirror.track import Track
 from foretwin.sim_worker.vehicle.commands import (
     STEP_BACK_NS,
     CommandMemory,
     TwinCommand,
-    estimated_command,
 )
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
-from foretwin.sim_worker.vehicle.seeding import local_state
 
 _ALONE = MirrorCast()
 _GRID_TOLERANCE = 0.05
@@ -61,14 +60,13 @@ class Mirror:
         self._world_id: str | None = None
         self._frame = drive_frame
         self._build(None)
+        self._track = self._new_track()
         self._role_manager = RoleManager(
             GroupMember(vehicle_id, vehicle, commands_recorded),
             cast,
             drive_frame=drive_frame,
             commands=self._commands,
         )
-        self._measured: Array | None = None
-        self._measured_stamp_ns = 0
         self._map_shift_m = self._seed_map_shift_m = np.zeros(2)
         self._seed_stamp_ns = 0
         self._steps = 0
@@ -82,6 +80,9 @@ class Mirror:
         self._world = RoleWorld(world, {name: self._vehicle}, commanded=commanded)
         self._world.set_role(name, "all")
         self._twin = self._world.twins[name]
+
+    def _new_track(self) -> Track:
+        return Track(self._vehicle, self._frame, continuous_ns=self._window_ns)
 
     def set_world(self, world: World | None, *, from_stamp_ns: int = 0) -> None:
         """Use `world`, or open ground, from the first state at or after `from_stamp_ns` on."""
@@ -113,23 +114,24 @@ class Mirror:
         """
         if not state.yaw_valid:
             return None
-        if self._measured is not None and (state.stamp_ns < self._measured_stamp_ns - STEP_BACK_NS):
+        last = self._track.latest
+        if last is not None and state.stamp_ns < last.stamp_ns - STEP_BACK_NS:
             # Worlds that were to come by the old clock are due: their time has passed.
             self._pending = [(state.stamp_ns, world) for _, world in self._pending]
-            self._measured, self._first_stamp_ns, self._last_index = None, None, -1
-        if self._measured is not None and state.stamp_ns <= self._measured_stamp_ns:
+            self._first_stamp_ns, self._last_index = None, -1
+            self._track, last = self._new_track(), None
+        if last is not None and state.stamp_ns <= last.stamp_ns:
             return None
         self._change_vehicle(state.stamp_ns)
         self._change_world(state.stamp_ns)
-        measured = local_state(state, self._frame, self._vehicle)
+        self._track.take(state)
+        measured, before = self._track.state(), self._track.before
         self._map_shift_m = np.array(state.map_shift_m or (0.0, 0.0))
-        gap_ns = state.stamp_ns - self._measured_stamp_ns
         self._role_manager.before(state, self._free_twin)
-        if self._measured is None or gap_ns > self._window_ns:
+        if before is None or state.stamp_ns - before.stamp_ns > self._window_ns:
             self._seed(measured, state.stamp_ns)
         else:
-            self._advance(measured, state.stamp_ns)
-        self._measured, self._measured_stamp_ns = measured, state.stamp_ns
+            self._advance(state.stamp_ns)
         self._world.place(self._vehicle_id, measured[:3])
         if not np.isfinite(self._twin.state).all():
             self._seed(measured, state.stamp_ns)
@@ -144,7 +146,7 @@ class Mirror:
         if not due:
             return
         self._pending_vehicles = [one for one in self._pending_vehicles if one[0] > stamp_ns]
-        self._vehicle = due[-1]
+        self._vehicle = self._track.vehicle = due[-1]
         self._commands.use_vehicle(self._vehicle)
         self._world.use_vehicle(self._vehicle_id, self._vehicle)
         self._role_manager.use_vehicle(self._vehicle)
@@ -162,7 +164,7 @@ class Mirror:
         self._frame = self._drive_frame if world is None else world.frame
         self._build(world)
         self._role_manager.change_world(world, self._frame)
-        self._measured = None
+        self._track = self._new_track()
 
     def _seed(self, measured: Array, stamp_ns: int) -> None:
         history = self._commands.angles_before(
@@ -176,27 +178,14 @@ class Mirror:
         self._role_manager.start_anew(stamp_ns)
         self._independent = self._recorded and history is not None and not self._commands.estimated
 
-    def _advance(self, measured: Array, stamp_ns: int) -> None:
+    def _advance(self, stamp_ns: int) -> None:
         """Step in whole physics steps, moving the shadow evenly towards its measured pose."""
-        before = self._measured
-        assert before is not None
-        start_ns = self._measured_stamp_ns
-        guess = estimated_command(
-            self._vehicle,
-            before,
-            measured,
-            stamp_ns=start_ns,
-            duration_s=(stamp_ns - start_ns) / 1e9,
-        )
-        turn = float(wrap_angle(measured[2] - before[2]))
-        moved = np.array([measured[0] - before[0], measured[1] - before[1], turn])
+        guess = self._track.command()
         total = (stamp_ns - self._seed_stamp_ns) // STEP_NS
         while self._steps < total:
             now_ns = self._seed_stamp_ns + self._steps * STEP_NS
             command = self._command(now_ns, guess)
-            share = (now_ns + STEP_NS - start_ns) / (stamp_ns - start_ns)
-            pose = before[:3] + min(max(share, 0.0), 1.0) * moved
-            self._world.place(self._vehicle_id, pose)
+            self._world.place(self._vehicle_id, self._track.at(now_ns + STEP_NS).pose)
             self._twin.command(accel_mps2=command.accel_mps2, tire_angle_rad=command.tire_angle_rad)
             self._world.step()
             self._twin.read()
@@ -211,7 +200,7 @@ class Mirror:
         return command
 
     def _free_twin(self) -> FreeTwin | None:
-        if self._measured is None:
+        if self._track.before is None:
             return None
         stamp_ns = self._seed_stamp_ns + self._steps * STEP_NS
         return FreeTwin(self._twin.state, stamp_ns)

@@ -29,8 +29,16 @@ class MeasuredPose(NamedTuple):
 class Track:
     """The last two states of a vehicle in one frame, and nothing of what comes later."""
 
-    def __init__(self, vehicle: VehicleParameters, frame: LocalFrame) -> None:
-        self._vehicle, self._frame = vehicle, frame
+    def __init__(
+        self,
+        vehicle: VehicleParameters,
+        frame: LocalFrame,
+        *,
+        continuous_ns: int = _CONTINUOUS_NS,
+    ) -> None:
+        """Between states farther apart than `continuous_ns` nothing is interpolated."""
+        self.vehicle = vehicle
+        self._frame, self._continuous_ns = frame, continuous_ns
         self.latest: VehicleState | None = None
         self.before: VehicleState | None = None
         self._rows: list[tuple[int, Array]] = []
@@ -41,7 +49,7 @@ class Track:
             return False
         if self.latest is not None and state.stamp_ns <= self.latest.stamp_ns:
             return False
-        row = (state.stamp_ns, local_state(state, self._frame, self._vehicle))
+        row = (state.stamp_ns, local_state(state, self._frame, self.vehicle))
         self._rows = [*self._rows[-1:], row]
         self.before, self.latest = self.latest, state
         return True
@@ -63,7 +71,7 @@ class Track:
         if len(self._rows) == 2:
             oldest_ns, oldest = self._rows[0]
             span_ns = newest_ns - oldest_ns
-            if stamp_ns <= newest_ns and span_ns <= _CONTINUOUS_NS:
+            if stamp_ns <= newest_ns and span_ns <= self._continuous_ns:
                 share = min(max((stamp_ns - oldest_ns) / span_ns, 0.0), 1.0)
                 moved = newest[:3] - oldest[:3]
                 moved[2] = wrap_angle(moved[2])
@@ -82,10 +90,10 @@ class Track:
         newest_ns, newest = self._rows[-1]
         oldest_ns, oldest = self._rows[0]
         span_s = (newest_ns - oldest_ns) / 1e9
-        if len(self._rows) < 2 or not 0.0 < span_s <= _CONTINUOUS_NS / 1e9:
+        if len(self._rows) < 2 or not 0.0 < span_s <= self._continuous_ns / 1e9:
             oldest, span_s = newest, 1.0
         return estimated_command(
-            self._vehicle, oldest, newest, stamp_ns=oldest_ns, duration_s=span_s
+            self.vehicle, oldest, newest, stamp_ns=oldest_ns, duration_s=span_s
         )
 
 
