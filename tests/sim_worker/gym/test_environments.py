@@ -18,6 +18,17 @@ from foretwin.sim_worker.gym.registration import ID
 from foretwin.sim_worker.gym.rows import StepFacts
 from tests.sim_worker.scenarios.worlds import cross, ring
 
+COVERS = (
+    "foretwin.sim_worker.gym",
+    "foretwin.sim_worker.gym.course",
+    "foretwin.sim_worker.gym.env",
+    "foretwin.sim_worker.gym.picture",
+    "foretwin.sim_worker.gym.registration",
+    "foretwin.sim_worker.gym.rows",
+    "foretwin.sim_worker.gym.spaces",
+    "foretwin.sim_worker.gym.vector_env",
+)
+
 ROWS = 5
 
 

@@ -20,6 +20,15 @@ from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context
 from tests.sim_worker.metrics.motions import LENGTH_M, Mover, rollout, times
 from tests.sim_worker.places import box, crossroads, turning_path
 
+COVERS = (
+    "foretwin.sim_worker.metrics.comfort",
+    "foretwin.sim_worker.metrics.ground",
+    "foretwin.sim_worker.metrics.progress",
+    "foretwin.sim_worker.metrics.score",
+    "foretwin.sim_worker.metrics.table",
+    "foretwin.sim_worker.metrics.violations",
+)
+
 HALF_M = LENGTH_M / 2
 
 

@@ -18,6 +18,13 @@ from foretwin.sim_worker.metrics.rollout import Rollout
 from foretwin.sim_worker.metrics.table import evaluate
 from tests.sim_worker.metrics.motions import LENGTH_M, VEHICLE, WIDTH_M, Mover, rollout, times
 
+COVERS = (
+    "foretwin.sim_worker.metrics.encroachment",
+    "foretwin.sim_worker.metrics.following",
+    "foretwin.sim_worker.metrics.rollout",
+    "foretwin.sim_worker.metrics.time_to_collision",
+)
+
 FROZEN = json.loads((Path(__file__).parents[2] / "data/metrics/crime.json").read_text())
 HALF_M = LENGTH_M / 2
 speeds = st.floats(2.0, 25.0)

@@ -20,6 +20,8 @@ from tests.sim_worker.driving import altered
 from tests.sim_worker.mirror.test_vehicle_group import TICK_NS, weaving
 from tests.sim_worker.places import FRAME, crossroads, state_at
 
+COVERS = ("foretwin.sim_worker.mirror.role_manager",)
+
 CAR = load_vehicle()
 LIMITS = FollowLimits()
 TICKS = 820

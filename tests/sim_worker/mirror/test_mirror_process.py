@@ -22,6 +22,8 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.places import FRAME, state_at
 
+COVERS = ("foretwin.sim_worker.mirror.process",)
+
 VAN = CastVehicle(vehicle_id="van", vehicle=load_vehicle("vw_vanagon"))
 TICK_NS = 100_000_000
 

@@ -17,6 +17,8 @@ from foretwin.sim_worker.mirror.vehicle_group import VehicleGroup
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import FRAME, box, crossroads, state_at
 
+COVERS = ("foretwin.sim_worker.mirror.member",)
+
 CAR, VAN = load_vehicle(), load_vehicle("vw_vanagon")
 TICK_NS = 20_000_000
 LIMITS = FollowLimits()

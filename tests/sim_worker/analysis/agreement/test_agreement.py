@@ -37,6 +37,12 @@ from tests.sim_worker.metrics.motions import (
 )
 from tests.sim_worker.places import straight_path
 
+COVERS = (
+    "foretwin.sim_worker.analysis.agreement.criteria",
+    "foretwin.sim_worker.analysis.agreement.flip",
+    "foretwin.sim_worker.analysis.agreement.tally",
+)
+
 TIME_S = times(8.0)
 NOBODY = Users(np.zeros((81, 0, 3)), np.zeros((81, 0)), np.zeros((0, 2)))
 FINE_M = MOST_M / 640

@@ -14,6 +14,8 @@ from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
 from foretwin.sim_worker.analysis.gap.pairs import SignalPairs
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 
+COVERS = ("foretwin.sim_worker.analysis.gap.pairs",)
+
 TIME_S = np.arange(301) * PERIOD_S
 TYRES_RAD = 0.12 * np.sin(1.3 * TIME_S)
 

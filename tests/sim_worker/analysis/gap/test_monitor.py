@@ -20,6 +20,8 @@ from tests.sim_worker.analysis.gap.test_verdict import END_S, SEED
 from tests.sim_worker.faulty_standin import drive_of, model_with
 from tests.telemetry.standin_drive import FRAME
 
+COVERS = ("foretwin.sim_worker.analysis.gap.errors",)
+
 START_NS = 1_767_225_600_000_000_000
 
 

@@ -27,6 +27,8 @@ from tests.sim_worker.driving import altered
 from tests.sim_worker.faulty_standin import CAR_FAULTS, MODEL_FAULTS, drive_of, model_with
 from tests.telemetry.standin_drive import FRAME
 
+COVERS = ("foretwin.sim_worker.analysis.gap.findings",)
+
 SEED, END_S = 2, 12.0
 """Of the fast tests: one drive simulated once."""
 FOUND = (

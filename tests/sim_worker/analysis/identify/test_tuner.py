@@ -31,6 +31,11 @@ from tests.sim_worker.standin_drives import (
 from tests.telemetry.city_drive import city_drive
 from tests.telemetry.standin_drive import FRAME
 
+COVERS = (
+    "foretwin.sim_worker.analysis.identify.steering_signals",
+    "foretwin.sim_worker.analysis.identify.step",
+)
+
 CAR = read_parameters().car
 Sample = tuple[str, Any]
 
