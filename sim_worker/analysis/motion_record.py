@@ -7,6 +7,7 @@ invented.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Any, NamedTuple
 
@@ -25,7 +26,6 @@ from foretwin.contracts.drive import (
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 
 PERIOD_S = 0.02
-_NAN = float("nan")
 
 
 class MotionRecord(NamedTuple):
@@ -125,9 +125,9 @@ class MotionRecorder:
             case ImuSample(accel_mps2=force, rate_radps=rate):
                 return rate[2], force[0], force[1]
             case SteeringSample(steering_wheel_rad=wheel, tire_angle_rad=tire):
-                return _NAN if wheel is None else wheel, _NAN if tire is None else tire
+                return _or_nan(wheel), _or_nan(tire)
             case ControlCommand(accel_mps2=accel, steering_wheel_rad=wheel, tire_angle_rad=tire):
-                return (accel, _NAN if wheel is None else wheel, _NAN if tire is None else tire)
+                return accel, _or_nan(wheel), _or_nan(tire)
             case VehicleStatus(control_mode=mode):
                 return (float(mode == "manual"),)
             case _:
@@ -173,6 +173,10 @@ class MotionRecorder:
         # Late samples came out of order; of two with one stamp the first counts.
         _, index = np.unique(table[:, 0], return_index=True)
         return table[index]
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def between_samples(time_s: Array, values: Array, at_s: Array, *, gap_s: float) -> Array:

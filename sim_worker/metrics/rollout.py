@@ -151,6 +151,11 @@ class RolloutView:
         )
 
     @functools.cached_property
+    def front_m(self) -> Array:
+        """(S, N, 2) middles of the ego's front."""
+        return self.centre_m + self.half_length_m * np.stack(self.heading, axis=-1)
+
+    @functools.cached_property
     def speed_mps(self) -> Array:
         """(S, N) speed of the ego over ground, negative in reverse."""
         vx, vy = self.states[..., 3], self.states[..., 4]

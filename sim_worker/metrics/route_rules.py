@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Conflict, Connection, LineControl, World
 from foretwin.geometry.frenet_path import FrenetPath
 
+_CONTROLS: dict[str, LineControl] = {name: name for name in get_args(LineControl)}
 _ON_PATH_M = 1.2
 """A connection whose middle stays this near to the path is the one that it takes."""
 _SAMPLES = 9
@@ -59,7 +60,7 @@ class RouteRules:
             LineAhead(
                 line.id,
                 np.asarray(line.ends),
-                _control(line.control.value),
+                _CONTROLS.get(line.control.value, "none"),
                 entered[line.across_id],
             )
             for line in world.stop_lines
@@ -131,11 +132,3 @@ def _last(line: Array, length_m: float) -> Array:
     """Return the points of a line (N, 2) within `length_m` before its end."""
     to_end = np.cumsum(np.hypot(*np.diff(line[::-1], axis=0).T))[::-1]
     return line[np.concatenate([to_end, [0.0]]) <= length_m]
-
-
-def _control(value: str) -> LineControl:
-    found: LineControl = "none"
-    for known in ("signal", "stop", "give_way"):
-        if value == known:
-            found = known
-    return found

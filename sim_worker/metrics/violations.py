@@ -28,12 +28,10 @@ def red_light_violations(view: RolloutView) -> Measure:
     """
     rules = _rules(view)
     count = np.zeros(len(view.valid))
-    cos, sin = view.heading
-    front = view.centre_m + view.half_length_m * np.stack([cos, sin], axis=-1)
     for line in rules.lines:
         if line.group_id is None or line.control != "signal":
             continue
-        future, time_s = line_crossings(front, line.ends_m, view.time_s)
+        future, time_s = line_crossings(view.front_m, line.ends_m, view.time_s)
         colours = _colours(view, line.group_id, time_s)
         np.add.at(count, future, [colour in _STOPS for colour in colours])
     return view.measure(count)

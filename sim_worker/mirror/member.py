@@ -96,7 +96,7 @@ class Member:
             twin = self.twin()
             self.stand_as_measured()
             if box_goes_on_from_twin:
-                self._leave_twin(twin, self.track.at(stamp_ns))
+                self.offset, self.settling.velocity = _seen_from(self.track.at(stamp_ns), twin)
 
     def _begin_twin(self, stamp_ns: int) -> None:
         box = self.box(self.track.at(stamp_ns))
@@ -106,16 +106,6 @@ class Member:
         self.drawn.stop()
         self.drawn.velocity = np.array([0.0, across - state[4], box.rate[2] - state[5]])
         self.put(state, stamp_ns)
-
-    def _leave_twin(self, twin: MeasuredPose, measured: MeasuredPose) -> None:
-        yaw = measured.pose[2]
-        self.offset[:2] = _into(yaw, twin.pose[:2] - measured.pose[:2])
-        self.offset[2] = wrap_angle(twin.pose[2] - yaw)
-        rate = np.empty(3)
-        rate[:2] = _into(yaw, twin.rate[:2] - measured.rate[:2])
-        rate[:2] -= measured.rate[2] * np.array([-self.offset[1], self.offset[0]])
-        rate[2] = twin.rate[2] - measured.rate[2]
-        self.settling.velocity = rate
 
     def put(self, state: Array, stamp_ns: int) -> None:
         """Put the twin at `state` (8,), as if it had driven there under its commands."""
@@ -165,15 +155,10 @@ class Member:
             return
         if follow and not self.touching:
             twin = self.twin()
-            gap, gap_rate = np.empty(3), np.empty(3)
-            gap[:2] = _into(twin.pose[2], measured.pose[:2] - twin.pose[:2])
-            gap[2] = wrap_angle(measured.pose[2] - twin.pose[2])
+            gap, gap_rate = _seen_from(twin, measured)
             if np.hypot(gap[0], gap[1]) > self._reach_m:
                 self.start_anew(stamp_ns)
                 return
-            gap_rate[:2] = _into(twin.pose[2], measured.rate[:2] - twin.rate[:2])
-            gap_rate[:2] -= twin.rate[2] * np.array([-gap[1], gap[0]])
-            gap_rate[2] = measured.rate[2] - twin.rate[2]
             moved = self.drawn.step(gap, gap_rate)
         elif self.drawn.at_rest:
             return
@@ -183,6 +168,15 @@ class Member:
         faster = self.drawn.velocity[0] * TIMESTEP_S / _PASSES_OVER_S if rolls else 0.0
         self.drawn.velocity[0] -= faster
         self.body.nudge(moved, faster_mps=faster)
+
+
+def _seen_from(one: MeasuredPose, other: MeasuredPose) -> MeasuredPose:
+    """Return another pose and how it changes in the axes of one, which turn with it."""
+    yaw = one.pose[2]
+    pose, rate = other.pose - one.pose, other.rate - one.rate
+    pose[:2], pose[2] = _into(yaw, pose[:2]), wrap_angle(pose[2])
+    rate[:2] = _into(yaw, rate[:2]) - one.rate[2] * np.array([-pose[1], pose[0]])
+    return MeasuredPose(pose, rate)
 
 
 def _into(yaw_rad: float, vector: Array) -> Array:

@@ -12,6 +12,8 @@ from foretwin.sim_worker.mirror.member import Member
 from foretwin.sim_worker.mirror.track import MeasuredPose
 from foretwin.sim_worker.mirror.vehicle_group import VehicleGroup
 
+_SIZES = ("length_m", "width_m", "height_m", "rear_overhang_m")
+
 
 def plane_state(
     pose: Array, speed_mps: float, *, drive_frame: LocalFrame, world_frame: LocalFrame
@@ -56,17 +58,13 @@ def with_group(
         measured = member.track.at(sample.stamp_ns)
         twin = member.has_twin
         shown = _twin_at(group, member, sample.stamp_ns) if twin else member.box(measured)
-        size = member.spec.vehicle
         others.append(
             MirroredVehicle(
                 vehicle_id=name,
                 role=member.role,
                 real=plane(measured),
                 shown=plane(shown),
-                length_m=size.length_m.value,
-                width_m=size.width_m.value,
-                height_m=size.height_m.value,
-                rear_overhang_m=size.rear_overhang_m.value,
+                **{name: getattr(member.spec.vehicle, name).value for name in _SIZES},
                 correction=_correction(group, member),
             )
         )

@@ -98,24 +98,16 @@ class Court:
     def failures(self, states: Array, users: Users) -> Flags:
         """Return (S, 5) which of `CRITERIA` motions (S, N, 8) among `users` fail."""
         count = len(states)
-        rollout = Rollout(
-            time_s=self._window.time_s,
-            states=states,
-            users=np.broadcast_to(users.poses, (count, *users.poses.shape)),
-            user_speed_mps=np.broadcast_to(users.speed_mps, (count, *users.speed_mps.shape)),
-            user_size_m=np.broadcast_to(users.size_m, (count, *users.size_m.shape)),
-            valid=np.ones(count, dtype=bool),
-            vehicle=self._vehicle,
-        )
+        poses, speeds, sizes = (np.broadcast_to(part, (count, *part.shape)) for part in users)
+        valid = np.ones(count, dtype=bool)
+        rollout = Rollout(self._window.time_s, states, poses, speeds, sizes, valid, self._vehicle)
         view = RolloutView(rollout, Context(ground=self._ground))
-        cos, sin = view.heading
-        front = view.centre_m + view.half_length_m * np.stack([cos, sin], axis=-1)
         red, unstopped = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
         for line in self._rules.lines:
             if line.control == "signal":
-                self._at_red(front, line, red)
+                self._at_red(view.front_m, line, red)
             elif line.control == "stop":
-                self._without_stop(front, line, view.speed_mps, unstopped)
+                self._without_stop(view.front_m, line, view.speed_mps, unstopped)
         return np.column_stack(
             [
                 METRICS["min_clearance"].compute(view).values < LEAST_CLEARANCE_M,

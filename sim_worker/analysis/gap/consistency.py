@@ -203,7 +203,17 @@ def _lag(model: Array, real: Array) -> Lag | None:
 
 _SHARE = 0.25
 """Of the mean departure: what counts as one."""
-_USUAL_LAG_S = 0.1
+_LATE_S, _USUAL_LAG_S = 0.36, 0.1
+"""A delay that is itself the departure is no lag to be allowed for."""
+_COMPARED = {
+    "speed": ("ground_mps", "wheel_mps", False),
+    "gyro": ("course_radps", "gyro_radps", False),
+    "model": ("commanded_rad", "model_tire_rad", True),
+    "measured": ("asked_rad", "done_rad", True),
+    "motion_by_angle": ("done_rad", "arc_rad", False),
+    "": ("by_measured_pm", "curvature_pm", False),
+}
+"""By the beginning of a piece of evidence's name: two signals, and whether one lags."""
 
 
 def began_ns(pairs: SignalPairs, seen: Consistency, evidence: str) -> int:
@@ -212,22 +222,14 @@ def began_ns(pairs: SignalPairs, seen: Consistency, evidence: str) -> int:
     The change point of Page's test (1954): where the sum of what departs beyond its allowance was
     last at its lowest.
     """
+    x_name, y_name, lags = next(
+        row for prefix, row in _COMPARED.items() if evidence.startswith(prefix)
+    )
+    x, y = getattr(pairs, x_name), getattr(pairs, y_name)
     lag_s = 0.0
-    if evidence.startswith(("speed", "gyro")):
-        speed = evidence.startswith("speed")
-        x, y = (
-            (pairs.ground_mps, pairs.wheel_mps) if speed else (pairs.course_radps, pairs.gyro_radps)
-        )
-    elif evidence.startswith("model"):
-        x, y = pairs.commanded_rad, pairs.model_tire_rad
-        lag_s = _usual(seen.measured_by_command.delay_s if seen.measured_by_command else 0.0)
-    elif evidence.startswith("measured"):
-        x, y = pairs.asked_rad, pairs.done_rad
-        lag_s = _usual(seen.measured_by_command.delay_s if seen.measured_by_command else 0.0)
-    elif evidence == "motion_by_angle":
-        x, y = pairs.done_rad, pairs.arc_rad
-    else:
-        x, y = pairs.by_measured_pm, pairs.curvature_pm
+    if lags and seen.measured_by_command is not None:
+        delay_s = seen.measured_by_command.delay_s
+        lag_s = delay_s if delay_s < _LATE_S else _USUAL_LAG_S
     late = round(lag_s / PERIOD_S)
     apart = np.nan_to_num(y[late:] - x[: len(x) - late])
     return int(pairs.stamp_ns[late + change_index(np.asarray(apart**2))])
@@ -238,7 +240,3 @@ def change_index(departure: Array) -> int:
     summed = np.cumsum(departure - _SHARE * float(np.mean(departure)))
     lowest = int(np.argmin(np.concatenate([[0.0], summed[:-1]])))
     return min(lowest, len(departure) - 1)
-
-
-def _usual(delay_s: float) -> float:
-    return delay_s if delay_s < 0.36 else _USUAL_LAG_S
