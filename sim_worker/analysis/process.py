@@ -43,7 +43,7 @@ class TuningWorker:
     """Feeds a VehicleWatch from messages; one that cannot be used is logged and passed over.
 
     In lock step messages wait for a `tune` question, which says how many there are, and are taken
-    in the order of their stamps: the answer must not depend on who was faster.
+    in the order of their stamps: the answer must not depend on which came first.
     """
 
     def __init__(self, setup: TuningSetup, bus: Bus, mailbox: Mailbox) -> None:

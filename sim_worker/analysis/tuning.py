@@ -1,4 +1,4 @@
-"""What a drive says of its vehicle while it goes on: parameters, the model's gap, and who departs.
+"""What a drive says of its vehicle while it goes on: parameters, the model's gap, departures.
 
 Pure: its time is that of the samples, so that the same samples say the same.
 """
@@ -28,7 +28,7 @@ _AHEAD_NS = 10_000_000_000
 
 
 class VehicleWatch:
-    """Identifies one vehicle and watches its gap; what is in force is told by `use`.
+    """Identifies one vehicle and watches its gap; what is in force is result by `use`.
 
     `handle` takes samples under their channels, and estimated VehicleStates under "state". Where
     those go back in time, the vehicle's clock has been set: all is watched anew. Samples far ahead
@@ -59,11 +59,11 @@ class VehicleWatch:
         found: list[Finding] = list(self._monitor.handle(channel, message))
         if channel == "state":
             return found
-        told = self._tuner.handle(channel, message)
-        if told is not None:
+        result = self._tuner.handle(channel, message)
+        if result is not None:
             # Taken here in any case: a later step is one from what was found, applied or not.
-            self._tuner.take(told)
-            found.append(with_priors(told, self._in_force))
+            self._tuner.take(result)
+            found.append(with_priors(result, self._in_force))
         return found
 
     def use(self, message: UseVehicle) -> None:

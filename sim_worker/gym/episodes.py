@@ -219,7 +219,7 @@ def _place(
 
 
 def _cases(scenario: Scenario, source: Source, values: Mapping[str, float]) -> tuple[Values, ...]:
-    """Return the source's cases with `values` fixed in them, those who come early or late."""
+    """Return the source's cases with `values` fixed in them, arrivals early or late."""
     rng = np.random.default_rng(source.cases_seed)
     count = source.cases
     # As many draws for each combination of listed values; so many are taken evenly.

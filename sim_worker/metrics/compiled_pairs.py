@@ -25,7 +25,7 @@ def least_until_touch(
     half_m: tuple[float, float],
     least_s: Array,
 ) -> None:
-    """Lower `least_s` (S, N) to the seconds until anybody is touched, by the formulas of `meeting`.
+    """Lower `least_s` (S, N) to the seconds until any is touched, by the formulas of `meeting`.
 
     `relative` holds (S, N, R) each: ahead, left, cos, sin, and the speeds ahead and left. Half
     sizes (S, 1, R) are the road users'; `length` and `width` are half of the ego's.
@@ -159,7 +159,7 @@ def stays_on_strips(
     half_length_m, half_width_m = half_m
     future, user, step = picked
     for k in range(len(step)):
-        who, other = future[k], user[k]
+        row, other = future[k], user[k]
         normal_x, normal_y = -way[k, 1], way[k, 0]
         found[0, k], found[1, k] = time_s[0], math.inf
         for end in range(2):
@@ -168,9 +168,9 @@ def stays_on_strips(
             within = at = step[k] + 1 - end
             inside_aside = inside_reach = 0.0
             while 0 <= at <= last:
-                aside = (x[who, at, other] - point_m[k, 0]) * normal_x
-                aside += (y[who, at, other] - point_m[k, 1]) * normal_y
-                cos, sin = math.cos(yaw[who, at, other]), math.sin(yaw[who, at, other])
+                aside = (x[row, at, other] - point_m[k, 0]) * normal_x
+                aside += (y[row, at, other] - point_m[k, 1]) * normal_y
+                cos, sin = math.cos(yaw[row, at, other]), math.sin(yaw[row, at, other])
                 reach = strip_half_m[k] + half_length_m[k] * abs(cos * normal_x + sin * normal_y)
                 reach += half_width_m[k] * abs(cos * normal_y - sin * normal_x)
                 if at != within and abs(aside) >= reach:

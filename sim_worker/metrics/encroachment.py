@@ -38,8 +38,8 @@ def post_encroachment_time(view: RolloutView) -> Measure:
 
     From the moment the first leaves the other's path until that other reaches the first one's:
     Allen, Shin and Cooper (1978), Analysis of traffic conflicts and collisions. A path is the
-    strip as wide as the road user, straight around the crossing; who is on it is told by the
-    oriented outlines. Both must pass within the rollout.
+    strip as wide as the road user, straight around the crossing; the oriented outlines
+    say when it is on it. Both must pass within the rollout.
     """
     found = view.keep(crossings)
     future, user = found.future, found.user
@@ -118,17 +118,17 @@ def _near_chunks(view: RolloutView) -> tuple[Indices, Indices, Indices, Indices]
     meet &= ego.least_y[:, :, None, None] <= user.most_y[:, None]
     meet &= ego.most_y[:, :, None, None] >= user.least_y[:, None]
     found = np.flatnonzero(meet)
-    future, ego_chunk, user_chunk, who = np.unravel_index(found, meet.shape)
+    future, ego_chunk, user_chunk, other = np.unravel_index(found, meet.shape)
     own_yaw, yaw = view.states[..., 2], view.users[2]
     last = len(view.time_s) - 1
     turned = [
-        yaw[future, np.minimum(user_chunk * _CHUNK + j, last), who]
+        yaw[future, np.minimum(user_chunk * _CHUNK + j, last), other]
         - own_yaw[future, np.minimum(ego_chunk * _CHUNK + i, last)]
         for i in (0, _CHUNK)
         for j in (0, _CHUNK)
     ]
     steep = np.any([np.abs(np.sin(angle)) >= _PARALLEL_SIN for angle in turned], axis=0)
-    return future[steep], who[steep], ego_chunk[steep], user_chunk[steep]
+    return future[steep], other[steep], ego_chunk[steep], user_chunk[steep]
 
 
 class _Bounds(NamedTuple):

@@ -1,7 +1,7 @@
-"""Who drives or stands ahead on the ego's course: headway, and what avoiding them would take.
+"""Road users ahead on the ego's course: headway, and what avoiding them would take.
 
-The course is the circle of the ego's present yaw rate and speed. Ahead on it is who overlaps the
-strip that the ego would sweep and is not driven against it or across it.
+The course is the circle of the ego's present yaw rate and speed. Ahead on it are those that overlap
+the strip that the ego would sweep, not driven against it or across it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Leaders(NamedTuple):
 
 
 def time_headway(view: RolloutView) -> Measure:
-    """Least time headway (S,), infinite where nobody is ahead or the ego stands.
+    """Least time headway (S,), infinite where none is ahead or the ego stands.
 
     Seconds until the ego's front is where the leader's rear is now: Jansson (2005), Collision
     Avoidance Theory, section 5.3.1; Westhofen et al. (2023), Criticality Metrics for Automated
@@ -54,7 +54,7 @@ def time_headway(view: RolloutView) -> Measure:
 
 
 def drac(view: RolloutView) -> Measure:
-    """Greatest deceleration rate to avoid the crash (S,), 0 where nobody is approached.
+    """Greatest deceleration rate to avoid the crash (S,), 0 where none is approached.
 
     Cooper and Ferguson (1976), Traffic studies at T-junctions; (v - v_leader)² / (2 gap) in
     Archer (2005), Indicators for traffic safety assessment and prediction, equation 4.
@@ -67,7 +67,7 @@ def required_deceleration(view: RolloutView) -> Measure:
     """Greatest deceleration (S,) that matches the leader's speed just before touching it.
 
     Jansson (2005), Collision Avoidance Theory, section 5.3.5: the leader keeps its acceleration;
-    0 where nobody is approached. Positive here, negative in the source.
+    0 where none is approached. Positive here, negative in the source.
     """
     ahead = view.keep(leaders)
     return _extreme(view, ahead, _longitudinal(ahead), np.maximum, 0.0)
@@ -92,7 +92,7 @@ def required_acceleration(view: RolloutView) -> Measure:
 
 
 def leaders(view: RolloutView) -> Leaders:
-    """Return everybody who is ahead on the ego's course at some instant.
+    """Return all road users ahead on the ego's course at some instant.
 
     With κ the curvature, a point at (x, y) of base_link's axes lies ((1 - r) / κ) to the left of
     the circle and atan2(κ x, 1 - κ y) / κ along it, where r² = (κ x)² + (1 - κ y)².

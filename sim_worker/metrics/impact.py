@@ -33,7 +33,7 @@ class Impacts(NamedTuple):
 
 
 def minimum_clearance(view: RolloutView) -> Measure:
-    """Least distance (S,) between the ego's outline and anybody's, infinite where nobody is there.
+    """Least distance (S,) between the ego's outline and any other, infinite where there is none.
 
     Boxes are at least as far apart as their centres less the half diagonals, and at most as their
     centres less the half widths: only pairs that can be the nearest are measured. 0 where they
@@ -129,7 +129,7 @@ def impacts(view: RolloutView) -> Impacts:
     pair = np.flatnonzero(view.centre_distance_m < reach + step_m)
     row, user = np.divmod(pair, max(users, 1))
     instant = row % instants
-    # Where there is no next instant, or nobody at it, nothing moves.
+    # Where there is no next instant, or no road user at it, nothing moves.
     goes_on = instant < instants - 1
     next_row, next_pair = row + goes_on, pair + users * goes_on
     both, then = (view.there.reshape(-1)[which] for which in (pair, next_pair))
@@ -161,27 +161,27 @@ def _first(
 ) -> Impacts:
     futures, instants = view.states.shape[:2]
     order = np.lexsort((user, instant + share, future))
-    who, first = np.unique(future[order], return_index=True)
+    hit_rows, first = np.unique(future[order], return_index=True)
     chosen = order[first]
     instant, user, share = instant[chosen], user[chosen], share[chosen]
     after = np.minimum(instant + 1, instants - 1)
     begin, end = view.time_s[instant], view.time_s[after]
-    state = view.states[who, instant]
-    motion = state[:, 3:5] + share[:, None] * (view.states[who, after, 3:5] - state[:, 3:5])
+    state = view.states[hit_rows, instant]
+    motion = state[:, 3:5] + share[:, None] * (view.states[hit_rows, after, 3:5] - state[:, 3:5])
     _, _, yaw, speed = view.users
-    other_mps = speed[who, instant, user]
-    turned = yaw[who, instant, user] - state[:, 2]
+    other_mps = speed[hit_rows, instant, user]
+    turned = yaw[hit_rows, instant, user] - state[:, 2]
     relative = other_mps[:, None] * np.stack([np.cos(turned), np.sin(turned)], axis=-1) - motion
     impact = np.hypot(motion[:, 0], motion[:, 1])
-    ahead = view.relative.ahead_m[who, instant, user] + view.centre_ahead_m
+    ahead = view.relative.ahead_m[hit_rows, instant, user] + view.centre_ahead_m
 
     def spread(values: Array, without: float) -> Array:
         found = np.full(futures, without)
-        found[who] = values
+        found[hit_rows] = values
         return found
 
     return Impacts(
-        collided=spread(np.ones(len(who)), 0.0) > 0.0,
+        collided=spread(np.ones(len(hit_rows)), 0.0) > 0.0,
         time_s=spread(begin + share * (end - begin), np.nan) - view.time_s[0],
         user=spread(user.astype(np.float64), -1.0).astype(np.intp),
         impact_mps=spread(impact, np.nan),

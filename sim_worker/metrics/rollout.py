@@ -24,7 +24,7 @@ from foretwin.world_gen.rules.signal_state import LiveColour
 _Kept = TypeVar("_Kept")
 _FUTURES_AT_ONCE = 8
 _FAR_M = 1e6
-"""Where a road user is put who is not there: out of reach of every metric, yet a number."""
+"""Where an absent road user is put: out of reach of every metric, yet a number."""
 
 
 class Rollout(NamedTuple):
@@ -187,7 +187,7 @@ class RolloutView:
 
     @functools.cached_property
     def relative(self) -> Relative:
-        """Everybody in the ego's axes."""
+        """All road users in the ego's axes."""
         x, y, yaw, speed = self.users
         found = Relative(
             ahead_m=np.empty(x.shape),

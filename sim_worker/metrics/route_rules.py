@@ -15,7 +15,7 @@ _ON_PATH_M = 1.2
 """A connection whose middle stays this near to the path is the one that it takes."""
 _SAMPLES = 9
 _APPROACH_M = 120.0
-"""How far back the way of those who have priority is followed."""
+"""How far back a way with priority is followed."""
 
 
 class LineAhead(NamedTuple):
@@ -111,7 +111,7 @@ def _priority(world: World, conflict: Conflict, by_id: dict[str, Connection]) ->
         point_m=point,
         own_way=own_way,
         own_from_m=float(along.min()),
-        # Who merges shares the lane from there on: that both have passed the point must do.
+        # Merging ways share the lane from there on: that both have passed the point must do.
         own_until_m=0.0 if merging else float(along.max()),
         way=way,
         way_from_m=float(arcs[0] if merging else arcs[1:].min()),

@@ -14,7 +14,7 @@ TTC_WEIGHT, PROGRESS_WEIGHT, COMFORT_WEIGHT = 5.0, 5.0, 2.0
 TTC_BOUND_S = 1.0
 """No collision with constant velocity sooner than this: NAVSIM's future window."""
 _LEAST_PROGRESS_M = 5.0
-"""Where nobody gets farther than this, waiting is no fault."""
+"""Where no future gets farther than this, waiting is no fault."""
 _BACK_M = (2.0, 6.0)
 """Falling back by more halves, or ends, the score: nuPlan's driving direction compliance."""
 

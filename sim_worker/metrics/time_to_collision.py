@@ -70,7 +70,7 @@ def _interval(distance: Array, speed: Array, reach: Array) -> tuple[Array, Array
 
 
 def ttc_series(view: RolloutView) -> Measure:
-    """Least time to collision with anybody at each instant (S, N), infinite where with nobody."""
+    """Least time to collision with any other at each instant (S, N), infinite where with none."""
     return view.measure(view.keep(_least_at_each_instant))
 
 

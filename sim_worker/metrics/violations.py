@@ -12,9 +12,9 @@ from foretwin.sim_worker.metrics.route_rules import PriorityConflict, RouteRules
 from foretwin.world_gen.rules.signal_state import colours_at, parts_of_cycle
 
 HARD_BRAKING_MPS2 = 2.0
-"""Who has priority and must brake harder was not given way to."""
+"""A road user with priority that must brake harder was not given way to."""
 NARROW_S = 1.0
-"""Nor was who reaches the shared ground sooner than this after the ego has left it."""
+"""Nor was one that reaches the shared ground sooner than this after the ego has left it."""
 _AT_POINT_M = 2.5
 _ON_WAY_M = 2.0
 _STOPS = ("red", "red_amber")
@@ -40,9 +40,9 @@ def red_light_violations(view: RolloutView) -> Measure:
 def right_of_way_violations(view: RolloutView) -> Measure:
     """How many road users (S,) the ego forces to brake hard, or narrowly misses, against priority.
 
-    Counted is who drives on a movement that the ego must wait for, has not reached the shared
+    Counted are those that drive on a movement that the ego must wait for, have not reached shared
     ground when the ego enters it, and would then have to brake by more than `HARD_BRAKING_MPS2`
-    to arrive after the ego has left, or does arrive within `NARROW_S` of that. Constant
+    to arrive after the ego has left, or do arrive within `NARROW_S` of that. Constant
     deceleration from a distance d at speed v: v² / 2d to stop, 2 (v T - d) / T² to be there no
     sooner than in T. A movement whose signal is not green has no priority.
     """
@@ -78,7 +78,7 @@ def _colours(view: RolloutView, group_id: str, at_s: Array) -> list[SignalColour
     drive_s = context.start_s + at_s
     if context.live:
         return [colours_at(plan, time_s, context.live)[group_id] for time_s in drive_s.tolist()]
-    # Colours change a few times a cycle: they are looked up once for all who come in between.
+    # Colours change a few times a cycle: they are looked up once for all in between.
     _, first, part = np.unique(
         parts_of_cycle(plan, drive_s), return_index=True, return_inverse=True
     )
@@ -89,7 +89,7 @@ def _colours(view: RolloutView, group_id: str, at_s: Array) -> list[SignalColour
 def line_crossings(front: Array, ends_m: Array, time_s: Array) -> tuple[Indices, Array]:
     """Return future (K,) and time (K,) of each crossing of a line, in the direction of travel.
 
-    The line runs from left to right as its driver sees it: who crosses comes from its right-hand
+    The line runs from left to right as its driver sees it: a crossing comes from its right-hand
     side, seen along it, to the left.
     """
     left, right = ends_m

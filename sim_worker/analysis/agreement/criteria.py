@@ -22,7 +22,7 @@ CRITERIA = ("clearance", "drivable_area", "red_light", "stop_line", "comfort")
 LEAST_CLEARANCE_M = 0.2
 """Nearer to another road user is a failure; boxes as detected are no more exact than that."""
 _STOP_WITHIN_M = 6.0
-"""Whoever stands within so much before a stop line has stopped for it."""
+"""A car that stands within so much before a stop line has stopped for it."""
 _HEARD_FOR_NS = 2_000_000_000
 _STOPS = ("red", "red_amber")
 _PRECISE_M, _NEAR_M = 0.5, 1.0
@@ -48,7 +48,7 @@ class Heard(NamedTuple):
 class Window(NamedTuple):
     """The same seconds simulated and driven, in one World: states (N, 8) at `time_s` (N,).
 
-    `known_users` says whether the car told of road users throughout; `position_std_m` is the
+    `known_users` says whether the car reported road users throughout; `position_std_m` is the
     greatest while it drove, None where unknown.
     """
 
@@ -132,7 +132,7 @@ class Court:
     def _without_stop(
         self, front: Array, line: LineAhead, speed_mps: Array, unstopped: Flags
     ) -> None:
-        """Mark who crosses a stop line without standing before it; who begins near it is free."""
+        """Mark motions that cross a line without standing before it, unless they begin near it."""
         time_s = self._window.time_s
         future, crossed_s = line_crossings(front, line.ends_m, time_s)
         for row, at_s in zip(future, crossed_s, strict=True):

@@ -1,4 +1,4 @@
-"""Who departs from commanded accelerations: a sequential test over blocks of driving.
+"""Departures from commanded accelerations: a sequential test over blocks of driving.
 
 Braking and pulling away last a second or two with a minute between them, so that a window of time
 forgets the last one before the next begins. Kept here are the blocks in which something was asked
@@ -193,7 +193,7 @@ def _exceeds(blocks: PushBlocks, part: _Part, used: Indices, off: float, doubt: 
 def _finding(
     cause: str, plateau: float, *, by_car: float, off: float, std: float, began_ns: int
 ) -> Finding:
-    """Say who departs: achieved over commanded is 1 for a car that does as told."""
+    """Say which of the two departs: achieved over commanded is 1 for a car that follows."""
     kind, by_model = _KINDS[cause], by_car + off
     off_car, off_model = abs(by_car - kind.usual), abs(by_model - kind.usual)
     culprit: Culprit = "vehicle" if off_car > off_model else "model"
@@ -201,7 +201,7 @@ def _finding(
         culprit = "both"
     unit = kind.unit.format(plateau=plateau)
     said = f"the car does {by_car:.2f} and the model {by_model:.2f}{unit}"
-    who = {"vehicle": "the car departs", "model": "the model departs", "both": "both depart"}
+    departs = {"vehicle": "the car departs", "model": "the model departs", "both": "both depart"}
     evidence = tuple(
         Evidence(
             name=f"{whose}_{cause}",
@@ -212,5 +212,5 @@ def _finding(
         )
         for whose, does in (("car", by_car), ("model", by_model))
     )
-    text = f"{said}: {who[culprit]} from the command"
+    text = f"{said}: {departs[culprit]} from the command"
     return Finding(culprit, cause, text, evidence, began_ns)

@@ -29,7 +29,7 @@ _BY_GYRO = {"steering_ratio", "cornering_stiffness", "friction", "inertia", "ste
 
 
 class Finding(NamedTuple):
-    """One departure: who, how, and the comparisons that say so."""
+    """One departure: of which of the two, how, and the comparisons that show it."""
 
     culprit: Culprit
     cause: str
@@ -139,8 +139,8 @@ def _actuator(seen: Consistency, pair: DelayedLine) -> Finding | None:
         return None
     for ratio in (_DEGREES, 1.0 / _DEGREES):
         if 0.7 < abs(line.gain) / ratio < 1.4:
-            who = "measured steering" if ratio > 1.0 else "the steering command"
-            return accuse("steering_in_degrees", f"{who} is in degrees where radians are declared")
+            sent = "measured steering" if ratio > 1.0 else "the steering command"
+            return accuse("steering_in_degrees", f"{sent} is in degrees where radians are declared")
     if line.gain < -0.3:
         return accuse("steering_sign", "the car steers to the other side than it is told")
     if _beyond(seen, line):
@@ -217,7 +217,7 @@ def _model_turns(seen: Consistency) -> Finding | None:
 
 
 def _gyro_confirmed(gyro: Line | None) -> bool:
-    """Whether the course over ground turns as the gyro says; without one nobody objects."""
+    """Whether the course over ground turns as the gyro shows; without one it may."""
     if gyro is None:
         return True
     return abs(gyro.gain - 1.0) + gyro.gain_std < _GAIN + 0.05

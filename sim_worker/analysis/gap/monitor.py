@@ -76,12 +76,12 @@ class GapMonitor:
         ]
         if not horizons:
             return []
-        # One second more before the start: what the delayed steering was told.
+        # One second more before the start: what the delayed steering was found.
         from_ns = now_ns - round(horizons[-1] * 1e9) - _SECOND_NS
         record = without_manual_commands(self._recorder.record(from_ns, now_ns))
         motion = motion_on_grid(self._states, record.stamp_ns, frame=self._frame)
-        told: list[GapSample | GapAlarm | Verdict] = []
+        found: list[GapSample | GapAlarm | Verdict] = []
         for sample in self._meter.latest(record, motion, horizons_s=horizons):
-            told.append(sample)
-            told.extend(self._limits.handle(sample))
-        return told
+            found.append(sample)
+            found.extend(self._limits.handle(sample))
+        return found

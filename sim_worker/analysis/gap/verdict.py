@@ -33,11 +33,11 @@ _IN_A_ROW = 2
 _DENSE_S, _PRECISE_M = 0.25, 0.15
 """Positions this near to each other and this good may accuse another sensor."""
 _FORGOTTEN_S = 10.0
-"""A finding that has not come back for so long is over, and a new one is told anew."""
+"""A finding that has not come back for so long is over, and a new one is reported anew."""
 
 
 class Judge:
-    """Takes a vehicle's samples and says, where it is sure, who departs from the commands.
+    """Takes a vehicle's samples and says, where it is sure, which departs: the car or its model.
 
     Pure: time is that of the samples. A verdict takes two findings in a row, 0.2 s apart, that
     accuse the same, and is given once as long as it holds.
@@ -55,9 +55,9 @@ class Judge:
         self._push = PushTest()
         self._pending: tuple[str, str, int, int] | None = None
         self._fixes: deque[tuple[int, float]] = deque(maxlen=40)
-        self._told: dict[tuple[str, str], int] = {}
+        self._reported: dict[tuple[str, str], int] = {}
         self.latest: Consistency | None = None
-        """What the latest stretch said, for those who show it."""
+        """The consistency of the latest stretch, for display."""
 
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Judge a model of other parameters from now on; what was about to be said is forgotten."""
@@ -115,17 +115,17 @@ class Judge:
         return apart_s <= _DENSE_S and float(np.median(table[:, 1])) <= _PRECISE_M
 
     def _weigh(self, findings: Sequence[Finding], to_ns: int) -> Verdict | None:
-        for key, seen_ns in list(self._told.items()):
+        for key, seen_ns in list(self._reported.items()):
             if to_ns - seen_ns > _FORGOTTEN_S * 1e9:
-                del self._told[key]
+                del self._reported[key]
         if not findings:
             self._pending = None
         by_key = {(str(one.culprit), one.cause): one for one in findings}
-        self._told |= {key: to_ns for key in by_key if key in self._told}
-        untold = [key for key in by_key if key not in self._told]
-        if not untold:
+        self._reported |= {key: to_ns for key in by_key if key in self._reported}
+        unreported = [key for key in by_key if key not in self._reported]
+        if not unreported:
             return None
-        key, found = untold[0], by_key[untold[0]]
+        key, found = unreported[0], by_key[unreported[0]]
         before = self._pending
         if before is None or before[0] != found.culprit:
             self._pending = (*key, 1, found.since_ns)
@@ -134,7 +134,7 @@ class Judge:
         if self._pending[2] < _IN_A_ROW:
             return None
         since_ns = self._pending[3]
-        self._told[key] = to_ns
+        self._reported[key] = to_ns
         return Verdict(
             vehicle_id=self._vehicle_id,
             stamp_ns=to_ns,
@@ -164,7 +164,7 @@ def _confidence(found: Finding) -> float:
 
 
 def without_manual_commands(record: MotionRecord) -> MotionRecord:
-    """Return the record without commands where a human drives: nobody carries them out then."""
+    """Return the record without commands where a human drives: they are not carried out then."""
     if not record.manual.any():
         return record
     names = ("command_accel_mps2", "command_wheel_rad", "command_tire_rad")

@@ -54,19 +54,19 @@ def front_stiffness(vehicle: VehicleParameters, gradient_rad_per_mps2: float) ->
 
 
 def accepted(
-    told: Identification,
+    result: Identification,
     vehicle: VehicleParameters,
     *,
     pinned: Collection[str] = (),
     source: str = "identified",
 ) -> tuple[VehicleParameters, tuple[ParameterChange, ...]]:
-    """Return `vehicle` with what may be taken of `told`, and each change.
+    """Return `vehicle` with what may be taken of `result`, and each change.
 
     An understeer gradient becomes the front axle's cornering stiffness, `pinned` under either
     name. What would make no vehicle (a negative drag), or an implausible one, is passed over.
     """
     changes: list[ParameterChange] = []
-    for estimate in told.estimates:
+    for estimate in result.estimates:
         if not is_acceptable(estimate) or estimate.name in pinned:
             continue
         assert estimate.value is not None
@@ -85,7 +85,7 @@ def accepted(
         if not low <= value <= high:
             continue
         changed = msgspec.structs.replace(
-            vehicle, **{name: Parameter(value, std, f"{source}, {told.excited_s:.0f} s")}
+            vehicle, **{name: Parameter(value, std, f"{source}, {result.excited_s:.0f} s")}
         )
         try:
             vehicle = check_vehicle(changed)
@@ -93,8 +93,8 @@ def accepted(
             continue
         changes.append(
             ParameterChange(
-                vehicle_id=told.vehicle_id,
-                stamp_ns=told.stamp_ns,
+                vehicle_id=result.vehicle_id,
+                stamp_ns=result.stamp_ns,
                 name=name,
                 before=before,
                 value=value,
@@ -129,13 +129,13 @@ def in_force(vehicle: VehicleParameters, name: str) -> float:
     return float(parameter.value)
 
 
-def with_priors(told: Identification, vehicle: VehicleParameters) -> Identification:
+def with_priors(result: Identification, vehicle: VehicleParameters) -> Identification:
     """Return an identification whose estimates stand beside the values of `vehicle`."""
     estimates = tuple(
         msgspec.structs.replace(found, prior=in_force(vehicle, found.name))
-        for found in told.estimates
+        for found in result.estimates
     )
-    return msgspec.structs.replace(told, estimates=estimates)
+    return msgspec.structs.replace(result, estimates=estimates)
 
 
 def is_left_open(vehicle: VehicleParameters, name: str, value: float) -> bool:

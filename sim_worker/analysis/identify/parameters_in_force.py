@@ -41,14 +41,14 @@ class ParametersInForce:
     def _is_pinned(self, name: str) -> bool:
         return name in self.pinned or (name == UNDERSTEER_GRADIENT and STIFFNESS in self.pinned)
 
-    def take(self, told: Identification) -> tuple[ParameterChange, ...]:
-        """Let what `told` says count, save where it is pinned or known better; the changes."""
+    def take(self, result: Identification) -> tuple[ParameterChange, ...]:
+        """Let what `result` says count, save where it is pinned or known better; the changes."""
         better = [
             found
-            for found in told.estimates
+            for found in result.estimates
             if is_acceptable(found) and not self._is_pinned(found.name) and self._is_news(found)
         ]
-        chosen = msgspec.structs.replace(told, estimates=tuple(better))
+        chosen = msgspec.structs.replace(result, estimates=tuple(better))
         previous = self.vehicle
         self.vehicle, changes = accepted(chosen, self.vehicle)
         names = {change.name for change in changes}

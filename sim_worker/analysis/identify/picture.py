@@ -17,9 +17,9 @@ from foretwin.sim_worker.analysis.motion_record import MotionRecord
 _TAKEN, _LEFT = "#1f77b4", "#b0b0b0"
 
 
-def draw_estimates(told: Identification, file: Path) -> None:
+def draw_estimates(result: Identification, file: Path) -> None:
     """Write a PNG: each parameter's interval, blue where it is taken, and the value in force."""
-    shown = [found for found in told.estimates if found.value is not None]
+    shown = [found for found in result.estimates if found.value is not None]
     if not shown:
         return
     columns = min(4, len(shown))

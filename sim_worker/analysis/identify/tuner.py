@@ -86,18 +86,18 @@ class Tuner(ParametersInForce):
             return None
         self._due_ns = newest_ns + self._every_ns
         self._from_ns = max(self._from_ns, newest_ns - self._window_ns)
-        told = self._examined(newest_ns)
-        noticed = self._steps(told)
+        result = self._examined(newest_ns)
+        noticed = self._steps(result)
         if not noticed:
-            return told
+            return result
         # What came before the step is of another car.
-        return self._anew(told, noticed, since_ns=newest_ns - self._every_ns)
+        return self._anew(result, noticed, since_ns=newest_ns - self._every_ns)
 
     def _examined(self, newest_ns: int) -> Identification:
         record = self._recorder.record(self._from_ns, newest_ns, period_s=_PERIOD_S)
-        told, steering = examine(record, self._given, vehicle_id=self._vehicle_id)
+        result, steering = examine(record, self._given, vehicle_id=self._vehicle_id)
         self._bends = None if steering is None else bends_before(steering)
-        return with_priors(told, self.vehicle)
+        return with_priors(result, self.vehicle)
 
     def _find_step(self, newest_ns: int) -> Step | None:
         if self._known is None or self._from_ns is None:
@@ -117,7 +117,7 @@ class Tuner(ParametersInForce):
         return self._anew(self._examined(newest_ns), _in_words(step), since_ns=self._from_ns)
 
     def _anew(
-        self, told: Identification, noticed: dict[str, str], *, since_ns: int
+        self, result: Identification, noticed: dict[str, str], *, since_ns: int
     ) -> Identification:
         self._from_ns = since_ns
         self._due_ns = since_ns + round(_LEAST_S * 1e9)
@@ -129,19 +129,19 @@ class Tuner(ParametersInForce):
         for name in names:
             self._taken.pop(name, None)
         return msgspec.structs.replace(
-            told,
+            result,
             estimates=tuple(
                 msgspec.structs.replace(found, reason="it has just changed: more driving is needed")
                 if found.name in names
                 else found
-                for found in told.estimates
+                for found in result.estimates
             ),
             step_noticed="; ".join(noticed.values()),
         )
 
-    def _steps(self, told: Identification) -> dict[str, str]:
+    def _steps(self, result: Identification) -> dict[str, str]:
         noticed = {}
-        for found in told.estimates:
+        for found in result.estimates:
             before = self._taken.get(found.name)
             if before is None or not is_acceptable(found) or self._is_pinned(found.name):
                 continue
@@ -154,9 +154,9 @@ class Tuner(ParametersInForce):
                 )
         return noticed
 
-    def take(self, told: Identification) -> tuple[ParameterChange, ...]:
-        """Let what `told` says count; later bends are compared with those that it is of."""
-        changes = super().take(told)
+    def take(self, result: Identification) -> tuple[ParameterChange, ...]:
+        """Let what `result` says count; later bends are compared with those that it is of."""
+        changes = super().take(result)
         bends, known = self._bends, self._known
         steered = any(change.name in _STEERING or change.name == STIFFNESS for change in changes)
         if steered and bends is not None and (known is None or not bends.knows_less(known)):

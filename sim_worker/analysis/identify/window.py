@@ -38,7 +38,7 @@ _Interval = tuple[float, float, float]
 class Examined(NamedTuple):
     """What a record tells, and the fit of its steering where it has one."""
 
-    told: Identification
+    result: Identification
     steering: SteeringFit | None
 
 
@@ -82,7 +82,7 @@ def identify(
     `grade` (N,) is the road's rise over run; without it, the record's altitude is asked. An
     estimate may be taken where its `reason` is empty. Raises ValueError for less than 1 s.
     """
-    return examine(record, vehicle, vehicle_id=vehicle_id, grade=grade).told
+    return examine(record, vehicle, vehicle_id=vehicle_id, grade=grade).result
 
 
 def examine(
@@ -102,7 +102,7 @@ def examine(
         estimates = _steering(fit, vehicle, turned_s)
         bins = steering_map(record, fit)
     along, worked_s = _longitudinal(record, vehicle, grade)
-    told = Identification(
+    result = Identification(
         vehicle_id=vehicle_id,
         from_stamp_ns=int(record.stamp_ns[0]),
         stamp_ns=int(record.stamp_ns[-1]),
@@ -115,7 +115,7 @@ def examine(
         steering_map=bins,
         excited_s=turned_s + worked_s,
     )
-    return Examined(told, fit)
+    return Examined(result, fit)
 
 
 def _steering_priors(vehicle: VehicleParameters) -> dict[str, float]:
@@ -223,21 +223,21 @@ def _longitudinal(
     try:
         if record.has("command_accel_mps2") and grade is None:
             grade = grade_from_altitude(record)
-        told = longitudinal.fit_longitudinal(record, vehicle, grade=grade)
+        along = longitudinal.fit_longitudinal(record, vehicle, grade=grade)
     except ValueError as lack:
         return _unknown({name: prior.value for name, prior in priors.items()}, lack), 0.0
     short = ""
     needed = (longitudinal.LEAST_DRIVING_S, longitudinal.LEAST_BRAKING_S)
-    if told.driving_s < needed[0] or told.braking_s < needed[1]:
-        short = longitudinal.too_little(told.driving_s, told.braking_s)
+    if along.driving_s < needed[0] or along.braking_s < needed[1]:
+        short = longitudinal.too_little(along.driving_s, along.braking_s)
     result = []
     for index, (name, prior) in enumerate(priors.items()):
         scale, most = 1.0, _WIDE_DELAY_S if index == longitudinal.DELAY else _WIDE_GAIN
         if index in (longitudinal.DRAG, longitudinal.ROLLING):
             scale = vehicle.mass_kg.value
             most = math.inf if prior.std is None else 1.96 * prior.std
-        half = scale * told.fit.half_width(index)
+        half = scale * along.fit.half_width(index)
         wide = "the interval is wide: more driving and braking would narrow it"
-        interval = _around(scale * float(told.fit.values[index]), half)
+        interval = _around(scale * float(along.fit.values[index]), half)
         result.append(_estimate(name, prior.value, interval, short, wide if half > most else ""))
-    return result, told.driving_s + told.braking_s
+    return result, along.driving_s + along.braking_s

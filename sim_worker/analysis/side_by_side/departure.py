@@ -99,7 +99,7 @@ def pace_kind(found: Departure, limits: Limits) -> DisagreementKind | None:
 def _between_ways(planned: Array, driven: Array) -> tuple[float, float]:
     """Return the greatest offset and angle of the planned way from the driven, as far as both go.
 
-    Ways, not instants: who stops on a lane's middle departs in pace, not in way.
+    Ways, not instants: a stop on a lane's middle departs in pace, not in way.
     """
     moved = _moved(driven)
     if len(moved) < 2 or len(_moved(planned)) < 2:

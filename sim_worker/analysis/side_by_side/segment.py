@@ -48,7 +48,7 @@ class AspectWatch:
     segment: int
     aspect: Aspect
     _now: Disagreement | None = None
-    _told: bool = False
+    _reported: bool = False
     _last_over_ns: int = 0
 
     def take(
@@ -64,21 +64,21 @@ class AspectWatch:
         if self._now is not None and stamp_ns - self._last_over_ns > END_NS:
             ended = self.finish()
         if kind is None and (self._now is None or within):
-            if self._now is not None and not self._told:
+            if self._now is not None and not self._reported:
                 self._now = None  # departed from for too short a time
             return ended
         self._last_over_ns = stamp_ns
         self._now = self._joined(stamp_ns, kind, found, place)
-        if not self._told and stamp_ns - self._now.stamp_ns >= BEGIN_NS:
-            self._told = True
+        if not self._reported and stamp_ns - self._now.stamp_ns >= BEGIN_NS:
+            self._reported = True
             return [*ended, self._now]
         return ended
 
     def finish(self) -> list[Disagreement]:
-        """End what lasts; return it if it was told of."""
-        now, told = self._now, self._told
-        self._now, self._told = None, False
-        if now is None or not told:
+        """End what lasts; return it if it was reported."""
+        now, reported = self._now, self._reported
+        self._now, self._reported = None, False
+        if now is None or not reported:
             return []
         return [replace(now, over=True)]
 

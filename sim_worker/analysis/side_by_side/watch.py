@@ -28,7 +28,7 @@ from foretwin.sim_worker.analysis.side_by_side.segment import (
 )
 
 HORIZON_S = 4.0
-"""How much of a plan is compared: beyond, both have seen what nobody knew."""
+"""How much of a plan is compared: beyond, both have seen what was not known."""
 _STEP_S = 0.1
 _EVERY_NS = 200_000_000
 """Plans come ten times a second and hardly differ: every second one tells all."""
@@ -40,8 +40,8 @@ _LONGEST_HOLE_NS = 1_500_000_000
 class SideBySide:
     """Compares each plan with what was driven from its stamp on, up to the next takeover.
 
-    A segment lasts as long as the control mode stays what it is; a status that does not say who
-    drives changes nothing. Figures are kept of every segment, disagreements of those in which a
+    A segment lasts as long as the control mode stays what it is; a status of unknown
+    mode changes nothing. Figures are kept of every segment, disagreements of those in which a
     human drives. `place` says where the car is as a plan comes in.
     """
 
@@ -69,7 +69,7 @@ class SideBySide:
         return [segment.record() for segment in (*self._done, *self._open)]
 
     def take_status(self, status: VehicleStatus) -> None:
-        """Take who drives; another than before is a takeover."""
+        """Take the control mode; another than before is a takeover."""
         mode = status.control_mode
         if mode == "unknown" or (self._open and self._open[-1].mode == mode):
             return
