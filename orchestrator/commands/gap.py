@@ -16,9 +16,8 @@ from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.gap_text import nobody_accused, table_lines, verdict_lines
 from foretwin.orchestrator.commands.progress_bar import progress_bar
-from foretwin.sim_worker.analysis.gap.errors import GapMeter, GapRow, gap_table
+from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.limits import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
 from foretwin.sim_worker.analysis.gap.verdict import Judge, without_manual_commands
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder

@@ -16,11 +16,7 @@ from foretwin.sim_worker.mirror.role_manager import FreeTwin, RoleManager
 from foretwin.sim_worker.mirror.role_world import RoleWorld
 from foretwin.sim_worker.mirror.samples import plane_state
 from foretwin.sim_worker.mirror.track import Track
-from foretwin.sim_worker.vehicle.commands import (
-    STEP_BACK_NS,
-    CommandMemory,
-    TwinCommand,
-)
+from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS, CommandMemory, TwinCommand
 from foretwin.sim_worker.vehicle.planar import MAX_STEERING_DELAY_S, TIMESTEP_S
 
 _ALONE = MirrorCast()

@@ -30,11 +30,7 @@ class Track:
     """The last two states of a vehicle in one frame, and nothing of what comes later."""
 
     def __init__(
-        self,
-        vehicle: VehicleParameters,
-        frame: LocalFrame,
-        *,
-        continuous_ns: int = _CONTINUOUS_NS,
+        self, vehicle: VehicleParameters, frame: LocalFrame, *, continuous_ns: int = _CONTINUOUS_NS
     ) -> None:
         """Between states farther apart than `continuous_ns` nothing is interpolated."""
         self.vehicle = vehicle

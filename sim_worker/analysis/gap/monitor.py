@@ -10,9 +10,8 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import GapAlarm, GapSample, Verdict
 from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.gap.errors import GapMeter
+from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.limits import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
 from foretwin.sim_worker.analysis.gap.verdict import KEPT_S, Judge, without_manual_commands
 

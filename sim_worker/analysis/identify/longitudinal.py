@@ -18,7 +18,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.identify.actuator import best_delay, delays
 from foretwin.sim_worker.analysis.identify.regression import Fit, delayed, fit_linear, smoothed
-from foretwin.sim_worker.analysis.identify.single_track import SLOWEST_MPS, sideways
+from foretwin.sim_worker.analysis.identify.steering_signals import SLOWEST_MPS, sideways
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
 

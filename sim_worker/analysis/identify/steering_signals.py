@@ -21,7 +21,6 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.identify.regression import smoothed
-from foretwin.sim_worker.analysis.identify.single_track import SLOWEST_MPS, sideways
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 
 WIDTH_S = 0.1
@@ -163,3 +162,39 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         gyro_bias_radps=bias,
         gyro_bias_std_radps=bias_std,
     )
+
+
+SLOWEST_MPS = 2.0
+"""Below it, slips are lost in noise."""
+
+
+class Sideways(NamedTuple):
+    """A car's sideways motion at N instants, of its centre of gravity, positive to the left."""
+
+    accel_mps2: Array
+    speed_mps: Array
+    rear_slip_rad: Array
+    front_mps2: Array
+    """The front axle's force over the car's mass."""
+
+
+def sideways(
+    vehicle: VehicleParameters,
+    *,
+    speed_mps: Array,
+    yaw_rate_radps: Array,
+    yaw_accel_radps2: Array,
+    period_s: float,
+) -> Sideways:
+    """Return the sideways motion (N,) of the file's car that turns so; NaN where that is NaN."""
+    base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
+    mass, stiffness = vehicle.mass_kg.value, vehicle.rear_cornering_stiffness_npr.value
+    fast = np.maximum(speed_mps, SLOWEST_MPS)
+    turning = vehicle.yaw_inertia_kgm2.value / mass * yaw_accel_radps2
+    accel = speed_mps * yaw_rate_radps
+    slip = speed = np.zeros_like(accel)
+    for _ in range(2):
+        slip = ((base - rear) * accel - turning) / base * mass / stiffness
+        speed = rear * yaw_rate_radps - fast * slip
+        accel = speed_mps * yaw_rate_radps + np.gradient(speed, period_s)
+    return Sideways(accel, speed, slip, (rear * accel + turning) / base)

@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.sim_worker.analysis.gap.errors import GapMeter
+from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
-from foretwin.sim_worker.analysis.gap.limits import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from foretwin.contracts.gap import GapSample
-from foretwin.sim_worker.analysis.gap.limits import GapLimits
+from foretwin.sim_worker.analysis.gap.errors import GapLimits
 from foretwin.sim_worker.analysis.gap.measured_motion import manoeuvre_of
 
 

@@ -19,7 +19,7 @@ from tests.sim_worker.standin_drives import city_minute, estimate, straight_minu
 COVERS = (
     "foretwin.sim_worker.analysis.identify.actuator",
     "foretwin.sim_worker.analysis.identify.longitudinal",
-    "foretwin.sim_worker.analysis.identify.single_track",
+    "foretwin.sim_worker.analysis.identify.steering_signals",
     "foretwin.sim_worker.analysis.identify.steering",
 )
 
