@@ -1,4 +1,7 @@
-"""Futures against what the car did, and against what the car itself had planned."""
+"""Futures against what the car did, and against what the car itself had planned.
+
+What a future must beat to be worth its cost are predictions that need no simulation.
+"""
 
 from __future__ import annotations
 

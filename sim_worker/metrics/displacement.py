@@ -1,4 +1,7 @@
-"""Displacement of predictions from what happened, and how many futures really differ."""
+"""Displacement of predictions from what happened, and how many futures really differ.
+
+How far two courses lie apart whatever the time: discrete Fréchet distance and time warping.
+"""
 
 from __future__ import annotations
 

@@ -52,19 +52,11 @@ def minimum_clearance(view: RolloutView) -> Measure:
     row, user = np.divmod(pair, max(users, 1))
     future = row // len(view.time_s)
     x, y, yaw, _ = (values.reshape(-1)[pair] for values in view.users)
+    centre, own_yaw = view.centre_m.reshape(-1, 2)[row], view.states[..., 2].reshape(-1)[row]
+    sizes = 2.0 * half_length[future, 0, user], 2.0 * half_width[future, 0, user]
     apart = clearance(
-        Rectangles(
-            view.centre_m.reshape(-1, 2)[row],
-            view.states[..., 2].reshape(-1)[row],
-            2.0 * view.half_length_m,
-            2.0 * view.half_width_m,
-        ),
-        Rectangles(
-            np.stack([x, y], axis=-1),
-            yaw,
-            2.0 * half_length[future, 0, user],
-            2.0 * half_width[future, 0, user],
-        ),
+        Rectangles(centre, own_yaw, 2.0 * view.half_length_m, 2.0 * view.half_width_m),
+        Rectangles(np.stack([x, y], axis=-1), yaw, *sizes),
     )
     found = np.where(touched, 0.0, np.inf)
     np.minimum.at(found, future, apart)

@@ -1,4 +1,7 @@
-"""Which signals of a stretch of driving agree with which: gains, offsets, delays, plateaus."""
+"""Which signals of a stretch of driving agree with which: gains, offsets, delays, plateaus.
+
+And when a departure began, within the stretch that shows it.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,8 @@ _MIN_CURVATURE_PM = 0.006
 _HARD_MPS2 = 1.2
 _LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
 _LEAST_STOP_S = 0.3
+_SPEEDS_TOGETHER_S = 0.4
+"""For so long, speeds and courses from positions err alike."""
 _EVERY = 5
 """Smoothed signals need not be compared at every sample."""
 
@@ -70,29 +75,19 @@ def consistency_of(pairs: SignalPairs) -> Consistency:
         angle = _line(pairs.done_rad, pairs.arc_rad)
     real, by_measured = pairs.curvature_pm, pairs.by_measured_pm
     hard = np.abs(real * pairs.speed_mps**2) > _HARD_MPS2
-    motion = _turning(by_measured, real)
+    motion, motion_hard = _turning(by_measured, real), None
+    if motion is not None:
+        hard_bends = np.where(hard, by_measured, np.nan)
+        motion_hard = _mean_ratio(hard_bends, real, period_s=PERIOD_S, least_s=0.6)
+    ground, wheels = pairs.ground_mps[::_EVERY], pairs.wheel_mps[::_EVERY]
     return Consistency(
         gyro_by_course=_turn_rates(pairs),
-        speed_by_gnss=_mean_ratio(
-            pairs.ground_mps[::_EVERY],
-            pairs.wheel_mps[::_EVERY],
-            period_s=_EVERY * PERIOD_S,
-            together_s=0.4,
-            least_s=1.5,
-        ),
+        speed_by_gnss=_mean_ratio(ground, wheels, period_s=_EVERY * PERIOD_S, least_s=1.5),
         measured_by_command=measured,
         model_by_command=model,
         model_stops_at_rad=_stop(pairs.commanded_rad, pairs.done_rad, pairs.model_tire_rad),
         motion_by_measured=motion,
-        motion_by_measured_hard=None
-        if motion is None
-        else _mean_ratio(
-            np.where(hard, by_measured, np.nan),
-            real,
-            period_s=PERIOD_S,
-            together_s=0.4,
-            least_s=0.6,
-        ),
+        motion_by_measured_hard=motion_hard,
         missing_mps2=_missing(pairs),
         motion_lag=_lag(by_measured, real),
         motion_by_command=_turning(pairs.by_command_pm, real),
@@ -138,7 +133,7 @@ def _turn_rates(pairs: SignalPairs) -> Line | None:
     seconds = len(course) * _EVERY * PERIOD_S
     if seconds < 1.2:
         return None
-    independent = max(seconds / 0.4, 2.0)
+    independent = max(seconds / _SPEEDS_TOGETHER_S, 2.0)
     # The course is by far the noisier: over it the gyro's gain would come out too small.
     line = line_through(gyro, course, independent=independent)
     if line is not None and line.gain > 5.0 * line.gain_std:
@@ -165,9 +160,7 @@ def _missing(pairs: SignalPairs) -> float:
     return float(np.sqrt(np.mean(apart * apart)))
 
 
-def _mean_ratio(
-    x: Array, y: Array, *, period_s: float, together_s: float, least_s: float
-) -> Line | None:
+def _mean_ratio(x: Array, y: Array, *, period_s: float, least_s: float) -> Line | None:
     """Fit y = gain x: some signals vary too little in seconds to part an offset from a gain."""
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known], y[known]
@@ -175,7 +168,7 @@ def _mean_ratio(
         return None
     gain = float(np.sum(x * y) / np.sum(x * x))
     left = y - gain * x
-    independent = max(len(x) * period_s / together_s, 2.0)
+    independent = max(len(x) * period_s / _SPEEDS_TOGETHER_S, 2.0)
     residual = float(np.sqrt(np.sum(left * left) / (len(x) - 1)))
     std = residual / float(np.sqrt(np.mean(x * x) * independent))
     return Line(gain, std, 0.0, 0.0, residual, 1.0)

@@ -1,4 +1,7 @@
-"""How far the free model leaves reality, by horizon and by manoeuvre."""
+"""How far the free model leaves reality, by horizon and by manoeuvre.
+
+Limits on the gap raise an alarm when it is exceeded, and another when it is well back within.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 Of seconds, many times a second. `analysis.identify` fits lines to minutes: its deviations take
 four stretches of three seconds at least and ten times as long, and its actuators follow with a lag,
 where here a pure delay must be found even if command and answer differ in sign, or 57 times.
+
+Several departures are fitted to one gap, so that none is put down to another.
 """
 
 from __future__ import annotations

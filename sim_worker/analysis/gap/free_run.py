@@ -1,4 +1,7 @@
-"""The planar model left to itself from measured states: many windows in one MuJoCo Batch."""
+"""The planar model left to itself from measured states: many windows in one MuJoCo Batch.
+
+Runs need not be made again: stretches overlap by most of their length.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The vehicle's estimated states on the grid of its record: what a free run is compared with."""
+"""The vehicle's estimated states on the grid of its record: what a free run is compared with.
+
+What the vehicle is doing follows from its measured motion alone.
+"""
 
 from __future__ import annotations
 

@@ -15,7 +15,13 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.identify.regression import Fit, delayed, fit_linear, smoothed
+from foretwin.sim_worker.analysis.identify.regression import (
+    Fit,
+    delayed,
+    fit_linear,
+    smoothed,
+    smoothed_and_rate,
+)
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 
 WIDTH_S = 0.05
@@ -91,8 +97,7 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
     fastest = vehicle.max_tire_rate_radps.value
     fastest *= abs(vehicle.steering_ratio.value) if at_wheel else 1.0
     period_s = float(record.time_s[1])
-    angle = smoothed(measured, period_s=period_s, width_s=WIDTH_S)
-    rate = smoothed(measured, period_s=period_s, width_s=WIDTH_S, derivative=True)
+    angle, rate = smoothed_and_rate(measured, period_s=period_s, width_s=WIDTH_S)
     # A held command lies half its period later than its stamps say once it is smoothed.
     blur_s = _blur_s(measured, period_s=period_s)
     asked = smoothed(command, period_s=period_s, width_s=math.hypot(WIDTH_S, blur_s))

@@ -5,6 +5,8 @@ the command u of `accel_delay_s` ago, drive and brake gains G, drag c and rollin
 Acceleration is the slope of the measured speed: an accelerometer would feel the body's pitch. In a
 bend it contains what the turned front wheels take, F_yf sin(δ), up to 0.2 m/s² in town. What is
 left is noise of the measured speed: over 6 s it averages out as white noise does.
+
+The road's grade along a drive follows from measured altitude.
 """
 
 from __future__ import annotations
@@ -17,7 +19,13 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.identify.actuator import best_delay, delays
-from foretwin.sim_worker.analysis.identify.regression import Fit, delayed, fit_linear, smoothed
+from foretwin.sim_worker.analysis.identify.regression import (
+    Fit,
+    delayed,
+    fit_linear,
+    smoothed,
+    smoothed_and_rate,
+)
 from foretwin.sim_worker.analysis.identify.steering_signals import SLOWEST_MPS, sideways
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
@@ -60,8 +68,7 @@ def _cornering(record: MotionRecord, vehicle: VehicleParameters, speed_mps: Arra
     if not record.has("yaw_rate_radps"):
         return np.zeros(len(speed_mps))
     period_s = float(record.time_s[1])
-    rate = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S)
-    turning = smoothed(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S, derivative=True)
+    rate, turning = smoothed_and_rate(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S)
     base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
     side = sideways(
         vehicle,
@@ -98,8 +105,7 @@ def fit_longitudinal(
     if grade is None:
         raise ValueError("the road's grade is unknown: 5 % of it is more than drag")
     period_s = float(record.time_s[1])
-    speed = smoothed(record.speed_mps, period_s=period_s, width_s=WIDTH_S)
-    accel = smoothed(record.speed_mps, period_s=period_s, width_s=WIDTH_S, derivative=True)
+    speed, accel = smoothed_and_rate(record.speed_mps, period_s=period_s, width_s=WIDTH_S)
     climbing = smoothed(np.sin(np.arctan(grade)), period_s=period_s, width_s=WIDTH_S)
     lags = (vehicle.drive_lag_s.value, vehicle.brake_lag_s.value)
     parts = []

@@ -10,6 +10,8 @@ bend tells has no other to vouch for it, and its interval says so.
 Leaving out is exact for residuals that last as long as a stretch, and exaggerates by a stretch's
 leverage where they do not; what is known to be brief is corrected by the root of it instead (CV2,
 Bell and McCaffrey, 2002).
+
+All signals of a regression pass one zero-phase filter, so that linear relations stay true.
 """
 
 from __future__ import annotations
@@ -171,6 +173,12 @@ def smoothed(values: Array, *, period_s: float, width_s: float, derivative: bool
     unknown = np.concatenate([[True], ~known, [True]])
     near = ndimage.binary_dilation(unknown, iterations=max(1, round(3.0 * sigma)))[1:-1]
     return np.asarray(np.where(near, np.nan, result))
+
+
+def smoothed_and_rate(values: Array, *, period_s: float, width_s: float) -> tuple[Array, Array]:
+    """Return what `smoothed` makes of (N,), and its derivative."""
+    plain = smoothed(values, period_s=period_s, width_s=width_s)
+    return plain, smoothed(values, period_s=period_s, width_s=width_s, derivative=True)
 
 
 def delayed(values: Array, *, period_s: float, delay_s: float) -> Array:

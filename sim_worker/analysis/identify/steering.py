@@ -2,6 +2,8 @@
 
 The model is that of `steering_signals`; the gyro's bias is estimated along, from standstill most
 of all.
+
+The steering map is the steering wheel over the effective tyre angle, binned by speed.
 """
 
 from __future__ import annotations

@@ -8,6 +8,10 @@ with steering wheel w, ratio i, offset δ0 at the tyre, understeer gradient K (G
 6-15), T = I_z/L (1/C_f + 1/C_r) for what the tyres need to turn the body, τ by which the tyres (or
 the gyro's samples) come after the steering wheel, and p± by which the car pulls to a side when it
 is driven or braked.
+
+Sideways acceleration is v r only as long as the car does not begin or end to slide sideways: on the
+way into a bend it differs by a tenth. Slips follow from the forces that the axles must bear, and
+those from the acceleration, so that two rounds are enough (Gillespie 1992, chapter 6).
 """
 
 from __future__ import annotations
@@ -20,12 +24,14 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.analysis.identify.regression import smoothed
+from foretwin.sim_worker.analysis.identify.regression import smoothed_and_rate
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 
 WIDTH_S = 0.1
 ALIKE_S = 2.0 * math.sqrt(math.pi) * WIDTH_S
 """For so long, smoothed white noise says one thing only."""
+SLOWEST_MPS = 2.0
+"""Below it, slips are lost in noise."""
 _LEAST_STOOD = 4.0
 _MAX_LATERAL_MPS2 = 4.0
 """Beyond it, tyres are no longer linear."""
@@ -117,13 +123,9 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
             raise ValueError(f"no {told} was measured for half of the time")
     period_s = float(record.time_s[1])
 
-    def smooth(values: Array, *, derivative: bool = False) -> Array:
-        return smoothed(values, period_s=period_s, width_s=WIDTH_S, derivative=derivative)
-
-    speed, rate, wheel = map(smooth, (record.speed_mps, record.yaw_rate_radps, record.wheel_rad))
-    gaining, turning, steering = (
-        smooth(values, derivative=True)
-        for values in (record.speed_mps, record.yaw_rate_radps, record.wheel_rad)
+    (speed, gaining), (rate, turning), (wheel, steering) = (
+        smoothed_and_rate(getattr(record, name), period_s=period_s, width_s=WIDTH_S)
+        for name in ("speed_mps", "yaw_rate_radps", "wheel_rad")
     )
     side = sideways(
         vehicle, speed_mps=speed, yaw_rate_radps=rate, yaw_accel_radps2=turning, period_s=period_s
@@ -135,6 +137,16 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
     used = np.flatnonzero(moving)
     base = vehicle.wheelbase_m.value
     standing = np.isfinite(rate) & (np.abs(speed) < 1e-3)
+    given = {
+        Theta.INVERSE_RATIO: wheel,
+        Theta.OFFSET: np.ones_like(wheel),
+        Theta.UNDERSTEER: -side.accel_mps2,
+        Theta.TURNING: -turning,
+        Theta.GYRO_BIAS: np.zeros_like(wheel),
+        Theta.LAG: -steering,
+        Theta.PULL_DRIVEN: np.maximum(gaining, 0.0),
+        Theta.PULL_BRAKED: np.minimum(gaining, 0.0),
+    }
     bias, bias_std = _mean(rate[standing], alike=ALIKE_S / period_s)
     return SteeringSignals(
         time_s=record.time_s,
@@ -145,27 +157,12 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         wheel_radps=steering,
         rear_slip_rad=side.rear_slip_rad,
         lateral_mps2=side.accel_mps2,
-        given=np.stack(
-            [
-                wheel,
-                np.ones_like(wheel),
-                -side.accel_mps2,
-                -turning,
-                np.zeros_like(wheel),
-                -steering,
-                np.maximum(gaining, 0.0),
-                np.minimum(gaining, 0.0),
-            ]
-        ),
+        given=np.stack([given[parameter] for parameter in Theta]),
         per_m=speed[used] / base,
         wheelbase_m=base,
         gyro_bias_radps=bias,
         gyro_bias_std_radps=bias_std,
     )
-
-
-SLOWEST_MPS = 2.0
-"""Below it, slips are lost in noise."""
 
 
 class Sideways(NamedTuple):
