@@ -48,9 +48,14 @@ def test_an_episode_begins_as_the_recorded_state_was() -> None:
 
 def test_a_scenario_meets_the_recorded_car() -> None:
     env = JunctionEnv(
-        crossroads(), states=STATES, path=straight_path(), scenario="scp", control="along_path",
-        cases=4, early_or_late_s=0.0,
-    )  # fmt: skip
+        crossroads(),
+        states=STATES,
+        path=straight_path(),
+        scenario="scp",
+        control="along_path",
+        cases=4,
+        early_or_late_s=0.0,
+    )
     assert len(env.course.rows.playable) == 8
     for case in range(8):
         seen, _ = env.reset(options={"case": case})

@@ -49,24 +49,29 @@ def junction(*, lights: bool) -> World:
     )
     conflicts = tuple(
         Conflict(
-            first_id=min("east", other), second_id=max("east", other), kind="crossing",
-            point=np.array([x, -1.5]), yields_id="east", rule="priority_road", source="tagged",
+            first_id=min("east", other),
+            second_id=max("east", other),
+            kind="crossing",
+            point=np.array([x, -1.5]),
+            yields_id="east",
+            rule="priority_road",
+            source="tagged",
             area=np.array([[x - 1, -2.5], [x + 1, -2.5], [x + 1, -0.5], [x - 1, -0.5]]),
         )
         for other, x in (("north", 1.5), ("south", -1.5))
-    )  # fmt: skip
+    )
     line = StopLine(
-        id="stop", lane_id="from_east", ends=np.array([[STOP_X, 0.0], [STOP_X, -3.0]]),
+        id="stop",
+        lane_id="from_east",
+        ends=np.array([[STOP_X, 0.0], [STOP_X, -3.0]]),
         control=Choice("signal" if lights else "give_way", "tagged"),
-    )  # fmt: skip
+    )
     whole = WorldJunction(
         summary=plain.intersection,
-        arms=(
-            Arm(id="a", name="", osm_ways=(1,), bearing_rad=0.0, lanes_in=1, lanes_out=1),
-        ),
+        arms=(Arm(id="a", name="", osm_ways=(1,), bearing_rad=0.0, lanes_in=1, lanes_out=1),),
         area=None,
         plan=PLAN if lights else None,
-    )  # fmt: skip
+    )
     return msgspec.structs.replace(
         plain, connections=connections, conflicts=conflicts, stop_lines=(line,), junctions=(whole,)
     )

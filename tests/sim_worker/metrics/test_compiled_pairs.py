@@ -38,11 +38,13 @@ def scene(seed: int) -> RolloutView:
         Rollout(
             time_s=time_s,
             states=np.stack([x, y, yaw, speed, nothing, rate, nothing, nothing], axis=-1),
-            users=users[..., :3], user_speed_mps=users[..., 3],
+            users=users[..., :3],
+            user_speed_mps=users[..., 3],
             user_size_m=random.uniform(0.4, 9.0, (FUTURES, USERS, 2)),
-            valid=np.ones(FUTURES, dtype=bool), vehicle=VEHICLE,
+            valid=np.ones(FUTURES, dtype=bool),
+            vehicle=VEHICLE,
         )
-    )  # fmt: skip
+    )
 
 
 @drawn

@@ -85,9 +85,10 @@ def test_a_future_that_is_ahead_and_to_the_left_is_told_so() -> None:
     reference[:, 1] = driven.states[0, :, 1] - 0.5 * time_s
 
     found = evaluate(
-        driven, ("ade", "fde", "lateral", "longitudinal", "heading"),
+        driven,
+        ("ade", "fde", "lateral", "longitudinal", "heading"),
         context=Context(reference=reference),
-    )  # fmt: skip
+    )
 
     shown = {name: measure.values[0] for name, measure in found.items()}
     cos, sin = np.cos(np.pi / 2 + 0.1), np.sin(np.pi / 2 + 0.1)

@@ -201,9 +201,11 @@ def test_the_score_weighs_progress_and_is_closed_by_a_collision() -> None:
     crashes = rollout(Mover(-50, -1.5, 0, 10), Mover(0, -1.5))
     together = fast._replace(
         states=np.concatenate([fast.states, slow.states]),
-        users=np.zeros((2, 81, 0, 3)), user_speed_mps=np.zeros((2, 81, 0)),
-        user_size_m=np.zeros((2, 0, 2)), valid=np.ones(2, dtype=bool),
-    )  # fmt: skip
+        users=np.zeros((2, 81, 0, 3)),
+        user_speed_mps=np.zeros((2, 81, 0)),
+        user_size_m=np.zeros((2, 0, 2)),
+        valid=np.ones(2, dtype=bool),
+    )
 
     score = evaluate(together, ("driving_score",), context=given)["driving_score"].values
 

@@ -18,9 +18,14 @@ MASS_KG = VEHICLE.mass_kg.value
 
 def values(driven: Rollout, mass_kg: float = MASS_KG) -> dict[str, float]:
     names = (
-        "collided", "at_fault_collision", "collision_time", "impact_speed", "closing_speed",
-        "delta_v", "min_clearance",
-    )  # fmt: skip
+        "collided",
+        "at_fault_collision",
+        "collision_time",
+        "impact_speed",
+        "closing_speed",
+        "delta_v",
+        "min_clearance",
+    )
     masses = np.full(driven.user_size_m.shape[:2], mass_kg)
     found = evaluate(driven, names, context=Context(user_mass_kg=masses))
     return {name: float(measure.values[0]) for name, measure in found.items()}

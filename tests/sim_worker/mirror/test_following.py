@@ -29,9 +29,11 @@ TICKS = 820
 
 @settings(max_examples=4, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(
-    along=st.floats(-3.0, 3.0), across=st.floats(-2.0, 2.0), yaw=st.sampled_from([0.0, 0.1]),
+    along=st.floats(-3.0, 3.0),
+    across=st.floats(-2.0, 2.0),
+    yaw=st.sampled_from([0.0, 0.1]),
     speed=st.sampled_from([0.0, 3.0, 12.0]),
-)  # fmt: skip
+)
 def test_a_gap_closes_within_the_bounds_and_without_overshoot(
     along: float, across: float, yaw: float, speed: float
 ) -> None:

@@ -15,10 +15,7 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered
 from tests.sim_worker.places import FRAME, crossroads, state_at
 
-COVERS = (
-    "foretwin.sim_worker.mirror.samples",
-    "foretwin.sim_worker.mirror.track",
-)
+COVERS = ("foretwin.sim_worker.mirror.samples", "foretwin.sim_worker.mirror.track")
 CAR = load_vehicle()
 
 

@@ -124,8 +124,9 @@ def weaving(k: int, *, side_m: float = 0.0) -> VehicleState:
     yaw = 0.25 * math.sin(0.6 * t)
     x = 10.0 * t
     y = -(2.5 / 0.6) * (math.cos(0.6 * t) - 1.0) + side_m
-    return state_at(x, y, yaw, 10.0, stamp_ns=k * TICK_NS, yaw_rate=0.15 * math.cos(0.6 * t),
-                    tire_angle=None)  # fmt: skip
+    return state_at(
+        x, y, yaw, 10.0, stamp_ns=k * TICK_NS, yaw_rate=0.15 * math.cos(0.6 * t), tire_angle=None
+    )
 
 
 def shown(member: Member, stamp_ns: int) -> MeasuredPose:

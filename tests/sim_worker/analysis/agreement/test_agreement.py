@@ -77,11 +77,19 @@ def case(
         world = msgspec.structs.replace(world, stop_lines=(line,))
     path = straight_path().xy_m
     window = Window(
-        round_id=1, stamp_ns=0, junction_id="j", world_id=world.id, time_s=TIME_S,
-        simulated=simulated, simulated_users=users, driven=driven,
-        driven_users=users if driven_users is None else driven_users, path_xy_m=path,
-        heard=heard or {}, **{"known_users": True, "position_std_m": 0.02, **known},
-    )  # fmt: skip
+        round_id=1,
+        stamp_ns=0,
+        junction_id="j",
+        world_id=world.id,
+        time_s=TIME_S,
+        simulated=simulated,
+        simulated_users=users,
+        driven=driven,
+        driven_users=users if driven_users is None else driven_users,
+        path_xy_m=path,
+        heard=heard or {},
+        **{"known_users": True, "position_std_m": 0.02, **known},
+    )
     rules = RouteRules(world, FrenetPath(path))
     return window, Court(window, rules, DrivableGround(world), VEHICLE)
 
@@ -130,9 +138,10 @@ def test_the_growth_that_leaves_the_road_is_that_of_the_closed_form() -> None:
     driven = along(Mover(-50.0, -1.6, 0.0, 5.0))
     window, court = case(along(STRAIGHT), driven)
     edge_m = next(
-        y for y in np.arange(0.0, 6.0, 0.001)
+        y
+        for y in np.arange(0.0, 6.0, 0.001)
         if not court._ground.contains(np.array([-30.0]), np.array([-1.5 - y]))[0]
-    )  # fmt: skip
+    )
     assert edge_m > WIDTH_M / 2 + TOLERANCE_M
     one = judged(window, court)
     factor, gap_m = flip(one, "across")
@@ -175,9 +184,13 @@ def test_in_a_bend_a_gap_along_keeps_to_the_way() -> None:
 
 @pytest.mark.parametrize(
     ("simulated_y", "driven_y", "outcome"),
-    [(-1.5, -1.5, "agree_pass"), (-1.5, -6.0, "too_optimistic"),
-     (-6.0, -1.5, "too_pessimistic"), (-6.0, -6.0, "agree_fail")],
-)  # fmt: skip
+    [
+        (-1.5, -1.5, "agree_pass"),
+        (-1.5, -6.0, "too_optimistic"),
+        (-6.0, -1.5, "too_pessimistic"),
+        (-6.0, -6.0, "agree_fail"),
+    ],
+)
 def test_the_four_outcomes(simulated_y: float, driven_y: float, outcome: str) -> None:
     one = judge(
         simulated=along(Mover(-50.0, simulated_y, 0.0, 5.0)),
@@ -203,8 +216,10 @@ def test_a_line_crossed_at_a_red_that_was_heard() -> None:
     assert failed(found.simulated) == []
     assert failed(found.driven) == ["red_light"]
     assert failed(case(simulated, driven, lights=True)[1].observable) == [
-        "clearance", "drivable_area", "comfort",
-    ]  # fmt: skip
+        "clearance",
+        "drivable_area",
+        "comfort",
+    ]
 
 
 def test_a_stop_sign_wants_a_car_to_stand() -> None:

@@ -51,10 +51,7 @@ def _hannover(data: Path) -> Iterator[tuple[str, VehicleInfo, Samples]]:
     for name in HANNOVER:
         for number, line in enumerate(geojson_lines(data / "drives-hannover" / name)):
             samples: Samples = [
-                (
-                    "gnss",
-                    GnssFix(stamp_ns=START_NS + k * PERIOD_NS, position=GeoPoint(lat, lon)),
-                )
+                ("gnss", GnssFix(stamp_ns=START_NS + k * PERIOD_NS, position=GeoPoint(lat, lon)))
                 for k, (lon, lat, _) in enumerate(line.positions)
             ]
             yield f"drives-hannover/{name} {number}", _positions_alone(name), samples
@@ -66,10 +63,16 @@ def _mcity(data: Path) -> Iterator[tuple[str, VehicleInfo, Samples]]:
         instants = read_mcity(file)
         for name in sorted({one.user_id for _, seen in instants for one in seen}):
             samples: Samples = [
-                ("gnss", GnssFix(stamp_ns=stamp, position=GeoPoint(one.lat_deg, one.lon_deg),
-                                 std_m=0.02))
-                for stamp, seen in instants for one in seen if one.user_id == name
-            ]  # fmt: skip
+                (
+                    "gnss",
+                    GnssFix(
+                        stamp_ns=stamp, position=GeoPoint(one.lat_deg, one.lon_deg), std_m=0.02
+                    ),
+                )
+                for stamp, seen in instants
+                for one in seen
+                if one.user_id == name
+            ]
             yield f"traffic-mcity-rtk/{file.name} {name}", _positions_alone(name), samples
 
 

@@ -34,13 +34,21 @@ def turning(
         stamp_ns=np.round(TIME_S * 1e9).astype(np.int64),
         moves=np.ones(len(TIME_S), dtype=np.bool_),
         excited=np.abs(asked_rad) > 0.01,
-        course_radps=speed * real_pm, gyro_radps=speed * real_pm,
-        ground_mps=speed, wheel_mps=speed, asked_rad=asked_rad, done_rad=shifted(asked_rad, 0.1),
-        arc_rad=unknown, speed_mps=speed, curvature_pm=real_pm, by_measured_pm=model_pm,
-        by_command_pm=model_pm, commanded_rad=asked_rad,
+        course_radps=speed * real_pm,
+        gyro_radps=speed * real_pm,
+        ground_mps=speed,
+        wheel_mps=speed,
+        asked_rad=asked_rad,
+        done_rad=shifted(asked_rad, 0.1),
+        arc_rad=unknown,
+        speed_mps=speed,
+        curvature_pm=real_pm,
+        by_measured_pm=model_pm,
+        by_command_pm=model_pm,
+        commanded_rad=asked_rad,
         model_tire_rad=shifted(asked_rad, 0.1) if model_rad is None else model_rad,
         pushes=PushBlocks(*np.zeros((6, 0))),
-    )  # fmt: skip
+    )
 
 
 def into_a_bend(*, offset_pm: float) -> SignalPairs:

@@ -22,9 +22,12 @@ class Runs:
             return np.repeat(began[:, None], 3, axis=1)
 
         return self._memory.states(
-            stamp_ns=np.array(stamps), held=np.array(held), settled=np.array(settled),
-            from_stamp_ns=stamps[0], run=run,
-        )  # fmt: skip
+            stamp_ns=np.array(stamps),
+            held=np.array(held),
+            settled=np.array(settled),
+            from_stamp_ns=stamps[0],
+            run=run,
+        )
 
 
 def test_runs_come_in_the_order_asked_for_and_settled_ones_are_made_once() -> None:

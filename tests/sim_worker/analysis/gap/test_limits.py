@@ -11,10 +11,18 @@ from foretwin.sim_worker.analysis.gap.measured_motion import manoeuvre_of
 
 def sample(across_m: float, *, horizon_s: float = 2.0, independent: bool = True) -> GapSample:
     return GapSample(
-        vehicle_id="car", stamp_ns=1, horizon_s=horizon_s, manoeuvre="curve", along_m=0.0,
-        across_m=across_m, yaw_rad=0.0, yaw_rate_radps=0.0, speed_mps=0.0, accel_mps2=0.0,
+        vehicle_id="car",
+        stamp_ns=1,
+        horizon_s=horizon_s,
+        manoeuvre="curve",
+        along_m=0.0,
+        across_m=across_m,
+        yaw_rad=0.0,
+        yaw_rate_radps=0.0,
+        speed_mps=0.0,
+        accel_mps2=0.0,
         independent=independent,
-    )  # fmt: skip
+    )
 
 
 def test_an_alarm_is_raised_once_and_ended_once() -> None:

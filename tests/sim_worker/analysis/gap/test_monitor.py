@@ -58,11 +58,16 @@ def test_a_model_compared_with_itself_has_no_gap() -> None:
         )
         states.append(
             VehicleState(
-                vehicle_id="car", stamp_ns=stamp_ns, position=place, yaw_rad=float(row[2]),
-                speed_mps=float(row[3]), yaw_rate_radps=float(row[5]), accel_mps2=float(row[7]),
+                vehicle_id="car",
+                stamp_ns=stamp_ns,
+                position=place,
+                yaw_rad=float(row[2]),
+                speed_mps=float(row[3]),
+                yaw_rate_radps=float(row[5]),
+                accel_mps2=float(row[7]),
                 tire_angle_rad=float(row[6]),
             )
-        )  # fmt: skip
+        )
     record = recorder.record()
     motion = motion_on_grid(states, record.stamp_ns, frame=FRAME)
     samples = [

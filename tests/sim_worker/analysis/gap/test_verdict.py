@@ -32,10 +32,17 @@ COVERS = ("foretwin.sim_worker.analysis.gap.findings",)
 SEED, END_S = 2, 12.0
 """Of the fast tests: one drive simulated once."""
 FOUND = (
-    "steering_read_in_degrees", "steering_commanded_in_degrees", "steering_sign",
-    "offset_steering_sensor", "scaled_gyro", "offset_speed", "steering_ratio", "steering_delay",
-    "friction", "drive_gain",
-)  # fmt: skip
+    "steering_read_in_degrees",
+    "steering_commanded_in_degrees",
+    "steering_sign",
+    "offset_steering_sensor",
+    "scaled_gyro",
+    "offset_speed",
+    "steering_ratio",
+    "steering_delay",
+    "friction",
+    "drive_gain",
+)
 
 
 def test_a_car_and_a_model_that_agree_are_left_alone() -> None:

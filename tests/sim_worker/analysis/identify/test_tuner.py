@@ -59,8 +59,13 @@ def test_parameters_count_as_soon_as_the_driving_tells_them() -> None:
     taken = tuner()
     told = through(taken, city_drive().samples)
     assert [round((found.stamp_ns - START_STAMP_NS) * 1e-9) for found in told] == [
-        20, 30, 40, 50, 60, 70,
-    ]  # fmt: skip
+        20,
+        30,
+        40,
+        50,
+        60,
+        70,
+    ]
     assert taken.vehicle.steering_ratio.value == pytest.approx(15.3, rel=0.02)
     assert taken.vehicle.brake_gain.value == pytest.approx(1.06, rel=0.03)
     assert taken.vehicle.steering_delay_s.value == pytest.approx(0.1, abs=0.01)

@@ -11,12 +11,7 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import ControlMode, PlannedTrajectory, VehicleState, VehicleStatus
-from foretwin.contracts.frames import (
-    GeoPoint,
-    LocalFrame,
-    geo_from_local,
-    geo_from_local_yaw,
-)
+from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
 from foretwin.contracts.side_by_side import Disagreement, DrivenSegment
 from foretwin.sim_worker.analysis.side_by_side.segment import DrivePlace
 from foretwin.sim_worker.analysis.side_by_side.watch import HORIZON_S, SideBySide
@@ -48,20 +43,26 @@ def stopping(time_s: Array) -> Array:
 def plan_at(at_s: float, rows: Array, time_s: Array) -> PlannedTrajectory:
     geo = geo_from_local(FRAME, rows[:, :2])
     return PlannedTrajectory(
-        stamp_ns=START_NS + round(at_s * 1e9), time_from_stamp_s=time_s,
-        lat_deg=geo[:, 0].copy(), lon_deg=geo[:, 1].copy(),
-        yaw_rad=geo_from_local_yaw(FRAME, rows[:, 2], rows[:, :2]), speed_mps=rows[:, 3].copy(),
-    )  # fmt: skip
+        stamp_ns=START_NS + round(at_s * 1e9),
+        time_from_stamp_s=time_s,
+        lat_deg=geo[:, 0].copy(),
+        lon_deg=geo[:, 1].copy(),
+        yaw_rad=geo_from_local_yaw(FRAME, rows[:, 2], rows[:, :2]),
+        speed_mps=rows[:, 3].copy(),
+    )
 
 
 def state_at(at_s: float, row: Array) -> VehicleState:
     geo = geo_from_local(FRAME, row[:2])
     return VehicleState(
-        vehicle_id="ego", stamp_ns=START_NS + round(at_s * 1e9),
+        vehicle_id="ego",
+        stamp_ns=START_NS + round(at_s * 1e9),
         position=GeoPoint(float(geo[0]), float(geo[1])),
         yaw_rad=float(geo_from_local_yaw(FRAME, float(row[2]), row[None, :2])[0]),
-        speed_mps=float(row[3]), yaw_rate_radps=0.0, accel_mps2=0.0,
-    )  # fmt: skip
+        speed_mps=float(row[3]),
+        yaw_rate_radps=0.0,
+        accel_mps2=0.0,
+    )
 
 
 def side_by_side(
