@@ -83,11 +83,9 @@ class GapMeter:
     ) -> list[GapSample]:
         """Return the gap at the record's last instant after each horizon, all in one batch."""
         last = len(motion.known) - 1
-        fitting = [h for h in horizons_s if round(h / PERIOD_S) <= last]
-        starts = np.array([last - round(horizon / PERIOD_S) for horizon in fitting], dtype=np.intp)
-        if not motion.known[starts].all():
-            fitting = [h for h, start in zip(fitting, starts, strict=True) if motion.known[start]]
-            starts = starts[motion.known[starts]]
+        steps = {horizon: round(horizon / PERIOD_S) for horizon in horizons_s}
+        fitting = [h for h, back in steps.items() if back <= last and motion.known[last - back]]
+        starts = np.array([last - steps[horizon] for horizon in fitting], dtype=np.intp)
         return self._measure(record, motion, starts, list(enumerate(fitting)))
 
     def _measure(

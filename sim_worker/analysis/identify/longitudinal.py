@@ -70,13 +70,7 @@ def _cornering(record: MotionRecord, vehicle: VehicleParameters, speed_mps: Arra
     period_s = float(record.time_s[1])
     rate, turning = smoothed_and_rate(record.yaw_rate_radps, period_s=period_s, width_s=WIDTH_S)
     base, rear = vehicle.wheelbase_m.value, vehicle.cog_from_rear_axle_m.value
-    side = sideways(
-        vehicle,
-        speed_mps=speed_mps,
-        yaw_rate_radps=rate,
-        yaw_accel_radps2=turning,
-        period_s=period_s,
-    )
+    side = sideways(vehicle, speed_mps, rate, turning, period_s=period_s)
     ahead = np.arctan2(side.speed_mps + (base - rear) * rate, np.maximum(speed_mps, SLOWEST_MPS))
     slip = side.front_mps2 * vehicle.mass_kg.value / vehicle.front_cornering_stiffness_npr.value
     return np.asarray(side.front_mps2 * np.sin(ahead + slip) - rate * side.speed_mps)
@@ -145,16 +139,13 @@ def fit_longitudinal(
         return np.stack([*pushes, -np.square(v), -np.ones_like(v)], axis=1)
 
     delay_s = best_delay(acting, target)
-    mass = vehicle.mass_kg.value
+    mass, drag, rolling = vehicle.mass_kg.value, vehicle.drag_npv2, vehicle.rolling_resistance_n
     # The dead time is a step from the last one; the file tells the losses alone.
     priors = (
         (vehicle.drive_gain.value, np.inf),
         (vehicle.brake_gain.value, np.inf),
-        (vehicle.drag_npv2.value / mass, 2.0 * (vehicle.drag_npv2.std or 0.4) / mass),
-        (
-            vehicle.rolling_resistance_n.value / mass,
-            2.0 * (vehicle.rolling_resistance_n.std or 130.0) / mass,
-        ),
+        (drag.value / mass, 2.0 * (drag.std or 0.4) / mass),
+        (rolling.value / mass, 2.0 * (rolling.std or 130.0) / mass),
         (0.0, np.inf),
     )
     centre, spread = np.array(priors).T

@@ -127,9 +127,7 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         smoothed_and_rate(getattr(record, name), period_s=period_s, width_s=WIDTH_S)
         for name in ("speed_mps", "yaw_rate_radps", "wheel_rad")
     )
-    side = sideways(
-        vehicle, speed_mps=speed, yaw_rate_radps=rate, yaw_accel_radps2=turning, period_s=period_s
-    )
+    side = sideways(vehicle, speed, rate, turning, period_s=period_s)
     known = np.isfinite(wheel) & np.isfinite(side.accel_mps2)
     moving = known & (speed > SLOWEST_MPS) & (np.abs(side.accel_mps2) < _MAX_LATERAL_MPS2)
     if not moving.any():
@@ -177,10 +175,10 @@ class Sideways(NamedTuple):
 
 def sideways(
     vehicle: VehicleParameters,
-    *,
     speed_mps: Array,
     yaw_rate_radps: Array,
     yaw_accel_radps2: Array,
+    *,
     period_s: float,
 ) -> Sideways:
     """Return the sideways motion (N,) of the file's car that turns so; NaN where that is NaN."""
