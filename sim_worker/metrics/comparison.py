@@ -18,7 +18,7 @@ from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics.displacement import horizon_error
 
-_MAX_GAP_S = 1.5
+MAX_GAP_S = 1.5
 """Across a longer hole in the track nothing is interpolated: no truth is known there."""
 _MIN_PLAN_S = 0.5
 """A plan that overlaps the future by less than this is not compared."""
@@ -137,7 +137,7 @@ def _poses_at(actual: ActualTrack, stamp_ns: int, time_s: Array) -> Array | None
         return None
     first = max(int(np.searchsorted(known_s, time_s[0], side="right")) - 1, 0)
     last = int(np.searchsorted(known_s, time_s[-1] - 1e-6))
-    if (np.diff(known_s[first : last + 1]) > _MAX_GAP_S).any():
+    if (np.diff(known_s[first : last + 1]) > MAX_GAP_S).any():
         return None
     return _interpolated(time_s, known_s, actual.xy_yaw)
 

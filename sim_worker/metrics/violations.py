@@ -17,7 +17,8 @@ NARROW_S = 1.0
 """Nor was one that reaches the shared ground sooner than this after the ego has left it."""
 _AT_POINT_M = 2.5
 _ON_WAY_M = 2.0
-_STOPS = ("red", "red_amber")
+STOPS = ("red", "red_amber")
+"""Colours that no front may pass a line at."""
 
 
 def red_light_violations(view: RolloutView) -> Measure:
@@ -33,7 +34,7 @@ def red_light_violations(view: RolloutView) -> Measure:
             continue
         future, time_s = line_crossings(view.front_m, line.ends_m, view.time_s)
         colours = _colours(view, line.group_id, time_s)
-        np.add.at(count, future, [colour in _STOPS for colour in colours])
+        np.add.at(count, future, [colour in STOPS for colour in colours])
     return view.measure(count)
 
 

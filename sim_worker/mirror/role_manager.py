@@ -16,11 +16,8 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.sim_worker.mirror.member import GroupMember
 from foretwin.sim_worker.mirror.samples import with_group
-from foretwin.sim_worker.mirror.vehicle_group import VehicleGroup
+from foretwin.sim_worker.mirror.vehicle_group import LONGEST_SILENCE_NS, VehicleGroup
 from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS, CommandMemory
-
-_LOST_NS = 8_000_000_000
-"""After a longer silence a twin that follows starts anew as well."""
 
 
 class FreeTwin(NamedTuple):
@@ -113,7 +110,7 @@ class RoleManager:
             self._correction = use.correction
         if due:
             self._apply(free_twin)
-        self._lost = self._last is None or state.stamp_ns - self._last.stamp_ns > _LOST_NS
+        self._lost = self._last is None or state.stamp_ns - self._last.stamp_ns > LONGEST_SILENCE_NS
         self._last = state
         if self._group is not None:
             self._group.take_state(self._car, state)

@@ -21,6 +21,9 @@ from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 Touches = frozenset[tuple[str, str]]
 """Sorted pairs of vehicle ids; `world` stands for what does not move."""
 
+LONGEST_SILENCE_NS = 8_000_000_000
+"""Over a longer one nothing is simulated, and a twin that follows starts anew as well."""
+
 
 class VehicleGroup:
     """Steps twins, moves boxes, and finds which touch; no clock, no bus.
@@ -107,7 +110,7 @@ class VehicleGroup:
 
     def advance(self, stamp_ns: int) -> None:
         """Step up to `stamp_ns`, in whole physics steps."""
-        if self.stamp_ns is None or stamp_ns - self.stamp_ns > _LONGEST_ADVANCE_NS:
+        if self.stamp_ns is None or stamp_ns - self.stamp_ns > LONGEST_SILENCE_NS:
             self.stamp_ns = stamp_ns
         self._update_presence(stamp_ns)
         found: set[tuple[str, str]] = set()
@@ -171,10 +174,6 @@ class VehicleGroup:
             for one, other in combinations(shadows, 2)
             if overlapping(shadows[one], shadows[other])
         }
-
-
-_LONGEST_ADVANCE_NS = 8_000_000_000
-"""Over a longer silence nothing is simulated."""
 
 
 def _outline(member: Member, pose: Array) -> Rectangles:

@@ -16,7 +16,7 @@ from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Context, Rollout, RolloutView
 from foretwin.sim_worker.metrics.route_rules import LineAhead, RouteRules
 from foretwin.sim_worker.metrics.table import METRICS
-from foretwin.sim_worker.metrics.violations import line_crossings
+from foretwin.sim_worker.metrics.violations import STOPS, line_crossings
 
 CRITERIA = ("clearance", "drivable_area", "red_light", "stop_line", "comfort")
 LEAST_CLEARANCE_M = 0.2
@@ -24,7 +24,6 @@ LEAST_CLEARANCE_M = 0.2
 _STOP_WITHIN_M = 6.0
 """A car that stands within so much before a stop line has stopped for it."""
 _HEARD_FOR_NS = 2_000_000_000
-_STOPS = ("red", "red_amber")
 _PRECISE_M, _NEAR_M = 0.5, 1.0
 """Positions of such standard deviations tell whether a car is on the road, or crosses a line."""
 
@@ -127,7 +126,7 @@ class Court:
             stamp_ns = self._window.stamp_ns + round(float(at_s) * 1e9)
             last = int(np.searchsorted(heard.stamps_ns, stamp_ns, side="right")) - 1
             if last >= 0 and stamp_ns - heard.stamps_ns[last] <= _HEARD_FOR_NS:
-                red[row] |= heard.colours[last] in _STOPS
+                red[row] |= heard.colours[last] in STOPS
 
     def _without_stop(
         self, front: Array, line: LineAhead, speed_mps: Array, unstopped: Flags

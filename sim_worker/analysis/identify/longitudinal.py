@@ -26,11 +26,10 @@ from foretwin.sim_worker.analysis.identify.regression import (
     smoothed,
     smoothed_and_rate,
 )
-from foretwin.sim_worker.analysis.identify.steering_signals import SLOWEST_MPS, sideways
+from foretwin.sim_worker.analysis.identify.steering_signals import SLOWEST_MPS, WIDTH_S, sideways
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
 
-WIDTH_S = 0.1
 DRIVE, BRAKE, DRAG, ROLLING, DELAY = range(5)
 _DRIVES_MPS2 = 0.3
 LEAST_DRIVING_S, LEAST_BRAKING_S, _LEAST_S = 4.0, 3.0, 1.0

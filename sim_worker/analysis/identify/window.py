@@ -18,6 +18,7 @@ from foretwin.contracts.tuning import (
 )
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.sim_worker.analysis.identify import longitudinal
+from foretwin.sim_worker.analysis.identify.acceptance import HALF_OF_95
 from foretwin.sim_worker.analysis.identify.actuator import fit_following
 from foretwin.sim_worker.analysis.identify.longitudinal import grade_from_altitude
 from foretwin.sim_worker.analysis.identify.steering import SteeringFit, fit_steering, steering_map
@@ -235,7 +236,7 @@ def _longitudinal(
         scale, most = 1.0, _WIDE_DELAY_S if index == longitudinal.DELAY else _WIDE_GAIN
         if index in (longitudinal.DRAG, longitudinal.ROLLING):
             scale = vehicle.mass_kg.value
-            most = math.inf if prior.std is None else 1.96 * prior.std
+            most = math.inf if prior.std is None else HALF_OF_95 * prior.std
         half = scale * along.fit.half_width(index)
         wide = "the interval is wide: more driving and braking would narrow it"
         interval = _around(scale * float(along.fit.values[index]), half)

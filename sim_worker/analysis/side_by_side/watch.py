@@ -26,6 +26,8 @@ from foretwin.sim_worker.analysis.side_by_side.segment import (
     Segment,
     Waiting,
 )
+from foretwin.sim_worker.metrics.comparison import MAX_GAP_S
+from foretwin.sim_worker.vehicle.commands import STEP_BACK_NS
 
 HORIZON_S = 4.0
 """How much of a plan is compared: beyond, both have seen what was not known."""
@@ -34,7 +36,7 @@ _EVERY_NS = 200_000_000
 """Plans come ten times a second and hardly differ: every second one tells all."""
 _LEAST_S = 1.0
 _KEEP_NS = round((HORIZON_S + 3.0) * 1e9)
-_LONGEST_HOLE_NS = 1_500_000_000
+_LONGEST_HOLE_NS = round(MAX_GAP_S * 1e9)
 
 
 class SideBySide:
@@ -116,7 +118,7 @@ class SideBySide:
         if not state.yaw_valid or self._last_plan_ns is None:
             return []  # what was driven before the first plan is compared with nothing
         if self._driven and state.stamp_ns <= self._driven[-1][0]:
-            if state.stamp_ns < self._driven[-1][0] - 1_000_000_000:
+            if state.stamp_ns < self._driven[-1][0] - STEP_BACK_NS:
                 return self._clock_stepped_back()
             return []
         lat, lon = state.position.lat_deg, state.position.lon_deg
