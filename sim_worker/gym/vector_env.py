@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -131,44 +131,45 @@ class JunctionVectorEnv(VectorEnv[Observation, npt.NDArray[np.float32], npt.NDAr
         terminated = facts.terminated & ~before
         truncated = self.course.over_time() & ~facts.terminated & ~before
         self._over = terminated | truncated
-        infos: dict[str, Any] = {}
-        for name, values in info_of(facts).items():
-            infos[name] = np.where(before, np.zeros_like(values), values)
-            infos[f"_{name}"] = ~before
+        info = info_of(facts)
+        infos = _of_rows(info, ~before)
         if before.any():
             rewards = np.where(before, 0.0, rewards)
             infos.update(self._begin(np.flatnonzero(before), looked=False))
         observations = self.course.look()
         if mode is AutoresetMode.SAME_STEP and self._over.any():
-            observations, infos = self._begin_at_once(observations, infos)
+            observations, infos = self._begin_at_once(observations, info)
         return observations, rewards, terminated, truncated, infos
 
     def _begin_at_once(
-        self, observations: Observation, infos: dict[str, Any]
+        self, observations: Observation, info: Mapping[str, Any]
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin the rows that are over, and keep what they ended with, as Gymnasium does."""
-        rows = np.flatnonzero(self._over)
+        over = self._over.copy()
+        rows = np.flatnonzero(over)
         ended = np.full(self.num_envs, None, dtype=object)
         for row in rows:
             ended[row] = observations[row].copy()
-        over = self._over.copy()
-        final = {k: np.where(over, v, np.zeros_like(v)) for k, v in infos.items() if k[0] != "_"}
-        final.update({f"_{name}": over.copy() for name in final})
         kept: dict[str, Any] = {
             "final_obs": ended,
             "_final_obs": over,
-            "final_info": final,
+            "final_info": _of_rows(info, over),
             "_final_info": over.copy(),
         }
-        for name, values in infos.items():
-            if name[0] != "_":
-                kept[name] = np.where(over, np.zeros_like(values), values)
-                kept[f"_{name}"] = infos[f"_{name}"] & ~over
-        return_infos = {**kept, **self._begin(rows, looked=True)}
-        return self.course.look(), return_infos
+        infos = {**kept, **_of_rows(info, ~over), **self._begin(rows, looked=True)}
+        return self.course.look(), infos
 
     def render(self) -> tuple[Picture, ...] | None:
         """Return a picture of each row from above (H, W, 3), or None without a render mode."""
         if not self.render_mode:
             return None
         return tuple(draw_row(self.course.rows, row) for row in range(self.num_envs))
+
+
+def _of_rows(info: Mapping[str, Any], rows: Flags) -> dict[str, Any]:
+    """Return what `info` says of some rows (S,), and beside each name which rows these are."""
+    found = {}
+    for name, values in info.items():
+        found[name] = np.where(rows, values, np.zeros_like(values))
+        found[f"_{name}"] = rows.copy()
+    return found
