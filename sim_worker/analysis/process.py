@@ -174,13 +174,10 @@ def serve_tuning(setup: TuningSetup, bus: Bus, life: ProcessLife) -> None:
 def _take(
     worker: TuningWorker, mailbox: Mailbox, timeout_s: float, *, most: int = _AT_ONCE
 ) -> None:
-    item = mailbox.take(timeout_s)
-    for _ in range(most - 1):
+    for taken in range(most):
+        item = mailbox.take(0.0 if taken else timeout_s)
         if item is None:
             return
-        worker.handle(item)
-        item = mailbox.take()
-    if item is not None:
         worker.handle(item)
 
 
