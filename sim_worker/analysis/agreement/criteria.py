@@ -66,7 +66,7 @@ class Window(NamedTuple):
     position_std_m: float | None
 
 
-class Court:
+class CriteriaEvaluator:
     """Judges motion through one window, by the World and the path that `rules` are of."""
 
     def __init__(
@@ -160,9 +160,9 @@ class Verdicts(NamedTuple):
         return not bool(self.driven.any())
 
 
-def verdicts(window: Window, court: Court) -> Verdicts:
+def verdicts(window: Window, evaluator: CriteriaEvaluator) -> Verdicts:
     """Judge both sides of a window; what reality does not show is counted on neither."""
-    observable = court.observable
-    simulated = court.failures(window.simulated[None], window.simulated_users)[0]
-    driven = court.failures(window.driven[None], window.driven_users)[0]
+    observable = evaluator.observable
+    simulated = evaluator.failures(window.simulated[None], window.simulated_users)[0]
+    driven = evaluator.failures(window.driven[None], window.driven_users)[0]
     return Verdicts(observable, simulated & observable, driven & observable)

@@ -13,7 +13,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.measured_motion import motion_on_grid
-from foretwin.sim_worker.analysis.gap.verdict import KEPT_S, Judge, without_manual_commands
+from foretwin.sim_worker.analysis.gap.verdict import KEPT_S, FaultDetector, without_manual_commands
 
 _SECOND_NS = 1_000_000_000
 _MOST_STATES_HZ = 120.0
@@ -33,10 +33,10 @@ class GapMonitor:
     def __init__(self, info: VehicleInfo, vehicle: VehicleParameters, *, frame: LocalFrame) -> None:
         self._vehicle_id = info.vehicle_id
         self._frame = frame
-        self._judge = Judge(info, vehicle, frame=frame)
+        self._detector = FaultDetector(info, vehicle, frame=frame)
         self._meter = GapMeter(FreeRunner(vehicle), vehicle_id=info.vehicle_id)
         self._limits = GapLimits()
-        self._recorder = self._judge.recorder
+        self._recorder = self._detector.recorder
         self._states: deque[VehicleState] = deque(maxlen=round(KEPT_S * _MOST_STATES_HZ))
         self._next_ns: int | None = None
         self._measured = 0
@@ -44,12 +44,12 @@ class GapMonitor:
     def use_vehicle(self, vehicle: VehicleParameters) -> None:
         """Compare with a model of other parameters from now on."""
         self._meter = GapMeter(FreeRunner(vehicle), vehicle_id=self._vehicle_id)
-        self._judge.use_vehicle(vehicle)
+        self._detector.use_vehicle(vehicle)
 
     def handle(self, channel: str, message: Any) -> list[GapSample | GapAlarm | Verdict]:
         """Take one message; return what follows from it, in time order."""
         if channel != _STATE:
-            verdict = self._judge.handle(channel, message)
+            verdict = self._detector.handle(channel, message)
             return [] if verdict is None else [verdict]
         if not isinstance(message, VehicleState):
             return []

@@ -36,7 +36,7 @@ _FORGOTTEN_S = 10.0
 """A finding that has not come back for so long is over, and a new one is reported anew."""
 
 
-class Judge:
+class FaultDetector:
     """Takes a vehicle's samples and says, where it is sure, which departs: the car or its model.
 
     Pure: time is that of the samples. A verdict takes two findings in a row, 0.2 s apart, that

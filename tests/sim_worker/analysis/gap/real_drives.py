@@ -1,4 +1,4 @@
-"""Every drive of the data folder, of cars of which nobody knows a fault, put before the judge."""
+"""Every drive of the data folder, of cars without a known fault, put before the detector."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from foretwin.contracts.drive import GnssFix, VehicleInfo
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.gap import Verdict
-from foretwin.sim_worker.analysis.gap.verdict import Judge
+from foretwin.sim_worker.analysis.gap.verdict import FaultDetector
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.logs.geojson import geojson_lines
 from foretwin.telemetry.logs.mcity import read_mcity
@@ -33,8 +33,8 @@ def accused_in(data: Path) -> Iterator[tuple[str, float, list[Verdict]]]:
     """Yield each drive, its seconds and its verdicts but "undecided", which accuses nobody."""
     for name, info, samples in (*_logs(data), *_hannover(data), *_mcity(data)):
         place = next(m.position for _, m in samples if isinstance(m, GnssFix))
-        judge = Judge(info, load_vehicle(), frame=LocalFrame(place))
-        said = [judge.handle(*sample) for sample in samples]
+        detector = FaultDetector(info, load_vehicle(), frame=LocalFrame(place))
+        said = [detector.handle(*sample) for sample in samples]
         seconds = (samples[-1][1].stamp_ns - samples[0][1].stamp_ns) * 1e-9
         yield name, seconds, [one for one in said if one and one.culprit != "undecided"]
 
