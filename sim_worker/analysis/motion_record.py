@@ -31,8 +31,8 @@ PERIOD_S = 0.02
 class MotionRecord(NamedTuple):
     """Signals at N even instants; NaN where a sensor is absent or silent for too long.
 
-    Positions are those of the antenna in the given local frame; specific force and rates are in
-    body axes; steering as measured (wheel, tyre) and as commanded, positive to the left. `manual`
+    Positions are those of the antenna in the given local frame; the yaw rate is the
+    body's; steering as measured (wheel, tyre) and as commanded, positive to the left. `manual`
     says where a human drives.
     """
 
@@ -43,8 +43,6 @@ class MotionRecord(NamedTuple):
     yaw_rad: Array
     speed_mps: Array
     yaw_rate_radps: Array
-    force_x_mps2: Array
-    force_y_mps2: Array
     wheel_rad: Array
     tire_rad: Array
     command_accel_mps2: Array
@@ -66,7 +64,7 @@ _MEASURED = {
     "gnss": ("x_m", "y_m", "altitude_m"),
     "heading": ("yaw_rad",),
     "speed": ("speed_mps",),
-    "imu": ("yaw_rate_radps", "force_x_mps2", "force_y_mps2"),
+    "imu": ("yaw_rate_radps",),
     "steering": ("wheel_rad", "tire_rad"),
 }
 _HELD = {"control": ("command_accel_mps2", "command_wheel_rad", "command_tire_rad")}
@@ -122,8 +120,8 @@ class MotionRecorder:
                 )
             case SpeedSample(speed_mps=speed):
                 return (speed,)
-            case ImuSample(accel_mps2=force, rate_radps=rate):
-                return rate[2], force[0], force[1]
+            case ImuSample(rate_radps=rate):
+                return (rate[2],)
             case SteeringSample(steering_wheel_rad=wheel, tire_angle_rad=tire):
                 return _or_nan(wheel), _or_nan(tire)
             case ControlCommand(accel_mps2=accel, steering_wheel_rad=wheel, tire_angle_rad=tire):

@@ -38,9 +38,6 @@ class FollowingFit(NamedTuple):
     delay_half_s: float
     lag_s: float
     lag_half_s: float
-    gain: float
-    gain_half: float
-    """Measured over commanded angle at rest; 1 where the actuator does as it is told."""
     moving_s: float
     """Seconds in which the command moved."""
 
@@ -129,19 +126,14 @@ def fit_following(record: MotionRecord, vehicle: VehicleParameters) -> Following
         fit = fit_linear(columns, dw, record.time_s[used])
         delay_s = float(np.clip(delay_s + fit.values[3], 0.0, MAX_DELAY_S))
     assert fit is not None
-    follows, rate_ps = float(fit.values[0]), float(fit.values[2])
-    lag_s, gain = 1.0 / rate_ps, follows / rate_ps
+    lag_s = 1.0 / float(fit.values[2])
     # A blur of s looks like s²/2τ more lag and less delay. It is s on the average alone: how the
     # samples fall upon the steps of the command repeats, and may make nothing of it or double it.
     step_half_s = fit.quantile * blur_s**2 / (2.0 * lag_s)
-    slope = np.array([1.0 / rate_ps, 0.0, -gain / rate_ps, 0.0])
-    gain_std = float(np.sqrt(slope @ fit.covariance @ slope))
     return FollowingFit(
         delay_s=delay_s,
         delay_half_s=math.hypot(fit.half_width(3), step_half_s[3]),
         lag_s=lag_s,
         lag_half_s=math.hypot(fit.half_width(2) * lag_s**2, step_half_s[2]),
-        gain=gain,
-        gain_half=float(fit.quantile[0]) * gain_std,
         moving_s=moving_s,
     )

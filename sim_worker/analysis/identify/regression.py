@@ -31,13 +31,12 @@ _GAUSSIAN_KURTOSIS = 3.0
 
 
 class Fit(NamedTuple):
-    """Estimates of K parameters: `values` (K,), `covariance` (K, K), and the residuals (N,)."""
+    """Estimates of K parameters: `values` (K,) and `covariance` (K, K)."""
 
     values: Array
     covariance: Array
     quantile: Array
     """Half the width of a 95 % interval, in standard deviations, for each parameter (K,)."""
-    residuals: Array
 
     def half_width(self, index: int) -> float:
         """Return half the 95 % interval of one parameter."""
@@ -116,7 +115,6 @@ def fit_linear(
         values=values * scale,
         covariance=np.asarray(spread * scale[:, None] * scale),
         quantile=np.asarray(special.stdtrit(freedom, 0.975)),
-        residuals=np.asarray(residuals),
     )
 
 
