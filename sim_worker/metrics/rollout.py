@@ -189,15 +189,7 @@ class RolloutView:
     def relative(self) -> Relative:
         """All road users in the ego's axes."""
         x, y, yaw, speed = self.users
-        found = Relative(
-            ahead_m=np.empty(x.shape),
-            left_m=np.empty(x.shape),
-            cos=np.empty(x.shape),
-            sin=np.empty(x.shape),
-            ahead_mps=np.empty(x.shape),
-            left_mps=np.empty(x.shape),
-            speed_mps=speed,
-        )
+        found = Relative._make([*(np.empty(x.shape) for _ in range(6)), speed])
         for rows in self.blocks:
             cos, sin = (values[rows, :, None] for values in self.heading)
             centre = self.centre_m[rows]
