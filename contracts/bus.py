@@ -6,10 +6,11 @@ What arrives lands in a `foretwin.contracts.mailbox.Mailbox`.
 from __future__ import annotations
 
 import collections
+import itertools
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any, Protocol, Self
 
@@ -46,6 +47,14 @@ LOSSLESS_WAIT_US = 600_000_000
 """How long a writer waits for a reader that stands still where nothing may be lost."""
 
 
+_QUEUE_SIZES = {
+    **dict.fromkeys(("real_time", "interactive_high", "data_high", "data"), 16),
+    "interactive_low": 4,
+    **dict.fromkeys(("control", "data_low", "background"), 2),
+}
+"""Batches that may wait to be sent, by priority; docs/bus.md."""
+
+
 class BusUnreachable(ConnectionError):  # noqa: N818
     """No router answers at the endpoint."""
 
@@ -60,9 +69,15 @@ class Bus(Protocol):
         """Let every message of the channel land in `mailbox` as Received."""
 
     def request(
-        self, channel: str, message: msgspec.Struct, mailbox: Mailbox, *, tag: Any = None,
-        timeout_s: float = 10.0, **ids: str,
-    ) -> None:  # fmt: skip
+        self,
+        channel: str,
+        message: msgspec.Struct,
+        mailbox: Mailbox,
+        *,
+        tag: Any = None,
+        timeout_s: float = 10.0,
+        **ids: str,
+    ) -> None:
         """Ask; exactly one Reply lands in `mailbox`, also when nobody answers."""
 
     def serve(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
@@ -91,20 +106,6 @@ def ask(
     return reply.message
 
 
-class _Sequence:
-    """Counts the messages of each key."""
-
-    def __init__(self) -> None:
-        self._next: dict[str, int] = collections.defaultdict(int)
-        self._lock = threading.Lock()
-
-    def take(self, full_key: str) -> int:
-        with self._lock:
-            seq = self._next[full_key]
-            self._next[full_key] = seq + 1
-            return seq
-
-
 def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
     """Return the Zenoh configuration; docs/bus.md gives the reason for each setting."""
     import zenoh
@@ -118,21 +119,17 @@ def zenoh_config(setup: BusSetup, *, router: bool) -> Any:
         "timestamping/enabled": True,
         "transport/shared_memory/enabled": False,
         "transport/link/tx/lease": LOSSLESS_LEASE_MS if setup.lossless else LEASE_MS,
-        "transport/link/tx/queue/size": {
-            "control": 2, "real_time": 16, "interactive_high": 16, "interactive_low": 4,
-            "data_high": 16, "data": 16, "data_low": 2, "background": 2,
-        },
+        "transport/link/tx/queue/size": _QUEUE_SIZES,
         "listen/endpoints": [setup.endpoint] if router else [],
-    }  # fmt: skip
+    }
     if setup.lossless:
         queue = "transport/link/tx/queue/congestion_control/block"
         settings[f"{queue}/wait_before_close"] = LOSSLESS_WAIT_US
     if not router:
         settings["connect/endpoints"] = [setup.endpoint]
         settings["connect/timeout_ms"] = round(1e3 * CONNECT_S)
-        settings["connect/retry"] = {
-            "period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2,
-        }  # fmt: skip
+        retry = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+        settings["connect/retry"] = retry
     for name, value in settings.items():
         config.insert_json5(name, json.dumps(value))
     return config
@@ -192,6 +189,11 @@ class ZenohSession:
             heard = self._session.declare_subscriber(key, land)
         self._declared.append(heard)
 
+    def _publisher(self, key: str, **qos: Any) -> Any:
+        if key not in self._publishers:
+            self._publishers[key] = self._session.declare_publisher(key, **qos)
+        return self._publishers[key]
+
     def close(self) -> None:
         """Close the session; idempotent."""
         self._publishers.clear()
@@ -206,36 +208,29 @@ class ZenohBus(ZenohSession):
     def __init__(self, setup: BusSetup, *, router: bool = False) -> None:
         super().__init__(setup, router=router)
         self._lossless = setup.lossless
-        self._sequence = _Sequence()
+        self._sent: dict[str, Iterator[int]] = collections.defaultdict(itertools.count)
+        """The next sequence number of each key."""
         self._lock = threading.Lock()
-        priority = self._zenoh.Priority
-        self._priorities = {
-            "real_time": priority.REAL_TIME,
-            "interactive_high": priority.INTERACTIVE_HIGH,
-            "data_high": priority.DATA_HIGH,
-            "data": priority.DATA,
-            "background": priority.BACKGROUND,
-        }
 
     def _qos(self, qos: Qos) -> dict[str, Any]:
         control = self._zenoh.CongestionControl
         return {
-            "priority": self._priorities[qos.priority],
+            "priority": getattr(self._zenoh.Priority, qos.priority.upper()),
             "congestion_control": control.BLOCK if qos.block or self._lossless else control.DROP,
             "express": qos.express,
         }
+
+    def _encoded(self, full_key: str, message: msgspec.Struct) -> bytes:
+        with self._lock:
+            seq = next(self._sent[full_key])
+        return encode(message, seq=seq, sent_ns=time.time_ns())
 
     def publish(self, channel: str, message: msgspec.Struct, **ids: str) -> None:
         """Send one message; see Bus."""
         full_key = channel_key(channel, **ids)
         with self._lock:
-            publisher = self._publishers.get(full_key)
-            if publisher is None:
-                publisher = self._session.declare_publisher(
-                    full_key, **self._qos(CHANNELS[channel].qos)
-                )
-                self._publishers[full_key] = publisher
-        publisher.put(encode(message, seq=self._sequence.take(full_key), sent_ns=time.time_ns()))
+            publisher = self._publisher(full_key, **self._qos(CHANNELS[channel].qos))
+        publisher.put(self._encoded(full_key, message))
 
     def subscribe(self, channel: str, mailbox: Mailbox, **ids: str) -> None:
         """Receive into `mailbox`; see Bus."""
@@ -247,9 +242,15 @@ class ZenohBus(ZenohSession):
         self._declared.append(self._session.declare_subscriber(channel_key(channel, **ids), land))
 
     def request(
-        self, channel: str, message: msgspec.Struct, mailbox: Mailbox, *, tag: Any = None,
-        timeout_s: float = 10.0, **ids: str,
-    ) -> None:  # fmt: skip
+        self,
+        channel: str,
+        message: msgspec.Struct,
+        mailbox: Mailbox,
+        *,
+        tag: Any = None,
+        timeout_s: float = 10.0,
+        **ids: str,
+    ) -> None:
         """Ask; see Bus."""
         kind = CHANNELS[channel].reply
         if kind is None:
@@ -274,7 +275,7 @@ class ZenohBus(ZenohSession):
         self._session.get(
             full_key,
             self._zenoh.handlers.Callback(land, lambda: finish(None, "no answer"), indirect=False),
-            payload=encode(message, seq=self._sequence.take(full_key), sent_ns=time.time_ns()),
+            payload=self._encoded(full_key, message),
             timeout=timeout_s,
             **self._qos(CHANNELS[channel].qos),
         )

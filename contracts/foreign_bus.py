@@ -87,13 +87,10 @@ class ZenohForeignBus(ZenohSession):
 
     def put(self, key: str, payload: bytes, attachment: bytes | None = None) -> None:
         """Send one sample; see ForeignBus."""
-        publisher = self._publishers.get(key)
-        if publisher is None:
-            publisher = self._session.declare_publisher(
-                key,
-                priority=self._zenoh.Priority.INTERACTIVE_HIGH,
-                congestion_control=self._zenoh.CongestionControl.DROP,
-                express=True,
-            )
-            self._publishers[key] = publisher
+        publisher = self._publisher(
+            key,
+            priority=self._zenoh.Priority.INTERACTIVE_HIGH,
+            congestion_control=self._zenoh.CongestionControl.DROP,
+            express=True,
+        )
         publisher.put(payload, attachment=attachment)

@@ -53,6 +53,21 @@ class LocalPoses(NamedTuple):
     yaw_rad: Array
 
 
+class LocalPose(NamedTuple):
+    """One position in metres and yaw in radians in a local frame."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+class GeoPose(NamedTuple):
+    """One position on Earth and the yaw there from true east."""
+
+    position: GeoPoint
+    yaw_rad: float
+
+
 def wrap_angle(angle_rad: Array | float) -> Array:
     """Return angles in radians, any shape, wrapped into [-π, π]."""
     if isinstance(angle_rad, float):
@@ -151,6 +166,23 @@ def geo_from_local_yaw(frame: LocalFrame, yaw_rad: Array | float, xy_m: Array) -
     """Turn yaws from the x axis of `frame` at (N, 2) `xy_m` into yaws from true east there."""
     geo = geo_from_local(frame, xy_m)
     return wrap_angle(np.asarray(yaw_rad) - grid_convergence(frame, geo[..., 0], geo[..., 1]))
+
+
+def geo_pose(
+    frame: LocalFrame, x_m: float, y_m: float, yaw_rad: float, *, alt_m: float = 0.0
+) -> GeoPose:
+    """Return a pose in `frame` as one on Earth, at the altitude given."""
+    xy_m = np.array([[x_m, y_m]])
+    ((lat_deg, lon_deg),) = geo_from_local(frame, xy_m).tolist()
+    (yaw,) = geo_from_local_yaw(frame, np.array([yaw_rad]), xy_m).tolist()
+    return GeoPose(GeoPoint(lat_deg, lon_deg, alt_m), yaw)
+
+
+def local_pose(frame: LocalFrame, position: GeoPoint, yaw_rad: float) -> LocalPose:
+    """Return a pose on Earth, its yaw from true east, as one in `frame`."""
+    lat_deg, lon_deg = position.lat_deg, position.lon_deg
+    x_m, y_m = local_from_geo(frame, lat_deg, lon_deg).tolist()
+    return LocalPose(x_m, y_m, float(local_from_geo_yaw(frame, yaw_rad, lat_deg, lon_deg)))
 
 
 def target_from_source(

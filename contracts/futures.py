@@ -16,9 +16,8 @@ from foretwin.contracts.drive import RoadUserKind, SignalState, VehicleState
 from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import FAULTS, Scenario
 
-STATE_COLUMNS = (
-    "x_m", "y_m", "yaw_rad", "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2",
-)  # fmt: skip
+_POSE = ("x_m", "y_m", "yaw_rad")
+STATE_COLUMNS = (*_POSE, "vx_mps", "vy_mps", "yaw_rate_radps", "tire_angle_rad", "accel_mps2")
 
 
 JOB_SCHEMA_VERSION = 1

@@ -43,115 +43,122 @@ REQUEST = Qos("interactive_high", block=True, express=True)
 
 
 class Channel(NamedTuple):
-    """One row of the table; `rate_hz` is the usual rate, None where it is on demand."""
+    """What a channel says, how often and what for; `reply` is the answer to a question.
 
-    name: str
-    key: str
+    `rate_hz` is the usual rate, None where it is on demand. Key and quality of service are those
+    of the group in which it stands.
+    """
+
     kind: type[msgspec.Struct]
-    reply: type[msgspec.Struct] | None
     rate_hz: float | None
-    qos: Qos
     purpose: str
+    reply: type[msgspec.Struct] | None = None
+    key: str = ""
+    qos: Qos = LIVE
 
 
-def _row(
-    name: str,
-    key: str,
-    kind: type[msgspec.Struct],
-    rate_hz: float | None,
-    qos: Qos,
-    purpose: str,
-    reply: type[msgspec.Struct] | None = None,
-) -> Channel:
-    return Channel(name, f"{PREFIX}/{key}", kind, reply, rate_hz, qos, purpose)
+_VEHICLE, _RUN = "vehicle/{vehicle}", "run/{run}"
+_WORKER = f"{_RUN}/worker/{{process}}"
 
-
-_TELEMETRY = "vehicle/{vehicle}/telemetry"
-_RUN = "run/{run}"
-
+_TABLE: dict[tuple[str, Qos], dict[str, Channel]] = {
+    # What the vehicle sends.
+    (f"{_VEHICLE}/telemetry", LIVE): {
+        "gnss": Channel(drive.GnssFix, 10, "antenna position"),
+        "imu": Channel(drive.ImuSample, 100, "specific force and rates"),
+        "speed": Channel(drive.SpeedSample, 50, "wheel speed"),
+        "heading": Channel(drive.HeadingSample, 10, "measured yaw"),
+        "steering": Channel(drive.SteeringSample, 50, "steering"),
+        "control": Channel(drive.ControlCommand, 50, "ADS commands"),
+        "plan": Channel(drive.PlannedTrajectory, 10, "ADS plan"),
+        "status": Channel(drive.VehicleStatus, 10, "mode and gear"),
+        "objects": Channel(drive.RoadUsers, 10, "detected road users"),
+        "signals": Channel(drive.SignalState, 1, "signal colours"),
+        "end": Channel(drive.DriveEnd, None, "the drive is over"),
+    },
+    # What is derived from it.
+    (_VEHICLE, LIVE): {
+        "state": Channel(drive.VehicleState, 50, "estimated state"),
+        "route": Channel(drive.RouteToGoal, 1, "where the ADS goes"),
+    },
+    # Questions to the vehicle's process.
+    (_VEHICLE, REQUEST): {
+        "info": Channel(drive.InfoRequest, None, "what the vehicle is", drive.VehicleInfo),
+        "advance": Channel(
+            drive.AdvanceRequest, None, "lock step: go on until", drive.AdvanceReply
+        ),
+    },
+    # Work.
+    (_WORKER, REQUEST): {
+        "job": Channel(runner.JobRequest, 2, "simulate futures", runner.JobAnswer),
+        "place": Channel(
+            placement.PlaceRequest, None, "find places for scenarios", placement.WorldPlaces
+        ),
+        "prepare": Channel(
+            simulation.PrepareRequest, None, "load a World", simulation.PrepareReply
+        ),
+        "use_world": Channel(
+            simulation.ActiveWorld, None, "the mirror's World", simulation.ActiveWorld
+        ),
+        "use_vehicle": Channel(
+            tuning.UseVehicle, None, "parameters from now on", tuning.UseVehicle
+        ),
+        "tune": Channel(
+            tuning.TuneRequest, None, "lock step: weigh what was sent", tuning.TuneReply
+        ),
+        "use_roles": Channel(roles.UseRoles, None, "the mirror's roles", roles.UseRoles),
+    },
+    (f"{_RUN}/builder/{{process}}", REQUEST): {
+        "build": Channel(simulation.BuildRequest, None, "build a World", simulation.BuildReply),
+    },
+    (_RUN, REQUEST): {
+        "set": Channel(tuning.SetRequest, None, "change a running drive", tuning.SetReply),
+    },
+    # What those who watch receive.
+    (_RUN, RESULT): {
+        "round": Channel(simulation.RoundView, 2, "one round of futures"),
+        "comparison": Channel(simulation.Comparison, 8, "nominal future against reality"),
+        "plan_comparison": Channel(simulation.PlanComparison, 2, "the car's plan against ours"),
+        "disagreement": Channel(side_by_side.Disagreement, None, "human and ADS disagree"),
+        "mirror": Channel(simulation.MirrorSample, 10, "twin, shadow, ghost and their gap"),
+        "gap": Channel(gap.GapSample, 4, "model against reality"),
+        "gap_alarm": Channel(gap.GapAlarm, None, "a gap beyond limits"),
+        "verdict": Channel(gap.Verdict, None, "which of the two is wrong"),
+        "identification": Channel(
+            tuning.Identification, 0.2, "what the driving says of the vehicle"
+        ),
+        "parameter": Channel(tuning.ParameterChange, None, "a parameter that counts from now on"),
+        "active_world": Channel(simulation.ActiveWorld, None, "which World counts"),
+        "world": Channel(simulation.WorldNotice, None, "a World is ready"),
+        "event": Channel(simulation.Event, None, "worth telling"),
+        "run_end": Channel(simulation.RunEnd, None, "write and leave"),
+    },
+    (_RUN, WATCH): {
+        "worker_status": Channel(simulation.WorkerStatus, 2, "health of the workers"),
+        "progress": Channel(simulation.Progress, 5, "one line"),
+    },
+    # The vehicles beside the car, and what goes towards a real vehicle: through a gateway that
+    # bounds it, off unless switched on twice.
+    (_RUN, LIVE): {
+        "other_vehicles": Channel(roles.OtherVehicles, 50, "states of the vehicles beside the car"),
+        "authority": Channel(towards_vehicle.Authority, 20, "the orchestrator is in charge"),
+        "vehicle_command": Channel(towards_vehicle.VehicleCommand, 50, "what the vehicle shall do"),
+        "virtual_objects": Channel(drive.RoadUsers, 10, "road users that are simulated"),
+    },
+    # A driving stack in another process as planner under test.
+    (_WORKER, LIVE): {
+        "planner_scene": Channel(
+            planner_link.PlannerScene, None, "futures at one instant: what to do?"
+        ),
+        "planned_motions": Channel(
+            planner_link.PlannedMotions, None, "what a driving stack would do"
+        ),
+    },
+}
 CHANNELS: dict[str, Channel] = {
-    channel.name: channel
-    for channel in (
-        # What the vehicle sends.
-        _row("gnss", f"{_TELEMETRY}/gnss", drive.GnssFix, 10, LIVE, "antenna position"),
-        _row("imu", f"{_TELEMETRY}/imu", drive.ImuSample, 100, LIVE, "specific force and rates"),
-        _row("speed", f"{_TELEMETRY}/speed", drive.SpeedSample, 50, LIVE, "wheel speed"),
-        _row("heading", f"{_TELEMETRY}/heading", drive.HeadingSample, 10, LIVE, "measured yaw"),
-        _row("steering", f"{_TELEMETRY}/steering", drive.SteeringSample, 50, LIVE, "steering"),
-        _row("control", f"{_TELEMETRY}/control", drive.ControlCommand, 50, LIVE, "ADS commands"),
-        _row("plan", f"{_TELEMETRY}/plan", drive.PlannedTrajectory, 10, LIVE, "ADS plan"),
-        _row("status", f"{_TELEMETRY}/status", drive.VehicleStatus, 10, LIVE, "mode and gear"),
-        _row("objects", f"{_TELEMETRY}/objects", drive.RoadUsers, 10, LIVE, "detected road users"),
-        _row("signals", f"{_TELEMETRY}/signals", drive.SignalState, 1, LIVE, "signal colours"),
-        _row("end", f"{_TELEMETRY}/end", drive.DriveEnd, None, LIVE, "the drive is over"),
-        # What is derived from it.
-        _row("state", "vehicle/{vehicle}/state", drive.VehicleState, 50, LIVE, "estimated state"),
-        _row("route", "vehicle/{vehicle}/route", drive.RouteToGoal, 1, LIVE, "where the ADS goes"),
-        # Questions to the vehicle's process.
-        _row("info", "vehicle/{vehicle}/info", drive.InfoRequest, None, REQUEST,
-             "what the vehicle is", drive.VehicleInfo),
-        _row("advance", "vehicle/{vehicle}/advance", drive.AdvanceRequest, None, REQUEST,
-             "lock step: go on until", drive.AdvanceReply),
-        # Work.
-        _row("job", f"{_RUN}/worker/{{process}}/job", runner.JobRequest, 2, REQUEST,
-             "simulate futures", runner.JobAnswer),
-        _row("place", f"{_RUN}/worker/{{process}}/place", placement.PlaceRequest, None, REQUEST,
-             "find places for scenarios", placement.WorldPlaces),
-        _row("prepare", f"{_RUN}/worker/{{process}}/prepare", simulation.PrepareRequest, None,
-             REQUEST, "load a World", simulation.PrepareReply),
-        _row("use_world", f"{_RUN}/worker/{{process}}/use_world", simulation.ActiveWorld, None,
-             REQUEST, "the mirror's World", simulation.ActiveWorld),
-        _row("use_vehicle", f"{_RUN}/worker/{{process}}/use_vehicle", tuning.UseVehicle, None,
-             REQUEST, "parameters from now on", tuning.UseVehicle),
-        _row("tune", f"{_RUN}/worker/{{process}}/tune", tuning.TuneRequest, None, REQUEST,
-             "lock step: weigh what was sent", tuning.TuneReply),
-        _row("use_roles", f"{_RUN}/worker/{{process}}/use_roles", roles.UseRoles, None, REQUEST,
-             "the mirror's roles", roles.UseRoles),
-        _row("set", f"{_RUN}/set", tuning.SetRequest, None, REQUEST, "change a running drive",
-             tuning.SetReply),
-        _row("build", f"{_RUN}/builder/{{process}}/build", simulation.BuildRequest, None, REQUEST,
-             "build a World", simulation.BuildReply),
-        # What those who watch receive.
-        _row("round", f"{_RUN}/round", simulation.RoundView, 2, RESULT, "one round of futures"),
-        _row("comparison", f"{_RUN}/comparison", simulation.Comparison, 8, RESULT,
-             "nominal future against reality"),
-        _row("plan_comparison", f"{_RUN}/plan_comparison", simulation.PlanComparison, 2, RESULT,
-             "the car's plan against ours"),
-        _row("other_vehicles", f"{_RUN}/other_vehicles", roles.OtherVehicles, 50, LIVE,
-             "states of the vehicles beside the car"),
-        _row("disagreement", f"{_RUN}/disagreement", side_by_side.Disagreement, None, RESULT,
-             "human and ADS disagree"),
-        _row("mirror", f"{_RUN}/mirror", simulation.MirrorSample, 10, RESULT,
-             "twin, shadow, ghost and their gap"),
-        _row("gap", f"{_RUN}/gap", gap.GapSample, 4, RESULT, "model against reality"),
-        _row("gap_alarm", f"{_RUN}/gap_alarm", gap.GapAlarm, None, RESULT, "a gap beyond limits"),
-        _row("verdict", f"{_RUN}/verdict", gap.Verdict, None, RESULT, "which of the two is wrong"),
-        _row("identification", f"{_RUN}/identification", tuning.Identification, 0.2, RESULT,
-             "what the driving says of the vehicle"),
-        _row("parameter", f"{_RUN}/parameter", tuning.ParameterChange, None, RESULT,
-             "a parameter that counts from now on"),
-        _row("active_world", f"{_RUN}/active_world", simulation.ActiveWorld, None, RESULT,
-             "which World counts"),
-        _row("world", f"{_RUN}/world", simulation.WorldNotice, None, RESULT, "a World is ready"),
-        _row("worker_status", f"{_RUN}/worker_status", simulation.WorkerStatus, 2, WATCH,
-             "health of the workers"),
-        _row("progress", f"{_RUN}/progress", simulation.Progress, 5, WATCH, "one line"),
-        _row("event", f"{_RUN}/event", simulation.Event, None, RESULT, "worth telling"),
-        _row("run_end", f"{_RUN}/run_end", simulation.RunEnd, None, RESULT, "write and leave"),
-        # Towards a real vehicle, through a gateway that bounds it; off unless switched on twice.
-        _row("authority", f"{_RUN}/authority", towards_vehicle.Authority, 20, LIVE,
-             "the orchestrator is in charge"),
-        _row("vehicle_command", f"{_RUN}/vehicle_command", towards_vehicle.VehicleCommand, 50,
-             LIVE, "what the vehicle shall do"),
-        _row("virtual_objects", f"{_RUN}/virtual_objects", drive.RoadUsers, 10, LIVE,
-             "road users that are simulated"),
-        # A driving stack in another process as planner under test.
-        _row("planner_scene", f"{_RUN}/worker/{{process}}/planner_scene",
-             planner_link.PlannerScene, None, LIVE, "futures at one instant: what to do?"),
-        _row("planned_motions", f"{_RUN}/worker/{{process}}/planned_motions",
-             planner_link.PlannedMotions, None, LIVE, "what a driving stack would do"),
-    )
-}  # fmt: skip
+    name: channel._replace(key=f"{PREFIX}/{place}/{name}", qos=qos)
+    for (place, qos), channels in _TABLE.items()
+    for name, channel in channels.items()
+}
 """All channels by name."""
 
 TELEMETRY_CHANNELS = tuple(
@@ -164,8 +171,9 @@ ALIVE_KEY = f"{PREFIX}/{_RUN}/alive/{{process}}"
 
 
 @functools.lru_cache(maxsize=1024)
-def key(name: str, *, vehicle: str | None = None, run: str | None = None,
-        process: str | None = None) -> str:  # fmt: skip
+def key(
+    name: str, *, vehicle: str | None = None, run: str | None = None, process: str | None = None
+) -> str:
     """Return the full key of channel `name`; `process` may be `*` in subscriptions.
 
     Raises KeyError for an unknown channel and ValueError for a missing or malformed id.

@@ -11,14 +11,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
-Quantity = Literal[
-    "aim.target_speed_mps", "aim.offset_m",
-    "ground.friction_factor",
-    "vehicle.steering_delay_s",
-    "command.accel_mps2", "command.brake_mps2", "command.tire_angle_rad",
-    "perception.delay_s", "perception.lost_from_s", "perception.lost_for_s",
-    "belief.offset_m",
-]  # fmt: skip
+_Aim = Literal["aim.target_speed_mps", "aim.offset_m"]
+_Command = Literal["command.accel_mps2", "command.brake_mps2", "command.tire_angle_rad"]
+_Perception = Literal["perception.delay_s", "perception.lost_from_s", "perception.lost_for_s"]
+_Other = Literal["ground.friction_factor", "vehicle.steering_delay_s", "belief.offset_m"]
+Quantity = Literal[_Aim, _Command, _Perception, _Other]
 """What a number acts on.
 
 `aim` is what a future strives for, `command` what the planner asks of the actuators (`brake_mps2`
@@ -32,15 +29,19 @@ class FutureNumber(NamedTuple):
     """One row: `operation` is how the number acts on `acts_on`, and how a sweep's or a future's
     own value joins that of its scenario."""
 
-    part: Literal["aim", "fault"]
     unit: str
-    low: float
-    high: float
     operation: Operation
     acts_on: Quantity
     meaning: str
+    low: float = -math.inf
+    high: float = math.inf
     above_low: bool = False
     """Whether `low` itself is out of range."""
+
+    @property
+    def part(self) -> Literal["aim", "fault"]:
+        """Whether the future strives for it, or it is a fault of the car or the ground."""
+        return "aim" if self.acts_on.startswith("aim.") else "fault"
 
     @property
     def neutral(self) -> float:
@@ -52,60 +53,62 @@ class FutureNumber(NamedTuple):
         return value * other if self.operation == "multiply" else value + other
 
 
-_ANY = math.inf
 MAX_EXTRA_DELAY_S = 0.4
 """As long as a stage can hold back a command on top of the vehicle's own delay."""
 
-FUTURE_NUMBERS: Mapping[str, FutureNumber] = MappingProxyType({
+_FUTURE_NUMBERS = {
     "target_speed_factor": FutureNumber(
-        "aim", "1", 0.0, _ANY, "multiply", "aim.target_speed_mps",
+        "1",
+        "multiply",
+        "aim.target_speed_mps",
         "of the speed that the nominal future aims at",
+        low=0.0,
     ),
     "target_speed_offset_mps": FutureNumber(
-        "aim", "m/s", -_ANY, _ANY, "add", "aim.target_speed_mps",
-        "on top of the speed aimed at",
+        "m/s", "add", "aim.target_speed_mps", "on top of the speed aimed at"
     ),
     "lateral_shift_m": FutureNumber(
-        "aim", "m", -_ANY, _ANY, "add", "aim.offset_m",
-        "how far to the left of its place on the path the ego aims",
+        "m", "add", "aim.offset_m", "how far to the left of its place on the path the ego aims"
     ),
     "friction_factor": FutureNumber(
-        "fault", "1", 0.0, _ANY, "multiply", "ground.friction_factor",
-        "of the friction between tyres and ground", above_low=True,
+        "1",
+        "multiply",
+        "ground.friction_factor",
+        "of the ground's friction",
+        low=0.0,
+        above_low=True,
     ),
     "extra_steering_delay_s": FutureNumber(
-        "fault", "s", 0.0, MAX_EXTRA_DELAY_S, "add", "vehicle.steering_delay_s",
+        "s",
+        "add",
+        "vehicle.steering_delay_s",
         "between a steering command and the tyres, on top of the vehicle's own",
+        low=0.0,
+        high=MAX_EXTRA_DELAY_S,
     ),
     "steering_gain": FutureNumber(
-        "fault", "1", -_ANY, _ANY, "multiply", "command.tire_angle_rad",
-        "of the tyre angle commanded",
+        "1", "multiply", "command.tire_angle_rad", "of the tyre angle commanded"
     ),
     "steering_offset_rad": FutureNumber(
-        "fault", "rad", -_ANY, _ANY, "add", "command.tire_angle_rad",
-        "on top of the tyre angle commanded",
+        "rad", "add", "command.tire_angle_rad", "on top of the tyre angle commanded"
     ),
     "brake_gain": FutureNumber(
-        "fault", "1", 0.0, _ANY, "multiply", "command.brake_mps2",
-        "of the deceleration commanded",
+        "1", "multiply", "command.brake_mps2", "of the deceleration commanded", low=0.0
     ),
     "perception_delay_s": FutureNumber(
-        "fault", "s", 0.0, _ANY, "add", "perception.delay_s",
-        "how late everybody else is seen",
+        "s", "add", "perception.delay_s", "how late everybody else is seen", low=0.0
     ),
     "position_offset_m": FutureNumber(
-        "fault", "m", -_ANY, _ANY, "add", "belief.offset_m",
-        "how far to the left of the truth the planner believes to be",
+        "m", "add", "belief.offset_m", "how far to the left of the truth the planner believes to be"
     ),
     "lost_from_s": FutureNumber(
-        "fault", "s", 0.0, _ANY, "add", "perception.lost_from_s",
-        "when the loss of all detections begins",
+        "s", "add", "perception.lost_from_s", "when the loss of all detections begins", low=0.0
     ),
     "lost_for_s": FutureNumber(
-        "fault", "s", 0.0, _ANY, "add", "perception.lost_for_s",
-        "how long all detections are lost",
+        "s", "add", "perception.lost_for_s", "how long all detections are lost", low=0.0
     ),
-})  # fmt: skip
+}
+FUTURE_NUMBERS: Mapping[str, FutureNumber] = MappingProxyType(_FUTURE_NUMBERS)
 """All numbers of a future by name; those of one quantity act on it in this order."""
 
 
@@ -113,11 +116,11 @@ class ScenarioNumber(NamedTuple):
     """A number of a scenario's ego or of one of its road users, by its field."""
 
     unit: str
-    low: float = -_ANY
-    high: float = _ANY
+    low: float = -math.inf
+    high: float = math.inf
 
 
-SCENARIO_NUMBERS: Mapping[str, ScenarioNumber] = MappingProxyType({
+_SCENARIO_NUMBERS = {
     "speed_mps": ScenarioNumber("m/s", 0.0),
     "lateral_shift_m": ScenarioNumber("m"),
     "impact_share": ScenarioNumber("1", 0.0, 1.0),
@@ -126,7 +129,8 @@ SCENARIO_NUMBERS: Mapping[str, ScenarioNumber] = MappingProxyType({
     "lateral_m": ScenarioNumber("m"),
     "acts_after_s": ScenarioNumber("s", 0.0),
     "decel_mps2": ScenarioNumber("m/s²", 0.0),
-})  # fmt: skip
+}
+SCENARIO_NUMBERS: Mapping[str, ScenarioNumber] = MappingProxyType(_SCENARIO_NUMBERS)
 """Numbers of a case by their fields: `ego.speed_mps`, `<actor>.gap_m` and so on."""
 
 

@@ -18,10 +18,10 @@ from foretwin.contracts.world import Control, JunctionKind
 
 TrafficTurn = Literal["straight", "across", "near"]
 """Through a junction: straight on, across oncoming traffic, or to the side where one drives."""
-Relation = Literal[
-    "oncoming", "from_near", "from_across", "ahead", "behind", "beside", "on_ring", "joins_ring",
-    "crosses_exit", "crosses_entry", "parked",
-]  # fmt: skip
+_FromArm = Literal["oncoming", "from_near", "from_across"]
+_AlongPath = Literal["ahead", "behind", "beside"]
+_AcrossArm = Literal["crosses_exit", "crosses_entry"]
+Relation = Literal[_FromArm, _AlongPath, "on_ring", "joins_ring", _AcrossArm, "parked"]
 """Where a road user comes from, as the ego sees it.
 
 `oncoming` from the opposite arm, `from_near` and `from_across` from the side arms, `ahead`,
@@ -95,15 +95,12 @@ if TYPE_CHECKING:
         """What is wrong with the car under test, or with the ground below it."""
 
 else:
+    _faults = [
+        (name, Number, row.neutral) for name, row in FUTURE_NUMBERS.items() if row.part == "fault"
+    ]
     FaultPart = msgspec.defstruct(
-        "FaultPart",
-        [
-            (name, Number, row.neutral)
-            for name, row in FUTURE_NUMBERS.items()
-            if row.part == "fault"
-        ],
-        frozen=True, kw_only=True, forbid_unknown_fields=True, module=__name__,
-    )  # fmt: skip
+        "FaultPart", _faults, frozen=True, kw_only=True, forbid_unknown_fields=True, module=__name__
+    )
 
 
 class Where(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

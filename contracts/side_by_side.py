@@ -10,11 +10,10 @@ from foretwin.contracts.drive import ControlMode
 from foretwin.contracts.frames import GeoPoint
 
 Aspect = Literal["way", "pace"]
-DisagreementKind = Literal[
-    "ads_turns_elsewhere", "ads_in_another_lane", "ads_beside",
-    "ads_stops", "human_stops", "ads_faster", "ads_slower",
-]  # fmt: skip
-"""The first three are about the way, the others about the pace; in each the gravest comes first."""
+WayDisagreement = Literal["ads_turns_elsewhere", "ads_in_another_lane", "ads_beside"]
+PaceDisagreement = Literal["ads_stops", "human_stops", "ads_faster", "ads_slower"]
+DisagreementKind = Literal[WayDisagreement, PaceDisagreement]
+"""In each aspect the gravest comes first."""
 
 
 class Disagreement(msgspec.Struct, frozen=True, kw_only=True):

@@ -15,10 +15,9 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.provenance import Choice, Provenance, Quantity
 from foretwin.contracts.signals import Signal, SignalPlan
 
-JunctionKind = Literal[
-    "roundabout", "circular", "mini_roundabout", "crossing", "t_junction", "y_junction",
-    "staggered", "merge", "other", "region",
-]  # fmt: skip
+_RingKind = Literal["roundabout", "circular", "mini_roundabout"]
+_PlainKind = Literal["crossing", "t_junction", "y_junction", "staggered", "merge", "other"]
+JunctionKind = Literal[_RingKind, _PlainKind, "region"]
 """`region` is no junction: it names a World made of a whole stretch of map."""
 Control = Literal["signals", "stop", "all_way_stop", "give_way", "roundabout", "uncontrolled"]
 DrivingSide = Literal["right", "left"]
@@ -27,10 +26,9 @@ Turn = Literal["straight", "left", "right", "u_turn"]
 LineControl = Literal["signal", "stop", "give_way", "none"]
 LaneChange = Literal["both", "left", "right", "none"]
 """To which sides, as the driver sees them, a lane may be left."""
-YieldRule = Literal[
-    "stop", "give_way", "roundabout", "priority_road", "lesser_road", "turn_across", "near_side",
-    "u_turn", "merge_order", "order",
-]  # fmt: skip
+_YieldByRoad = Literal["stop", "give_way", "roundabout", "priority_road", "lesser_road"]
+_YieldByMovement = Literal["turn_across", "near_side", "u_turn", "merge_order", "order"]
+YieldRule = Literal[_YieldByRoad, _YieldByMovement]
 """Why one movement waits for another.
 
 A stop or give-way sign, a ring, a signed priority road, a road of lower class or a way out of a

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import Flags, left_of, turn_rad
 from foretwin.geometry.polyline_batch import Polylines
 
 MIN_STEP_M = 0.25
-"""Nodes of a way closer than this to the one before say nothing about where it leads."""
+"""Nodes of a way closer than this to the one before give no direction."""
 _SHARE = 0.45
 _DEVIATION_M, _WIDEST_DEVIATION_M = 0.35, 2.5
 _SOFTEST_RAD, _SHARPEST_RAD = math.radians(3.0), math.radians(150.0)
@@ -21,7 +21,6 @@ _STEP_RAD, _STEP_M = math.radians(16.0), 12.0
 """Two chords of an arc turn no farther, and are no longer."""
 
 
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 _KINK_RAD, _STUB_M = math.radians(15.0), 1.5
 
 
@@ -33,11 +32,11 @@ class Rounded(NamedTuple):
     after: Array
 
 
-def thinned(lines: Polylines, min_step_m: float = MIN_STEP_M) -> Polylines:
-    """Return the lines without points nearer than `min_step_m` to the one before; ends stay."""
+def thinned(lines: Polylines) -> Polylines:
+    """Return the lines without points nearer than `MIN_STEP_M` to the one before; ends stay."""
     for _ in range(12):
         near = np.zeros(len(lines.xy_m), dtype=bool)
-        near[1:] = lines.steps[1][:-1] < min_step_m
+        near[1:] = lines.steps[1][:-1] < MIN_STEP_M
         first, last = lines.first[:-1], lines.first[1:] - 1
         near[first] = False
         # In place of a line's end its neighbour goes.
@@ -58,15 +57,11 @@ def without_end_kinks(lines: Polylines, at_start: Flags, at_end: Flags) -> Polyl
     """
     gap, step = lines.steps
     into = np.roll(gap, 1, axis=0)
-    cross = into[:, 0] * gap[:, 1] - into[:, 1] * gap[:, 0]
-    bend = np.abs(np.arctan2(cross, (into * gap).sum(axis=1)))
+    bend = np.abs(turn_rad(into, gap))
     keep = np.ones(len(lines.xy_m), dtype=bool)
     long = np.diff(lines.first) > 2
     second, last_but_one = lines.first[:-1] + 1, lines.first[1:] - 2
-    for at, flags, stub_m in (
-        (second, at_start, np.roll(step, 1)),
-        (last_but_one, at_end, step),
-    ):
+    for at, flags, stub_m in ((second, at_start, np.roll(step, 1)), (last_but_one, at_end, step)):
         rows = np.nonzero(flags & long)[0]
         kinks = at[rows]
         keep[kinks[(bend[kinks] > _KINK_RAD) & (stub_m[kinks] < _STUB_M)]] = False
@@ -101,7 +96,7 @@ def rounded_through(lines: Polylines, radius_m: Array, before: Array, after: Arr
     gap, seg = whole.steps
     u = gap / np.maximum(seg, 1e-9)[:, None]
     into = np.roll(u, 1, axis=0)
-    bend = np.arctan2(into[:, 0] * u[:, 1] - into[:, 1] * u[:, 0], (into * u).sum(axis=1))
+    bend = turn_rad(into, u)
     bend[first[:-1]] = bend[first[1:] - 1] = 0.0
     angle = np.abs(bend)
     head, tail = first[:-1][on_before] + 1, first[1:][on_after] - 2

@@ -2,7 +2,7 @@
 
 A numpy call costs as much for 64 cars as for one: at 50 ticks a second, some 150 calls took
 longer than the physics. Here is nothing but arithmetic on arrays that others own; what it means
-is told where it is called. All is compiled at import, for one signature and no other: no drive
+stands where it is called. All is compiled at import, for one signature and no other: no drive
 waits for a compiler.
 """
 
@@ -55,9 +55,14 @@ def kernel(returns: Any, *arguments: Any) -> Callable[[_Function], _Function]:
 
 @kernel(types.void, IN_ROWS, IN, TABLE, TABLE, REAL, WHOLE, OUT_ROWS)
 def locate(
-    xy: Array, near_arc_m: Array, nodes: Array, segments: Array,
-    first_arc_m: float, either: int, found: Array,
-) -> None:  # fmt: skip
+    xy: Array,
+    near_arc_m: Array,
+    nodes: Array,
+    segments: Array,
+    first_arc_m: float,
+    either: int,
+    found: Array,
+) -> None:
     """Fill `found` (2, S): arc length and offset of positions (2, S), as `FrenetPath.locate`."""
     last = nodes.shape[1] - 1
     for car in range(xy.shape[1]):

@@ -102,7 +102,8 @@ class FrenetPath:
 
     def __reduce__(self) -> tuple[object, tuple[object, ...]]:
         """Travel to another process as what the path was made of."""
-        return _path_of, self._given
+        *given, before_m = self._given
+        return functools.partial(FrenetPath, before_m=before_m), tuple(given)
 
     @property
     def node_poses(self) -> Array:
@@ -201,26 +202,13 @@ class FrenetPath:
         xy = np.asarray(xy_m, dtype=np.float64).T
         if near_arc_m is None:
             end = max(2, int(np.searchsorted(self.arc_m, upto_arc_m, side="right")))
-            node = self._nearest(xy_m, end)
+            near, either = self.arc_m[self._nearest(xy_m, end)], 0
         else:
-            either = min(math.ceil(within_m / SPACING_M), self._last // 2)
-            found = np.empty((2, xy.shape[1]))
             near = np.asarray(near_arc_m, dtype=np.float64)
-            compiled.locate(xy, near, self._nodes, self._segments, self.first_arc_m, either, found)
-            return FrenetPoint(found[0], found[1])
-        # The node's own tangent decides between the segment before and the one after.
-        nodes = self._nodes.take(node, axis=1)
-        turned = (xy - nodes[:2]) * nodes[:1:-1]
-        node -= turned[0] < turned[1]
-        segments = self._segments.take(node, axis=1, mode="clip")
-        turned = segments[2:6].reshape(2, 2, -1)
-        turned *= (xy - segments[:2])[:, None]
-        share, offset = turned[0, 0], turned[0, 1]
-        turned[0] += turned[1]
-        np.maximum(share, 0.0, out=share)
-        np.minimum(share, 1.0, out=share)
-        share += segments[6]
-        return FrenetPoint(share, offset)
+            either = min(math.ceil(within_m / SPACING_M), self._last // 2)
+        found = np.empty((2, xy.shape[1]))
+        compiled.locate(xy, near, self._nodes, self._segments, self.first_arc_m, either, found)
+        return FrenetPoint(found[0], found[1])
 
 
 def _with_steps(values: Array) -> Array:
@@ -236,10 +224,6 @@ def _between(table: Array, place: NodePlace) -> Array:
     steps *= place.share
     steps += found[:half]
     return np.asarray(steps)
-
-
-def _path_of(xy_m: Array, speed_limit_mps: Array | None, before_m: float) -> FrenetPath:
-    return FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
 
 
 def _prolonged(at: Array, arc: Array, values: Array) -> Array:

@@ -82,6 +82,16 @@ def left_of(direction: Array) -> Array:
     return np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return the cross product of vectors (..., 2): positive where b points to the left of a."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def turn_rad(before: Array, after: Array) -> Array:
+    """Return (...) the angle from one vector (..., 2) to the next, positive to the left."""
+    return np.asarray(np.arctan2(cross(before, after), (before * after).sum(axis=-1)))
+
+
 class Mitres(NamedTuple):
     """Rays across a polyline that its parallels share: unit vectors (N - 1, 2) along its segments,
     (N, 2) to the left at its points, and (N,) how much farther a parallel is there."""
@@ -97,19 +107,21 @@ def mitres(xy_m: Array, *, before: Array | None = None, after: Array | None = No
     d /= np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-9)[:, None]
     incoming = np.concatenate([d[:1] if before is None else before[None], d])
     outgoing = np.concatenate([d, d[-1:] if after is None else after[None]])
-    normal = left_of(incoming) + left_of(outgoing)
-    norm = np.hypot(normal[:, 0], normal[:, 1])
-    normal = np.where(norm[:, None] > 0.2, normal / np.maximum(norm, 0.2)[:, None], left_of(d[[0]]))
-    stretch = 1.0 / np.maximum((normal * left_of(outgoing)).sum(axis=1), 1.0 / MITRE_LIMIT)
-    return Mitres(d, normal, stretch)
+    return Mitres(d, *rays_between(incoming, outgoing, left_of(d[[0]])))
+
+
+def rays_between(into: Array, out: Array, otherwise: Array) -> tuple[Array, Array]:
+    """Return of bends between unit directions (N, 2) their rays to the left (N, 2), and how much
+    farther a parallel is there (N,); `otherwise` stands for the ray where a road turns back."""
+    normal = left_of(into + out)
+    norm = np.hypot(normal[:, 0], normal[:, 1])[:, None]
+    normal = np.where(norm > 0.2, normal / np.maximum(norm, 0.2), otherwise)
+    stretch = 1.0 / np.maximum((normal * left_of(out)).sum(axis=1), 1.0 / MITRE_LIMIT)
+    return normal, stretch
 
 
 def offset(
-    xy_m: Array,
-    left_m: float,
-    *,
-    before: Array | None = None,
-    after: Array | None = None,
+    xy_m: Array, left_m: float, *, before: Array | None = None, after: Array | None = None
 ) -> Array:
     """Return the polyline shifted to its left by `left_m` (negative: to its right).
 

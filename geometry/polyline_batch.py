@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import MITRE_LIMIT, left_of
+from foretwin.geometry.polyline import left_of, rays_between
 
 Indices = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -95,17 +95,20 @@ def _starts(counts: Indices) -> Indices:
 
 def points_at(lines: Polylines, which: Indices, at_m: Array) -> Array:
     """Return points (M, 2) at arc lengths `at_m` (M,), clamped, of the lines `which` (M,)."""
-    arc, total = lines.arc_m, lines.length_m
-    at = np.clip(at_m, 0.0, total[which])
-    # A key that grows along each line and from line to line.
-    room = np.concatenate([[0.0], np.cumsum(total + 1.0)])
-    key = arc + room[lines.line]
-    i = np.searchsorted(key, at + room[which], side="right") - 1
-    i = np.clip(i, lines.first[which], lines.first[which + 1] - 2)
+    at = np.clip(at_m, 0.0, lines.length_m[which])
+    i = segments_at(lines, which, at)
     gap, length = lines.steps
-    share = (at - arc[i]) / np.maximum(length[i], 1e-12)
+    share = (at - lines.arc_m[i]) / np.maximum(length[i], 1e-12)
     found: Array = lines.xy_m[i] + np.clip(share, 0.0, 1.0)[:, None] * gap[i]
     return found
+
+
+def segments_at(lines: Polylines, which: Indices, at_m: Array) -> Indices:
+    """Return (M,) the points behind which arc lengths `at_m` (M,) of the lines `which` (M,) lie."""
+    # A key that grows along each line and from line to line finds all in one search.
+    room = np.concatenate([[0.0], np.cumsum(lines.length_m + 1.0)])
+    i = np.searchsorted(lines.arc_m + room[lines.line], at_m + room[which], side="right") - 1
+    return np.asarray(np.clip(i, lines.first[which], lines.first[which + 1] - 2))
 
 
 def without_repeats(lines: Polylines, *, tolerance_m: float = 0.01) -> Polylines:
@@ -161,16 +164,10 @@ def offset(
         into[first] = np.where(np.isnan(before), into[first], before)
     if after is not None:
         out[last] = np.where(np.isnan(after), out[last], after)
-    normal = left_of(into + out)
-    norm = np.hypot(normal[:, 0], normal[:, 1])[:, None]
-    normal = np.where(norm > 0.2, normal / np.maximum(norm, 0.2), at_start[lines.line])
-    stretch = 1.0 / np.maximum((normal * left_of(out)).sum(axis=1), 1.0 / MITRE_LIMIT)
+    normal, stretch = rays_between(into, out, at_start[lines.line])
     shift = left_m[lines.line]
-    shifted = np.where(
-        (np.abs(shift) < 1e-9)[:, None],
-        lines.xy_m,
-        lines.xy_m + normal * (shift * stretch)[:, None],
-    )
+    moved = lines.xy_m + normal * (shift * stretch)[:, None]
+    shifted = np.where((np.abs(shift) < 1e-9)[:, None], lines.xy_m, moved)
     return _without_backward_runs(Polylines(shifted, lines.first), lines)
 
 

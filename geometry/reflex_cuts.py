@@ -12,6 +12,7 @@ import numpy.typing as npt
 import shapely
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import cross, left_of
 
 _SNAP_M = 1e-6
 _TO_CORNER_M = 0.06
@@ -105,7 +106,7 @@ def _halves(polygon: shapely.Polygon) -> tuple[shapely.Polygon, shapely.Polygon]
     steps = np.diff(hole, axis=0)
     k = int(np.argmax((steps * steps).sum(axis=1)))
     ahead = steps[k] / np.hypot(*steps[k])
-    left = np.array([-ahead[1], ahead[0]])
+    left = left_of(ahead)
     at = hole[k] + left * (_INTO_HOLE_M if shapely.is_ccw(ring) else -_INTO_HOLE_M)
     west, south, east, north = polygon.bounds
     far = 2.0 * (east - west + north - south)
@@ -136,7 +137,7 @@ class _Corners:
     def sharpest(self) -> Indices:
         """Return for each ring its reflex corner between the longest walls."""
         into, out = self.xy - self.xy[self.before], self.xy[self.after] - self.xy
-        return self._least(_cross(into, out))
+        return self._least(cross(into, out))
 
     def hits(self, corner: Indices, ahead: Array) -> tuple[Array, Indices, Array]:
         """Return where rays `ahead` (2, R, 2), two from a corner of each ring, meet it next.
@@ -146,7 +147,7 @@ class _Corners:
         """
         a, b = self.xy, self.xy[self.after]
         start, along = self.xy[corner][self.ring], ahead[:, self.ring]
-        side_a, side_b = _cross(along, a - start), _cross(along, b - start)
+        side_a, side_b = cross(along, a - start), cross(along, b - start)
         side_a[np.abs(side_a) < _SNAP_M] = 0.0
         side_b[np.abs(side_b) < _SNAP_M] = 0.0
         gap = side_a - side_b
@@ -168,11 +169,6 @@ class _Corners:
         at = np.where(values == least[..., self.ring], row, len(row))
         found: Indices = np.minimum.reduceat(at, self.first, axis=-1)
         return found
-
-
-def _cross(a: Array, b: Array) -> Array:
-    turned: Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return turned
 
 
 def _cut_once(pieces: Geometries, owner: Indices) -> tuple[Geometries, Indices]:

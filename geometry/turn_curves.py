@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import left_of
+from foretwin.geometry.polyline import Flags, cross, left_of, turn_rad
 from foretwin.geometry.polyline_batch import Polylines
 
 WANTED_RADIUS_M = 4.5
@@ -20,13 +20,12 @@ LEAD_M = 0.4
 _STEP_RAD, _STEP_M = math.radians(8.0), 0.5
 _REPEAT_M = 0.02
 _TIGHTNESS = 8.0
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 class Turns(NamedTuple):
     """Paths from lane to lane, and the radius in metres of the tightest arc of each, (K,).
 
-    A radius of 0 says that there is no room for any: the path is then no more than a chord.
+    A radius of 0 means that there is no room for any: the path is then no more than a chord.
     """
 
     lines: Polylines
@@ -58,10 +57,9 @@ def turn_curves(start: Array, heading: Array, end: Array, end_heading: Array) ->
     lead = np.minimum(LEAD_M, 0.15 * np.hypot(chord[:, 0], chord[:, 1]))
     p, q = start + lead[:, None] * heading, end - lead[:, None] * end_heading
     gap = q - p
-    cross = _cross(heading, end_heading)
-    angle = np.arctan2(cross, _dot(heading, end_heading))
+    angle = turn_rad(heading, end_heading)
     best = _straight(gap, heading)
-    cost = np.where((np.abs(angle) < 0.005) & (np.abs(_cross(heading, gap)) < 0.003), -1.0, np.inf)
+    cost = np.where((np.abs(angle) < 0.005) & (np.abs(cross(heading, gap)) < 0.003), -1.0, np.inf)
     for side in (1.0, -1.0):
         for found in (
             _one_arc(gap, heading, end_heading, side * angle % math.tau, side),
@@ -77,10 +75,6 @@ def turn_curves(start: Array, heading: Array, end: Array, end_heading: Array) ->
     return Turns(drawn.lines, np.where(np.isfinite(cost), drawn.radius_m, 0.0))
 
 
-def _cross(a: Array, b: Array) -> Array:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-
-
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray((a * b).sum(axis=1))
 
@@ -93,13 +87,13 @@ def _straight(gap: Array, heading: Array) -> _Paths:
 def _one_arc(gap: Array, u: Array, v: Array, turn: Array, side: float) -> _Paths:
     """Return the widest arc of `turn` radians to one side, with a straight before or behind."""
     share = np.maximum(1.0 - np.cos(turn), 1e-9)
-    by_start, by_end = side * _cross(gap, v) / share, side * _cross(u, gap) / share
+    by_start, by_end = side * cross(gap, v) / share, side * cross(u, gap) / share
     radius = np.where(turn <= math.pi, np.minimum(by_start, by_end), np.maximum(by_start, by_end))
     sin, cos = np.sin(turn), 1.0 - np.cos(turn)
     left = left_of(u) * side
     rest = gap - radius[:, None] * (sin[:, None] * u + cos[:, None] * left)
     before, behind = _dot(rest, u), _dot(rest, v)
-    ahead = (np.abs(_cross(rest, u)) <= np.abs(_cross(rest, v)) + 1e-6) & (before > 0.0)
+    ahead = (np.abs(cross(rest, u)) <= np.abs(cross(rest, v)) + 1e-6) & (before > 0.0)
     before, behind = np.where(ahead, before, 0.0), np.where(ahead, 0.0, behind)
     valid = (radius > 0.05) & (radius < 1e5) & (behind > -1e-6)
     valid &= (turn > 1e-4) & (turn < math.tau - 1e-4)
@@ -121,9 +115,8 @@ def _two_arcs(gap: Array, u: Array, v: Array, side: float) -> _Paths:
     first_centre = radius[:, None] * left_u
     touch = 0.5 * (first_centre + gap - radius[:, None] * left_v)
     spoke, to_touch = -left_u, (touch - first_centre) / radius[:, None]
-    first = side * np.arctan2(_cross(spoke, to_touch), _dot(spoke, to_touch)) % math.tau
-    to_end = left_v
-    second = -side * np.arctan2(_cross(-to_touch, to_end), _dot(-to_touch, to_end)) % math.tau
+    first = side * turn_rad(spoke, to_touch) % math.tau
+    second = -side * turn_rad(-to_touch, left_v) % math.tau
     first = np.where(first > math.tau - 1e-6, 0.0, first)
     second = np.where(second > math.tau - 1e-6, 0.0, second)
     none = np.zeros(len(gap))

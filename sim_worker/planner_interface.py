@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
-import numpy.typing as npt
-
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 
@@ -28,7 +25,7 @@ class SeenUsers(NamedTuple):
     size_m: Array
     arc_m: Array
     offset_m: Array
-    walks: npt.NDArray[np.bool_]
+    walks: Flags
     turned_rad: Array
 
 
@@ -43,7 +40,7 @@ class SharedGround(NamedTuple):
     enter_arc_m: Array
     leave_arc_m: Array
     point_m: Array
-    waits: npt.NDArray[np.bool_]
+    waits: Flags
     their_yaw_rad: Array | None = None
 
 
@@ -122,21 +119,20 @@ class RemembersWithinJob(Protocol):
         """Return what drives the `count` cars of one job."""
 
 
-def rows_of(view: PlannerView, rows: npt.NDArray[np.intp]) -> PlannerView:
+def rows_of(view: PlannerView, rows: Indices) -> PlannerView:
     """Return what a planner sees that drives only some of the cars."""
     users = view.users
     if users is not None:
         users = SeenUsers._make(field[rows] for field in users)
-    return view._replace(
-        states=view.states[rows],
-        arc_m=view.arc_m[rows],
-        offset_m=view.offset_m[rows],
-        desired_offset_m=view.desired_offset_m[rows],
-        target_speed_mps=view.target_speed_mps[rows],
-        speed_factor=view.speed_factor[rows],
-        lead_gap_m=view.lead_gap_m[rows],
-        lead_speed_mps=view.lead_speed_mps[rows],
-        stop_arc_m=None if view.stop_arc_m is None else view.stop_arc_m[rows],
-        users=users,
-        heading=None if view.heading is None else view.heading[:, rows],
-    )
+    of_some = {
+        name: values[rows] for name in _BY_CAR if (values := getattr(view, name)) is not None
+    }
+    if view.heading is not None:
+        of_some["heading"] = view.heading[:, rows]
+    return view._replace(users=users, **of_some)
+
+
+_BY_CAR = (
+    *("states", "arc_m", "offset_m", "desired_offset_m", "target_speed_mps", "speed_factor"),
+    *("lead_gap_m", "lead_speed_mps", "stop_arc_m"),
+)

@@ -46,19 +46,8 @@ class _Prepared(NamedTuple):
 class StageCache:
     """Compiled stages of the Worlds used last; loads a World's file on first use."""
 
-    def __init__(
-        self,
-        worlds_dir: Path,
-        vehicle: VehicleParameters,
-        *,
-        control_hz: float = 20.0,
-        threads: int = 1,
-        nsim: int,
-        kept: int,
-    ) -> None:
-        self._worlds_dir = worlds_dir
-        self._vehicle = vehicle
-        self._control_hz, self._threads, self._nsim, self._kept = control_hz, threads, nsim, kept
+    def __init__(self, setup: WorkerSetup, vehicle: VehicleParameters) -> None:
+        self._setup, self._vehicle = setup, vehicle
         self._stages: OrderedDict[str, _Prepared] = OrderedDict()
 
     def get(self, world_id: str) -> _Prepared:
@@ -66,16 +55,16 @@ class StageCache:
         if world_id in self._stages:
             self._stages.move_to_end(world_id)
             return self._stages[world_id]
-        world = load_world(self._worlds_dir, world_id)
+        setup, world = self._setup, load_world(Path(self._setup.worlds_dir), world_id)
         stage = Stage(
             world,
             self._vehicle,
-            nsim=self._nsim,
-            control_hz=self._control_hz,
-            threads=self._threads,
+            nsim=setup.simulations,
+            control_hz=setup.control_hz,
+            threads=setup.threads,
         )
         self._stages[world_id] = prepared = _Prepared(stage, SceneMaker(world))
-        while len(self._stages) > self._kept:
+        while len(self._stages) > setup.kept_worlds:
             self._stages.popitem(last=False)
         return prepared
 
@@ -85,11 +74,10 @@ class StageCache:
         for prepared in self._stages.values():
             prepared.stage.use_vehicle(vehicle)
 
-    def __len__(self) -> int:
-        return len(self._stages)
-
-    def __contains__(self, world_id: str) -> bool:
-        return world_id in self._stages
+    @property
+    def world_ids(self) -> tuple[str, ...]:
+        """Return the Worlds that are compiled, the one used last at the end."""
+        return tuple(self._stages)
 
 
 class FuturesWorker:
@@ -98,9 +86,9 @@ class FuturesWorker:
     def __init__(self, setup: WorkerSetup) -> None:
         self._id = setup.process_id
         self._worlds_dir = Path(setup.worlds_dir)
-        self._stages = self._cache(setup, setup.vehicle)
+        self._stages = StageCache(setup, setup.vehicle)
         self._vehicles = {vehicle_digest(v): v for v in setup.swept_vehicles}
-        self._swept = {name: self._cache(setup, v) for name, v in self._vehicles.items()}
+        self._swept = {name: StageCache(setup, v) for name, v in self._vehicles.items()}
         self._version = 0
         self._answers: dict[str, Callable[[msgspec.Struct], msgspec.Struct]] = {
             "prepare": self._prepare,
@@ -108,12 +96,6 @@ class FuturesWorker:
             "job": self._job,
             "place": self._place,
         }
-
-    def _cache(self, setup: WorkerSetup, vehicle: VehicleParameters) -> StageCache:
-        return StageCache(
-            self._worlds_dir, vehicle, control_hz=setup.control_hz, threads=setup.threads,
-            nsim=setup.simulations, kept=setup.kept_worlds,
-        )  # fmt: skip
 
     def handle(self, request: Request) -> None:
         """Answer one question; never raises: what cannot be answered is refused in one line."""

@@ -25,7 +25,7 @@ from foretwin.viewer.live_viewer import (
     offline_environment,
     rerun_program,
 )
-from foretwin.viewer.monitor import RUN_CHANNELS, VEHICLE_CHANNELS, Monitor, read_world
+from foretwin.viewer.monitor import Monitor, read_world
 from foretwin.viewer.recordings import copy_with_blueprint, is_complete
 from foretwin.viewer.rows import Row
 from foretwin.viewer.sinks import FileStream, LiveStream
@@ -65,8 +65,8 @@ class Recorder:
         self, setup: ViewerSetup, messages: Mailbox, find_start: Callable[[int], int]
     ) -> None:
         self._messages = messages
-        self._dropped_told = 0
-        self._window_told = False
+        self._reported_dropped = 0
+        self._reported_window = False
         self._flushed_s = time.monotonic()
         self._monitor = Monitor(
             drive_frame=setup.drive_frame,
@@ -75,6 +75,7 @@ class Recorder:
             attribution=setup.attribution,
             load_world=lambda world_id: read_world(Path(setup.worlds_dir), world_id),
         )
+        self.channels = self._monitor.channels
         blueprint = drive_blueprint()
         self._live_viewer = live_viewer(setup.live)
         self._file = FileStream(
@@ -100,7 +101,7 @@ class Recorder:
                 rows = self._monitor.note("error", str(problem))
             self._write(rows)
         if time.monotonic() - self._flushed_s > FLUSH_PERIOD_S:
-            self._tell_troubles()
+            self._report_troubles()
             self._file.flush()
             self._flushed_s = time.monotonic()
         return item is not None
@@ -114,7 +115,7 @@ class Recorder:
 
     def close(self, farewell: Farewell, *, keep_window: bool) -> None:
         """Complete the file, then give the live view a moment; bounded even if it is frozen."""
-        self._tell_troubles()
+        self._report_troubles()
         self._file.close()
         if self._live is not None and self._live_viewer is not None:
             self._live.close(farewell.live_s)
@@ -127,16 +128,16 @@ class Recorder:
         if self._live is not None:
             self._live.write(rows)
 
-    def _tell_troubles(self) -> None:
-        if self._live is not None and self._live.failed and not self._window_told:
-            self._window_told = True
+    def _report_troubles(self) -> None:
+        if self._live is not None and self._live.failed and not self._reported_window:
+            self._reported_window = True
             self._write(self._monitor.note("warning", f"no live view: {self._live.failed}"))
         dropped = self._messages.dropped
-        if dropped > self._dropped_told:
-            text = f"{dropped - self._dropped_told} messages dropped, {dropped} in all"
+        if dropped > self._reported_dropped:
+            text = f"{dropped - self._reported_dropped} messages dropped, {dropped} in all"
             _log.warning(text)
             self._write(self._monitor.note("warning", text))
-            self._dropped_told = dropped
+            self._reported_dropped = dropped
 
 
 def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
@@ -154,10 +155,8 @@ def serve(setup: ViewerSetup, bus: Bus, life: ProcessLife) -> None:
         return int(info.start_stamp_ns)
 
     recorder = Recorder(setup, messages, find_start)
-    for channel in VEHICLE_CHANNELS:
-        bus.subscribe(channel, messages, vehicle=setup.vehicle_id)
-    for channel in RUN_CHANNELS:
-        bus.subscribe(channel, messages, run=setup.run_id)
+    for channel in recorder.channels:
+        bus.subscribe(channel, messages, vehicle=setup.vehicle_id, run=setup.run_id)
     life.ready()
     while not life.over:
         recorder.take_one(0.1)

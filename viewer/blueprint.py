@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import rerun as rr
 import rerun.blueprint as rrb
 
+from foretwin.contracts import drive
 from foretwin.viewer.rows import TIMELINE
 
 MainView = Literal["Intersection", "Chase", "Map"]
@@ -44,60 +45,24 @@ def drive_blueprint(
         start=rrb.TimeRangeBoundary.infinite(),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
-    intersection = rrb.Spatial3DView(
-        origin="/world/focus",
-        contents=["/world/**"],
-        name="Intersection",
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=(-19.0, -26.0, 88.0),
-            look_target=(0.0, 0.0, 0.0),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
-        background=BACKGROUND,
-        line_grid=False,
-    )
-    chase = rrb.Spatial3DView(
-        origin="/world/ego/real",
-        contents=["/world/**"],
-        name="Chase",
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=(-17.0, 0.0, 9.0),
-            look_target=(7.0, 0.0, 0.0),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
-        background=BACKGROUND,
-        line_grid=False,
-    )
+    intersection = _space("Intersection", "/world/focus", eye_m=(-19.0, -26.0, 88.0))
+    chase = _space("Chase", "/world/ego/real", eye_m=(-17.0, 0.0, 9.0), target_m=(7.0, 0.0, 0.0))
     # Rerun's own map view fetches tiles from the internet, which tells where the car is: seen from
     # straight above, the World needs none. /geo is recorded for those who add a map view.
-    overview = rrb.Spatial3DView(
-        origin="/world/focus",
-        contents=["/world/**", "/map/**"],
-        name="Map",
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=(0.0, 0.0, 330.0),
-            look_target=(0.0, 0.0, 0.0),
-            eye_up=(0.0, 1.0, 0.0),
-        ),
-        background=BACKGROUND,
-        line_grid=False,
-    )
+    overview = _space("Map", "/world/focus", "/map/**", eye_m=(0.0, 0.0, 330.0), up=(0.0, 1.0, 0.0))
     gaps = [
         _plot(f"/gap/{quantity}", name, last_30_s, legend=quantity == "pos_m")
         for quantity, name in GAP_VIEWS.items()
     ]
-    comparison = rrb.Horizontal(
-        _plot("/comparison/ade_m/4", "ADE at 4 s, m", last_30_s, legend=True),
-        _plot("/comparison/ade_m/8", "ADE at 8 s, m", last_30_s, legend=False),
-        name="Comparison",
-    )
-    short = rrb.Horizontal(
-        _plot("/comparison/ade_m/1", "ADE at 1 s, m", last_30_s, legend=True),
-        _plot("/comparison/ade_m/2", "ADE at 2 s, m", last_30_s, legend=False),
-        name="Short horizons",
+    comparison, short = (
+        rrb.Horizontal(
+            *(
+                _plot(f"/comparison/ade_m/{s}", f"ADE at {s} s, m", last_30_s, legend=s == first)
+                for s in (first, 2 * first)
+            ),
+            name=name,
+        )
+        for name, first in (("Comparison", 4), ("Short horizons", 1))
     )
     reality = rrb.Vertical(
         rrb.Horizontal(
@@ -155,6 +120,27 @@ def drive_blueprint(
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
         auto_layout=False,
         auto_views=False,
+    )
+
+
+def _space(
+    name: str,
+    origin: str,
+    *more: str,
+    eye_m: drive.Vector3,
+    target_m: drive.Vector3 = (0.0, 0.0, 0.0),
+    up: drive.Vector3 = (0.0, 0.0, 1.0),
+) -> rrb.Spatial3DView:
+    """Return a view of the World and of what else is named, seen from a place about `origin`."""
+    return rrb.Spatial3DView(
+        origin=origin,
+        contents=["/world/**", *more],
+        name=name,
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=eye_m, look_target=target_m, eye_up=up
+        ),
+        background=BACKGROUND,
+        line_grid=False,
     )
 
 

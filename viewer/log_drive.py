@@ -15,7 +15,7 @@ from foretwin.contracts.gap import ALARM_LIMITS_PER_S
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.viewer.log_roles import GHOST, SHADOW, TWIN, RolesLog, box_of, pose_of
 from foretwin.viewer.meshes import Colour
-from foretwin.viewer.rows import Row, static
+from foretwin.viewer.rows import Row, point_at, raised, static
 
 TRAIL: Colour = (126, 132, 144)
 PLAN: Colour = (88, 150, 255)
@@ -48,36 +48,26 @@ def static_rows() -> list[Row]:
     ]
     # Said once for all instants: turned into Rerun's form each time, colours cost most of a row.
     mark, place, fix = (rr.Radius.ui_points(size) for size in (6, 9, 3))
+    trail = rr.Radius.ui_points(2.5)
     rows += [
         static("map/ego", rr.Points3D.from_fields(radii=mark, colors=[TWIN])),
         static("geo/ego/real", rr.GeoPoints.from_fields(radii=place, colors=[TWIN])),
-        static(
-            "geo/ego/trail",
-            rr.GeoLineStrings.from_fields(radii=rr.Radius.ui_points(2.5), colors=[TWIN]),
-        ),
+        static("geo/ego/trail", rr.GeoLineStrings.from_fields(radii=trail, colors=[TWIN])),
         static("geo/gnss", rr.GeoPoints.from_fields(radii=fix, colors=[GHOST])),
         static("world/ego/trail/real", rr.LineStrips3D.from_fields(radii=0.12, colors=[TRAIL])),
         static("world/plan", rr.LineStrips3D.from_fields(radii=0.22, colors=[PLAN])),
     ]
     for quantity in GAP_LIMITS_PER_S:
-        for name, colour, width in (("twin", TWIN, 2.0), ("shadow", SHADOW, 1.5)):
-            rows.append(
-                static(
-                    f"gap/{quantity}/{name}",
-                    rr.SeriesLines(colors=colour, names=name, widths=width),
-                )
-            )
-        count = 1 if quantity == "pos_m" else 2
-        rows.append(
+        names = ["limit"] if quantity == "pos_m" else ["limit", "-limit"]
+        count = len(names)
+        limit = rr.SeriesLines(colors=[LIMIT] * count, names=names, widths=[2.5] * count)
+        rows += [
+            static(f"gap/{quantity}/twin", rr.SeriesLines(colors=TWIN, names="twin", widths=2.0)),
             static(
-                f"gap/{quantity}/limit",
-                rr.SeriesLines(
-                    colors=[LIMIT] * count,
-                    names=["limit"] if count == 1 else ["limit", "-limit"],
-                    widths=[2.5] * count,
-                ),
-            )
-        )
+                f"gap/{quantity}/shadow", rr.SeriesLines(colors=SHADOW, names="shadow", widths=1.5)
+            ),
+            static(f"gap/{quantity}/limit", limit),
+        ]
     return rows
 
 
@@ -125,29 +115,16 @@ class DriveLog:
             Row("world/ego/real", drive_ns, pose_of(here, self._yaw_rad)),
             Row("world/focus", drive_ns, rr.Transform3D(translation=self._look(here, drive_ns))),
             # From straight above, the car itself is a few pixels.
-            Row(
-                "map/ego",
-                drive_ns,
-                rr.Points3D([[float(here[0]), float(here[1]), MARK_HEIGHT_M]]),
-            ),
+            Row("map/ego", drive_ns, rr.Points3D([point_at(here, MARK_HEIGHT_M)])),
             Row("geo/ego/real", drive_ns, rr.GeoPoints(lat_lon=[lat_lon])),
         ]
         if len(self._trail) > 1 and self._due("trail", drive_ns, TRAIL_PERIOD_NS):
-            path = np.array([point for _, point, _ in self._trail])
-            rows.append(
-                Row(
-                    "world/ego/trail/real",
-                    drive_ns,
-                    rr.LineStrips3D([np.column_stack([path, np.full(len(path), 0.1)])]),
-                )
-            )
-            rows.append(
-                Row(
-                    "geo/ego/trail",
-                    drive_ns,
-                    rr.GeoLineStrings(lat_lon=[[place for _, _, place in self._trail]]),
-                )
-            )
+            path = raised(np.array([point for _, point, _ in self._trail]), 0.1)
+            places = [place for _, _, place in self._trail]
+            rows += [
+                Row("world/ego/trail/real", drive_ns, rr.LineStrips3D([path])),
+                Row("geo/ego/trail", drive_ns, rr.GeoLineStrings(lat_lon=[places])),
+            ]
         return rows
 
     def _look(self, here: Array, drive_ns: int) -> list[float]:
@@ -165,7 +142,7 @@ class DriveLog:
             weight = 1.0 - np.exp(-(drive_ns - last_ns) / (FOCUS_TIME_CONSTANT_S * 1e9))
             self._focus = self._focus + weight * (wanted - self._focus)
         self._last_ns["focus"] = drive_ns
-        return [float(self._focus[0]), float(self._focus[1]), 0.0]
+        return point_at(self._focus, 0.0)
 
     def gnss(self, fix: GnssFix, drive_ns: int) -> list[Row]:
         """Return the antenna's raw position on the map."""
@@ -179,8 +156,7 @@ class DriveLog:
         if len(plan.lat_deg) < 2 or not self._due("plan", drive_ns):
             return []
         xy_m = local_from_geo(self._frame, plan.lat_deg, plan.lon_deg)
-        line = np.column_stack([xy_m, np.full(len(xy_m), 0.22)])
-        return [Row("world/plan", drive_ns, rr.LineStrips3D([line]))]
+        return [Row("world/plan", drive_ns, rr.LineStrips3D([raised(xy_m, 0.22)]))]
 
     def mirror(self, sample: MirrorSample, drive_ns: int) -> list[Row]:
         """Return who stands where in which role, and the free twin's gaps to the real car."""

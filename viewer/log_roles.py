@@ -8,7 +8,7 @@ import rerun as rr
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.simulation import MirroredVehicle, MirrorSample, PlaneState, TwinCorrection
 from foretwin.viewer.meshes import Colour
-from foretwin.viewer.rows import Row, path_part, static
+from foretwin.viewer.rows import Row, path_part, point_at, static
 
 REAL: Colour = (245, 246, 250)
 TWIN: Colour = (0, 200, 255)
@@ -35,16 +35,16 @@ _GONE = 1e-3
 """Scale of who is not there: a static box cannot be taken away."""
 
 
-def box_of(who: str, size_m: tuple[float, float, float, float] = CAR_SIZE_M) -> rr.Boxes3D:
+def box_of(role: str, size_m: tuple[float, float, float, float] = CAR_SIZE_M) -> rr.Boxes3D:
     """Return the box of a vehicle in its role, about base_link."""
     length, width, height, overhang = size_m
-    colour, margin_m = CARS[who]
+    colour, margin_m = CARS[role]
     return rr.Boxes3D(
         half_sizes=[[length / 2 + margin_m, width / 2 + margin_m, height / 2 + margin_m]],
         centers=[[length / 2 - overhang, 0.0, height / 2 + 0.05]],
         colors=[colour],
         radii=0.04,
-        fill_mode="solid" if who == "real" else "majorwireframe",
+        fill_mode="solid" if role == "real" else "majorwireframe",
     )
 
 
@@ -62,7 +62,7 @@ def static_rows() -> list[Row]:
 def pose_of(xy_m: Array, yaw_rad: float, *, scale: float | None = None) -> rr.Transform3D:
     """Return a pose on the ground of the drive's frame."""
     return rr.Transform3D(
-        translation=[float(xy_m[0]), float(xy_m[1]), 0.0],
+        translation=point_at(xy_m, 0.0),
         quaternion=rr.Quaternion(xyzw=[0.0, 0.0, np.sin(yaw_rad / 2.0), np.cos(yaw_rad / 2.0)]),
         scale=scale,
     )
@@ -92,15 +92,11 @@ class RolesLog:
     def _own(self, sample: MirrorSample, drive_ns: int) -> list[Row]:
         self._used = self._used or sample.role != "all"
         rows = []
-        for name, car in (
-            ("twin", sample.twin),
-            ("shadow", sample.shadow),
-            ("ghost", sample.ghost),
-        ):
+        for name in ("twin", "shadow", "ghost"):
             scale = None
             if self._used:
                 scale = 1.0 if sample.role in ("all", name) else _GONE
-            rows.append(Row(f"world/ego/{name}", drive_ns, _plane(car, scale)))
+            rows.append(Row(f"world/ego/{name}", drive_ns, _plane(getattr(sample, name), scale)))
         if sample.free is not None:
             if not self._free_shown:
                 rows.append(Row("world/ego/free/box", drive_ns, box_of("free")))

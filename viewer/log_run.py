@@ -7,7 +7,7 @@ import rerun as rr
 
 from foretwin.contracts.simulation import Event, Progress, WorkerStatus
 from foretwin.contracts.world import ATTRIBUTION
-from foretwin.viewer.rows import Row, path_part, plain_text, static
+from foretwin.viewer.rows import Row, document, path_part, plain_text, static
 
 WORKER_COLOURS = {
     "starting": 0x607D8BFF,
@@ -32,11 +32,11 @@ class RunLog:
 
     def static_rows(self) -> list[Row]:
         """Return the status line as it reads before the first progress."""
-        return [static("about", _document(f"{self._title} · {self._source}"))]
+        return [static("about", document(f"{self._title} · {self._source}"))]
 
     def first_status(self) -> Row:
         """Return the status line at drive time 0."""
-        return Row("status", 0, _document(f"**{self._title}** · {self._source}"), True)
+        return Row("status", 0, document(f"**{self._title}** · {self._source}"), True)
 
     def worker(self, status: WorkerStatus, drive_ns: int) -> list[Row]:
         """Return a change of state and the real-time factor."""
@@ -75,14 +75,10 @@ class RunLog:
             f"{plain_text(progress.mission_state)} · {ahead} · "
             f"{short}{progress.futures_per_s:.0f} futures/s · {progress.dropped} dropped"
         )
-        return [Row("status", drive_ns, _document(text))]
+        return [Row("status", drive_ns, document(text))]
 
 
 def rows_of_event(event: Event, drive_ns: int) -> list[Row]:
     """Return one line of the event log."""
     text = f"{plain_text(event.source)}: {plain_text(event.text)}"
     return [Row("events", drive_ns, rr.TextLog(text, level=LEVELS[event.level]))]
-
-
-def _document(text: str) -> rr.TextDocument:
-    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

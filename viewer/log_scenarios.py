@@ -13,7 +13,7 @@ from foretwin.contracts.simulation import HORIZONS_S, Comparison, PlanComparison
 from foretwin.viewer.log_drive import PLAN
 from foretwin.viewer.log_roles import TWIN
 from foretwin.viewer.meshes import Colour
-from foretwin.viewer.rows import Row, static, table_cell
+from foretwin.viewer.rows import Row, document, point_at, raised, static, table_cell
 
 SAFE, WATCH, CRITICAL = (56, 176, 92), (255, 184, 28), (234, 62, 56)
 NOMINAL: Colour = (250, 250, 255)
@@ -59,8 +59,8 @@ def criticality_colours(criticality: Array | Array32) -> npt.NDArray[np.uint8]:
 
 def rows_of_round(view: RoundView, drive_ns: int) -> list[Row]:
     """Return the futures as one entity, their ends, and the table of the worst."""
-    table = rr.TextDocument(scenario_table(view), media_type=rr.MediaType.MARKDOWN)
-    return [*_futures(view, drive_ns), Row("scenarios/table", drive_ns, table)]
+    table = Row("scenarios/table", drive_ns, document(scenario_table(view)))
+    return [*_futures(view, drive_ns), table]
 
 
 def no_futures(drive_ns: int) -> list[Row]:
@@ -87,25 +87,15 @@ def _futures(view: RoundView, drive_ns: int) -> list[Row]:
         heights[view.nominal_index] = 0.5
     strips = np.concatenate(
         [paths, np.broadcast_to(heights[:, None, None], (*paths.shape[:2], 1))], axis=2
-    )[usable]
+    )[usable].astype(np.float32)
+    colours, radii = colours[usable], radii[usable]
+    lines = rr.LineStrips3D(list(strips), colors=colours, radii=radii)
+    # Many futures share one path and differ in speed alone: their ends tell them apart.
+    end_radii = np.where(radii > 0.2, 0.7, 0.45)
+    ends = rr.Points3D(strips[:, -1], colors=colours, radii=end_radii)
     return [
-        Row(
-            "world/futures",
-            drive_ns,
-            rr.LineStrips3D(
-                list(strips.astype(np.float32)), colors=colours[usable], radii=radii[usable]
-            ),
-        ),
-        # Many futures share one path and differ in speed alone: their ends tell them apart.
-        Row(
-            "world/futures/ends",
-            drive_ns,
-            rr.Points3D(
-                strips[:, -1].astype(np.float32),
-                colors=colours[usable],
-                radii=np.where(radii[usable] > 0.2, 0.7, 0.45),
-            ),
-        ),
+        Row("world/futures", drive_ns, lines),
+        Row("world/futures/ends", drive_ns, ends),
         *others,
     ]
 
@@ -113,25 +103,18 @@ def _futures(view: RoundView, drive_ns: int) -> list[Row]:
 def _road_users(view: RoundView, drive_ns: int) -> list[Row]:
     """Return whom the worst futures meet, and where they touch, with the scenarios' names."""
     tracks = view.user_xy_m[np.isfinite(view.user_xy_m).all(axis=(1, 2))]
-    raised = np.concatenate([tracks, np.full((*tracks.shape[:2], 1), 0.35, np.float32)], axis=2)
-    touches = np.column_stack([view.touch_xy_m, np.full(len(view.touch_xy_m), 0.8)])
+    lines = [raised(track, 0.35) for track in tracks]
+    touches = rr.Points3D(
+        raised(view.touch_xy_m, 0.8),
+        colors=[CRITICAL],
+        radii=[0.6],
+        labels=list(view.touch_names),
+        show_labels=False,
+    )
+    users = rr.LineStrips3D(lines, colors=[ROAD_USER], radii=[0.06])
     return [
-        Row(
-            "world/futures/road_users",
-            drive_ns,
-            rr.LineStrips3D(list(raised), colors=[ROAD_USER], radii=[0.06]),
-        ),
-        Row(
-            "world/futures/touches",
-            drive_ns,
-            rr.Points3D(
-                touches.astype(np.float32),
-                colors=[CRITICAL],
-                radii=[0.6],
-                labels=list(view.touch_names),
-                show_labels=False,
-            ),
-        ),
+        Row("world/futures/road_users", drive_ns, users),
+        Row("world/futures/touches", drive_ns, touches),
     ]
 
 
@@ -162,12 +145,9 @@ def scenario_table(view: RoundView) -> str:
 def rows_of_comparison(comparison: Comparison, drive_ns: int) -> list[Row]:
     """Return the mean displacement error of the nominal future and of both baselines."""
     base = f"comparison/ade_m/{comparison.horizon_s:g}"
+    errors = {name: getattr(comparison, name) for name in BASELINES}
     return [
-        Row(f"{base}/nominal", drive_ns, rr.Scalars(comparison.nominal.ade_m)),
-        Row(f"{base}/constant_velocity", drive_ns, rr.Scalars(comparison.constant_velocity.ade_m)),
-        Row(
-            f"{base}/constant_turn_rate", drive_ns, rr.Scalars(comparison.constant_turn_rate.ade_m)
-        ),
+        Row(f"{base}/{name}", drive_ns, rr.Scalars(error.ade_m)) for name, error in errors.items()
     ]
 
 
@@ -184,9 +164,11 @@ def rows_of_disagreement(one: Disagreement, drive_ns: int, frame: LocalFrame) ->
     if one.over:
         return []
     place = local_from_geo(frame, one.position.lat_deg, one.position.lon_deg)
-    at = [float(place[0]), float(place[1]), 2.0]
     mark = rr.Points3D(
-        [at], colors=[CRITICAL], radii=rr.Radius.ui_points(7), labels=[one.kind.replace("_", " ")]
+        [point_at(place, 2.0)],
+        colors=[CRITICAL],
+        radii=rr.Radius.ui_points(7),
+        labels=[one.kind.replace("_", " ")],
     )
     # A place of its own for each: marks stay on the map.
     return [Row(f"world/disagreements/{one.aspect}_{one.stamp_ns}", drive_ns, mark)]

@@ -18,7 +18,7 @@ from foretwin.contracts.tuning import Identification, ParameterChange, Parameter
 from foretwin.viewer.log_drive import LIMIT, PLAN
 from foretwin.viewer.log_roles import REAL, TWIN
 from foretwin.viewer.meshes import Colour
-from foretwin.viewer.rows import Row, plain_text, static, table_cell
+from foretwin.viewer.rows import Row, document, plain_text, static, table_cell
 
 GAPS = {"across_m": 1.0, "along_m": 1.0, "yaw_deg": math.degrees(1.0)}
 _FIELDS = {"across_m": "across_m", "along_m": "along_m", "yaw_deg": "yaw_rad"}
@@ -73,8 +73,8 @@ class TuningLog:
     def opening(self) -> list[Row]:
         """Return the texts before anything is found."""
         return [
-            Row("reality/verdict", 0, _document("no verdict yet"), True),
-            Row("parameters/table", 0, _document("nothing identified yet"), True),
+            Row("reality/verdict", 0, document("no verdict yet"), True),
+            Row("parameters/table", 0, document("nothing identified yet"), True),
         ]
 
     def gap(self, sample: GapSample, drive_ns: int) -> list[Row]:
@@ -108,12 +108,12 @@ class TuningLog:
             for one in verdict.evidence
         ]
         self._verdicts.insert(0, "\n".join(lines))
-        return [Row("reality/verdict", drive_ns, _document("\n\n".join(self._verdicts)))]
+        return [Row("reality/verdict", drive_ns, document("\n\n".join(self._verdicts)))]
 
     def identification(self, told: Identification, drive_ns: int) -> list[Row]:
         """Return the table of parameters, and the curves of those that have a value."""
         self._estimates |= {found.name: found for found in told.estimates}
-        rows = [Row("parameters/table", drive_ns, _document(self._table()))]
+        rows = [Row("parameters/table", drive_ns, document(self._table()))]
         for found in told.estimates:
             if found.name not in PLOTTED:
                 continue
@@ -152,7 +152,3 @@ class TuningLog:
 
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.4g}"
-
-
-def _document(text: str) -> rr.TextDocument:
-    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

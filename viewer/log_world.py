@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import rerun as rr
@@ -10,10 +10,10 @@ import rerun as rr
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local, target_from_source
 from foretwin.contracts.provenance import Provenance
-from foretwin.contracts.world import World
+from foretwin.contracts.world import Area, Building, World
 from foretwin.geometry.polyline import left_of
 from foretwin.viewer.meshes import Colour, Mesh, Polygon, flat_mesh, prism_mesh
-from foretwin.viewer.rows import Row, path_part
+from foretwin.viewer.rows import Row, path_part, raised
 
 GROUND: Colour = (25, 28, 35)
 ROAD: Colour = (58, 61, 68)
@@ -50,29 +50,20 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
     def row(name: str, components: rr.AsComponents) -> Row:
         return Row(f"{base}/{name}", drive_ns, components, lasting=True)
 
+    def flat(name: str, polygons: Sequence[Polygon], height_m: float, colour: Colour) -> list[Row]:
+        if not polygons:
+            return []
+        mesh = flat_mesh(move.polygons(polygons), height_m=height_m, colour=colour)
+        return [row(name, _archetype(mesh))]
+
     round_about = np.linspace(0.0, 2.0 * np.pi, 73)[:-1]
     disc = world.radius_m * np.column_stack([np.cos(round_about), np.sin(round_about)])
-    ground = flat_mesh(move.polygons([Polygon(disc)]), height_m=GROUND_HEIGHT_M, colour=GROUND)
-    rows = [row("ground", _archetype(ground))]
-    surface = [Polygon(area.outline, area.holes) for area in world.road_surface]
     junction = [place.area for place in world.junctions[:1] if place.area is not None]
-    if surface:
-        rows.append(
-            row(
-                "roads/surface",
-                _archetype(flat_mesh(move.polygons(surface), height_m=ROAD_HEIGHT_M, colour=ROAD)),
-            )
-        )
-    if junction:
-        inside = [Polygon(area.outline, area.holes) for area in junction]
-        rows.append(
-            row(
-                "roads/junction",
-                _archetype(
-                    flat_mesh(move.polygons(inside), height_m=JUNCTION_HEIGHT_M, colour=JUNCTION)
-                ),
-            )
-        )
+    rows = [
+        *flat("ground", [Polygon(disc)], GROUND_HEIGHT_M, GROUND),
+        *flat("roads/surface", _polygons(world.road_surface), ROAD_HEIGHT_M, ROAD),
+        *flat("roads/junction", _polygons(junction), JUNCTION_HEIGHT_M, JUNCTION),
+    ]
     edges = [
         offset_left(lane.centerline, side * lane.width_m.value / 2.0)
         for lane in world.lanes
@@ -91,38 +82,30 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
         for crossing in world.crossings
         for stripe in zebra_stripes(crossing.line, width_m=crossing.width_m.value)
     ]
-    if stripes:
-        mesh = flat_mesh(move.polygons(stripes), height_m=PAINT_HEIGHT_M, colour=PAINT)
-        rows.append(row("crossings", _archetype(mesh)))
-    if world.islands:
-        islands = [Polygon(area.outline, area.holes) for area in world.islands]
-        mesh = flat_mesh(move.polygons(islands), height_m=ISLAND_HEIGHT_M, colour=ISLAND)
-        rows.append(row("islands", _archetype(mesh)))
+    rows += flat("crossings", stripes, PAINT_HEIGHT_M, PAINT)
+    rows += flat("islands", _polygons(world.islands), ISLAND_HEIGHT_M, ISLAND)
     if world.signals:
         rows += _signal_rows(world, move, f"{base}/signals", drive_ns)
     if world.buildings:
-        footprints = [Polygon(building.outline, building.holes) for building in world.buildings]
         mesh = prism_mesh(
-            move.polygons(footprints),
+            move.polygons(_polygons(world.buildings)),
             low_m=[building.min_height_m for building in world.buildings],
             high_m=[building.height_m.value for building in world.buildings],
             colours=[BUILDING[building.height_m.source] for building in world.buildings],
         )
         rows.append(row("buildings", _archetype(mesh)))
     if world.lanes:
-        rows.append(
-            Row(
-                f"geo/roads/{path_part(world.id)}",
-                drive_ns,
-                rr.GeoLineStrings(
-                    lat_lon=[geo_from_local(world.frame, lane.centerline) for lane in world.lanes],
-                    radii=rr.Radius.ui_points(1.2),
-                    colors=[[150, 156, 168]] * len(world.lanes),
-                ),
-                lasting=True,
-            )
+        lanes = rr.GeoLineStrings(
+            lat_lon=[geo_from_local(world.frame, lane.centerline) for lane in world.lanes],
+            radii=rr.Radius.ui_points(1.2),
+            colors=[[150, 156, 168]] * len(world.lanes),
         )
+        rows.append(Row(f"geo/roads/{path_part(world.id)}", drive_ns, lanes, lasting=True))
     return rows
+
+
+def _polygons(areas: Iterable[Area | Building]) -> list[Polygon]:
+    return [Polygon(area.outline, area.holes) for area in areas]
 
 
 def world_centre(world: World, *, drive_frame: LocalFrame) -> Array:
@@ -194,7 +177,7 @@ def _archetype(mesh: Mesh) -> rr.Mesh3D:
 
 def _lines(lines: Sequence[Array], colour: Colour, radius_m: float) -> rr.LineStrips3D:
     return rr.LineStrips3D(
-        [np.column_stack([line, np.full(len(line), LINE_HEIGHT_M)]) for line in lines],
+        [raised(line, LINE_HEIGHT_M) for line in lines],
         colors=[colour] * len(lines),
         radii=[radius_m] * len(lines),
     )

@@ -15,34 +15,9 @@ from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.viewer import log_drive, log_roles, log_scenarios, log_tuning
 from foretwin.viewer.log_drive import DriveLog
 from foretwin.viewer.log_run import RunLog, rows_of_event
-from foretwin.viewer.log_scenarios import (
-    no_futures,
-    rows_of_comparison,
-    rows_of_disagreement,
-    rows_of_plan_comparison,
-    rows_of_round,
-)
 from foretwin.viewer.log_tuning import TuningLog
 from foretwin.viewer.log_world import rows_of_world, world_centre
 from foretwin.viewer.rows import Row
-
-VEHICLE_CHANNELS = ("state", "gnss", "plan", "end")
-RUN_CHANNELS = (
-    "round",
-    "comparison",
-    "plan_comparison",
-    "disagreement",
-    "mirror",
-    "active_world",
-    "world",
-    "worker_status",
-    "progress",
-    "event",
-    "gap",
-    "verdict",
-    "identification",
-    "parameter",
-)
 
 _log = logging.getLogger(__name__)
 
@@ -87,10 +62,12 @@ class Monitor:
             "gnss": self._drive.gnss,
             "plan": self._drive.plan,
             "end": lambda end, ns: self._say("info", f"vehicle: {end.reason}", ns),
-            "round": rows_of_round,
-            "comparison": rows_of_comparison,
-            "plan_comparison": rows_of_plan_comparison,
-            "disagreement": lambda one, ns: rows_of_disagreement(one, ns, self._frame),
+            "round": log_scenarios.rows_of_round,
+            "comparison": log_scenarios.rows_of_comparison,
+            "plan_comparison": log_scenarios.rows_of_plan_comparison,
+            "disagreement": lambda one, ns: log_scenarios.rows_of_disagreement(
+                one, ns, self._frame
+            ),
             "mirror": self._drive.mirror,
             "active_world": self._active_world,
             "world": self._world,
@@ -102,6 +79,11 @@ class Monitor:
             "identification": self._tuning.identification,
             "parameter": self._tuning.parameter,
         }
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels whose messages can be shown."""
+        return tuple(self._handlers)
 
     def opening(self) -> list[Row]:
         """Return the rows that come before every message."""
@@ -159,7 +141,7 @@ class Monitor:
     def _active_world(self, active: ActiveWorld, drive_ns: int) -> list[Row]:
         if active.world_id is None:
             self._drive.look_at(None)
-            return no_futures(drive_ns)
+            return log_scenarios.no_futures(drive_ns)
         rows = self._show_world(active.world_id, drive_ns)
         self._drive.look_at(self._centres.get(active.world_id))
         return rows

@@ -14,13 +14,8 @@ import numpy as np
 from rerun.experimental import ViewerClient
 
 from foretwin.contracts.ports import free_port
-from foretwin.viewer.blueprint import (
-    DETAIL_VIEWS,
-    MAIN_VIEWS,
-    DetailView,
-    MainView,
-    drive_blueprint,
-)
+from foretwin.viewer import blueprint
+from foretwin.viewer.blueprint import DetailView, MainView
 from foretwin.viewer.live_viewer import (
     NoViewerError,
     address,
@@ -67,14 +62,11 @@ def take_picture(
     with tempfile.TemporaryDirectory(prefix="foretwin-") as folder:
         # The viewer renames what it opens, so a layout sent apart would never meet it.
         copy = Path(folder) / "recording.rrd"
-        copy_with_blueprint(recording, copy, drive_blueprint(main=main, detail=detail))
+        copy_with_blueprint(recording, copy, blueprint.drive_blueprint(main=main, detail=detail))
         port = free_port()
+        window = f"{size[0]}x{size[1]}"
         program = start_program(
-            "--headless",
-            "--hide-welcome-screen",
-            "--window-size",
-            f"{size[0]}x{size[1]}",
-            port=port,
+            "--headless", "--hide-welcome-screen", "--window-size", window, port=port
         )
         try:
             wait_until_it_answers(program, port)
@@ -83,19 +75,6 @@ def take_picture(
             return _settled(client, at_s)
         finally:
             _end(program)
-
-
-def render_recording(
-    recording: Path,
-    out: Path,
-    *,
-    at_s: float | None = None,
-    main: MainView = "Intersection",
-    detail: DetailView = "Comparison",
-    size: tuple[int, int] = SIZE,
-) -> None:
-    """Write the window of `take_picture` to `out` as PNG."""
-    out.write_bytes(take_picture(recording, at_s=at_s, main=main, detail=detail, size=size).window)
 
 
 def _settled(client: ViewerClient, at_s: float | None) -> Picture:
@@ -150,20 +129,20 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("recording", type=Path, metavar="RRD")
     parser.add_argument("out", type=Path, metavar="OUT.png")
     parser.add_argument("--at", type=float, metavar="S", help="drive time; default: the end")
-    parser.add_argument("--main", choices=MAIN_VIEWS, default="Intersection")
-    parser.add_argument("--detail", choices=DETAIL_VIEWS, default="Comparison")
+    parser.add_argument("--main", choices=blueprint.MAIN_VIEWS, default="Intersection")
+    parser.add_argument("--detail", choices=blueprint.DETAIL_VIEWS, default="Comparison")
     parser.add_argument("--size", metavar="WxH", default=f"{SIZE[0]}x{SIZE[1]}")
     given = parser.parse_args(arguments)
     try:
         width, height = (int(part) for part in given.size.split("x"))
-        render_recording(
+        picture = take_picture(
             given.recording,
-            given.out,
             at_s=given.at,
             main=given.main,
             detail=given.detail,
             size=(width, height),
         )
+        given.out.write_bytes(picture.window)
     except (OSError, ValueError) as problem:
         print(f"foretwin.viewer.picture: {problem}", file=sys.stderr)
         return 2

@@ -5,7 +5,10 @@ from __future__ import annotations
 import unicodedata
 from typing import NamedTuple
 
+import numpy as np
 import rerun as rr
+
+from foretwin.contracts.arrays import Array, Array32
 
 APPLICATION_ID = "foretwin"
 TIMELINE = "drive_time"
@@ -32,6 +35,21 @@ class Row(NamedTuple):
 def static(path: str, components: rr.AsComponents) -> Row:
     """Return a row that holds at all times."""
     return Row(path, None, components, lasting=True)
+
+
+def document(text: str) -> rr.TextDocument:
+    """Return a text in Markdown."""
+    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
+
+
+def point_at(xy_m: Array, z_m: float) -> list[float]:
+    """Return a point of the drive's frame at a height."""
+    return [float(xy_m[0]), float(xy_m[1]), z_m]
+
+
+def raised(line_m: Array | Array32, z_m: float) -> Array:
+    """Return a line (N, 2) at a height, (N, 3)."""
+    return np.column_stack([line_m, np.full(len(line_m), z_m)])
 
 
 def plain_text(text: str) -> str:

@@ -66,7 +66,7 @@ def build_region(
     """Build one World of all that lies within `bounds`, in a frame about their middle.
 
     Every junction whose roads all reach into the bounds gets the same treatment as the one
-    that `build_world` is asked for. Pass an `index` made with all junctions of the map; for
+    that `build_world` is made for. Pass an `index` made with all junctions of the map; for
     `ground` see there. Raises `MapError` where the bounds hold no road for cars.
     """
     index = index or index_map(osm, graph, find_intersections(osm, graph))
@@ -81,10 +81,8 @@ def build_region(
 def _rectangle(bounds: LatLonBounds, frame: LocalFrame) -> Rectangle:
     """Return the largest rectangle of the frame within bounds in degrees."""
     south, north, west, east = bounds.south, bounds.north, bounds.west, bounds.east
-    corners = local_from_geo(
-        frame, np.array([south, south, north, north]), np.array([west, east, west, east])
-    )
-    (sw, se, nw, ne) = np.round(corners, 3).tolist()
+    lat, lon = np.array([south, south, north, north]), np.array([west, east, west, east])
+    sw, se, nw, ne = np.round(local_from_geo(frame, lat, lon), 3).tolist()
     return Rectangle(max(sw[0], nw[0]), max(sw[1], se[1]), min(se[0], ne[0]), min(nw[1], ne[1]))
 
 
@@ -199,8 +197,8 @@ def _arms(junction: Junction, around: Surroundings) -> tuple[Arm, ...]:
         for leg in arm.outward:
             section = around.sections.get(leg.edge.index)
             if section is not None:
-                lanes_out += len(section.driven(reverse=leg.reverse))
-                lanes_in += len(section.driven(reverse=not leg.reverse))
+                lanes_out += len(section.along(reverse=leg.reverse).driven)
+                lanes_in += len(section.along(reverse=not leg.reverse).driven)
         arms.append(
             Arm(
                 id=f"a{i}",

@@ -12,9 +12,8 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
-from foretwin.geometry.polyline import arc_lengths, points_at
+from foretwin.geometry.polyline import Flags, arc_lengths, points_at
 
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 MIN_PIECE_M = 0.5
 """Shorter pieces of road at the World's edge are left out."""
 
@@ -26,7 +25,7 @@ class Disc(msgspec.Struct, frozen=True, dict=True):
 
     @property
     def bounds_m(self) -> tuple[float, float, float, float] | None:
-        """None: a disc is told by its radius alone."""
+        """None: a disc has its radius alone."""
         return None
 
     @cached_property
@@ -65,12 +64,11 @@ class Rectangle(msgspec.Struct, frozen=True):
     @property
     def radius_m(self) -> float:
         """Distance of the farthest corner from the origin."""
-        return math.hypot(
-            max(abs(self.west_m), abs(self.east_m)), max(abs(self.south_m), abs(self.north_m))
-        )
+        west_m, south_m, east_m, north_m = map(abs, self.bounds_m)
+        return math.hypot(max(west_m, east_m), max(south_m, north_m))
 
     @property
-    def bounds_m(self) -> tuple[float, float, float, float] | None:
+    def bounds_m(self) -> tuple[float, float, float, float]:
         """West, south, east and north."""
         return (self.west_m, self.south_m, self.east_m, self.north_m)
 
@@ -81,22 +79,15 @@ class Rectangle(msgspec.Struct, frozen=True):
 
     def holds(self, xy_m: Array) -> Flags:
         """Return for points (N, 2) whether they lie inside, as (N,) of bool."""
-        x, y = xy_m[:, 0], xy_m[:, 1]
-        inside: Flags = (
-            (x >= self.west_m) & (x <= self.east_m) & (y >= self.south_m) & (y <= self.north_m)
-        )
-        return inside
+        west_m, south_m, east_m, north_m = self.bounds_m
+        low, high = xy_m >= (west_m, south_m), xy_m <= (east_m, north_m)
+        return np.asarray((low & high).all(axis=1))
 
     def crossings(self, xy_m: Array) -> list[float]:
         """Return arc lengths at which a polyline (N, 2) meets the lines of the edge."""
         s = arc_lengths(xy_m)
         found: list[float] = []
-        for axis, level in (
-            (0, self.west_m),
-            (0, self.east_m),
-            (1, self.south_m),
-            (1, self.north_m),
-        ):
+        for axis, level in zip((0, 1, 0, 1), self.bounds_m, strict=True):
             gap = xy_m[:, axis] - level
             for i in np.nonzero(gap[:-1] * gap[1:] < 0.0)[0]:
                 share = gap[i] / (gap[i] - gap[i + 1])

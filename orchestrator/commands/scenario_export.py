@@ -11,7 +11,7 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import World
 from foretwin.orchestrator.commands.scenarios import RADIUS_M, PlacesAsked, asked_junctions
 from foretwin.sim_worker.planners.registry import check_planner
-from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import write_openscenario
 from foretwin.sim_worker.scenarios.placement import places
@@ -35,7 +35,7 @@ class PlacedCase(NamedTuple):
 
     scenario: Scenario
     world: World
-    played: Cast
+    played: StagedCase
 
 
 def export_scenario(request: CaseRequest, out: Path) -> None:
@@ -98,7 +98,7 @@ def placed_case(request: CaseRequest) -> PlacedCase:
     reasons = [unplaced.reason for unplaced in result.unplaced]
     for place in result.places:
         played = cast(scenario, cases[request.case - 1], place, vehicle=vehicle)
-        if isinstance(played, Cast):
+        if isinstance(played, StagedCase):
             return PlacedCase(scenario, world, played)
         reasons.append(played.reason)
     where = junctions[0].summary

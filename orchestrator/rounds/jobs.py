@@ -24,7 +24,7 @@ from foretwin.orchestrator.rounds.seen_users import near_car
 from foretwin.orchestrator.routing.route_ahead import PATH_BEHIND_M
 from foretwin.sim_worker.futures.future_mix import cases_of, plan_futures
 from foretwin.sim_worker.metrics.table import ROW_METRICS
-from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.live import KnownScenarios
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.world_gen.rules.signal_state import LIVE_FOR_S
@@ -67,7 +67,7 @@ class RoundPlanner:
         self._config = config
         self.use_vehicle(vehicle, 0)
         self._scenarios = scenarios_of(config)
-        self._known: dict[str, LiveScenarios] = {}
+        self._known: dict[str, KnownScenarios] = {}
         self._futures: dict[tuple[str, ...], tuple[Future, ...]] = {}
 
     def use_vehicle(self, vehicle: VehicleParameters, version: int) -> None:
@@ -154,7 +154,7 @@ class RoundPlanner:
         if world.id not in self._known:
             while len(self._known) >= _KEPT_WORLDS:
                 del self._known[next(iter(self._known))]
-            self._known[world.id] = LiveScenarios(RoadNetwork(world))
+            self._known[world.id] = KnownScenarios(RoadNetwork(world))
         known = self._known[world.id]
         on = known.on(FrenetPath(path.xy_m), PATH_BEHIND_M, self._vehicle)
         passage = on.passage

@@ -165,7 +165,7 @@ def _lane_offset(graph: RoadGraph, route: Route, number: int) -> float:
     used = msgspec.structs.replace(
         edge, forward=edge.forward or not reverse, backward=edge.backward or reverse
     )
-    driven = cross_section(used, graph.driving_side).driven(reverse=reverse)
+    driven = cross_section(used, graph.driving_side).along(reverse=reverse).driven
     own = [lane for lane in driven if lane.kind == "driving"] or driven
     turn = _next_turn(route, number)
     if turn == 0.0:

@@ -142,7 +142,7 @@ def _straight(route: Route, place: int, s_m: float) -> float | None:
 def _side_of(graph: RoadGraph, directed: DirectedEdge) -> _LateralPosition:
     """Return the middle of the lanes driven this way, any of which the car may be in."""
     section = cross_section(directed.edge, graph.driving_side)
-    lanes = section.abreast(reverse=directed.reverse)
+    lanes = section.along(reverse=directed.reverse).abreast
     lefts = np.array([lane.left_m for lane in lanes]) if lanes else np.zeros(1)
     if directed.reverse:
         lefts = -lefts

@@ -131,7 +131,7 @@ def _states(
         state = estimator.handle(channel, message)
         if state is not None:
             states.append(state)
-    return states, log_of_detections(seen, recorded.declared, longest_gap_s=longest_gap_s)
+    return states, log_of_detections(seen, longest_gap_s=longest_gap_s)
 
 
 def _line(states: list[VehicleState], stamps: list[int], place: int) -> Array | None:

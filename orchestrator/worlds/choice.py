@@ -81,7 +81,7 @@ class AlongRoute(NamedTuple):
 def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> AlongRoute:
     """Return the junctions along a route's line; the service roads that it uses count there."""
     from foretwin.orchestrator.routing.line_matching import match_line
-    from foretwin.world_gen.junctions.route_junctions import junctions_on_route
+    from foretwin.world_gen.junctions.intersections import junctions_on_route
     from foretwin.world_gen.roads.service_roads import open_service_roads
 
     matched = match_line(opened.graph, line_deg, name=f"--route {route}")

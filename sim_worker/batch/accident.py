@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
@@ -26,8 +25,8 @@ from foretwin.sim_worker.batch.accident_bodies import (
     accident_bodies,
     ground_forces,
 )
-from foretwin.sim_worker.batch.accident_model import AccidentBatch, Crush, Impact
-from foretwin.sim_worker.batch.collision_detection import Indices, Touches
+from foretwin.sim_worker.batch.accident_model import AccidentBatch, ContactLaw, Crush
+from foretwin.sim_worker.batch.collision_detection import Touches
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 
 _STIFF, _STIFF_LOOK_S = Crush(400.0, 0.0005), 0.01
@@ -68,7 +67,7 @@ class Accidents(NamedTuple):
     ego_states: Array
     user_poses: Array
     user_velocities: Array
-    valid: npt.NDArray[np.bool_]
+    valid: Flags
 
 
 def run_accidents(
@@ -77,19 +76,17 @@ def run_accidents(
     *,
     kinds: Sequence[RoadUserKind],
     friction_factor: Array | float = 1.0,
-    user_decel_mps2: Array | float = 0.0,
-    impact: Impact | None = None,
+    impact: ContactLaw | None = None,
     ground: bool = True,
     duration_s: float = ACCIDENT_S,
     step_s: float = 0.05,
-    threads: int = 1,
 ) -> Accidents:
     """Run each of A touches on for `duration_s` with both bodies moving freely.
 
-    `kinds` of the road users touched, one for each; `friction_factor` of the ground and
-    `user_decel_mps2` at which those with wheels brake, one for all or (A,). Results are `step_s`
-    apart. Without `ground` nothing but the impact acts. Raises ValueError where the numbers of
-    touches and kinds differ, or where `duration_s` is no multiple of `step_s`.
+    `kinds` of the road users touched, one for each, of whom none brakes; `friction_factor` of the
+    ground, one for all or (A,). Results are `step_s` apart. Without `ground` nothing but the impact
+    acts. Raises ValueError where the numbers of touches and kinds differ, or where `duration_s` is
+    no multiple of `step_s`.
     """
     count = len(touches.time_s)
     if len(kinds) != count:
@@ -97,25 +94,18 @@ def run_accidents(
     steps = duration_s / step_s
     if steps < 1.0 - 1e-9 or abs(steps - round(steps)) > 1e-6:
         raise ValueError(f"duration_s {duration_s:g} must be a multiple of step_s {step_s:g}")
-    bodies = accident_bodies(
-        vehicle,
-        touches,
-        kinds=kinds,
-        friction_factor=np.broadcast_to(friction_factor, count),
-        user_decel_mps2=np.broadcast_to(user_decel_mps2, count),
-    )
+    friction = np.broadcast_to(friction_factor, count)
+    bodies = accident_bodies(vehicle, touches, kinds=kinds, friction_factor=friction)
     poses, velocities = _start(vehicle, touches)
     apart = np.flatnonzero(~touches.from_start)
-    bodies = bodies.only(apart)
     tracks = _run(
-        bodies,
+        bodies.only(apart),
         poses[:, apart],
         velocities[:, apart],
-        impact=Impact() if impact is None else impact,
+        impact=impact or ContactLaw(),
         ground=ground,
         steps=round(steps),
         step_s=step_s,
-        threads=threads,
     )
     return _results(vehicle, touches, apart, tracks, velocities, step_s)
 
@@ -133,18 +123,17 @@ def _run(
     poses: Array,
     velocities: Array,
     *,
-    impact: Impact,
+    impact: ContactLaw,
     ground: bool,
     steps: int,
     step_s: float,
-    threads: int,
 ) -> _Tracks:
     count = poses.shape[1]
     track = np.empty((2, steps + 1, 2, count, 3))
     impulse = np.zeros((2, count, 3))
     if not count:
         return _Tracks(track[0], track[1], impulse[..., :2])
-    batch = AccidentBatch(bodies, impact, threads=threads)
+    batch = AccidentBatch(bodies, impact)
     batch.place(poses, velocities)
     track[0, 0], track[1, 0] = poses, velocities
     if not ground:
@@ -175,7 +164,7 @@ def _ground(bodies: Bodies, batch: AccidentBatch) -> GroundForces:
     return ground_forces(bodies, np.stack([ahead, aside], axis=-1))
 
 
-def _may_touch(bodies: Bodies, batch: AccidentBatch, *, within_s: float) -> npt.NDArray[np.bool_]:
+def _may_touch(bodies: Bodies, batch: AccidentBatch, *, within_s: float) -> Flags:
     """(A,) bool: whether the two cannot be ruled out to meet before the next look."""
     poses, velocities = batch.poses, batch.velocities
     yaw = poses[..., 2]

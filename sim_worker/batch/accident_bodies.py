@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.collision_detection import Touches
@@ -63,11 +62,11 @@ class Bodies(NamedTuple):
     stiffness_npr: Array
     load_n: Array
     friction: Array
-    slides: npt.NDArray[np.bool_]
+    slides: Flags
     brake_n: Array
     tire_angle_rad: Array
 
-    def only(self, accidents: npt.NDArray[np.intp]) -> Bodies:
+    def only(self, accidents: Indices) -> Bodies:
         """Return those of some accidents."""
         return Bodies._make(part[..., accidents] for part in self)
 
@@ -78,7 +77,6 @@ def accident_bodies(
     *,
     kinds: Sequence[RoadUserKind],
     friction_factor: Array,
-    user_decel_mps2: Array,
 ) -> Bodies:
     """Describe the ego and its partner in each of A touches.
 
@@ -94,37 +92,29 @@ def accident_bodies(
     grip = np.where(slides, sliding, grip) * friction_factor
     rear = vehicle.cog_from_rear_axle_m.value
     front = vehicle.wheelbase_m.value - rear
-    own_mass = vehicle.mass_kg.value
     own_friction = vehicle.friction.value * friction_factor
-    decel = np.maximum(-touches.ego_states[:, 7], 0.0)
-    axles = np.stack(
-        [
-            [np.full(count, front), _AXLE_SHARE * length],
-            [np.full(count, rear), _AXLE_SHARE * length],
-        ]
-    )
-    masses = np.stack([np.full(count, own_mass), mass])
+    decel = np.stack([np.maximum(-touches.ego_states[:, 7], 0.0), np.zeros(count)])
+    axle = _AXLE_SHARE * length
+
+    def both(own: float, others: Array) -> Array:
+        return np.stack([np.full(count, own), others])
+
+    axles = np.stack([both(front, axle), both(rear, axle)])
+    masses = both(vehicle.mass_kg.value, mass)
     loads = masses * GRAVITY_MPS2 * axles[::-1] / axles.sum(axis=0)
     stiffness = _STIFFNESS_PRAD * loads
     stiffness[0, 0] = vehicle.front_cornering_stiffness_npr.value
     stiffness[1, 0] = vehicle.rear_cornering_stiffness_npr.value
     friction = np.stack([own_friction, grip])
-    brake = masses * np.minimum(
-        np.stack([decel, user_decel_mps2]), _BRAKED_SHARE * friction * GRAVITY_MPS2
-    )
+    brake = masses * np.minimum(decel, _BRAKED_SHARE * friction * GRAVITY_MPS2)
     return Bodies(
         mass_kg=masses,
-        yaw_inertia_kgm2=np.stack(
-            [
-                np.full(count, vehicle.yaw_inertia_kgm2.value),
-                mass * (np.square(length) + np.square(width)) / 12.0,
-            ]
+        yaw_inertia_kgm2=both(
+            vehicle.yaw_inertia_kgm2.value, mass * (np.square(length) + np.square(width)) / 12.0
         ),
-        length_m=np.stack([np.full(count, vehicle.length_m.value), length]),
-        width_m=np.stack([np.full(count, vehicle.width_m.value), width]),
-        box_ahead_m=np.stack(
-            [np.full(count, box_centre_from_base_m(vehicle) - rear), np.zeros(count)]
-        ),
+        length_m=both(vehicle.length_m.value, length),
+        width_m=both(vehicle.width_m.value, width),
+        box_ahead_m=both(box_centre_from_base_m(vehicle) - rear, np.zeros(count)),
         front_m=axles[0],
         rear_m=axles[1],
         stiffness_npr=stiffness,

@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.sim_worker.batch.accident_bodies import Bodies, GroundForces
 from foretwin.sim_worker.vehicle.planar import set_physics_options
 
@@ -29,7 +28,7 @@ _OFF_CENTRE = 0.1
 """Where the compiled model has a position of 0, it would never look at those of a simulation."""
 
 
-class Impact(NamedTuple):
+class ContactLaw(NamedTuple):
     """How two road users bounce off and rub each other.
 
     `restitution`: separating over closing speed along the normal. Brach and Brach, Vehicle
@@ -82,10 +81,10 @@ def _rebound(damping: float, crush: Crush) -> float:
 class AccidentBatch:
     """A simulations of two bodies each; belongs to one thread."""
 
-    def __init__(self, bodies: Bodies, impact: Impact, *, threads: int) -> None:
+    def __init__(self, bodies: Bodies, impact: ContactLaw) -> None:
         self.count = bodies.mass_kg.shape[1]
         self._impact = impact
-        self._batch = mujoco_batch.Batch(_model(), self.count, nthread=threads, persistent=True)
+        self._batch = mujoco_batch.Batch(_model(), self.count, nthread=1, persistent=True)
         self._fill(bodies)
         self._qpos = self._batch.bind("qpos").reshape(self.count, 2, 3)
         self._qvel = self._batch.bind("qvel").reshape(self.count, 2, 3)
@@ -150,9 +149,7 @@ class AccidentBatch:
         limits = np.maximum(forces.limit_n.transpose(2, 1, 0), _TINY_N)
         self._range[..., 0], self._range[..., 1] = -limits, limits
 
-    def advance(
-        self, which: npt.NDArray[np.bool_], duration_s: float, longest_step_s: float
-    ) -> Array:
+    def advance(self, which: Flags, duration_s: float, longest_step_s: float) -> Array:
         """Step the simulations `which` (A,); return (2, N, 3) impulses of their contact.
 
         Force times time on either body in the frame of the poses, and its moment about the centre

@@ -6,9 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.sim_worker.batch.model import PREFIX, change_vehicle, compile_stage, world_spec
@@ -121,7 +120,7 @@ class Stage:
         steering_delay_s: Array,
         friction_factor: Array,
         steering_history_rad: Array | None = None,
-        backwards: npt.NDArray[np.bool_] | None = None,
+        backwards: Flags | None = None,
     ) -> None:
         """Start S futures from base_link `states` (S, 8) in the World's frame.
 
@@ -173,7 +172,7 @@ class Stage:
 
     def reseed(
         self,
-        rows: npt.NDArray[np.intp],
+        rows: Indices,
         states: Array,
         *,
         steering_delay_s: Array,
@@ -191,7 +190,7 @@ class Stage:
         self._actuation.restart(rows, friction=friction, accel_mps2=start[:, 7])
         self.static_contact[rows] = False
 
-    def _place(self, rows: slice | npt.NDArray[np.intp], states: Array) -> Array:
+    def _place(self, rows: slice | Indices, states: Array) -> Array:
         """Put vehicles where their states are, and return these, within limits."""
         limit = self.vehicle.max_tire_angle_rad.value
         start = np.array(states, dtype=np.float64)
@@ -231,7 +230,7 @@ class Stage:
         if len(far):
             self._physics.advance(per_step[far], far)
 
-    def _near_statics_of(self, columns: Array) -> npt.NDArray[np.bool_]:
+    def _near_statics_of(self, columns: Array) -> Flags:
         """(S,) bool: whether a contact during the coming tick cannot be ruled out.
 
         `columns` (8, S) are those of the states.
@@ -254,7 +253,7 @@ class Stage:
         """(2, S) cosine and sine of their yaw; live as well."""
         return self._heading
 
-    def diverged(self) -> npt.NDArray[np.bool_]:
+    def diverged(self) -> Flags:
         """(S,) bool: whether a simulation's state is not finite or beyond all bounds."""
         return np.asarray(~(np.abs(self._live.T) < _SANE).all(axis=0))
 

@@ -10,9 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.rectangles import (
@@ -24,8 +23,6 @@ from foretwin.geometry.rectangles import (
 )
 from foretwin.sim_worker.driver_model import MAX_CLOSING_MPS
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
-
-Indices = npt.NDArray[np.intp]
 
 _SEARCH_STEP_S = 0.01
 _PRECISION_S = 1e-5
@@ -54,7 +51,7 @@ class Touches(NamedTuple):
     user_size_m: Array
     point_m: Array
     normal: Array
-    from_start: npt.NDArray[np.bool_]
+    from_start: Flags
 
 
 _NOBODY = Touches(
@@ -82,9 +79,7 @@ def first_touches(
     """
     if not users.shape[2]:
         return _NOBODY
-    near = _near(vehicle, states, users, user_size_m, tick_s=tick_s)
-    motion = _Motion(vehicle, states, users, user_size_m, *near)
-    motion = motion.only(motion.may_touch())
+    motion = _may_touch(vehicle, states, users, user_size_m, tick_s=tick_s)
     steps = _steps(tick_s)
     if not len(motion.future):
         return _describe(motion, np.zeros(0), 1.0 / steps, tick_s)
@@ -105,19 +100,31 @@ def first_touches(
 
 def touched(
     vehicle: VehicleParameters, states: Array, users: Array, user_size_m: Array, *, tick_s: float
-) -> npt.NDArray[np.bool_]:
+) -> Flags:
     """Return which of S futures `first_touches` finds a touch in: (S,) bool, without details."""
-    motion = _Motion(
-        vehicle, states, users, user_size_m,
-        *_near(vehicle, states, users, user_size_m, tick_s=tick_s),
-    )  # fmt: skip
+    motion = _may_touch(vehicle, states, users, user_size_m, tick_s=tick_s)
     found = np.zeros(len(states), dtype=bool)
-    if len(motion.future):
-        motion = motion.only(motion.may_touch())
     if len(motion.future):
         share = np.arange(_steps(tick_s) + 1.0) / _steps(tick_s)
         found[motion.future[motion.overlapping(share[:, None]).any(axis=0)]] = True
     return found
+
+
+def _may_touch(
+    vehicle: VehicleParameters, states: Array, users: Array, user_size_m: Array, *, tick_s: float
+) -> _Motion:
+    """Return the pairs that are not farther apart than they can move towards each other."""
+    near = _near(vehicle, states, users, user_size_m, tick_s=tick_s)
+    motion = _Motion(vehicle, states, users, user_size_m, *near)
+    if not len(motion.future):
+        return motion
+    gap = separations(*motion.rectangles(np.zeros(1))).max(axis=0)
+    reach = math.hypot(vehicle.length_m.value, vehicle.width_m.value)
+    travel = np.hypot(motion.state_change[:, 0], motion.state_change[:, 1])
+    travel += reach * np.abs(motion.state_change[:, 2])
+    travel += np.hypot(motion.pose_change[:, 0], motion.pose_change[:, 1])
+    travel += motion.size_m.max(axis=1, initial=0.0) * np.abs(motion.pose_change[:, 2])
+    return motion.only(np.flatnonzero(gap <= travel))
 
 
 def _steps(tick_s: float) -> int:
@@ -168,19 +175,8 @@ class _Motion:
             Rectangles(pose[..., :2], pose[..., 2], self.size_m[:, 0], self.size_m[:, 1]),
         )
 
-    def overlapping(self, share: Array) -> npt.NDArray[np.bool_]:
+    def overlapping(self, share: Array) -> Flags:
         return overlapping(*self.rectangles(share))
-
-    def may_touch(self) -> Indices:
-        """Return the pairs that are not farther apart than they can move towards each other."""
-        gap = separations(*self.rectangles(np.zeros(1))).max(axis=0)
-        vehicle = self.vehicle
-        reach = math.hypot(vehicle.length_m.value, vehicle.width_m.value)
-        travel = np.hypot(self.state_change[:, 0], self.state_change[:, 1])
-        travel += reach * np.abs(self.state_change[:, 2])
-        travel += np.hypot(self.pose_change[:, 0], self.pose_change[:, 1])
-        travel += self.size_m.max(axis=1, initial=0.0) * np.abs(self.pose_change[:, 2])
-        return np.flatnonzero(gap <= travel)
 
 
 def ego_rectangles(vehicle: VehicleParameters, states: Array) -> Rectangles:

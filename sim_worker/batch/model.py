@@ -66,10 +66,9 @@ def compile_stage(spec: mujoco.MjSpec, vehicle: VehicleParameters) -> mujoco.MjM
 
 _OF_BODIES = ("body_mass", "body_inertia", "body_pos", "body_ipos", "body_iquat")
 _OF_GEOMS = ("geom_size", "geom_pos", "geom_aabb", "geom_rbound")
-_OF_ACTUATORS = (
-    "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange", "actuator_forcerange",
-    "actuator_delay",
-)  # fmt: skip
+_OF_ACTUATORS = tuple(
+    f"actuator_{name}" for name in ("gainprm", "biasprm", "ctrlrange", "forcerange", "delay")
+)
 
 
 def change_vehicle(

@@ -10,13 +10,10 @@ import math
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import shapely
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.world_gen.export.mjcf import VEHICLE
-
-Flags = npt.NDArray[np.bool_]
 
 _CELL_M = 1.0
 _CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(8, 3)

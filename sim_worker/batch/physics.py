@@ -10,15 +10,11 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.model import STATIC_CONTACT, compile_open
-
-Flags = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.intp]
 
 _EXPANDED = ("actuator_delay", "actuator_biasprm", "actuator_forcerange")
 
@@ -45,14 +41,14 @@ class Physics:
         self._sensor = int(model.sensor(STATIC_CONTACT).adr[0])
         self._control_spec = int(mujoco.mjtState.mjSTATE_CTRL)
 
-    def reset(self, rows: Rows) -> None:
+    def reset(self, rows: Indices) -> None:
         """Forget all that cars did before."""
         self._open.reset(ids=rows, stage=mujoco.mjtStage.mjSTAGE_NONE)
         if self._been_among[rows].any():
             self._among.reset(ids=rows, stage=mujoco.mjtStage.mjSTAGE_NONE)
             self._been_among[rows] = False
 
-    def advance(self, controls: Array, rows: Rows | None) -> None:
+    def advance(self, controls: Array, rows: Indices | None) -> None:
         """Step the cars `rows` (K,), or all, in the open; `controls` are (K, steps, nu)."""
         self._open.rollout(
             controls.shape[1],
@@ -62,7 +58,7 @@ class Physics:
             ids=rows,
         )
 
-    def advance_among(self, controls: Array, rows: Rows) -> Flags:
+    def advance_among(self, controls: Array, rows: Indices) -> Flags:
         """Step the cars `rows` (K,) among all that stands around; return (K,) who touched it."""
         self._been_among[rows] = True
         self._among.state[rows] = self._open.state[rows]

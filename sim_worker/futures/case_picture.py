@@ -23,8 +23,8 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import offset
 from foretwin.geometry.rectangles import Rectangles, corners
-from foretwin.sim_worker.futures.case_picture_runs import Run
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.futures.case_picture_runs import Run, box_at
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.world_gen.export.picture_ground import draw_ground
 from foretwin.world_gen.export.picture_marks import scale_bar
 from foretwin.world_gen.export.picture_style import LANE_EDGE, LINE_COLOUR, View, view_around
@@ -36,7 +36,7 @@ _GHOST_EVERY_S = 1.0
 
 def draw_case(
     axes: Axes,
-    played: Cast,
+    played: StagedCase,
     world: World,
     heedless: Run,
     planned: Run | None,
@@ -51,52 +51,72 @@ def draw_case(
     view = view or _view(heedless, planned, aspect)
     draw_ground(axes, world, view)
     draw_lanes(axes, world, view)
-    _draw_paths(axes, played, heedless)
-    runs = ((heedless, EGO), *(((planned, PLANNED),) if planned is not None else ()))
-    for run, colour in runs:
-        axes.plot(*run.ego.centre_m.T, color=colour, linewidth=1.6, zorder=12.0)
-        draw_box(
-            axes, run.ego_at(0), facecolor="none", edgecolor=colour, linewidth=1.1, zorder=12.1
-        )
-        draw_box(axes, run.ego_at(run.moment), facecolor=colour, edgecolor="black", linewidth=0.7,
-             alpha=0.85, zorder=13.0 if run is heedless else 12.8)  # fmt: skip
-    for instant in _ghosts(heedless):
-        draw_box(axes, heedless.ego_at(instant), facecolor="none", edgecolor=EGO, linewidth=0.5,
-             alpha=0.55, zorder=12.0)  # fmt: skip
+    _draw_paths(axes, played)
+    _draw_run(axes, heedless.ego, EGO, heedless.moment, above=13.0)
+    if planned is not None:
+        _draw_run(axes, planned.ego, PLANNED, planned.moment, above=12.8)
+    _draw_ghosts(axes, heedless, heedless.ego, EGO)
     for number, actor in enumerate(played.actors):
-        colour = OTHERS if actor.speed_mps > 0.0 else STANDING
-        box = heedless.others[number]
-        if actor.speed_mps > 0.0:
-            axes.plot(*box.centre_m.T, color=colour, linewidth=1.3, zorder=12.0)
-            start = heedless.others_at(0)[number]
-            draw_box(axes, start, facecolor="none", edgecolor=colour, linewidth=1.1, zorder=12.2)
-            for instant in _ghosts(heedless):
-                draw_box(axes, heedless.others_at(instant)[number], facecolor="none",
-                     edgecolor=colour, linewidth=0.5, alpha=0.55, zorder=12.0)  # fmt: skip
-        at = heedless.others_at(heedless.moment)[number]
-        draw_box(axes, at, facecolor=colour, edgecolor="black", linewidth=0.7, alpha=0.85,
-             zorder=12.9)  # fmt: skip
-        if planned is not None and actor.speed_mps > 0.0:
-            at = planned.others_at(planned.moment)[number]
-            draw_box(axes, at, facecolor="none", edgecolor=PLANNED, linewidth=1.4, zorder=13.1)
+        track = heedless.others[number]
+        if actor.speed_mps <= 0.0:
+            _draw_full(axes, track, STANDING, heedless.moment, above=12.9)
+            continue
+        _draw_run(axes, track, OTHERS, heedless.moment, width=1.3, start_above=12.2, above=12.9)
+        _draw_ghosts(axes, heedless, track, OTHERS)
+        if planned is not None:
+            box = box_at(planned.others[number], planned.moment)
+            _draw_outline(axes, box, PLANNED, linewidth=1.4, zorder=13.1)
     if played.impact_with:
-        axes.plot(
-            *played.impact_point_m, marker="*", markersize=11.0, color=IMPACT,
-            markeredgecolor="black", markeredgewidth=0.7, zorder=14.0,
-        )  # fmt: skip
+        mark: dict[str, Any] = {"marker": "*", "markersize": 11.0, "markeredgecolor": "black"}
+        axes.plot(*played.impact_point_m, color=IMPACT, markeredgewidth=0.7, zorder=14.0, **mark)
     scale_bar(axes, view)
 
 
-def told(played: Cast, heedless: Run, planned: Run | None, planner: str) -> str:
+def _draw_run(
+    axes: Axes,
+    track: Rectangles,
+    colour: str,
+    moment: int,
+    *,
+    above: float,
+    width: float = 1.6,
+    start_above: float = 12.1,
+) -> None:
+    """Draw the line of a box, its start, and where it is at the moment."""
+    axes.plot(*track.centre_m.T, color=colour, linewidth=width, zorder=12.0)
+    _draw_outline(axes, box_at(track, 0), colour, linewidth=1.1, zorder=start_above)
+    _draw_full(axes, track, colour, moment, above=above)
+
+
+def _draw_full(axes: Axes, track: Rectangles, colour: str, moment: int, *, above: float) -> None:
+    style: dict[str, Any] = {"edgecolor": "black", "linewidth": 0.7, "alpha": 0.85}
+    draw_box(axes, box_at(track, moment), facecolor=colour, zorder=above, **style)
+
+
+def _draw_ghosts(axes: Axes, run: Run, track: Rectangles, colour: str) -> None:
+    """Draw a box at whole seconds between the start and the moment."""
+    every = max(1, round(_GHOST_EVERY_S / float(run.time_s[1] - run.time_s[0])))
+    for instant in range(every, run.moment, every):
+        ghost = box_at(track, instant)
+        _draw_outline(axes, ghost, colour, linewidth=0.5, alpha=0.55, zorder=12.0)
+
+
+def _draw_outline(axes: Axes, box: Rectangles, colour: str, **style: float) -> None:
+    draw_box(axes, box, facecolor="none", edgecolor=colour, **style)
+
+
+def told(played: StagedCase, heedless: Run, planned: Run | None, planner: str) -> str:
     """Say in one line each who is how fast, what is planned, and what the planner makes of it."""
-    moving = [f"ego {3.6 * played.ego_speed_mps:.0f} km/h{' backwards' if played.reverse else ''}"]
+    moving = [
+        f"ego {3.6 * played.ego_speed_mps:.0f} km/h{' backwards' if played.place.reverse else ''}"
+    ]
     moving += [
         f"{_words(a.name)} {3.6 * a.speed_mps:.0f} km/h" for a in played.actors if a.speed_mps > 0.0
     ]
     lines = [", ".join(moving) + _faults(played)]
     if played.impact_with:
-        lines.append(f"keeping its speed: hits {_words(played.impact_with)} after "
-                     f"{played.impact_time_s:.1f} s")  # fmt: skip
+        hit = f"{_words(played.impact_with)} after {played.impact_time_s:.1f} s"
+        lines.append(f"keeping its speed: hits {hit}")
     elif played.actors:
         lines.append(f"keeping its speed: {heedless.clearance_m:.1f} m to the nearest")
     else:
@@ -113,7 +133,7 @@ def told(played: Cast, heedless: Run, planned: Run | None, planner: str) -> str:
 
 def write_case_picture(
     path: Path,
-    played: Cast,
+    played: StagedCase,
     scenario: Scenario,
     world: World,
     heedless: Run,
@@ -122,15 +142,24 @@ def write_case_picture(
     planner: str,
 ) -> None:
     """Write one case as PNG, with its legend and the map's attribution."""
-    figure = Figure(figsize=(9.0, 10.0), dpi=110, facecolor="white")
-    axes = figure.add_axes((0.02, 0.1, 0.96, 0.77))
+    figure, axes = upright_figure(0.1, 0.77)
     draw_case(axes, played, world, heedless, planned, aspect=0.96 * 9.0 / 7.7)
     where = world.intersection.name or played.place.junction_id
     figure.text(0.02, 0.965, f"{scenario.title}: {where}", fontsize=13, weight="bold")
-    figure.text(
-        0.02, 0.88, f"{scenario.shows}\n{told(played, heedless, planned, planner)}", fontsize=9.5
-    )
+    words = told(played, heedless, planned, planner)
+    figure.text(0.02, 0.88, f"{scenario.shows}\n{words}", fontsize=9.5)
     draw_case_legend(figure, planner if planned is not None else "", ncols=3)
+    write_upright(figure, path, world)
+
+
+def upright_figure(bottom: float, height: float) -> tuple[Figure, Axes]:
+    """Return a figure of 9 by 10 inches with axes from a share of its height on."""
+    figure = Figure(figsize=(9.0, 10.0), dpi=110, facecolor="white")
+    return figure, figure.add_axes((0.02, bottom, 0.96, height))
+
+
+def write_upright(figure: Figure, path: Path, world: World) -> None:
+    """Write a figure as PNG with the attribution of the World's map."""
     figure.text(0.98, 0.012, world.attribution, fontsize=9, ha="right", weight="bold")
     path.parent.mkdir(parents=True, exist_ok=True)
     metadata = {"Copyright": world.attribution, "Software": "foretwin"}
@@ -139,30 +168,38 @@ def write_case_picture(
 
 def draw_case_legend(figure: Figure, planner: str, *, ncols: int = 4) -> None:
     """Explain the colours at the figure's lower edge."""
-    handles: list[Any] = [
-        Patch(facecolor=EGO, edgecolor="black", label="ego, keeping its speed"),
-        Patch(facecolor=OTHERS, edgecolor="black", label="others at the impact, or when nearest"),
-        Patch(facecolor=STANDING, edgecolor="black", label="standing"),
-        Patch(facecolor="none", edgecolor=EGO, label="start (hollow), each second (faint)"),
-        Line2D([], [], marker="*", linestyle="", markersize=10, color=IMPACT,
-               markeredgecolor="black", label="planned impact"),
-    ]  # fmt: skip
+    boxes = [
+        (EGO, "black", "ego, keeping its speed"),
+        (OTHERS, "black", "others at the impact, or when nearest"),
+        (STANDING, "black", "standing"),
+        ("none", EGO, "start (hollow), each second (faint)"),
+    ]
     if planner:
-        handles[1:1] = [
-            Patch(facecolor=PLANNED, edgecolor="black", label=f"ego by {planner}, when nearest"),
-            Patch(facecolor="none", edgecolor=PLANNED, label="others at that moment"),
+        boxes[1:1] = [
+            (PLANNED, "black", f"ego by {planner}, when nearest"),
+            ("none", PLANNED, "others at that moment"),
         ]
+    handles: list[Any] = [
+        Patch(facecolor=face, edgecolor=edge, label=label) for face, edge, label in boxes
+    ]
+    star: dict[str, Any] = {
+        "marker": "*",
+        "linestyle": "",
+        "markersize": 10,
+        "markeredgecolor": "black",
+    }
+    handles.append(Line2D([], [], color=IMPACT, label="planned impact", **star))
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.012, 0.0), "ncols": ncols}
     figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.012, 0.0), ncols=ncols, fontsize=8.5,
-        frameon=False, columnspacing=1.2, handlelength=1.6,
-    )  # fmt: skip
+        handles=handles, fontsize=8.5, frameon=False, columnspacing=1.2, handlelength=1.6, **place
+    )
 
 
 def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _faults(played: Cast) -> str:
+def _faults(played: StagedCase) -> str:
     """Name the faults of the case that are not none."""
     said = [
         f"{_words(field)} {value:.2g}"
@@ -195,12 +232,6 @@ def framed(xy_m: Array, aspect: float) -> tuple[Array, float]:
     return (low + high) / 2.0, min(max(half, _LEAST_HALF_M), _MOST_HALF_M)
 
 
-def _ghosts(run: Run) -> list[int]:
-    """Return the instants of whole seconds between the start and the moment."""
-    every = max(1, round(_GHOST_EVERY_S / float(run.time_s[1] - run.time_s[0])))
-    return list(range(every, run.moment, every))
-
-
 def draw_lanes(axes: Axes, world: World, view: View) -> None:
     """Draw the edges of lanes, and stop lines."""
     lines = [
@@ -216,12 +247,17 @@ def draw_lanes(axes: Axes, world: World, view: View) -> None:
             axes.plot(*stop.ends.T, color=colour, linewidth=1.8, solid_capstyle="butt", zorder=6.0)
 
 
-def _draw_paths(axes: Axes, played: Cast, heedless: Run) -> None:
-    ways = [(played.ego_xy_m, EGO)]
-    ways += [(a.xy_m, OTHERS) for a in played.actors if a.speed_mps > 0.0]
-    for xy, colour in ways:
-        axes.plot(*xy.T, color=colour, linewidth=0.8, linestyle=(0, (4, 3)), alpha=0.7,
-                  zorder=11.0)  # fmt: skip
+def _draw_paths(axes: Axes, played: StagedCase) -> None:
+    style: dict[str, Any] = {
+        "linewidth": 0.8,
+        "linestyle": (0, (4, 3)),
+        "alpha": 0.7,
+        "zorder": 11.0,
+    }
+    axes.plot(*played.place.ego.xy_m.T, color=EGO, **style)
+    for actor in played.actors:
+        if actor.speed_mps > 0.0:
+            axes.plot(*actor.xy_m.T, color=OTHERS, **style)
 
 
 def draw_box(axes: Axes, box: Rectangles, **style: Any) -> None:

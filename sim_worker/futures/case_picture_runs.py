@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,10 +16,10 @@ from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import Rectangles, clearance
 from foretwin.sim_worker.batch.batch_simulation import Stage
+from foretwin.sim_worker.batch.collision_detection import ego_rectangles
 from foretwin.sim_worker.futures.run_job import run_job
-from foretwin.sim_worker.scenarios.impact import Moving, ego_box, ego_rectangles, rectangles
-from foretwin.sim_worker.scenarios.roles import Cast
-from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
+from foretwin.sim_worker.scenarios.impact import ego_box
+from foretwin.sim_worker.scenarios.roles import StagedCase
 
 STEP_S = 0.1
 
@@ -40,49 +40,37 @@ class Run(NamedTuple):
     """When the ego touches somebody or something, not a number where it does not."""
     collision_with: str
 
-    def ego_at(self, instant: int) -> Rectangles:
-        """Return the ego's box at an instant."""
-        return _at(self.ego, instant)
 
-    def others_at(self, instant: int) -> tuple[Rectangles, ...]:
-        """Return the other road users' boxes at an instant, in the order of the case."""
-        return tuple(_at(box, instant) for box in self.others)
-
-
-def heedless_run(played: Cast, vehicle: VehicleParameters, *, horizon_s: float) -> Run:
+def heedless_run(played: StagedCase, vehicle: VehicleParameters, *, horizon_s: float) -> Run:
     """Drive a case as planned: the ego keeps its speed, and so does everybody who is heedless.
 
     It ends with the planned impact, where one is planned.
     """
     end_s = played.impact_time_s if played.impact_with else horizon_s
     time = np.linspace(0.0, end_s, max(2, math.ceil(end_s / STEP_S) + 1))
-    ego = Moving(FrenetPath(played.ego_xy_m), played.ego_speed_mps, played.ego_lateral_m)
-    box = ego_box(vehicle, reverse=played.reverse)
+    path, reverse = FrenetPath(played.place.ego.xy_m), played.place.reverse
+    ego = ego_box(vehicle, path, played.ego_speed_mps, played.ego_lateral_m, reverse=reverse)
     others = []
     for actor in played.actors:
-        brakes = actor.acts_after_s if actor.conduct == "stops" else math.inf
-        path = FrenetPath(actor.xy_m)
-        moving = Moving(path, actor.speed_mps, actor.lateral_m, brakes, actor.decel_mps2)
-        arc = actor.start_arc_m + moving.travelled_m(time)
-        others.append(rectangles(moving, actor.traits, arc))
-    boxes = ego_rectangles(ego, box, played.ego_arc_m + ego.travelled_m(time))
+        moving = actor.moving(FrenetPath(actor.xy_m))
+        others.append(moving.rectangles(actor.start_arc_m + moving.travelled_m(time)))
+    boxes = ego.rectangles(played.ego_arc_m + ego.travelled_m(time))
     return _run(time, boxes, tuple(others), played.impact_time_s, played.impact_with)
 
 
 def planned_run(
-    played: Cast,
+    played: StagedCase,
     scenario: Scenario,
     world: World,
     vehicle: VehicleParameters,
     *,
     planner: str,
-    stage: Stage | None = None,
 ) -> Run:
     """Drive a case as a planner does, with all that a future of a job has.
 
-    `stage` holds the World, else one is made. Raises ValueError where the planner fails.
+    Raises ValueError where the planner fails.
     """
-    stage = stage or Stage(world, vehicle, nsim=1)
+    stage = Stage(world, vehicle, nsim=1)
     result = run_job(_job(played, scenario, world, planner), stage)
     if result.left_out[0] or not result.outcome.valid[0]:
         reason = result.left_out[0] or ", ".join(result.outcome.failures)
@@ -90,26 +78,36 @@ def planned_run(
     return _result_run(result, played, vehicle)
 
 
-def _job(played: Cast, scenario: Scenario, world: World, planner: str) -> Job:
+def _job(played: StagedCase, scenario: Scenario, world: World, planner: str) -> Job:
     future = Future(
-        index=0, name=scenario.id, planner=planner, scenario_id=scenario.id,
-        values=dict(played.values), place=played.place.name,
-    )  # fmt: skip
+        index=0,
+        name=scenario.id,
+        planner=planner,
+        scenario_id=scenario.id,
+        values=dict(played.values),
+        place=played.place.name,
+    )
     # Where the case begins is told by its place; the car is anywhere.
-    anywhere = VehicleState(
-        vehicle_id="ego", stamp_ns=0, position=world.frame.origin, yaw_rad=0.0, speed_mps=0.0,
-        yaw_rate_radps=0.0, accel_mps2=0.0, tire_angle_rad=0.0,
-    )  # fmt: skip
-    horizon_s = math.ceil(scenario.horizon_s / STEP_S - 1e-9) * STEP_S
+    motion = ("yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad")
+    anywhere: dict[str, Any] = dict.fromkeys(motion, 0.0)
     return Job(
-        round_id=0, job_index=0, world_id=world.id, state=anywhere,
-        path=PathAhead(xy_m=played.ego_xy_m, speed_limit_mps=played.ego_speed_limit_mps),
-        futures=(future,), horizon_s=horizon_s, step_s=STEP_S, seed=0,
-        cruise_speed_mps=played.ego_speed_mps, scenarios=(scenario,),
-    )  # fmt: skip
+        round_id=0,
+        job_index=0,
+        world_id=world.id,
+        state=VehicleState(vehicle_id="ego", stamp_ns=0, position=world.frame.origin, **anywhere),
+        path=PathAhead(
+            xy_m=played.place.ego.xy_m, speed_limit_mps=played.place.ego.speed_limit_mps
+        ),
+        futures=(future,),
+        horizon_s=math.ceil(scenario.horizon_s / STEP_S - 1e-9) * STEP_S,
+        step_s=STEP_S,
+        seed=0,
+        cruise_speed_mps=played.ego_speed_mps,
+        scenarios=(scenario,),
+    )
 
 
-def _result_run(result: FuturesResult, played: Cast, vehicle: VehicleParameters) -> Run:
+def _result_run(result: FuturesResult, played: StagedCase, vehicle: VehicleParameters) -> Run:
     states = result.trajectory.states[0].astype(np.float64)
     time = result.trajectory.time_s
     outcome, users = result.outcome, result.road_users
@@ -118,17 +116,11 @@ def _result_run(result: FuturesResult, played: Cast, vehicle: VehicleParameters)
         hit = ("", "a road user", "a building or an island")[int(outcome.collision_with[0])]
         # What follows is the accident's business.
         end = max(2, math.ceil(hit_s / STEP_S - 1e-6) + 1)
-    yaw = states[:end, 2]
-    ahead = box_centre_from_base_m(vehicle) * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
-    ego = Rectangles(states[:end, :2] + ahead, yaw, vehicle.length_m.value, vehicle.width_m.value)
-    poses = users.poses[0, :end].astype(np.float64)
+    ego = ego_rectangles(vehicle, states[:end])
+    poses, sizes = users.poses[0, :end].astype(np.float64), users.size_m[0].tolist()
     others = tuple(
-        Rectangles(
-            poses[:, r, :2], poses[:, r, 2], float(users.size_m[0, r, 0]),
-            float(users.size_m[0, r, 1]),
-        )
-        for r in range(len(played.actors))
-    )  # fmt: skip
+        Rectangles(poses[:, r, :2], poses[:, r, 2], *sizes[r]) for r in range(len(played.actors))
+    )
     return _run(time[:end], ego, others, hit_s, hit)
 
 
@@ -141,8 +133,7 @@ def _run(
     return Run(time_s, ego, others, moment, float(gap.min()), hit_s if hit else math.nan, hit)
 
 
-def _at(box: Rectangles, instant: int) -> Rectangles:
-    return Rectangles(
-        box.centre_m[instant : instant + 1], box.yaw_rad[instant : instant + 1], box.length_m,
-        box.width_m,
-    )  # fmt: skip
+def box_at(track: Rectangles, instant: int) -> Rectangles:
+    """Return the box of a track at an instant; its arrays keep an axis of one."""
+    at = slice(instant, instant + 1)
+    return track._replace(centre_m=track.centre_m[at], yaw_rad=track.yaw_rad[at])

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.play import Play
-from foretwin.sim_worker.futures.scene import Scene
+from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.planner_interface import (
     Planner,
     PlannerOutput,
@@ -21,9 +20,6 @@ from foretwin.sim_worker.planner_interface import (
     rows_of,
 )
 from foretwin.sim_worker.planners.registry import load_planner
-
-Flags = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.intp]
 
 
 class DriveRecord(NamedTuple):
@@ -44,7 +40,7 @@ class DriveRecord(NamedTuple):
     remarks: tuple[str, ...]
 
 
-def drive(scene: Scene, stage: Stage, *, ticks: int) -> DriveRecord:
+def drive(scene: JobScene, stage: Stage, *, ticks: int) -> DriveRecord:
     """Seed the stage with the scene's starts and drive for a number of control ticks."""
     loop = _Loop(scene, stage, ticks)
     for tick in range(ticks):
@@ -53,7 +49,7 @@ def drive(scene: Scene, stage: Stage, *, ticks: int) -> DriveRecord:
 
 
 class _Loop:
-    def __init__(self, scene: Scene, stage: Stage, ticks: int) -> None:
+    def __init__(self, scene: JobScene, stage: Stage, ticks: int) -> None:
         self._play = Play(scene, stage)
         self._scene, self._stage = scene, stage
         count = len(scene.starts)
@@ -125,7 +121,7 @@ class _Planners:
         self.failed: Flags = np.zeros(len(names), dtype=bool)
         self.any_failed = False
         self.reasons = [""] * len(names)
-        self._groups: list[tuple[str, Planner, Rows]] = []
+        self._groups: list[tuple[str, Planner, Indices]] = []
         for kind in sorted(set(names)):
             rows = np.flatnonzero([name == kind for name in names])
             planner = load_planner(kind)
@@ -144,7 +140,7 @@ class _Planners:
             accel[rows], angle[rows] = self._ask(name, planner, rows, rows_of(shown, rows))
         return PlannerOutput(accel, angle)
 
-    def _ask(self, name: str, planner: Planner, rows: Rows, view: PlannerView) -> PlannerOutput:
+    def _ask(self, name: str, planner: Planner, rows: Indices, view: PlannerView) -> PlannerOutput:
         if self.any_failed and self.failed[rows].all():
             return PlannerOutput(np.zeros(len(rows)), np.zeros(len(rows)))
         try:
@@ -176,7 +172,7 @@ class _Planners:
                     found[rows[place]] = said
         return found
 
-    def _fail(self, name: str, rows: Rows, reason: str, time_s: float) -> None:
+    def _fail(self, name: str, rows: Indices, reason: str, time_s: float) -> None:
         for row in rows[~self.failed[rows]]:
             self.reasons[row] = f"planner {name!r} at {time_s:g} s: {' '.join(reason.split())}"
         self.failed[rows] = True

@@ -10,7 +10,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import apart, arc_lengths
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.scenarios.ways import Way
 
 _KEEPS_SPEED, _KEEPS_TO_M = 0.35, 1.5
@@ -28,7 +28,9 @@ class DrivenLine(NamedTuple):
     states: Array
 
 
-def driven_lines(cases: Iterable[Cast], states: Array, *, tick_s: float) -> Iterable[DrivenLine]:
+def driven_lines(
+    cases: Iterable[StagedCase], states: Array, *, tick_s: float
+) -> Iterable[DrivenLine]:
     """Yield the line of each case's ego from its states (S, T, 8) at control ticks."""
     for case, driven in zip(cases, states, strict=True):
         path, way = case.place.ego.path, case.place.ego
@@ -52,7 +54,7 @@ def driven_lines(cases: Iterable[Cast], states: Array, *, tick_s: float) -> Iter
         )
 
 
-def drives_as_cast(case: Cast, line: DrivenLine, path: FrenetPath) -> bool:
+def drives_as_cast(case: StagedCase, line: DrivenLine, path: FrenetPath) -> bool:
     """Return whether a car drives as a case cast on its line has it, until the impact: about at
     the case's speed, and along its `path`."""
     until_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s

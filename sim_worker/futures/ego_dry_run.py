@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,12 +26,11 @@ from foretwin.sim_worker.futures.driven_line import (
     time_at,
 )
 from foretwin.sim_worker.futures.scene import SceneMaker
-from foretwin.sim_worker.scenarios.impact import Moving, ego_box
+from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.places import Unplaced
-from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor
-from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
+from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
+from foretwin.sim_worker.scenarios.staged import staged_start
 from foretwin.sim_worker.scenarios.ways import Way
-from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
 _FORWARDS, _BACKWARDS = "constant_speed", "reverse_pursuit"
 _STRAIGHT_PM = 1e-3
@@ -58,7 +57,7 @@ class _Ego(NamedTuple):
     start_m: float | None
 
 
-def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | Unplaced]:
+def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, StagedCase | Unplaced]:
     """Return the cases of the rows that name their place, met where the car really drives.
 
     A function of the job, as what it leads to: the drives of one job are driven together, and kept
@@ -68,7 +67,7 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | 
     bent = {
         row: case
         for row, case in played.items()
-        if isinstance(case, Cast) and math.isfinite(case.impact_time_s) and _bends(case)
+        if isinstance(case, StagedCase) and math.isfinite(case.impact_time_s) and _bends(case)
     }
     if not bent:
         return played
@@ -78,20 +77,20 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | 
         future = job.futures[row]
         groups.setdefault((future.scenario_id, future.place, _ego(case)), []).append(row)
     scenarios = {scenario.id: scenario for scenario in job.scenarios}
-    on_time: dict[int, Cast] = {}
+    on_time: dict[int, StagedCase] = {}
     for (scenario_id, place, ego), rows in groups.items():
         line = lines[ego]
         cases = [job.futures[row].values for row in rows]
-        again = maker.staged.cast(
-            scenarios[scenario_id], cases, place, stage.vehicle, ego_way=line.way,
-            ego_arc_m=ego.start_m,
-        )  # fmt: skip
+        scenario, way = scenarios[scenario_id], line.way
+        again = maker.scenarios.cast(
+            scenario, cases, place, stage.vehicle, ego_way=way, ego_arc_m=ego.start_m
+        )
         for row, met in zip(rows, again, strict=True):
             # Where no car can drive like that, nobody can say when it meets somebody.
             played[row] = _unplanned(bent[row])
             meant = bent[row].impact_with
             if (
-                isinstance(met, Cast)
+                isinstance(met, StagedCase)
                 and met.impact_with == meant
                 and drives_as_cast(met, line, bent[row].place.ego.path)
             ):
@@ -102,9 +101,9 @@ def staged_cases(job: Job, stage: Stage, maker: SceneMaker) -> dict[int, Cast | 
 
 
 def _off_m(
-    cases: Mapping[int, Cast],
+    cases: Mapping[int, StagedCase],
     lines: Mapping[_Ego, DrivenLine],
-    bent: Mapping[int, Cast],
+    bent: Mapping[int, StagedCase],
     stage: Stage,
 ) -> dict[int, float]:
     """Return how far from their plans impacts are, as it was driven, by row."""
@@ -119,17 +118,14 @@ def _off_m(
         first = max(math.ceil((from_s + case.impact_time_s - _WATCHED_S) / tick_s), 0)
         ticks = first + np.arange(round((_WATCHED_S + _AFTER_S / 2.0) / tick_s))
         ticks = np.minimum(ticks, len(line.states) - 1)
-        player = next(
-            p for p in staged_players(case, case.place.ego.path) if p.name == case.impact_with
-        )
+        actor = next(a for a in case.actors if a.name == case.impact_with)
+        way = case.place.way_named(actor.way)
+        box = actor.moving(way.path)
         since_s = np.asarray(ticks * tick_s - from_s, dtype=np.float64)
-        stops_s = player.acts_after_s if player.conduct == "stops" else math.inf
-        moving = Moving(player.path, player.speed_mps, 0.0, stops_s, player.decel_mps2)
-        arc = player.start_arc_m + moving.travelled_m(since_s)
-        pose = player.path.pose_at(arc, player.lateral_m)
+        at = box.rectangles(actor.start_on(way) + box.travelled_m(since_s))
         states.append(line.states[ticks])
-        users.append(np.column_stack([pose.xy_m, pose.yaw_rad])[:, None])
-        sizes.append([(KINDS[player.kind].length_m, KINDS[player.kind].width_m)])
+        users.append(np.column_stack([at.centre_m, at.yaw_rad])[:, None])
+        sizes.append([(box.length_m, box.width_m)])
     touches = first_touches(
         stage.vehicle, np.stack(states), np.stack(users), np.array(sizes), tick_s=tick_s
     )
@@ -139,11 +135,11 @@ def _off_m(
     return off
 
 
-def off_plan_m(case: Cast, state: Array, vehicle: VehicleParameters) -> float:
+def off_plan_m(case: StagedCase, state: Array, vehicle: VehicleParameters) -> float:
     """Return how far the point of the ego that is to be hit is from where that is planned, with
     base_link in a state (8,)."""
-    box = ego_box(vehicle, reverse=case.reverse)
-    yaw = float(state[2]) + (math.pi if case.reverse else 0.0)
+    box = ego_box(vehicle, case.place.ego.path, 0.0, reverse=case.place.reverse)
+    yaw = float(state[2]) + (math.pi if case.place.reverse else 0.0)
     cos, sin = math.cos(yaw), math.sin(yaw)
     left = case.place.near_sign * (case.impact_share - 0.5) * box.width_m
     x = float(state[0]) + box.front_m * cos - left * sin - float(case.impact_point_m[0])
@@ -151,16 +147,16 @@ def off_plan_m(case: Cast, state: Array, vehicle: VehicleParameters) -> float:
     return math.hypot(x, y)
 
 
-def _ego(case: Cast) -> _Ego:
+def _ego(case: StagedCase) -> _Ego:
     path = case.place.ego.path
     bends = path.arc_m[(np.abs(path.curvature_pm) > _STRAIGHT_PM) & (path.arc_m > 0.0)]
     in_time = case.ego_arc_m < bends.min(initial=np.inf) - _RUN_UP_M
     shift = case.values[f"{EGO}.lateral_shift_m"]
     start = None if in_time else case.ego_arc_m
-    return _Ego(case.ego_speed_mps, shift, case.reverse, start)
+    return _Ego(case.ego_speed_mps, shift, case.place.reverse, start)
 
 
-def _bends(case: Cast) -> bool:
+def _bends(case: StagedCase) -> bool:
     """Return whether the ego's path bends before the impact."""
     path = case.place.ego.path
     until = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
@@ -169,10 +165,10 @@ def _bends(case: Cast) -> bool:
 
 
 def _lines(
-    job: Job, bent: Mapping[int, Cast], stage: Stage, maker: SceneMaker
+    job: Job, bent: Mapping[int, StagedCase], stage: Stage, maker: SceneMaker
 ) -> dict[_Ego, DrivenLine]:
     """Return the line of each ego, all driven side by side."""
-    first: dict[_Ego, Cast] = {}
+    first: dict[_Ego, StagedCase] = {}
     for case in bent.values():
         ego = _ego(case)
         if ego not in first or case.ego_arc_m < first[ego].ego_arc_m:
@@ -184,10 +180,8 @@ def _lines(
     )
     ticks = math.ceil((last_s + _AFTER_S) / stage.control_dt_s)
     way = first[egos[0]].place.ego
-    key = (
-        way.name, stage.vehicle.name, stage.control_dt_s, ticks,
-        *((ego, first[ego].ego_arc_m) for ego in egos),
-    )  # fmt: skip
+    starts = ((ego, first[ego].ego_arc_m) for ego in egos)
+    key = (way.name, stage.vehicle.name, stage.control_dt_s, ticks, *starts)
     if key not in maker.rehearsed:
         cases = [first[ego] for ego in egos]
         states = _drive_alone(job, cases, stage, maker, ticks)
@@ -198,25 +192,25 @@ def _lines(
     return lines
 
 
-def _drive_alone(job: Job, cases: list[Cast], stage: Stage, maker: SceneMaker, ticks: int) -> Array:
+def _drive_alone(
+    job: Job, cases: list[StagedCase], stage: Stage, maker: SceneMaker, ticks: int
+) -> Array:
     """Return states (S, T, 8) of egos that nobody meets."""
     futures = tuple(
         Future(
-            index=index, name="alone", planner=_BACKWARDS if case.reverse else _FORWARDS,
+            index=index,
+            name="alone",
+            planner=_BACKWARDS if case.place.reverse else _FORWARDS,
             values={f"{EGO}.speed_mps": case.ego_speed_mps},
         )
         for index, case in enumerate(cases)
-    )  # fmt: skip
+    )
+    same = ("round_id", "job_index", "world_id", "state", "path", "step_s", "seed")
+    given: dict[str, Any] = {name: getattr(job, name) for name in same}
     alone = Job(
-        round_id=job.round_id,
-        job_index=job.job_index,
-        world_id=job.world_id,
-        state=job.state,
-        path=job.path,
+        **given,
         futures=futures,
         horizon_s=ticks * stage.control_dt_s,
-        step_s=job.step_s,
-        seed=job.seed,
         cruise_speed_mps=0.0,
         starts=np.stack([staged_start(case, stage.vehicle) for case in cases]),
     )
@@ -225,7 +219,7 @@ def _drive_alone(job: Job, cases: list[Cast], stage: Stage, maker: SceneMaker, t
     return drive(scene._replace(limit_share=None), stage, ticks=ticks).states
 
 
-def _on_time(case: Cast, line: DrivenLine, way: Way) -> Cast:
+def _on_time(case: StagedCase, line: DrivenLine, way: Way) -> StagedCase:
     """Return a case, on the ego's path `way` again, in which those who come meet the ego when it
     really is there."""
     met_m = case.ego_arc_m + case.ego_speed_mps * case.impact_time_s
@@ -233,14 +227,12 @@ def _on_time(case: Cast, line: DrivenLine, way: Way) -> Cast:
     later_s = (to_s - from_s) - case.impact_time_s
     return case._replace(
         place=case.place._replace(ego=way),
-        ego_xy_m=way.xy_m,
-        ego_speed_limit_mps=way.speed_limit_mps,
         actors=tuple(_from_line(actor, later_s, line, way) for actor in case.actors),
         impact_time_s=case.impact_time_s + later_s,
     )
 
 
-def _from_line(actor: CastActor, later_s: float, line: DrivenLine, way: Way) -> CastActor:
+def _from_line(actor: StagedActor, later_s: float, line: DrivenLine, way: Way) -> StagedActor:
     if actor.relation not in ALONG:
         return actor._replace(start_arc_m=actor.start_arc_m - actor.speed_mps * later_s)
     if actor.way != way.name:
@@ -250,8 +242,8 @@ def _from_line(actor: CastActor, later_s: float, line: DrivenLine, way: Way) -> 
     return actor._replace(xy_m=way.xy_m, start_arc_m=float(place.arc_m[0]))
 
 
-def _unplanned(case: Cast) -> Cast:
+def _unplanned(case: StagedCase) -> StagedCase:
+    nowhere = np.full(2, math.nan)
     return case._replace(
-        impact_time_s=math.nan, impact_point_m=np.full(2, math.nan), impact_share=math.nan,
-        impact_with="",
-    )  # fmt: skip
+        impact_time_s=math.nan, impact_point_m=nowhere, impact_share=math.nan, impact_with=""
+    )

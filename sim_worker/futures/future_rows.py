@@ -12,7 +12,6 @@ import numpy as np
 
 from foretwin.contracts.futures import (
     COLLISION_WITH,
-    Accident,
     Future,
     FuturesResult,
     Job,
@@ -24,25 +23,38 @@ from foretwin.sim_worker.metrics.table import ROW_METRICS
 
 Row = dict[str, Any]
 
-FUTURE_COLUMNS: Mapping[str, type] = MappingProxyType({
-    "future_id": str, "job_sha256": str, "round_id": int, "job_index": int, "index": int,
-    "name": str, "stamp_ns": int, "world_id": str, "junction_id": str, "planner": str,
-    "vehicle": str, "vehicle_version": int, "seed": int, "horizon_s": float,
-    "scenario": str, "place": str, "cell": int, "case": int, "values": dict,
-    "seen_road_users": int, "replayed_road_users": int,
-    **dict.fromkeys(FUTURE_NUMBERS, float),
-    "valid": bool, "failure": str, "remark": str, "left_out": str,
-    "planned_impact_time_s": float, "planned_impact_with": str, "planned_impact_off_m": float,
-    "collided": bool, "collision_time_s": float, "collision_with": str, "min_clearance_m": float,
-    "progress_m": float, "end_x_m": float, "end_y_m": float, "end_yaw_rad": float,
-    "end_speed_mps": float, "end_difference_from_nominal_m": float,
-    "max_difference_from_nominal_m": float,
-    "accident_with": str, "accident_kind": str, "accident_time_s": float, "accident_x_m": float,
-    "accident_y_m": float, "accident_angle_rad": float, "accident_closing_mps": float,
-    "accident_ego_delta_v_mps": float, "accident_user_delta_v_mps": float,
-    **{f"metric_{name}": float for name in ROW_METRICS},
-    "trajectory_sha256": str, "worker_id": str,
-})  # fmt: skip
+_COLUMNS: tuple[tuple[type, str], ...] = (
+    (str, "future_id job_sha256"),
+    (int, "round_id job_index index"),
+    (str, "name"),
+    (int, "stamp_ns"),
+    (str, "world_id junction_id planner vehicle"),
+    (int, "vehicle_version seed"),
+    (float, "horizon_s"),
+    (str, "scenario place"),
+    (int, "cell case"),
+    (dict, "values"),
+    (int, "seen_road_users replayed_road_users"),
+    (float, " ".join(FUTURE_NUMBERS)),
+    (bool, "valid"),
+    (str, "failure remark left_out"),
+    (float, "planned_impact_time_s"),
+    (str, "planned_impact_with"),
+    (float, "planned_impact_off_m"),
+    (bool, "collided"),
+    (float, "collision_time_s"),
+    (str, "collision_with"),
+    (float, "min_clearance_m progress_m end_x_m end_y_m end_yaw_rad end_speed_mps"),
+    (float, "end_difference_from_nominal_m max_difference_from_nominal_m"),
+    (str, "accident_with accident_kind"),
+    (float, "accident_time_s accident_x_m accident_y_m accident_angle_rad accident_closing_mps"),
+    (float, "accident_ego_delta_v_mps accident_user_delta_v_mps"),
+    (float, " ".join(f"metric_{name}" for name in ROW_METRICS)),
+    (str, "trajectory_sha256 worker_id"),
+)
+FUTURE_COLUMNS: Mapping[str, type] = MappingProxyType(
+    {name: kind for kind, names in _COLUMNS for name in names.split()}
+)
 """Columns of the table of futures and what they hold; null where one does not apply."""
 
 
@@ -84,65 +96,65 @@ def rows_from_bytes(data: bytes, job: Job) -> list[Row]:
     return rows
 
 
+_OF_JOB = ("round_id", "job_index", "world_id", "vehicle_version", "seed", "horizon_s")
+_OF_ACCIDENT = ("time_s", "angle_rad", "closing_mps", "ego_delta_v_mps", "user_delta_v_mps")
+
+
 def _asked(job: Job, future: Future, job_sha256: str) -> Row:
     return {
-        "future_id": future_id(job_sha256, future.index), "job_sha256": job_sha256,
-        "round_id": job.round_id, "job_index": job.job_index, "index": future.index,
-        "name": future.name, "stamp_ns": None if future.place else job.state.stamp_ns,
-        "world_id": job.world_id, "planner": future.planner,
-        "vehicle_version": job.vehicle_version, "seed": job.seed, "horizon_s": job.horizon_s,
-        "scenario": future.scenario_id, "place": future.place,
-        "values": list(future.values.items()), "seen_road_users": len(job.road_users),
-        "replayed_road_users": len(job.replayed), **numbers_of(future), "failure": "",
-        "remark": "", "left_out": "", "planned_impact_with": "",
-    }  # fmt: skip
+        **{name: getattr(job, name) for name in _OF_JOB},
+        **numbers_of(future),
+        **dict.fromkeys(("failure", "remark", "left_out", "planned_impact_with"), ""),
+        "future_id": future_id(job_sha256, future.index),
+        "job_sha256": job_sha256,
+        "index": future.index,
+        "name": future.name,
+        "stamp_ns": None if future.place else job.state.stamp_ns,
+        "planner": future.planner,
+        "scenario": future.scenario_id,
+        "place": future.place,
+        "values": list(future.values.items()),
+        "seen_road_users": len(job.road_users),
+        "replayed_road_users": len(job.replayed),
+    }
 
 
 def _played(job: Job, future: Future, result: FuturesResult, place: int) -> Row:
     outcome, planned = result.outcome, result.planned
     states = np.ascontiguousarray(result.trajectory.states[place])
     users = np.ascontiguousarray(result.road_users.poses[place])
-    end = states[-1].astype(np.float64)
+    x, y, yaw, ahead_mps, left_mps = states[-1, :5].astype(np.float64)
     row: Row = {
         "valid": bool(outcome.valid[place]),
         "failure": outcome.failures[place] if outcome.failures else "",
         "remark": outcome.remarks[place] if outcome.remarks else "",
         "left_out": result.left_out[place],
         "collided": bool(outcome.collided[place]),
-        "collision_time_s": _number(outcome.collision_time_s[place]),
         "collision_with": COLLISION_WITH[int(outcome.collision_with[place])],
-        "min_clearance_m": _number(outcome.min_clearance_m[place]),
-        "progress_m": _number(outcome.progress_m[place]),
-        "end_x_m": float(end[0]), "end_y_m": float(end[1]), "end_yaw_rad": float(end[2]),
-        "end_speed_mps": float(np.hypot(end[3], end[4])),
+        "end_speed_mps": float(np.hypot(ahead_mps, left_mps)),
         "trajectory_sha256": hashlib.sha256(states.tobytes() + users.tobytes()).hexdigest(),
         "worker_id": result.worker_id,
-    }  # fmt: skip
+    }
+    row |= _place("end", x, y) | {"end_yaw_rad": float(yaw)}
+    for name in ("collision_time_s", "min_clearance_m", "progress_m"):
+        row[name] = _number(getattr(outcome, name)[place])
     row |= {f"metric_{name}": _number(values[place]) for name, values in result.metrics.items()}
     if planned is not None:
-        row |= {
-            "planned_impact_time_s": _number(planned.time_s[place]),
-            "planned_impact_with": planned.met[place],
-            "planned_impact_off_m": _number(planned.off_m[place]),
-        }
+        row["planned_impact_with"] = planned.met[place]
+        row["planned_impact_time_s"] = _number(planned.time_s[place])
+        row["planned_impact_off_m"] = _number(planned.off_m[place])
     for accident in result.accidents:
         if accident.future == place:
-            names = road_user_names(job, future)
-            row |= _accident(result, accident) | {"accident_with": names[accident.road_user]}
+            kind = result.road_users.kinds[place, accident.road_user]
+            row["accident_with"] = road_user_names(job, future)[accident.road_user]
+            row["accident_kind"] = result.road_users.kind_names[int(kind)]
+            row |= {f"accident_{name}": getattr(accident, name) for name in _OF_ACCIDENT}
+            row |= _place("accident", *accident.point_m)
     return row
 
 
-def _accident(result: FuturesResult, accident: Accident) -> Row:
-    tracks = result.road_users
-    return {
-        "accident_kind": tracks.kind_names[int(tracks.kinds[accident.future, accident.road_user])],
-        "accident_time_s": accident.time_s,
-        "accident_x_m": float(accident.point_m[0]), "accident_y_m": float(accident.point_m[1]),
-        "accident_angle_rad": accident.angle_rad,
-        "accident_closing_mps": accident.closing_mps,
-        "accident_ego_delta_v_mps": accident.ego_delta_v_mps,
-        "accident_user_delta_v_mps": accident.user_delta_v_mps,
-    }  # fmt: skip
+def _place(what: str, x_m: float, y_m: float) -> Row:
+    return {f"{what}_x_m": float(x_m), f"{what}_y_m": float(y_m)}
 
 
 def _number(value: float) -> float | None:

@@ -10,7 +10,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.futures import Job
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.futures.closed_loop import DriveRecord
-from foretwin.sim_worker.futures.scene import Scene, SceneMaker
+from foretwin.sim_worker.futures.scene import JobScene, SceneMaker
 from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 from foretwin.sim_worker.metrics.table import METRICS, evaluate
@@ -20,7 +20,7 @@ from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 CLEARANCE = "min_clearance"
 
 
-class Measured(NamedTuple):
+class JobMetrics(NamedTuple):
     """Metrics that the job names, each (S,), and the least clearance (S,), infinite for nobody."""
 
     values: dict[str, Array]
@@ -29,14 +29,14 @@ class Measured(NamedTuple):
 
 def measure(
     job: Job,
-    scene: Scene,
+    scene: JobScene,
     record: DriveRecord,
     user_size_m: Array,
     *,
     vehicle: VehicleParameters,
     every: int,
     scenes: SceneMaker,
-) -> Measured:
+) -> JobMetrics:
     """Measure what the job names, and the clearance, at the instants of the result.
 
     `scenes` are those of the job's World.
@@ -49,7 +49,7 @@ def measure(
     if scene.traffic is not None:
         names = list(dict.fromkeys([CLEARANCE, *names]))
     if not names:
-        return Measured({}, clearance)
+        return JobMetrics({}, clearance)
     instants = record.states[:, ::every]
     rollout = Rollout(
         time_s=np.arange(instants.shape[1], dtype=np.float64) * job.step_s,
@@ -72,12 +72,12 @@ def measure(
     found = evaluate(rollout, names, context=context)
     if CLEARANCE in found:
         clearance = found[CLEARANCE].values
-    return Measured({name: found[name].values for name in job.metrics}, clearance)
+    return JobMetrics({name: found[name].values for name in job.metrics}, clearance)
 
 
-def _masses(scene: Scene) -> Array:
+def _masses(scene: JobScene) -> Array:
     """Return (S, R) masses of road users by their kinds."""
-    if scene.casts is None:
+    if scene.traffic is None:
         return np.zeros((len(scene.starts), 0))
     masses = np.array([KINDS[kind].mass_kg for kind in KIND_NAMES])
-    return masses[scene.casts.kinds]
+    return masses[scene.traffic.crowd.kinds]

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.futures import Future, numbers_of
 from foretwin.contracts.numbers import FUTURE_NUMBERS, Quantity
 from foretwin.geometry.frenet_path import FrenetPoint
@@ -38,7 +37,7 @@ class NumberColumns:
         self._spoils_belief = "belief" in changed
         self.count = len(column)
 
-    def of(self, futures: npt.NDArray[np.intp]) -> NumberColumns:
+    def of(self, futures: Indices) -> NumberColumns:
         """Return the numbers of (K,) of these futures."""
         return NumberColumns({name: column[futures] for name, column in self._columns.items()})
 

@@ -11,11 +11,11 @@ from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.futures import Accident, PlannedImpacts
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.futures.ego_dry_run import off_plan_m
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 
 
 def planned_impacts(
-    cases: Mapping[int, Cast],
+    cases: Mapping[int, StagedCase],
     states: Array32,
     accidents: Sequence[Accident],
     vehicle: VehicleParameters,

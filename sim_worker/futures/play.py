@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.batch.batch_simulation import Controls, Stage
-from foretwin.sim_worker.futures.scene import Scene
+from foretwin.sim_worker.futures.scene import JobScene
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.road_users.crowd import EgoBoxes
 from foretwin.sim_worker.road_users.perception import Lead
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
-
-Rows = npt.NDArray[np.intp]
 
 DECIDE_EVERY_S = 0.2
 """How often law-abiding road users think again."""
@@ -30,7 +27,7 @@ class Play:
     """
 
     def __init__(
-        self, scene: Scene, stage: Stage, *, decide_every_s: float = DECIDE_EVERY_S
+        self, scene: JobScene, stage: Stage, *, decide_every_s: float = DECIDE_EVERY_S
     ) -> None:
         """Seed the stage with the scene's starts."""
         self.scene, self.stage = scene, stage
@@ -49,7 +46,7 @@ class Play:
         self._tick_reach_m = _MAX_PACE_MPS * stage.control_dt_s
         self._red = np.full((1, 0), np.inf)
 
-    def restart(self, rows: Rows, scene: Scene, *, looked: bool) -> None:
+    def restart(self, rows: Indices, scene: JobScene, *, looked: bool) -> None:
         """Begin `rows` anew, as `scene` has them; the others go on.
 
         Traffic and sight of both were `begun` from one. `looked` says that planners have looked
@@ -81,7 +78,7 @@ class Play:
             self._decide(self.scene.red_arcs_m(time_s), now, place)
         return self._view(tick, time_s, now, place, heading)
 
-    def look_by_row(self, ticks: Rows, lights_s: Array, now: Array) -> PlannerView:
+    def look_by_row(self, ticks: Indices, lights_s: Array, now: Array) -> PlannerView:
         """Do the same for cars that began at different times, and decide at every tick.
 
         `ticks` (S,) are those since each began, `lights_s` (S,) the times by which lights run.
@@ -127,7 +124,7 @@ class Play:
 
     def _view(
         self,
-        tick: int | Rows,
+        tick: int | Indices,
         time_s: float,
         now: Array,
         place: FrenetPoint,
@@ -169,6 +166,6 @@ class Play:
         )
 
 
-def _steering_delay_s(scene: Scene, stage: Stage) -> Array:
+def _steering_delay_s(scene: JobScene, stage: Stage) -> Array:
     delay_s = stage.vehicle.steering_delay_s.value
     return scene.numbers.applied("vehicle.steering_delay_s", delay_s)

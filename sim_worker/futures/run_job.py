@@ -12,11 +12,12 @@ import hashlib
 import math
 import time
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Array32
 from foretwin.contracts.codec import content_bytes
 from foretwin.contracts.futures import (
     JOB_SCHEMA_VERSION,
@@ -24,6 +25,7 @@ from foretwin.contracts.futures import (
     FuturesResult,
     Job,
     Outcome,
+    PlannedImpacts,
     RoadUserTracks,
     Trajectory,
 )
@@ -40,10 +42,10 @@ from foretwin.sim_worker.futures.ego_dry_run import staged_cases
 from foretwin.sim_worker.futures.measuring import measure
 from foretwin.sim_worker.futures.outcomes import judge, with_collisions
 from foretwin.sim_worker.futures.planned_impacts import planned_impacts
-from foretwin.sim_worker.futures.scene import Scene, SceneMaker
+from foretwin.sim_worker.futures.scene import JobScene, SceneMaker
 from foretwin.sim_worker.road_users.cast import KIND_NAMES
 from foretwin.sim_worker.scenarios.places import Unplaced
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 
 
 def run_job(
@@ -68,8 +70,53 @@ def run_job(
     ticks, every = _ticks(job, stage)
     maker = SceneMaker(world) if scenes is None else scenes
     job, staged, unplaced = _placed(job, staged_cases(job, stage, maker))
-    if not job.futures:
-        return _nothing_played(job, unplaced, worker_id, ticks // every + 1)
+    time_s = np.arange(0, ticks + 1, every, dtype=np.float64) * stage.control_dt_s
+    if job.futures:
+        played = _play(job, staged, stage, maker, ticks=ticks, every=every)
+    else:
+        played = _nothing_played(job, len(time_s))
+    return FuturesResult(
+        round_id=job.round_id,
+        job_index=job.job_index,
+        worker_id=worker_id,
+        world_id=job.world_id,
+        future_indices=tuple(future.index for future in job.futures),
+        trajectory=Trajectory(stamp_ns=job.state.stamp_ns, time_s=time_s, states=played.states),
+        road_users=played.road_users,
+        outcome=played.outcome,
+        metrics=played.metrics,
+        accidents=played.accidents,
+        left_out=played.left_out,
+        planned=played.planned,
+        unplaced=unplaced,
+        sim_seconds=len(job.futures) * job.horizon_s,
+        cpu_seconds=time.process_time() - cpu_start,
+        wall_seconds=time.perf_counter() - wall_start,
+        vehicle_version=job.vehicle_version,
+    )
+
+
+class _Played(NamedTuple):
+    """What a job's futures make of its result; `states` (S, N, 8)."""
+
+    states: Array32
+    road_users: RoadUserTracks
+    outcome: Outcome
+    metrics: dict[str, Array]
+    accidents: tuple[Accident, ...] = ()
+    left_out: tuple[str, ...] = ()
+    planned: PlannedImpacts | None = None
+
+
+def _play(
+    job: Job,
+    staged: Mapping[int, StagedCase],
+    stage: Stage,
+    maker: SceneMaker,
+    *,
+    ticks: int,
+    every: int,
+) -> _Played:
     scene = maker.scene(job, stage.vehicle, tick_s=stage.control_dt_s, staged=staged)
     with np.errstate(over="ignore", invalid="ignore"):
         record = drive(scene, stage, ticks=ticks)
@@ -83,29 +130,9 @@ def run_job(
     motion = ran_on if job.accident_motion else None
     states = with_collisions(states, outcome, motion, step_s=job.step_s)
     accidents = () if ran_on is None else _told(ran_on)
-    return FuturesResult(
-        round_id=job.round_id,
-        job_index=job.job_index,
-        worker_id=worker_id,
-        world_id=job.world_id,
-        future_indices=tuple(future.index for future in job.futures),
-        trajectory=Trajectory(
-            stamp_ns=job.state.stamp_ns,
-            time_s=np.arange(0, ticks + 1, every, dtype=np.float64) * stage.control_dt_s,
-            states=states,
-        ),
-        road_users=_tracks(scene, record, sizes, every),
-        outcome=outcome,
-        metrics=measured.values,
-        accidents=accidents,
-        left_out=scene.left_out,
-        planned=planned_impacts(staged, states, accidents, stage.vehicle, step_s=job.step_s),
-        unplaced=unplaced,
-        sim_seconds=len(job.futures) * job.horizon_s,
-        cpu_seconds=time.process_time() - cpu_start,
-        wall_seconds=time.perf_counter() - wall_start,
-        vehicle_version=job.vehicle_version,
-    )
+    planned = planned_impacts(staged, states, accidents, stage.vehicle, step_s=job.step_s)
+    tracks = _tracks(scene, record, sizes, every)
+    return _Played(states, tracks, outcome, measured.values, accidents, scene.left_out, planned)
 
 
 def check_job(job: Job, stage: Stage) -> None:
@@ -125,8 +152,8 @@ def check_job(job: Job, stage: Stage) -> None:
 
 
 def _placed(
-    job: Job, staged: Mapping[int, Cast | Unplaced]
-) -> tuple[Job, dict[int, Cast], tuple[tuple[int, str], ...]]:
+    job: Job, staged: Mapping[int, StagedCase | Unplaced]
+) -> tuple[Job, dict[int, StagedCase], tuple[tuple[int, str], ...]]:
     """Return the job of those futures that can be played, their cases, and why others cannot."""
     unplaced = {
         job.futures[row].index: case.reason
@@ -135,7 +162,9 @@ def _placed(
     }
     rows = [row for row, future in enumerate(job.futures) if future.index not in unplaced]
     cases = {
-        place: case for place, row in enumerate(rows) if isinstance(case := staged.get(row), Cast)
+        place: case
+        for place, row in enumerate(rows)
+        if isinstance(case := staged.get(row), StagedCase)
     }
     if unplaced:
         starts = None if job.starts is None else job.starts[rows]
@@ -144,31 +173,25 @@ def _placed(
     return job, cases, tuple(unplaced.items())
 
 
-def _nothing_played(
-    job: Job, unplaced: tuple[tuple[int, str], ...], worker_id: str, instants: int
-) -> FuturesResult:
+def _nothing_played(job: Job, instants: int) -> _Played:
     none, flags = np.zeros(0), np.zeros(0, dtype=bool)
-    return FuturesResult(
-        round_id=job.round_id, job_index=job.job_index, worker_id=worker_id,
-        world_id=job.world_id, future_indices=(),
-        trajectory=Trajectory(
-            stamp_ns=job.state.stamp_ns, time_s=job.step_s * np.arange(instants, dtype=np.float64),
-            states=np.zeros((0, instants, 8), np.float32),
-        ),
-        road_users=RoadUserTracks(
-            poses=np.zeros((0, instants, 0, 3), np.float32),
-            speed_mps=np.zeros((0, instants, 0), np.float32),
-            size_m=np.zeros((0, 0, 2), np.float32), kinds=np.zeros((0, 0), np.int32),
-            kind_names=KIND_NAMES,
-        ),
-        outcome=Outcome(
-            collided=flags, collision_time_s=none, collision_with=none, min_clearance_m=none,
-            progress_m=none, valid=flags,
-        ),
-        metrics=dict.fromkeys(job.metrics, none), accidents=(), left_out=(),
-        unplaced=unplaced,
-        sim_seconds=0.0, cpu_seconds=0.0, wall_seconds=0.0, vehicle_version=job.vehicle_version,
-    )  # fmt: skip
+    nobody = RoadUserTracks(
+        poses=np.zeros((0, instants, 0, 3), np.float32),
+        speed_mps=np.zeros((0, instants, 0), np.float32),
+        size_m=np.zeros((0, 0, 2), np.float32),
+        kinds=np.zeros((0, 0), np.int32),
+        kind_names=KIND_NAMES,
+    )
+    outcome = Outcome(
+        collided=flags,
+        collision_time_s=none,
+        collision_with=none,
+        min_clearance_m=none,
+        progress_m=none,
+        valid=flags,
+    )
+    states = np.zeros((0, instants, 8), np.float32)
+    return _Played(states, nobody, outcome, dict.fromkeys(job.metrics, none))
 
 
 def result_digest(result: FuturesResult) -> str:
@@ -197,17 +220,17 @@ def _ticks(job: Job, stage: Stage) -> tuple[int, int]:
     return round(instants) * round(every), round(every)
 
 
-def _sizes(scene: Scene) -> Array:
+def _sizes(scene: JobScene) -> Array:
     """Return (S, R, 2) length and width of road users."""
-    if scene.casts is None:
+    if scene.traffic is None:
         return np.zeros((len(scene.starts), 0, 2))
-    crowd = scene.casts.crowd
+    crowd = scene.traffic.crowd
     return np.stack([crowd.length_m, crowd.width_m], axis=-1)
 
 
-def _tracks(scene: Scene, record: DriveRecord, sizes: Array, every: int) -> RoadUserTracks:
+def _tracks(scene: JobScene, record: DriveRecord, sizes: Array, every: int) -> RoadUserTracks:
     count, _, most, _ = record.users.shape
-    kinds = np.zeros((count, most), np.int32) if scene.casts is None else scene.casts.kinds
+    kinds = np.zeros((count, most)) if scene.traffic is None else scene.traffic.crowd.kinds
     absent = np.isnan(record.users[:, ::every, :, 0])
     return RoadUserTracks(
         poses=record.users[:, ::every].astype(np.float32),
@@ -218,13 +241,11 @@ def _tracks(scene: Scene, record: DriveRecord, sizes: Array, every: int) -> Road
     )
 
 
-def _accidents(job: Job, scene: Scene, stage: Stage, touches: Touches) -> Accidents:
-    assert scene.casts is not None or not len(touches.future)
-    kinds = (
-        []
-        if scene.casts is None
-        else [KIND_NAMES[kind] for kind in scene.casts.kinds[touches.future, touches.user]]
-    )
+def _accidents(job: Job, scene: JobScene, stage: Stage, touches: Touches) -> Accidents:
+    kinds = []
+    if scene.traffic is not None:
+        met = scene.traffic.crowd.kinds[touches.future, touches.user]
+        kinds = [KIND_NAMES[kind] for kind in met]
     # Without the motion after it, an accident is over once its delta-v is.
     enough_s = math.ceil(DELTA_V_WITHIN_S / job.step_s - 1e-9) * job.step_s
     return run_accidents(

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.futures import Future, Job
 from foretwin.contracts.scenario import Scenario
@@ -20,17 +19,17 @@ from foretwin.sim_worker.futures.number_columns import NumberColumns, number_col
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
 from foretwin.sim_worker.planners.registry import drives_backwards
-from foretwin.sim_worker.road_users.cast import Casting, Player, casting
+from foretwin.sim_worker.road_users.cast import Player, casting
 from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
 from foretwin.sim_worker.road_users.traffic import Traffic
-from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.live import KnownScenarios
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.scenarios.seen import SeenActors
-from foretwin.sim_worker.scenarios.staged import StagedScenarios, staged_players, staged_start
+from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
 from foretwin.world_gen.rules.signal_state import LiveColour, world_colours_at
 
@@ -47,8 +46,8 @@ class Aims(NamedTuple):
     offset_m: Array
 
 
-class Scene(NamedTuple):
-    """All that S futures of a job begin with; `casts` is None where nobody else is on the road.
+class JobScene(NamedTuple):
+    """All that S futures of a job begin with; `traffic` is None where nobody else is on the road.
 
     `limit_share` (M,) at the path's nodes is how far limits lie below that at the start.
     """
@@ -60,7 +59,6 @@ class Scene(NamedTuple):
     planners: tuple[str, ...]
     numbers: NumberColumns
     limit_share: Array | None
-    casts: Casting | None
     traffic: Traffic | None
     sight: Sight | None
     rules: PathRules
@@ -71,7 +69,7 @@ class Scene(NamedTuple):
     """(S,) why a future's scenario does not happen in it, in words; empty where it does."""
 
     @property
-    def backwards(self) -> npt.NDArray[np.bool_]:
+    def backwards(self) -> Flags:
         """(S,) whose planner drives in reverse."""
         return np.array([drives_backwards(name) for name in self.planners])
 
@@ -108,9 +106,7 @@ class SceneMaker:
         self._rules = JunctionRules(world)
         self._network = RoadNetwork(world)
         self._seen = SeenActors(self._network)
-        self._live = LiveScenarios(self._network)
-        self.staged = StagedScenarios(self._network)
-        """The scenarios of this World at named places, away from any drive."""
+        self.scenarios = KnownScenarios(self._network)
         self.rehearsed: dict[tuple[object, ...], Any] = {}
         """Drives of egos alone that cases were cast on."""
 
@@ -125,9 +121,9 @@ class SceneMaker:
         vehicle: VehicleParameters,
         *,
         tick_s: float,
-        staged: Mapping[int, Cast | Unplaced] | None = None,
+        staged: Mapping[int, StagedCase | Unplaced] | None = None,
         start_arc_m: Array | None = None,
-    ) -> Scene:
+    ) -> JobScene:
         """Return the scene of a job on this World.
 
         `staged` are the cases of the rows that name their place, if they are known already;
@@ -145,7 +141,7 @@ class SceneMaker:
         if job.starts is None:
             starts = np.repeat(local_state(job.state, self.world.frame, vehicle)[None], count, 0)
             for row, played in staged.items():
-                if isinstance(played, Cast):
+                if isinstance(played, StagedCase):
                     starts[row] = staged_start(played, vehicle)
         else:
             starts = np.array(job.starts, dtype=np.float64)
@@ -153,7 +149,7 @@ class SceneMaker:
         if staged and start_arc_m is None:
             start_arc_m = place.arc_m
             for row, played in staged.items():
-                if isinstance(played, Cast):
+                if isinstance(played, StagedCase):
                     start_arc_m[row] = played.ego_arc_m
         if start_arc_m is not None:
             # Ways may be long, and cross themselves.
@@ -161,7 +157,7 @@ class SceneMaker:
         numbers = number_columns(job.futures)
         aims = _aims(job, place.offset_m, numbers)
         live = any(v.scenario_id and not v.place for v in job.futures)
-        on_path = self._live.on(path, float(place.arc_m[0]), vehicle) if live else None
+        on_path = self.scenarios.on(path, float(place.arc_m[0]), vehicle) if live else None
         seen = self._seen.actors(job.road_users)
         casts: list[tuple[Player, ...]] = []
         left_out = [""] * count
@@ -202,12 +198,10 @@ class SceneMaker:
                     numbers.applied("perception.lost_from_s", 0.0),
                     numbers.applied("perception.lost_for_s", 0.0),
                 ),
-                hidden_by=crowd.hidden_by,
-                walks=crowd.walks,
                 tick_s=tick_s,
             )
         heard = {state.group_id: LiveColour(0.0, state.colour) for state in job.signals}
-        return Scene(
+        return JobScene(
             path=path,
             starts=starts,
             start_arc_m=place.arc_m,
@@ -216,7 +210,6 @@ class SceneMaker:
             numbers=numbers,
             # Staged, a case says how fast the ego drives.
             limit_share=None if staged else _limit_share(path, float(place.arc_m[0])),
-            casts=crowd if traffic is not None else None,
             traffic=traffic,
             sight=sight,
             rules=rules,
@@ -226,19 +219,23 @@ class SceneMaker:
             left_out=tuple(left_out),
         )
 
-    def staged_cases(self, job: Job, vehicle: VehicleParameters) -> dict[int, Cast | Unplaced]:
+    def staged_cases(
+        self, job: Job, vehicle: VehicleParameters
+    ) -> dict[int, StagedCase | Unplaced]:
         """Return the cases of the rows that name their place, on its path as it is."""
         known = {scenario.id: scenario for scenario in job.scenarios}
         rows: dict[tuple[str, str], list[int]] = {}
         for row, future in enumerate(job.futures):
             if future.place and future.scenario_id:
                 rows.setdefault((future.scenario_id, future.place), []).append(row)
-        found: dict[int, Cast | Unplaced] = {}
+        found: dict[int, StagedCase | Unplaced] = {}
         for (_, place), mine in rows.items():
             scenario = _scenario_of(job.futures[mine[0]], known)
             assert scenario is not None
             cases = [job.futures[row].values for row in mine]
-            found.update(zip(mine, self.staged.cast(scenario, cases, place, vehicle), strict=True))
+            found.update(
+                zip(mine, self.scenarios.cast(scenario, cases, place, vehicle), strict=True)
+            )
         return found
 
 

@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array, Flags
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.futures.play import Rows
 from foretwin.sim_worker.gym.actions import Control, action_size, commands
 from foretwin.sim_worker.gym.episodes import Source
 from foretwin.sim_worker.gym.observation import Observation, feature_names, observe
@@ -78,7 +77,7 @@ class Course:
             drawn = case
         return Begun(int(playable[drawn]), lights_s)
 
-    def begin(self, rows: Rows, begun: Sequence[Begun], *, looked: bool = False) -> None:
+    def begin(self, rows: Indices, begun: Sequence[Begun], *, looked: bool = False) -> None:
         """Let some rows begin; see `EpisodeRows.begin`."""
         cases, lights_s = zip(*begun, strict=True)
         self.rows.begin(rows, np.array(cases), np.array(lights_s), looked=looked)

@@ -27,7 +27,7 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.placement import places
-from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import find_scenario
 from foretwin.sim_worker.scenarios.staged import staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
@@ -113,7 +113,7 @@ def _of_scenario(source: Source, world: World, vehicle: VehicleParameters) -> Ep
     if at.reverse:
         raise UserError(f"{scenario.id} is driven backwards at {at.name}; learners drive forwards")
     cases = _cases(scenario, source, source.values or {})
-    played = scenes.staged.cast(scenario, cases, at.name, vehicle)
+    played = scenes.scenarios.cast(scenario, cases, at.name, vehicle)
     begun = [
         (staged_start(one, vehicle), case)
         for case, one in zip(cases, played, strict=True)
@@ -202,7 +202,7 @@ def _job(
 
 def _place(
     scenario: Scenario, world: World, vehicle: VehicleParameters, wanted: str | int
-) -> Place:
+) -> ScenarioPlace:
     most = wanted + 1 if isinstance(wanted, int) and wanted >= 0 else None
     found = places(scenario, world, vehicle=vehicle, most=most)
     if not found.places:

@@ -6,18 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array, Flags
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.batch.collision_detection import touched
-from foretwin.sim_worker.futures.play import Play, Rows
-from foretwin.sim_worker.futures.scene import Aims, Scene
+from foretwin.sim_worker.futures.play import Play
+from foretwin.sim_worker.futures.scene import Aims, JobScene
 from foretwin.sim_worker.gym.episodes import Episodes
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners.giving_way import wait_arcs
-from foretwin.sim_worker.road_users.cast import Casting
 from foretwin.world_gen.rules.signal_state import cycle_s
 
 OFF_PATH_M = 6.0
@@ -106,12 +105,14 @@ class EpisodeRows:
         return np.asarray(self.ticks * self.stage.control_dt_s, dtype=np.float64)
 
     @property
-    def scene(self) -> Scene:
+    def scene(self) -> JobScene:
         """The scene as it is now."""
         assert self._play is not None, "nothing has begun"
         return self._play.scene
 
-    def begin(self, rows: Rows, cases: Rows, lights_s: Array, *, looked: bool = False) -> None:
+    def begin(
+        self, rows: Indices, cases: Indices, lights_s: Array, *, looked: bool = False
+    ) -> None:
         """Let `rows` (K,) begin the futures `cases` (K,) of the job; at first, all have to.
 
         `lights_s` (K,) is how much later by the lights' plans each is. See `Play.restart` about
@@ -177,9 +178,8 @@ class EpisodeRows:
         found = np.zeros(self.count, dtype=bool)
         if self.stage.looked:
             found |= self.stage.static_contact
-        casts = self.scene.casts
-        if casts is not None:
-            crowd = casts.crowd
+        if self.scene.traffic is not None:
+            crowd = self.scene.traffic.crowd
             found |= touched(
                 self.stage.vehicle,
                 np.stack([before, after], axis=1),
@@ -199,34 +199,25 @@ class EpisodeRows:
         return np.asarray(off)
 
 
-def scene_of(pool: Scene, cases: Rows) -> Scene:
+def scene_of(pool: JobScene, cases: Indices) -> JobScene:
     """Return the scene of (S,) futures of another one, each as it begins there."""
-    casts = pool.casts
     traffic = sight = None
-    if casts is not None and pool.traffic is not None and pool.sight is not None:
+    if pool.traffic is not None and pool.sight is not None:
         traffic = pool.traffic.begun(cases)
         sight = pool.sight.begun(cases, traffic)
-        casts = Casting(
-            traffic.crowd,
-            casts.paths,
-            casts.kinds[cases],
-            casts.hidden_by[cases],
-            casts.walks[cases],
-        )
     return pool._replace(
         starts=pool.starts[cases],
         start_arc_m=pool.start_arc_m[cases],
         aims=Aims._make(column[cases] for column in pool.aims),
         planners=tuple(pool.planners[k] for k in cases),
         numbers=pool.numbers.of(cases),
-        casts=casts,
         traffic=traffic,
         sight=sight,
         left_out=(),
     )
 
 
-def _playable(pool: Scene) -> Rows:
+def _playable(pool: JobScene) -> Indices:
     """Return which futures can be played as episodes, forwards; UserError where none can."""
     place = pool.path.locate(pool.starts[:, :2], near_arc_m=pool.start_arc_m)
     beside = np.abs(place.offset_m) > _BEGINS_WITHIN_M

@@ -13,10 +13,9 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from foretwin.contracts.arrays import Flags
+from foretwin.contracts.arrays import Flags, Indices
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.world import World
-from foretwin.sim_worker.futures.play import Rows
 from foretwin.sim_worker.gym.course import info_of
 from foretwin.sim_worker.gym.episodes import CASE
 from foretwin.sim_worker.gym.observation import Observation
@@ -110,7 +109,7 @@ class JunctionVectorEnv(VectorEnv[Observation, npt.NDArray[np.float32], npt.NDAr
         ]
         self._np_random = self._rngs[0]
 
-    def _begin(self, rows: Rows, case: int | None = None, *, looked: bool) -> dict[str, Any]:
+    def _begin(self, rows: Indices, case: int | None = None, *, looked: bool) -> dict[str, Any]:
         begun = [self.course.draw(self._rngs[row], case) for row in rows]
         self.course.begin(rows, begun, looked=looked)
         self._over[rows] = False

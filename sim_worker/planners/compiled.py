@@ -7,24 +7,32 @@ import math
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.compiled import IN, IN_ROWS, OUT, REAL, TABLE, kernel, types
 
+_PLACES, _LIMITS, _TRACKING = [IN] * 4, types.UniTuple(REAL, 3), types.UniTuple(REAL, 8)
 
-@kernel(
-    types.void, IN_ROWS, IN_ROWS, IN, IN, IN, IN, TABLE, REAL, REAL, REAL, REAL,
-    types.UniTuple(REAL, 8), OUT, OUT,
-)  # fmt: skip
+
+@kernel(types.void, IN_ROWS, IN_ROWS, *_PLACES, TABLE, REAL, _LIMITS, _TRACKING, OUT, OUT)
 def curve(
-    states: Array, heading: Array, arc_m: Array, offset_m: Array, desired_offset_m: Array,
-    speed_factor: Array, table: Array, first_arc_m: float, wheelbase_m: float,
-    max_angle_rad: float, max_rate_radps: float, tracking: tuple[float, ...],
-    accel: Array, angle: Array,
-) -> None:  # fmt: skip
+    states: Array,
+    heading: Array,
+    arc_m: Array,
+    offset_m: Array,
+    desired_offset_m: Array,
+    speed_factor: Array,
+    table: Array,
+    first_arc_m: float,
+    limits: tuple[float, ...],
+    tracking: tuple[float, ...],
+    accel: Array,
+    angle: Array,
+) -> None:
     """Fill tyre angles (S,) of pure pursuit, and accelerations (S,) that curves allow.
 
-    `states` (8, S); `table` (10, M) as of `FrenetPath`.
+    `states` (8, S); `table` (10, M) as of `FrenetPath`; `limits` are the wheelbase, and the most
+    angle and rate of the tyres.
     """
-    (
-        look_s, look_m, kept_m, look_aside, most_lateral, turn_rad, wheel_lateral, curve_s,
-    ) = tracking  # fmt: skip
+    wheelbase_m, max_angle_rad, max_rate_radps = limits
+    look_s, look_m, kept_m, look_aside = tracking[:4]
+    most_lateral, turn_rad, wheel_lateral, curve_s = tracking[4:]
     last = table.shape[1] - 1
     steepest = math.tan(max_angle_rad)
     for car in range(states.shape[1]):
@@ -68,9 +76,13 @@ def curve(
 
 @kernel(types.void, IN_ROWS, IN, IN, IN, REAL, OUT)
 def free_road(
-    states: Array, wished_mps: Array, wished_mps2: Array, exponent: Array, comfort_mps2: float,
+    states: Array,
+    wished_mps: Array,
+    wished_mps2: Array,
+    exponent: Array,
+    comfort_mps2: float,
     accel: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Lower accelerations (S,) to those of the intelligent-driver model on a free road."""
     for car in range(len(accel)):
         ratio = max(states[3, car], 0.0) / wished_mps[car]

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.sim_worker.driver_model import HOLD_MPS2, HOLD_SPEED_MPS, MAX_DECEL_MPS2
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView, SeenUsers, rows_of
 from foretwin.sim_worker.planners.lattice_choice import Planned, choose
@@ -31,6 +30,8 @@ _AT_ONCE_S, _LEAD_BRAKES_MPS2 = 0.15, 2.5
 """Sooner where somebody ahead brakes harder than this."""
 _TURNS_RADPS, _GAINS_MPS = 0.15, 1.0
 """Who turns or drives otherwise by more than when a motion was chosen is looked at again."""
+MotionPair = tuple[Motions, Motions]
+"""Along the path and across it."""
 _LOOKAHEAD_S, _PREVIEW_S = 0.6, 0.1
 _SPEED_GAIN, _PLACE_GAIN = 1.2, 0.3
 
@@ -59,7 +60,7 @@ class LatticeDriver:
         """`preview_s`: over so much of the plan's beginning its acceleration is taken, as the
         plan begins with the present one."""
         self._preview_s = preview_s
-        self._chosen: tuple[Motions, Motions] | None = None
+        self._chosen: MotionPair | None = None
         self._since_s: Array | float = -np.inf
         self._looked_s = 0.0
         self._seen: SeenUsers | None = None
@@ -103,23 +104,23 @@ class LatticeDriver:
 
     def _due(
         self,
-        chosen: tuple[Motions, Motions],
+        chosen: MotionPair,
         view: PlannerView,
         passed_s: Array,
         changing: Changes | None,
-    ) -> npt.NDArray[np.bool_]:
+    ) -> Flags:
         """Return (S,) who chooses anew: everybody at the same times, some in between."""
         if view.time_s > self._next_s - 1e-6:
             return np.ones(len(passed_s), dtype=bool)
-        due = self._sees_somebody_new(view)
-        due |= self._lead_brakes(view) & (passed_s > _AT_ONCE_S)
+        due = np.zeros(len(passed_s), dtype=bool)
+        if view.users is not None and self._seen is not None:
+            new = np.isfinite(view.users.arc_m) & ~np.isfinite(self._seen.arc_m)
+            due |= new.any(axis=1)
+        if self._lead_mps is not None:
+            least = _LEAD_BRAKES_MPS2 * (view.time_s - self._looked_s)
+            braking = self._lead_mps - view.lead_speed_mps > least
+            due |= braking & (passed_s > _AT_ONCE_S)
         return due | self._endangered(chosen, view, passed_s, changing, ~due)
-
-    def _sees_somebody_new(self, view: PlannerView) -> npt.NDArray[np.bool_]:
-        if view.users is None or self._seen is None:
-            return np.zeros(len(view.arc_m), dtype=bool)
-        new = np.isfinite(view.users.arc_m) & ~np.isfinite(self._seen.arc_m)
-        return np.asarray(new.any(axis=1))
 
     def _changes(self, view: PlannerView) -> Changes | None:
         if view.users is None or self._seen is None:
@@ -127,9 +128,13 @@ class LatticeDriver:
         return changes(self._seen, view.users, passed_s=view.time_s - self._looked_s)
 
     def _endangered(
-        self, chosen: tuple[Motions, Motions], view: PlannerView, passed_s: Array,
-        changing: Changes | None, open_: npt.NDArray[np.bool_],
-    ) -> npt.NDArray[np.bool_]:  # fmt: skip
+        self,
+        chosen: MotionPair,
+        view: PlannerView,
+        passed_s: Array,
+        changing: Changes | None,
+        open_: Flags,
+    ) -> Flags:
         """Return (S,) of the `open_` ones whose motion leads into somebody who drives otherwise
         than when that was looked at last."""
         endangered = np.zeros(len(view.arc_m), dtype=bool)
@@ -142,15 +147,13 @@ class LatticeDriver:
         if not len(rows):
             return endangered
         known[0][rows], known[1][rows] = changing.yaw_rate_radps[rows], users.speed_mps[rows]
-        along, across = (Motions(m.coefficients[:, rows], m.end_s[rows]) for m in chosen)
+        along, across = chosen[0].of(rows), chosen[1].of(rows)
         changing = Changes(*(values[rows] for values in changing))
         free = still_free(rows_of(view, rows), along, across, passed_s[rows], changing)
         endangered[rows] = ~free
         return endangered
 
-    def _note(
-        self, view: PlannerView, due: npt.NDArray[np.bool_], changing: Changes | None
-    ) -> None:
+    def _note(self, view: PlannerView, due: Flags, changing: Changes | None) -> None:
         """Remember how others drive as motions are chosen."""
         if view.users is None:
             return
@@ -161,29 +164,21 @@ class LatticeDriver:
         else:
             self._known[0][due], self._known[1][due] = turns[due], speed[due]
 
-    def _lead_brakes(self, view: PlannerView) -> npt.NDArray[np.bool_]:
-        if self._lead_mps is None:
-            return np.zeros(len(view.arc_m), dtype=bool)
-        least = _LEAD_BRAKES_MPS2 * (view.time_s - self._looked_s)
-        return np.asarray(self._lead_mps - view.lead_speed_mps > least)
-
     def _renewed(
         self,
-        chosen: tuple[Motions, Motions],
+        chosen: MotionPair,
         view: PlannerView,
-        rows: npt.NDArray[np.intp],
+        rows: Indices,
         passed_s: Array,
         changing: Changes | None,
-    ) -> tuple[Motions, Motions]:
+    ) -> MotionPair:
         """Return the motions with those of some rows chosen anew."""
-        along, across = chosen
         if len(rows) == len(passed_s):
-            return choose(view, _planned(along, across, passed_s), changing)
-        mine = Motions(along.coefficients[:, rows], along.end_s[rows])
-        aside = Motions(across.coefficients[:, rows], across.end_s[rows])
+            return choose(view, _planned(*chosen, passed_s), changing)
+        along, across = chosen
+        before = _planned(along.of(rows), across.of(rows), passed_s[rows])
         if changing is not None:
             changing = Changes(*(values[rows] for values in changing))
-        before = _planned(mine, aside, passed_s[rows])
         for old, new in zip(chosen, choose(rows_of(view, rows), before, changing), strict=True):
             old.coefficients[:, rows] = new.coefficients
             old.end_s[rows] = new.end_s

@@ -13,16 +13,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.frames import wrap_angle
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.planner_interface import PlannerView, SeenUsers, SharedGround, rows_of
 from foretwin.sim_worker.planners.tracking import front_from_base_m
-
-Flags = npt.NDArray[np.bool_]
-Indices = npt.NDArray[np.intp]
 
 CRITICAL_GAP_S = 4.1
 FOLLOW_UP_S = 2.9

@@ -6,22 +6,21 @@ goes to the planner's process is pickled: it is foretwin's own. What comes back 
 
 from __future__ import annotations
 
-import json
 import pickle
 import socket
 import struct
 import time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 
 READY, QUESTION, ANSWER, FAILURE = b"R", b"Q", b"A", b"F"
 _HEADER = struct.Struct("<cQ")
-_COUNT = struct.Struct("<I")
 _MAX_ANSWER_BYTES = 1 << 24
-_SHARED = ("path", "vehicle", "ground", "car_plan")
+SHARED = ("path", "vehicle", "ground", "car_plan")
 """Of a view, what stays the same throughout a job."""
 
 
@@ -73,27 +72,27 @@ def _exactly(link: socket.socket, count: int, end: float | None) -> bytearray:
 class Question(NamedTuple):
     """One control tick; `begins` is the number of cars where a job begins with it, else 0.
 
-    `shared` holds what stays the same throughout a job, None where it was sent already.
+    `shared` holds what stays the same throughout a job and is None in `view`, by its fields; None
+    where it was sent already.
     """
 
     begins: int
-    shared: tuple[object, ...] | None
-    changing: tuple[object, ...]
+    shared: dict[str, Any] | None
+    view: PlannerView
 
 
 def pack_question(view: PlannerView, *, begins: int, with_shared: bool) -> bytes:
     """Return a question's bytes."""
-    fields = view._asdict()
-    shared = tuple(fields.pop(name) for name in _SHARED)
-    if fields["users"] is not None:
-        fields["users"] = tuple(fields["users"])
-    question = (begins, shared if with_shared else None, tuple(fields.items()))
+    shared = {name: getattr(view, name) for name in SHARED} if with_shared else None
+    nothing: dict[str, Any] = dict.fromkeys(SHARED)
+    question = Question(begins, shared, view._replace(**nothing))
     return pickle.dumps(question, protocol=pickle.HIGHEST_PROTOCOL)
 
 
 def read_question(body: bytes) -> Question:
     """Return a question from its bytes, which must be foretwin's own."""
-    return Question(*pickle.loads(body))
+    question: Question = pickle.loads(body)
+    return question
 
 
 def pack_answer(answer: PlannerOutput, remarks: dict[int, str]) -> bytes:
@@ -102,17 +101,15 @@ def pack_answer(answer: PlannerOutput, remarks: dict[int, str]) -> bytes:
     angle = np.asarray(answer[1], dtype=np.float64)
     if accel.ndim != 1 or accel.shape != angle.shape:
         raise ValueError(f"answers of shapes {accel.shape} and {angle.shape}")
-    text = json.dumps({str(row): words for row, words in remarks.items()}) if remarks else ""
-    return _COUNT.pack(len(accel)) + accel.tobytes() + angle.tobytes() + text.encode()
+    words = {int(row): str(said) for row, said in remarks.items()}
+    return msgspec.msgpack.encode((accel.tobytes(), angle.tobytes(), words))
 
 
 def read_answer(body: bytes) -> tuple[PlannerOutput, dict[int, str]]:
     """Return an answer and its remarks; raises ValueError where there is none in the bytes."""
     try:
-        (count,) = _COUNT.unpack_from(body)
-        numbers = np.frombuffer(body, dtype=np.float64, count=2 * count, offset=_COUNT.size)
-        text = body[_COUNT.size + numbers.nbytes :]
-        told = {int(row): str(words) for row, words in json.loads(text).items()} if text else {}
-    except (struct.error, AttributeError, ValueError) as error:
+        *columns, remarks = msgspec.msgpack.decode(body, type=tuple[bytes, bytes, dict[int, str]])
+        accel, angle = (np.frombuffer(column).copy() for column in columns)
+    except (msgspec.DecodeError, ValueError) as error:
         raise ValueError(f"no answer in {len(body)} bytes: {error}") from error
-    return PlannerOutput(numbers[:count].copy(), numbers[count:].copy()), told
+    return PlannerOutput(accel, angle), remarks

@@ -14,12 +14,7 @@ import time
 from importlib.metadata import EntryPoint
 from typing import Any
 
-from foretwin.sim_worker.planner_interface import (
-    Planner,
-    PlannerView,
-    RemembersWithinJob,
-    SeenUsers,
-)
+from foretwin.sim_worker.planner_interface import Planner, RemembersWithinJob
 from foretwin.sim_worker.planners.host_link import (
     ANSWER,
     FAILURE,
@@ -76,14 +71,14 @@ def _leave_with(parent: int) -> None:
 
 def _answer(link: socket.socket, planner: Any) -> None:
     driver: Planner | None = None
-    shared: tuple[Any, ...] = ()
+    shared: dict[str, Any] = {}
     while True:
         question = read_question(receive(link).body)
         shared = question.shared or shared
         try:
             if question.begins or driver is None:
                 driver = _driver(planner, question.begins)
-            answer = driver.plan(_view(question.changing, shared))
+            answer = driver.plan(question.view._replace(**shared))
             body = pack_answer(answer, dict(getattr(driver, "remarks", {})))
         except Exception as error:
             send(link, FAILURE, _told(error))
@@ -97,14 +92,6 @@ def _driver(planner: Any, count: int) -> Planner:
     if isinstance(planner, AnswersOne) and not hasattr(planner, "plan"):
         return OneAtATime(planner)
     return planner  # type: ignore[no-any-return]
-
-
-def _view(changing: tuple[Any, ...], shared: tuple[Any, ...]) -> PlannerView:
-    fields = dict(changing)
-    if fields["users"] is not None:
-        fields["users"] = SeenUsers(*fields["users"])
-    path, vehicle, ground, car_plan = shared
-    return PlannerView(path=path, vehicle=vehicle, ground=ground, car_plan=car_plan, **fields)
 
 
 def _told(error: BaseException) -> bytes:

@@ -20,6 +20,7 @@ from foretwin.sim_worker.planners.host_link import (
     ANSWER,
     FAILURE,
     QUESTION,
+    SHARED,
     LinkLost,
     pack_question,
     read_answer,
@@ -32,6 +33,7 @@ START_S = 60.0
 FIRST_ANSWER_S, ANSWER_S = 1.0, 0.5
 """Of a planner in another process, or on another machine. Chosen."""
 _BUFFER_BYTES = 1 << 20
+_PROCESS = "foretwin.sim_worker.planners.host_process"
 
 log = logging.getLogger("foretwin.sim_worker.planners")
 
@@ -115,16 +117,17 @@ class HostedPlanner:
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER_BYTES)
         self._ready = False
         path = os.pathsep.join(entry or os.curdir for entry in sys.path)
+        given: dict[str, object] = {"link": theirs.fileno(), "parent": os.getpid()}
+        given |= {"name": self._name, "object": self._value}
+        words = [str(word) for name, value in given.items() for word in (f"--{name}", value)]
         with theirs:
             process = subprocess.Popen(
-                [
-                    sys.executable, "-P", "-m", "foretwin.sim_worker.planners.host_process",
-                    "--link", str(theirs.fileno()), "--parent", str(os.getpid()),
-                    "--name", self._name, "--object", self._value,
-                ],
-                pass_fds=(theirs.fileno(),), env=os.environ | {"PYTHONPATH": path},
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-            )  # fmt: skip
+                [sys.executable, "-P", "-m", _PROCESS, *words],
+                pass_fds=(theirs.fileno(),),
+                env=os.environ | {"PYTHONPATH": path},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+            )
         return _Host(process, ours)
 
     def _await_ready(self) -> None:
@@ -169,15 +172,13 @@ class HostedDriver:
 
     def __init__(self, planner: HostedPlanner, count: int) -> None:
         self._planner, self._begins = planner, count
-        self._shared: tuple[object, ...] = ()
+        self._shared: list[object] = [self] * len(SHARED)
         self.remarks: dict[int, str] = {}
 
     def plan(self, view: PlannerView) -> PlannerOutput:
         """Answer one control tick; raises PlannerFailed."""
-        shared = (view.path, view.vehicle, view.ground, view.car_plan)
-        fresh = len(self._shared) != len(shared) or any(
-            new is not old for new, old in zip(shared, self._shared, strict=True)
-        )
+        shared = [getattr(view, name) for name in SHARED]
+        fresh = any(new is not old for new, old in zip(shared, self._shared, strict=True))
         body = pack_question(view, begins=self._begins, with_shared=fresh)
         answer, remarks = self._planner.ask(body, begins=self._begins > 0)
         self._begins, self._shared = 0, shared

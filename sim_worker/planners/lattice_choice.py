@@ -72,10 +72,7 @@ def choose(
     best = total.reshape(len(total), -1).argmin(axis=1)
     rows = np.arange(len(total))
     first, second = np.divmod(best, total.shape[2])
-    return (
-        Motions(along.coefficients[:, rows, first], along.end_s[rows, first]),
-        Motions(across.coefficients[:, rows, second], across.end_s[rows, second]),
-    )
+    return along.of(rows, first), across.of(rows, second)
 
 
 def _stop_places(view: PlannerView) -> Array:
@@ -115,10 +112,8 @@ def _along(view: PlannerView, speed: Array, accel: Floats, stop: Array) -> Motio
     lead = np.maximum(view.lead_speed_mps, 0.0)[:, None]
     gap = np.minimum(view.lead_gap_m, 150.0)[:, None]
     room = gap + lead * _SPEED_TIMES_S - driver.STANDSTILL_GAP_M - driver.BRISK_TIME_GAP_S * lead
-    following = to_place(
-        arc, speed, accel, end_place=arc + np.maximum(room, 0.0),
-        end_speed=np.broadcast_to(lead, room.shape), end_s=_SPEED_TIMES_S,
-    )  # fmt: skip
+    place, pace = arc + np.maximum(room, 0.0), np.broadcast_to(lead, room.shape)
+    following = to_place(arc, speed, accel, end_place=place, end_speed=pace, end_s=_SPEED_TIMES_S)
     return joined(keeping, braking, stopping, following, emergency)
 
 
@@ -126,9 +121,7 @@ def _across(view: PlannerView, offset: Floats, slide: Floats, push: Floats) -> M
     """Return (S, D) motions across the path: to offsets beside the wanted one, and to stay."""
     offset, slide, push = offset[:, None], slide[:, None], push[:, None]
     aside = np.repeat(_ASIDE_M, len(_ASIDE_TIMES_S))
-    times = np.tile(_ASIDE_TIMES_S, len(_ASIDE_M))
+    times = np.append(np.tile(_ASIDE_TIMES_S, len(_ASIDE_M)), 2.0)
     ends = np.concatenate([view.desired_offset_m[:, None] + aside, offset], axis=1)
-    return to_place(
-        offset, slide, push, end_place=ends, end_speed=np.zeros_like(ends),
-        end_s=np.append(times, 2.0),
-    )  # fmt: skip
+    rest = np.zeros_like(ends)
+    return to_place(offset, slide, push, end_place=ends, end_speed=rest, end_s=times)

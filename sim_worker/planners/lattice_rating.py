@@ -6,9 +6,8 @@ In single precision, with instants on the first axis, so that sums over them are
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.geometry.frenet_path import SPACING_M
 from foretwin.sim_worker.driver_model import HASTE, LATERAL_ACCEL_MPS2, MAX_DECEL_MPS2
 from foretwin.sim_worker.planner_interface import PlannerView
@@ -77,7 +76,7 @@ def rate_across(view: PlannerView, across: Motions, speed: Array) -> tuple[Float
 
 def still_free(
     view: PlannerView, along: Motions, across: Motions, now_s: Array, changing: Changes | None
-) -> npt.NDArray[np.bool_]:
+) -> Flags:
     """Return (S,) whether motions that began `now_s` (S,) ago go on to touch nobody."""
     later = now_s + _INSTANTS_S[:, None]
     place, speed, _ = along.at(later)

@@ -6,7 +6,6 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.planner_interface import (
@@ -101,18 +100,14 @@ class OneAtATime:
 
 def car_view(view: PlannerView, row: int) -> CarView:
     """Return what the car of one row sees."""
-    stop = view.stop_arc_m
-    columns = (
-        view.arc_m, view.offset_m, view.desired_offset_m, view.target_speed_mps,
-        view.speed_factor, view.lead_gap_m, view.lead_speed_mps,
-    )  # fmt: skip
-    fields = [
-        view.time_s, *view.states[row].tolist(), view.path,
-        *(float(column[row]) for column in columns),
-        np.inf if stop is None else float(stop[row]),
-        _users(view, row), view.ground, view.car_plan, view.vehicle,
-    ]  # fmt: skip
-    return CarView._make(fields)
+    stop = np.inf if view.stop_arc_m is None else float(view.stop_arc_m[row])
+    numbers = [float(getattr(view, name)[row]) for name in _NUMBERS]
+    places = (view.time_s, *view.states[row].tolist(), view.path, *numbers, stop)
+    rest = (_users(view, row), view.ground, view.car_plan, view.vehicle)
+    return CarView._make([*places, *rest])
+
+
+_NUMBERS = CarView._fields[CarView._fields.index("arc_m") : CarView._fields.index("stop_arc_m")]
 
 
 def _users(view: PlannerView, row: int) -> tuple[SeenUser, ...]:
@@ -120,15 +115,8 @@ def _users(view: PlannerView, row: int) -> tuple[SeenUser, ...]:
     if users is None:
         return ()
     there = np.isfinite(users.poses[row, :, 0])
-
-    def of(values: Array) -> list[float]:
-        return values[row][there].tolist()  # type: ignore[no-any-return]
-
-    return tuple(
-        SeenUser._make([*pose, speed, *size, arc, offset, bool(walks), turned])
-        for pose, speed, size, arc, offset, walks, turned in zip(
-            users.poses[row][there].tolist(), of(users.speed_mps),
-            users.size_m[row][there].tolist(), of(users.arc_m), of(users.offset_m),
-            users.walks[row][there].tolist(), of(users.turned_rad), strict=True,
-        )
-    )  # fmt: skip
+    poses, speed, size, arc, offset, walks, turned = (
+        column[row][there].tolist() for column in users
+    )
+    rows = zip(poses, speed, size, arc, offset, map(bool, walks), turned, strict=True)
+    return tuple(SeenUser._make([*pose, v, *box, *rest]) for pose, v, box, *rest in rows)

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from foretwin.contracts.arrays import Indices
+
 Floats = npt.NDArray[np.floating]
 """In double precision where a car follows them, in single precision where they are rated."""
 
@@ -21,6 +23,10 @@ class Motions(NamedTuple):
 
     coefficients: Floats
     end_s: Floats
+
+    def of(self, *places: Indices | slice) -> Motions:
+        """Return those at places along the axes (…)."""
+        return Motions(self.coefficients[:, *places], self.end_s[*places])
 
     def place_at(self, time_s: Floats) -> Floats:
         """Return places at times that broadcast against (…); see `at`."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.driver_model import SIGHT_M
@@ -54,7 +53,7 @@ def changes(before: SeenUsers, now: SeenUsers, *, passed_s: float) -> Changes | 
     return Changes(np.where(known, brakes, 0.0), np.where(known, turns, 0.0))
 
 
-def _may_meet(view: PlannerView, users: SeenUsers, within_s: float) -> npt.NDArray[np.bool_]:
+def _may_meet(view: PlannerView, users: SeenUsers, within_s: float) -> Flags:
     """(S, R) bool: who could come near the car's way, by present speeds, in that time."""
     along = within_s * users.speed_mps * np.cos(users.turned_rad)
     aside = within_s * np.abs(users.speed_mps * np.sin(users.turned_rad))
@@ -123,7 +122,7 @@ class _Boxes(NamedTuple):
     width_m: Array
     brakes_mps2: Array
     yaw_rate_radps: Array
-    keeps_lane: npt.NDArray[np.bool_]
+    keeps_lane: Flags
 
 
 def _either_way(now: _Boxes, path: FrenetPath) -> _Boxes:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.planner_interface import PlannerOutput, PlannerView
 from foretwin.sim_worker.planners import compiled, tracking
@@ -42,7 +41,7 @@ class _Wishes(NamedTuple):
     speed_mps: Array
     accel_mps2: Array
     exponent: Array
-    stand: npt.NDArray[np.bool_] | None
+    stand: Flags | None
 
 
 class PurePursuitIdm:
@@ -67,6 +66,7 @@ class PurePursuitIdm:
         if heading is None:
             heading = np.array([np.cos(states[2]), np.sin(states[2])])
         accel, angle = np.empty(len(speed)), np.empty(len(speed))
+        limits = vehicle.wheelbase_m, vehicle.max_tire_angle_rad, vehicle.max_tire_rate_radps
         compiled.curve(
             states,
             heading,
@@ -76,9 +76,7 @@ class PurePursuitIdm:
             np.asarray(view.speed_factor, dtype=np.float64),
             path.with_curve_speeds(driver.LATERAL_ACCEL_MPS2, driver.COMFORT_DECEL_MPS2),
             path.first_arc_m,
-            vehicle.wheelbase_m.value,
-            vehicle.max_tire_angle_rad.value,
-            vehicle.max_tire_rate_radps.value,
+            tuple(float(part.value) for part in limits),
             _TRACKING,
             accel,
             angle,

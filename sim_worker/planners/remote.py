@@ -12,9 +12,8 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.bus import Bus, Mailbox, Received
 from foretwin.contracts.planner_link import PlannedMotions, PlannerScene
 from foretwin.sim_worker.planner_interface import Planner, PlannerOutput, PlannerView, rows_of
@@ -138,9 +137,8 @@ class RemoteDriver:
                     message = item.message()
                 except ValueError:
                     message = None
-                if isinstance(message, PlannedMotions) and (message.job, message.question) == (
-                    scene.job, scene.question,
-                ):  # fmt: skip
+                asked = (scene.job, scene.question)
+                if isinstance(message, PlannedMotions) and (message.job, message.question) == asked:
                     return message
             elif left <= 0.0:
                 return None
@@ -156,7 +154,7 @@ class _Motions:
     """The motions received last, by row."""
 
     def __init__(self, count: int) -> None:
-        self.known: npt.NDArray[np.bool_] = np.zeros(count, dtype=bool)
+        self.known: Flags = np.zeros(count, dtype=bool)
         self._received: Trajectories | None = None
         self._place = np.zeros(count, dtype=np.intp)
 
@@ -179,9 +177,7 @@ class _Motions:
         self._place[rows] = np.arange(len(rows))
         return [int(row) for row in np.flatnonzero(~self.known)]
 
-    def track(
-        self, view: PlannerView, rows: npt.NDArray[np.intp] | slice = slice(None)
-    ) -> PlannerOutput:
+    def track(self, view: PlannerView, rows: Indices | slice = slice(None)) -> PlannerOutput:
         assert self._received is not None
         place = self._place[rows]
         mine = Trajectories._make(values[place] for values in self._received)

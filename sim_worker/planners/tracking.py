@@ -27,25 +27,15 @@ def pure_pursuit(view: PlannerView) -> Array:
     δ = atan(2 L y / d²) with the goal at (x, y) in body axes and distance d
     (Coulter 1992, Implementation of the Pure Pursuit Path Tracking Algorithm).
     """
-    ahead = view.arc_m + lookahead_m(view.states[:, 3], aside_m(view))
+    aside = np.abs(view.offset_m - view.desired_offset_m)
+    ahead = view.arc_m + lookahead_m(view.states[:, 3], aside)
     return steer_towards(view, view.path.point_at(ahead, view.desired_offset_m))
-
-
-def aside_m(view: PlannerView) -> Array:
-    """Return how far (S,) the cars are from their lines."""
-    aside = view.offset_m - view.desired_offset_m
-    return np.abs(aside, out=aside)
 
 
 def lookahead_m(speed_mps: Array, aside_m: Array) -> Array:
     """Return how far ahead goals lie for cars so far beside their lines, each (S,)."""
-    lookahead = LOOKAHEAD_TIME_S * speed_mps
-    np.maximum(lookahead, MIN_LOOKAHEAD_M, out=lookahead)
-    more = aside_m - KEPT_M
-    np.maximum(more, 0.0, out=more)
-    more *= LOOKAHEAD_ASIDE
-    lookahead += more
-    return lookahead
+    lookahead = np.maximum(LOOKAHEAD_TIME_S * speed_mps, MIN_LOOKAHEAD_M)
+    return np.asarray(lookahead + LOOKAHEAD_ASIDE * np.maximum(aside_m - KEPT_M, 0.0))
 
 
 def steer_towards(view: PlannerView, goal: Array) -> Array:
@@ -59,20 +49,11 @@ def steer_towards(view: PlannerView, goal: Array) -> Array:
         heading = np.array([np.cos(states[2]), np.sin(states[2])])
     way = goal.T - states[:2]
     ahead = heading * way[::-1]
-    slope = ahead[0] - ahead[1]
-    slope *= 2.0 * wheelbase
-    way *= way
-    distance_square = way[0] + way[1]
-    distance_square += 1e-9
-    slope /= distance_square
-    most = np.maximum(states[3], 1.0)
-    most *= most
-    np.divide(wheelbase * MAX_LATERAL_ACCEL_MPS2, most, out=most)
-    np.minimum(most, math.tan(view.vehicle.max_tire_angle_rad.value), out=most)
-    np.minimum(slope, most, out=slope)
-    np.negative(most, out=most)
-    np.maximum(slope, most, out=slope)
-    return np.asarray(np.arctan(slope, out=slope))
+    distance_square = np.square(way[0]) + np.square(way[1]) + 1e-9
+    slope = (ahead[0] - ahead[1]) * (2.0 * wheelbase) / distance_square
+    most = wheelbase * MAX_LATERAL_ACCEL_MPS2 / np.square(np.maximum(states[3], 1.0))
+    most = np.minimum(most, math.tan(view.vehicle.max_tire_angle_rad.value))
+    return np.asarray(np.arctan(np.maximum(np.minimum(slope, most), -most)))
 
 
 def front_from_base_m(vehicle: VehicleParameters) -> float:
@@ -88,18 +69,9 @@ def turning_speed(view: PlannerView, tire_angle_rad: Array, *, lateral_accel_mps
     """
     vehicle, present = view.vehicle, view.states[:, 6]
     wheelbase, rate = vehicle.wheelbase_m.value, vehicle.max_tire_rate_radps.value
-    bend, turned = np.abs(present), np.abs(tire_angle_rad)
-    np.maximum(bend, turned, out=bend)
-    # κ L of the wider angle, and the time until the wheels are where they should be times their
-    # rate; neither may be zero.
-    np.tan(bend, out=bend)
-    bend += 1e-6 * wheelbase
-    np.subtract(present, tire_angle_rad, out=turned)
-    np.abs(turned, out=turned)
-    turned += 1e-6 * rate
-    # What the car turns by at 1 m/s until then.
-    turned *= bend
-    np.divide(MAX_TURN_RAD * wheelbase * rate, turned, out=turned)
-    np.divide(lateral_accel_mps2 * wheelbase, bend, out=bend)
-    np.sqrt(bend, out=bend)
-    return np.minimum(bend, turned, out=bend)
+    # κ L of the wider angle, and what the car turns by at 1 m/s until the wheels are where they
+    # should be, times their rate; neither may be zero.
+    bend = np.tan(np.maximum(np.abs(present), np.abs(tire_angle_rad))) + 1e-6 * wheelbase
+    turned = (np.abs(present - tire_angle_rad) + 1e-6 * rate) * bend
+    allowed = np.sqrt(lateral_accel_mps2 * wheelbase / bend)
+    return np.minimum(allowed, MAX_TURN_RAD * wheelbase * rate / turned)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.futures import RecordedRoadUser
 from foretwin.contracts.scenario import Conduct
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.road_users.crowd import Crowd
-from foretwin.sim_worker.road_users.path_table import Indices
 from foretwin.sim_worker.road_users.replay import Replay
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
@@ -41,8 +39,8 @@ class Player(NamedTuple):
     size_m: tuple[float, float] | None = None
 
 
-class Casting(NamedTuple):
-    """The crowd of a job, and what else is known of it: (S, R) where nothing else is said.
+class RoadUserArrays(NamedTuple):
+    """The crowd of a job, and the paths that it moves on.
 
     `paths` are all that anybody drives on, the ego's first; `replay` has where those are who come
     first in every future, if they were recorded.
@@ -50,9 +48,6 @@ class Casting(NamedTuple):
 
     crowd: Crowd
     paths: tuple[FrenetPath, ...]
-    kinds: Indices
-    hidden_by: Indices
-    walks: npt.NDArray[np.bool_]
     replay: Replay | None = None
 
 
@@ -61,7 +56,7 @@ def casting(
     *,
     ego_path: FrenetPath,
     replayed: Sequence[RecordedRoadUser] = (),
-) -> Casting:
+) -> RoadUserArrays:
     """Lay the road users of S futures out as arrays; places without one are not present.
 
     Those `replayed` come first in each; their `path_of` counts on after the paths.
@@ -85,87 +80,50 @@ def casting(
     for player in players:
         paths.setdefault(id(player.path), player.path)
     places = {path: place for place, path in enumerate(paths)}
-    rows = [_NOBODY, *(_row(player, places) for player in players)]
+    rows = [_NOBODY, *(_player_row(player, places[id(player.path)]) for player in players)]
     which[:, :first] = len(rows) + np.arange(first)
-    rows += [_recorded_row(user, len(paths) + place) for place, user in enumerate(replayed)]
-    present, lawful, walks, path_of, kinds, columns = (
-        np.array(column)[which] for column in zip(*rows, strict=True)
-    )
-    length, width, lateral, arc, speed, desired, accel, decel, brakes_at, brakes_by = np.moveaxis(
-        columns, -1, 0
-    ).copy()
-    crowd = Crowd(
-        present=present,
-        lawful=lawful,
-        length_m=length,
-        width_m=width,
-        path_of=path_of,
-        lateral_m=lateral,
-        start_arc_m=arc,
-        start_speed_mps=speed,
-        desired_mps=desired,
-        accel_mps2=accel,
-        decel_mps2=decel,
-        brakes_at_s=brakes_at,
-        brakes_by_mps2=brakes_by,
+    rows += [_row(user.kind, user.size_m, len(paths) + k) for k, user in enumerate(replayed)]
+    columns = np.moveaxis(np.array(rows)[which], -1, 0).copy()
+    present, lawful, walks = columns[:3] > 0.0
+    path_of, kinds = columns[3:5].astype(np.intp)
+    crowd = Crowd._make(
+        [present, lawful, *columns[5:7], path_of, *columns[7:], walks, kinds, hidden]
     )
     replay = Replay(replayed) if replayed else None
-    return Casting(crowd, tuple(paths.values()), kinds, hidden, walks, replay)
+    return RoadUserArrays(crowd, tuple(paths.values()), replay)
 
 
-class _Row(NamedTuple):
-    """What arrays hold of one player; `numbers` are the columns of `Crowd` from its length on."""
-
-    present: bool
-    lawful: bool
-    walks: bool
-    path: int
-    kind: int
-    numbers: tuple[float, ...]
+_Row = tuple[float, ...]
+"""Of one player: 1 where present, lawful and walking, places of path and kind, and the columns of
+`Crowd` from its length on, without the path."""
+_STILL: _Row = (0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
+_NOBODY: _Row = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, *_STILL)
 
 
-_NOBODY = _Row(
-    False, False, False, 0, 0, (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, np.inf, 0.0)
-)  # fmt: skip
+def _row(
+    kind: RoadUserKind,
+    size_m: tuple[float, float] | None,
+    path: int,
+    *,
+    lawful: bool = False,
+    motion: _Row = _STILL,
+) -> _Row:
+    traits = KINDS[kind]
+    size = size_m or (traits.length_m, traits.width_m)
+    return (1.0, lawful, not traits.keeps_lane, path, KIND_NAMES.index(kind), *size, *motion)
 
 
-def _recorded_row(user: RecordedRoadUser, path: int) -> _Row:
-    traits = KINDS[user.kind]
-    length, width = user.size_m or (traits.length_m, traits.width_m)
-    return _NOBODY._replace(
-        present=True,
-        walks=not traits.keeps_lane,
-        path=path,
-        kind=KIND_NAMES.index(user.kind),
-        numbers=(length, width, *_NOBODY.numbers[2:]),
-    )
-
-
-def _row(player: Player, places: Mapping[int, int]) -> _Row:
-    return _Row(
-        present=True,
-        lawful=player.conduct == "law_abiding",
-        walks=not KINDS[player.kind].keeps_lane,
-        path=places[id(player.path)],
-        kind=KIND_NAMES.index(player.kind),
-        numbers=_numbers(player),
-    )
-
-
-def _numbers(player: Player) -> tuple[float, ...]:
-    """Return a player's columns in the order of `Crowd`, from its length on."""
+def _player_row(player: Player, path: int) -> _Row:
     traits = KINDS[player.kind]
-    length, width = player.size_m or (traits.length_m, traits.width_m)
-    desired = player.speed_mps if player.desired_mps is None else player.desired_mps
-    return (
-        length,
-        width,
+    motion = (
         player.lateral_m,
         player.start_arc_m,
         0.0 if player.conduct == "parked" else player.speed_mps,
-        desired,
+        player.speed_mps if player.desired_mps is None else player.desired_mps,
         traits.accel_mps2,
         traits.decel_mps2,
         player.acts_after_s if player.conduct == "stops" else np.inf,
         player.decel_mps2,
     )
+    lawful = player.conduct == "law_abiding"
+    return _row(player.kind, player.size_m, path, lawful=lawful, motion=motion)

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.road_users.path_table import Indices
-
-Flags = npt.NDArray[np.bool_]
+from foretwin.contracts.arrays import Array, Flags, Indices
 
 
 class Crowd(NamedTuple):
@@ -18,7 +12,8 @@ class Crowd(NamedTuple):
 
     `path_of` is a place in the `PathTable`; `lateral_m` lies to its left. `desired_mps` is the
     speed on a free road. From `brakes_at_s` on, infinite for most, it brakes by `brakes_by_mps2`.
-    `lawful` ones react to others, the rest keep their speed.
+    `lawful` ones react to others, the rest keep their speed. `walks` is true of those who keep to
+    no lane, `kinds` are places in `KIND_NAMES`, `hidden_by` the column of who hides it, or -1.
     """
 
     present: Flags
@@ -34,6 +29,9 @@ class Crowd(NamedTuple):
     decel_mps2: Array
     brakes_at_s: Array
     brakes_by_mps2: Array
+    walks: Flags
+    kinds: Indices
+    hidden_by: Indices
 
 
 class EgoBoxes(NamedTuple):

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.speed_profile import speed_in_bends_mps
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
-from foretwin.sim_worker.road_users.path_table import Indices, PathTable
+from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.right_of_way import PathRules
 
 _BESIDE_M = 0.3
@@ -96,11 +96,8 @@ class LawAbiding:
         width = _with_ego(ego.width_m, crowd.width_m)
         half_bend = 0.5 * bend
         widest = 0.5 * (self._width + np.max(length + width)) + _BESIDE_M
-        found = [
-            _in_front(xs.T, ys.T, s[part], x[part], y[part], cos[part], sin[part],
-                      half_bend[part], widest[part], part.start)
-            for part in self._parts
-        ]  # fmt: skip
+        mine = np.stack([x, y, cos, sin, half_bend, widest])
+        found = [_in_front(xs.T, ys.T, s, mine, part) for part in self._parts]
         k, o = np.concatenate(found, axis=1)
         at = s[k] * length.shape[1] + o
         dx, dy = xs.take(at) - x[k], ys.take(at) - y[k]
@@ -171,14 +168,14 @@ class LawAbiding:
         return np.asarray(ahead.min(axis=1, initial=np.inf)) - driver.LINE_GAP_M
 
 
-def _in_front(
-    xs: Array, ys: Array, future: Indices, x: Array, y: Array, cos: Array, sin: Array,
-    half_bend: Array, within_m: Array, first: int,
-) -> Indices:  # fmt: skip
-    """Return (2, N) who of (K,) road users has whom of (R + 1, S) ahead, near its own parabola.
+def _in_front(xs: Array, ys: Array, futures: Indices, mine: Array, part: slice) -> Indices:
+    """Return (2, N) who of a part of (K,) has whom of (R + 1, S) ahead, near its own parabola.
 
+    `mine` (6, K) is x, y, cosine and sine of its yaw, half its bend, and how far beside counts.
     Everybody's x and y come with one row for each of the others: so the inner loops are long.
     """
+    x, y, cos, sin, half_bend, within_m = mine[:, part]
+    future = futures[part]
     dx, dy = xs.take(future, axis=1) - x, ys.take(future, axis=1) - y
     ahead = cos * dx
     ahead += sin * dy
@@ -192,7 +189,7 @@ def _in_front(
     near &= ahead > 0.0
     near &= ahead < driver.SIGHT_M
     other, who = np.divmod(np.flatnonzero(near), len(x))
-    return np.stack([who + first, other])
+    return np.stack([who + part.start, other])
 
 
 def _with_ego(ego: Array | float, others: Array) -> Array:

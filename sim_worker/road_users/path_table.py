@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.geometry.frenet_path import SPACING_M, FrenetPath
-
-Indices = npt.NDArray[np.intp]
 
 
 class OnPaths(NamedTuple):
@@ -23,7 +20,7 @@ class OnPaths(NamedTuple):
     last: Array
 
 
-class Place(NamedTuple):
+class PathPlace(NamedTuple):
     """Places (…) in a table: the node before, and the share of the way to the next."""
 
     node: Indices
@@ -59,14 +56,14 @@ class PathTable:
         last = self._last[path_of] - 1e-9
         return OnPaths(self._begin[path_of], self._first_arc[path_of], last)
 
-    def place(self, on: OnPaths, arc_m: Array) -> Place:
+    def place(self, on: OnPaths, arc_m: Array) -> PathPlace:
         """Return where arc lengths (…) are on their paths."""
         place = (arc_m - on.first_arc_m) / SPACING_M
         place = np.minimum(np.maximum(place, 0.0), on.last)
         index = place.astype(np.intp)
-        return Place(on.begin + index, place - index)
+        return PathPlace(on.begin + index, place - index)
 
-    def poses(self, place: Place, lateral_m: Array | None = None) -> Array:
+    def poses(self, place: PathPlace, lateral_m: Array | None = None) -> Array:
         """Return x, y, yaw (…, 3) at places on the paths, `lateral_m` (…) to the left of them."""
         found = self._steps.take(place.node, axis=0)
         found *= place.share[..., None]
@@ -76,7 +73,7 @@ class PathTable:
             found[..., 1] += np.cos(found[..., 2]) * lateral_m
         return np.asarray(found)
 
-    def headings(self, place: Place) -> Array:
+    def headings(self, place: PathPlace) -> Array:
         """Return the paths' headings (…), without jumps, at places."""
         return np.asarray(
             self._steps[:, 2].take(place.node) * place.share + self._poses[:, 2].take(place.node)
@@ -99,7 +96,7 @@ class PathProjection:
         self._columns = [np.ascontiguousarray(column) for column in columns.T]
         self._steps = [np.diff(column, append=column[-1:]) for column in self._columns]
 
-    def at(self, place: Place) -> tuple[Array, Array, Array]:
+    def at(self, place: PathPlace) -> tuple[Array, Array, Array]:
         """Return arc length, offset to the left and relative heading (…) on the other path."""
         arc, offset, turned = (
             steps.take(place.node) * place.share + column.take(place.node)

@@ -7,15 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPoint
 from foretwin.sim_worker.planner_interface import SeenUsers
-from foretwin.sim_worker.road_users.path_table import PathProjection, Place
+from foretwin.sim_worker.road_users.path_table import PathPlace, PathProjection
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
-
-Flags = npt.NDArray[np.bool_]
 
 _MARGIN_M = 0.3
 """What passes the car's side by less than this is in its way."""
@@ -47,25 +45,22 @@ class Sight:
         vehicle: VehicleParameters,
         faults: PerceptionFaults,
         *,
-        hidden_by: npt.NDArray[np.intp],
-        walks: Flags,
         tick_s: float,
         kept: int | None = None,
     ) -> None:
-        """`along` projects the traffic's paths on the ego's; `hidden_by` (S, R) columns or -1.
+        """`along` projects the traffic's paths on the ego's.
 
         What was seen is remembered for as long as anybody sees late, or for `kept` ticks.
         """
         crowd = traffic.crowd
-        self._crowd, self._along, self._walks = crowd, along, walks
-        self._vehicle, self._hidden_by = vehicle, hidden_by
+        self._crowd, self._along, self._vehicle = crowd, along, vehicle
         self._length_m, self._width_m = vehicle.length_m.value, vehicle.width_m.value
         self._front_m = box_centre_from_base_m(vehicle) + self._length_m / 2.0
         self._size = np.stack([crowd.length_m, crowd.width_m], axis=-1)
         self._late = np.round(faults.delay_s / tick_s).astype(np.intp)
         self._faults, self._tick_s = faults, tick_s
-        self._hidden = np.nonzero((hidden_by >= 0) & crowd.present)
-        self._hides = hidden_by[self._hidden]
+        self._hidden = np.nonzero((crowd.hidden_by >= 0) & crowd.present)
+        self._hides = crowd.hidden_by[self._hidden]
         self.anybody_hidden = len(self._hides) > 0
         """Whether it matters where the cars' eyes are."""
         kept = kept or int(self._late.max(initial=0)) + 1
@@ -79,15 +74,13 @@ class Sight:
         self._at_most_aside_m = half_diagonal + (0.5 * self._width_m + _MARGIN_M + _ROUNDING_M)
         """However it is turned, who is farther aside than this is not in the way."""
 
-    def begun(self, futures: npt.NDArray[np.intp], traffic: Traffic) -> Sight:
+    def begun(self, futures: Indices, traffic: Traffic) -> Sight:
         """Return the sight of (K,) cars that see `traffic`, begun as that of these futures did."""
         return Sight(
             traffic,
             self._along,
             self._vehicle,
             PerceptionFaults._make(column[futures] for column in self._faults),
-            hidden_by=self._hidden_by[futures],
-            walks=self._walks[futures],
             tick_s=self._tick_s,
             kept=len(self._past) + 1,
         )
@@ -105,9 +98,7 @@ class Sight:
             for mine, theirs in zip(self._past, past, strict=True)
         ]
 
-    def look(
-        self, tick: int | npt.NDArray[np.intp], traffic: Traffic, eyes_xy_m: Array
-    ) -> SeenUsers:
+    def look(self, tick: int | Indices, traffic: Traffic, eyes_xy_m: Array) -> SeenUsers:
         """Return what is seen at a tick, or ticks (S,), from where the cars' fronts are (S, 2)."""
         self._past = [_now(traffic), *self._past[:-1]]
         node, share, speed, poses = self._past[0]
@@ -116,18 +107,16 @@ class Sight:
             node, share, speed, poses = (
                 np.stack([past[k] for past in self._past])[self._late, rows] for k in range(4)
             )
-        on_arc, offset, turned = self._along.at(Place(node, share))
+        on_arc, offset, turned = self._along.at(PathPlace(node, share))
         if self._beside_m is not None:
             offset = offset + self._beside_m * np.cos(turned)
         unseen = self._unseen(tick, poses, eyes_xy_m)
         if unseen is not None:
             on_arc = np.where(unseen, np.nan, on_arc)
             poses = np.where(unseen[..., None], np.nan, poses)
-        return SeenUsers(poses, speed, self._size, on_arc, offset, self._walks, turned)
+        return SeenUsers(poses, speed, self._size, on_arc, offset, self._crowd.walks, turned)
 
-    def _unseen(
-        self, tick: int | npt.NDArray[np.intp], poses: Array, eyes_xy_m: Array
-    ) -> Flags | None:
+    def _unseen(self, tick: int | Indices, poses: Array, eyes_xy_m: Array) -> Flags | None:
         """(S, R) bool: who is away, lost or hidden; None where everybody is seen."""
         if self._all_there and not self._ever_lost and not self.anybody_hidden:
             return None

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.futures import RecordedRoadUser
-from foretwin.sim_worker.road_users.path_table import Indices
 
 _AT_SAMPLE_S = 1e-9
 """So near to a sample's time is at it."""
@@ -26,7 +24,7 @@ class ReplayMoment(NamedTuple):
     node: Indices
     share: Array
     speed_mps: Array
-    gone: npt.NDArray[np.bool_]
+    gone: Flags
 
 
 class Replay:
@@ -48,9 +46,8 @@ class Replay:
         self._speed = np.concatenate([user.speed_mps for user in users])
         self._gone_after = np.concatenate([user.gone_after for user in users]).astype(bool)
         self._gone_after[self._begin + counts - 1] = True
-        self._first_s, self._end_s = (
-            self._time_s[self._begin], self._time_s[self._begin + counts - 1],
-        )  # fmt: skip
+        self._first_s = self._time_s[self._begin]
+        self._end_s = self._time_s[self._begin + counts - 1]
         # One search for all: everybody's times are moved behind those of the one before.
         span_s = float(self._end_s.max() - self._first_s.min()) + 1.0
         self._moved_s = np.arange(len(users)) * span_s

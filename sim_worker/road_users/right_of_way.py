@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.world import Connection, World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.geometry.polyline import arc_lengths, direction_at
+from foretwin.geometry.polyline import arc_lengths, direction_at, points_at
 from foretwin.sim_worker.planner_interface import SharedGround
-from foretwin.sim_worker.road_users.path_table import Indices
 
 _ON_PATH_M, _ON_PATH_RAD = 1.5, 0.6
 _GREEN_KEEPS = ("turn_across", "u_turn", "merge_order")
@@ -148,12 +147,10 @@ def _signals(
 
 def _probe(line: Array) -> Array:
     """Return (3, 3) x, y, heading at the start, the middle and the end of a polyline."""
-    steps = np.diff(line, axis=0)
-    arc = arc_lengths(line)
+    steps, arc = np.diff(line, axis=0), arc_lengths(line)
     at = np.array([0.0, 0.5, 1.0]) * arc[-1]
     step = np.minimum(np.searchsorted(arc, at, side="right") - 1, len(steps) - 1)
-    xy = [np.interp(at, arc, line[:, k]) for k in (0, 1)]
-    return np.column_stack([*xy, np.arctan2(steps[step, 1], steps[step, 0])])
+    return np.column_stack([points_at(line, at), np.arctan2(steps[step, 1], steps[step, 0])])
 
 
 def _stretches(world: World) -> dict[tuple[str, str], _Stretch]:

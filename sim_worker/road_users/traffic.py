@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes, Flags
+from foretwin.contracts.arrays import Array, Flags, Indices
+from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.law_abiding import LawAbiding, Now
-from foretwin.sim_worker.road_users.path_table import Indices, PathTable
+from foretwin.sim_worker.road_users.path_table import PathTable
 from foretwin.sim_worker.road_users.replay import Replay
 from foretwin.sim_worker.road_users.right_of_way import PathRules
 

@@ -14,16 +14,15 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import corners
 from foretwin.sim_worker.scenarios.impact import (
     TOLERANCE_M,
-    Moving,
+    MovingBox,
     Touch,
-    ego_rectangles,
     first_touch,
     front_point,
     gap_m,
 )
-from foretwin.sim_worker.scenarios.roles import CastActor, Meeting, Staging
+from foretwin.sim_worker.scenarios.roles import PlannedMeeting, StagedActor, Staging
 from foretwin.sim_worker.scenarios.ways import Way
-from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
+from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
 _CLEAR_M, _LANE_HALF_M = 0.3, 1.5
 """What is parked leaves the lane free, and a car's side by so much."""
@@ -40,9 +39,9 @@ class Touched(NamedTuple):
     share: float
 
 
-def along(part: ActorPart, staging: Staging, meetings: dict[str, Meeting]) -> CastActor:
+def along(part: ActorPart, staging: Staging, meetings: dict[str, PlannedMeeting]) -> StagedActor:
     """Return an actor on the ego's path or beside it; who hides another stands before its way."""
-    place, box = staging.place, staging.box
+    place, box = staging.place, staging.ego
     traits, gap = KINDS[part.kind], staging.number(part, "gap_m")
     half = traits.length_m / 2.0
     lateral = place.near_sign * staging.number(part, "lateral_m")
@@ -66,15 +65,11 @@ def along(part: ActorPart, staging: Staging, meetings: dict[str, Meeting]) -> Ca
 
 def _out_of_the_way(part: ActorPart, staging: Staging, arc_m: float, beside_m: float) -> float:
     """Return how far beside the path a box must stand that the ego passes it, in curves as well."""
-    step = math.copysign(_ASIDE_STEP_M, beside_m)
+    step, size = math.copysign(_ASIDE_STEP_M, beside_m), KINDS[part.kind]
     for number in range(_ASIDE_STEPS):
         lateral = beside_m + number * step
-        parked = Moving(staging.place.ego.path, 0.0, lateral)
-        touch = first_touch(
-            staging.ego, staging.box, parked, _with_room(KINDS[part.kind], _PASS_CLEAR_M),
-            actor_arc_m=np.array([arc_m]),
-            ego_arc_m=np.array([staging.start_m]), until_s=staging.scenario.horizon_s,
-        )  # fmt: skip
+        parked = MovingBox(staging.place.ego.path, 0.0, size.length_m, size.width_m, lateral)
+        touch = _touch(staging, parked.with_room(_PASS_CLEAR_M), arc_m)
         if not np.isfinite(touch.time_s[0]):
             # Where it had to be moved, a step more leaves the ego a margin.
             return lateral if number == 0 else lateral + step
@@ -84,9 +79,9 @@ def _out_of_the_way(part: ActorPart, staging: Staging, arc_m: float, beside_m: f
 _ASIDE_STEPS, _ASIDE_STEP_M = 10, 0.3
 
 
-def beside_bay(part: ActorPart, staging: Staging, way: Way) -> CastActor:
+def beside_bay(part: ActorPart, staging: Staging, way: Way) -> StagedActor:
     """Return a car in the bay behind the ego's or ahead of it."""
-    away = (staging.box.length_m + KINDS[part.kind].length_m) / 2.0 + staging.number(part, "gap_m")
+    away = (staging.ego.length_m + KINDS[part.kind].length_m) / 2.0 + staging.number(part, "gap_m")
     arc = way.entry_m + (away if part.relation == "ahead" else -away)
     return staging.actor(part, way.xy_m, arc, 0.0, way.name)
 
@@ -96,7 +91,7 @@ def closing_time_s(part: ActorPart, staging: Staging) -> float | None:
     time = np.arange(0.0, staging.scenario.horizon_s, 0.01)
     after = staging.number(part, "acts_after_s") if part.conduct == "stops" else math.inf
     speed, decel = staging.number(part, "speed_mps"), staging.number(part, "decel_mps2")
-    ahead = Moving(_ANYWHERE, speed, 0.0, after, decel).travelled_m(time)
+    ahead = MovingBox(_ANYWHERE, speed, 0.0, 0.0, 0.0, after, decel).travelled_m(time)
     gap = staging.number(part, "gap_m") + ahead - staging.ego.speed_mps * time
     closed = np.flatnonzero(gap <= 0.0)
     return float(time[closed[0]]) if len(closed) else None
@@ -105,84 +100,58 @@ def closing_time_s(part: ActorPart, staging: Staging) -> float | None:
 _ANYWHERE = FrenetPath(np.array([[0.0, 0.0], [1.0, 0.0]]))
 
 
-class _OnPath(NamedTuple):
-    """An actor as it moves along the ego's path, and its first touch of the ego."""
-
-    moving: Moving
-    touch: Touch
-
-
-def _with_room(traits: KindTraits, room_m: float) -> KindTraits:
-    return traits._replace(
-        length_m=traits.length_m + 2 * room_m, width_m=traits.width_m + 2 * room_m
-    )
+def _touch(
+    staging: Staging, other: MovingBox, arc_m: float, *, until_s: float | None = None
+) -> Touch:
+    """Return the first touch of the ego by a box that starts at an arc length of its own path."""
+    end_s = staging.scenario.horizon_s if until_s is None else until_s
+    return first_touch(staging.ego, other, staging.start_m, arc_m, until_s=end_s)
 
 
-def _played(actor: CastActor, staging: Staging, *, room_m: float = 0.0) -> _OnPath:
-    after = actor.acts_after_s if actor.conduct == "stops" else math.inf
-    path = staging.place.ego.path
-    moving = Moving(path, actor.speed_mps, actor.lateral_m, after, actor.decel_mps2)
-    touch = first_touch(
-        staging.ego, staging.box, moving, _with_room(actor.traits, room_m),
-        ego_arc_m=np.array([staging.start_m]),
-        actor_arc_m=np.array([actor.start_on(staging.place.ego)]),
-        until_s=staging.scenario.horizon_s,
-    )  # fmt: skip
-    return _OnPath(moving, touch)
-
-
-def stands_in_the_way(actor: CastActor, staging: Staging) -> bool:
+def stands_in_the_way(actor: StagedActor, staging: Staging) -> bool:
     """Return whether the ego touches somebody beside its path, with whatever side.
 
     One that backs into a bay goes no farther than its way, and needs room for being off it.
     """
-    if not staging.place.reverse:
-        return bool(np.isfinite(_played(actor, staging, room_m=_PASS_CLEAR_M).touch.time_s[0]))
-    way, wider = staging.place.way_named(actor.way), _with_room(actor.traits, _BAY_CLEAR_M)
-    touch = first_touch(
-        staging.ego, staging.box, Moving(way.path, 0.0, actor.lateral_m), wider,
-        ego_arc_m=np.array([staging.start_m]), actor_arc_m=np.array([actor.start_on(way)]),
-        until_s=(staging.place.ego.path.length_m - staging.start_m) / staging.ego.speed_mps,
-    )  # fmt: skip
+    place, until_s, room_m = staging.place, None, _PASS_CLEAR_M
+    way = place.ego
+    if place.reverse:
+        way, room_m = place.way_named(actor.way), _BAY_CLEAR_M
+        until_s = (place.ego.path.length_m - staging.start_m) / staging.ego.speed_mps
+    box = actor.moving(way.path).with_room(room_m)
+    touch = _touch(staging, box, actor.start_on(way), until_s=until_s)
     return bool(np.isfinite(touch.time_s[0]))
 
 
 def backs_into_a_house(staging: Staging) -> bool:
     """Return whether an ego that keeps to its line into a bay touches a building, or nearly so."""
-    walls, path, box = staging.place.walls, staging.place.ego.path, staging.box
+    walls, path = staging.place.walls, staging.place.ego.path
     if walls is None or not staging.place.reverse:
         return False
     arcs = np.arange(staging.start_m, path.length_m, 0.5)
-    at = ego_rectangles(staging.ego, box, arcs)
-    wider = at._replace(
-        length_m=box.length_m + 2 * _BAY_CLEAR_M, width_m=box.width_m + 2 * _BAY_CLEAR_M
-    )
-    return any(walls.meet(shapely.Polygon(outline)) for outline in corners(wider))
+    outlines = corners(staging.ego.with_room(_BAY_CLEAR_M).rectangles(arcs))
+    return any(walls.meet(shapely.Polygon(outline)) for outline in outlines)
 
 
-def stands_in_a_house(actor: CastActor, staging: Staging) -> bool:
+def stands_in_a_house(actor: StagedActor, staging: Staging) -> bool:
     """Return whether somebody parked would stand in a building."""
     walls, way = staging.place.walls, staging.place.way_named(actor.way)
     arc, half = actor.start_on(way), actor.traits.length_m / 2.0
     return walls is not None and walls.block(
-        way.path, from_m=arc - half, to_m=arc + half, width_m=actor.traits.width_m,
-        left_m=actor.lateral_m,
-    )  # fmt: skip
+        way.path, arc - half, arc + half, width_m=actor.traits.width_m, left_m=actor.lateral_m
+    )
 
 
-def run_into(actor: CastActor, staging: Staging) -> Touched | None:
+def run_into(actor: StagedActor, staging: Staging) -> Touched | None:
     """Return the first touch of who drives ahead, if the ego's front makes it."""
-    moving, touch = _played(actor, staging)
+    ego, way = staging.ego, staging.place.ego
+    ahead = actor.moving(way.path)
+    touch = _touch(staging, ahead, actor.start_on(way))
     if not np.isfinite(touch.time_s[0]):
         return None
-    shares = np.linspace(0.0, 1.0, 41)
-    points = np.concatenate(
-        [
-            front_point(staging.ego, staging.box, touch.ego_arc_m, share, staging.place.near_sign)
-            for share in shares
-        ]
-    )
-    gaps = gap_m(points, moving, actor.traits, np.full(len(shares), touch.actor_arc_m[0]))
+    shares, sign = np.linspace(0.0, 1.0, 41), staging.place.near_sign
+    points = np.concatenate([front_point(ego, touch.ego_arc_m, s, sign) for s in shares])
+    gaps = gap_m(points, ahead, np.full(len(shares), touch.actor_arc_m[0]))
     on_front = np.flatnonzero(gaps <= TOLERANCE_M / 2)
     if not len(on_front):
         return None

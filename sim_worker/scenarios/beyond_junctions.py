@@ -15,7 +15,7 @@ from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.world import Lane
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths, points_at
-from foretwin.sim_worker.scenarios.places import Place
+from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.relations import ways_over
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, Way
@@ -25,7 +25,6 @@ _FAST = ("motorway", "trunk", "motorway_link", "trunk_link", "raceway")
 _LEAST_M = {"motorway": 120.0, "road": 60.0, "circuit": 150.0, "parking_bay": 32.0}
 _LEAST_RADIUS_M = 150.0
 """Of a motorway's lane: a bend for 80 km/h, at 0.34 g. Trunk roads through junctions bend more."""
-_ON_LANE_M = 2.5
 _JOINT_M = 1.5
 
 _BAY_RADIUS_M = 6.0
@@ -36,7 +35,7 @@ _BAY_LENGTH_M = 6.0
 _BEND_RAD = math.radians(6.0)
 
 
-def other_places(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], str]:
+def other_places(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[ScenarioPlace], str]:
     """Return the places of a scenario that needs no junction, and why there is none if so."""
     setting = scenario.where.setting
     if setting == "parking_bay":
@@ -71,7 +70,7 @@ def _fits(lane: Lane, setting: str, network: RoadNetwork) -> bool:
     road = network.roads.get(lane.road_id)
     road_class = "" if road is None else road.road_class
     if setting == "motorway":
-        across = lane.left_id if network.near_sign > 0.0 else lane.right_id
+        across = network.beside(lane, near=False)
         return road_class in _CLASSES["motorway"] and across is not None
     return setting != "circuit" or road_class in _CLASSES["circuit"]
 
@@ -83,10 +82,9 @@ def _least_radius_m(way: Way) -> float:
     return 1.0 / max(float(np.abs(curvature).max()), 1e-6)
 
 
-def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> Place:
-    return Place(
+def _place(scenario: Scenario, network: RoadNetwork, way: Way) -> ScenarioPlace:
+    return ScenarioPlace(
         scenario_id=scenario.id,
-        world_id=network.world.id,
         junction_id=network.world.intersection.id,
         name=way.name,
         driving_side=network.driving_side,
@@ -145,7 +143,7 @@ def _onward(lane: Lane, among: dict[str, Lane], network: RoadNetwork) -> list[st
     return [nearest] if apart[nearest] <= _JOINT_M else []
 
 
-def _bays(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[Place], str]:
+def _bays(scenario: Scenario, network: RoadNetwork) -> tuple[Iterator[ScenarioPlace], str]:
     """Return a bay at the near side of each lane that is straight, long and clear enough."""
     reasons = {lane.id: _no_bay(lane, network) for lane in network.world.lanes}
     fitting = [lane for lane in network.world.lanes if not reasons[lane.id]]
@@ -165,7 +163,7 @@ def _no_bay(lane: Lane, network: RoadNetwork) -> str:
         return "none is for cars"
     if road is not None and road.road_class in _FAST:
         return "nobody parks at fast roads"
-    if (lane.right_id if network.near_sign > 0.0 else lane.left_id) is not None:
+    if network.beside(lane, near=True) is not None:
         return "another lane lies between"
     half = _LEAST_M["parking_bay"] / 2.0
     middle = float(arc_lengths(lane.centerline)[-1]) / 2.0
@@ -202,7 +200,7 @@ class _Bay:
         arc, left = np.broadcast_arrays(np.atleast_1d(arc_m), np.atleast_1d(left_m))
         return self._path.point_at(arc, left)
 
-    def place(self, scenario: Scenario, network: RoadNetwork) -> Place:
+    def place(self, scenario: Scenario, network: RoadNetwork) -> ScenarioPlace:
         """Return the place: base_link backs along the ego's way to a metre behind the middle."""
         stop_m = self._middle_m - 1.3
         turn = np.linspace(0.0, self._angle_rad, 9)

@@ -21,19 +21,25 @@ from foretwin.sim_worker.scenarios.alongside import (
     stands_in_the_way,
 )
 from foretwin.sim_worker.scenarios.drawing import Values
-from foretwin.sim_worker.scenarios.impact import Moving, ego_box
+from foretwin.sim_worker.scenarios.impact import MovingBox, ego_box
 from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S, incoming, meet
-from foretwin.sim_worker.scenarios.places import Place, Unplaced
-from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor, Meeting, Staging
+from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
+from foretwin.sim_worker.scenarios.roles import (
+    ALONG,
+    PlannedMeeting,
+    StagedActor,
+    StagedCase,
+    Staging,
+)
 
-__all__ = ["Cast", "CastActor", "cast", "cast_all"]
+__all__ = ["StagedActor", "StagedCase", "cast", "cast_all"]
 
 _LATERAL_ACCEL_MPS2 = 4.0
 """Cars begin with no more of it: half of what holds them on a dry road."""
 _VERGE_M = 4.0
 """Beside the road, where one may still stand or park."""
 
-_Met = dict[tuple[str | float, ...], Meeting | str]
+_Met = dict[tuple[str | float, ...], PlannedMeeting | str]
 """Meetings by actor, its numbers named here, and the ego's speed and shift: all they depend on."""
 _MEETS_BY = ("speed_mps", "impact_share", "arrives_after_s")
 
@@ -41,12 +47,12 @@ _MEETS_BY = ("speed_mps", "impact_share", "arrives_after_s")
 def cast(
     scenario: Scenario,
     values: Values,
-    place: Place,
+    place: ScenarioPlace,
     *,
     vehicle: VehicleParameters,
     ego_arc_m: float | None = None,
     ego_speed_mps: float | None = None,
-) -> Cast | Unplaced:
+) -> StagedCase | Unplaced:
     """Return one case at one place, or why these values cannot be played there.
 
     Live, `ego_arc_m` (of base_link on the place's ego path) and `ego_speed_mps` are the car's;
@@ -59,12 +65,12 @@ def cast(
 def cast_all(
     scenario: Scenario,
     cases: Sequence[Values],
-    place: Place,
+    place: ScenarioPlace,
     *,
     vehicle: VehicleParameters,
     ego_arc_m: float | None = None,
     ego_speed_mps: float | None = None,
-) -> tuple[Cast | Unplaced, ...]:
+) -> tuple[StagedCase | Unplaced, ...]:
     """Return what `cast` does for each case; cases that differ elsewhere share the search."""
     met: _Met = {}
     return tuple(
@@ -75,18 +81,19 @@ def cast_all(
 def _cast(
     scenario: Scenario,
     values: Values,
-    place: Place,
+    place: ScenarioPlace,
     vehicle: VehicleParameters,
     ego_arc_m: float | None,
     ego_speed_mps: float | None,
     met: _Met,
-) -> Cast | Unplaced:
+) -> StagedCase | Unplaced:
     wished_mps = values[f"{EGO}.speed_mps"]
     speed = wished_mps if ego_speed_mps is None else ego_speed_mps
     speed = max(speed, min(LEAST_START_MPS, wished_mps) or LEAST_START_MPS)
-    ego = Moving(place.ego.path, speed, values[f"{EGO}.lateral_shift_m"])
-    staging = Staging(scenario, values, place, ego, ego_box(vehicle, reverse=place.reverse))
-    meetings: dict[str, Meeting] = {}
+    shift = values[f"{EGO}.lateral_shift_m"]
+    ego = ego_box(vehicle, place.ego.path, speed, shift, reverse=place.reverse)
+    staging = Staging(scenario, values, place, ego)
+    meetings: dict[str, PlannedMeeting] = {}
     for part, ways in zip(scenario.actors, place.actor_ways, strict=True):
         if part.relation in ALONG:
             continue
@@ -119,23 +126,29 @@ def _cast(
         for actor in actors
         if actor.name in meetings
     ]
-    return Cast(
-        scenario_id=scenario.id, place=place, values=values, actors=actors,
-        ego_xy_m=way.xy_m, ego_speed_limit_mps=way.speed_limit_mps, ego_arc_m=start,
-        ego_lateral_m=ego.offset_m, ego_speed_mps=speed, reverse=place.reverse,
-        impact_time_s=touched.time_s, impact_point_m=touched.point_m,
-        impact_share=touched.share, impact_with=other, off_lanes_m=max(off),
-    )  # fmt: skip
+    return StagedCase(
+        place,
+        values,
+        actors,
+        ego_arc_m=start,
+        ego_lateral_m=ego.offset_m,
+        ego_speed_mps=speed,
+        impact_time_s=touched.time_s,
+        impact_point_m=touched.point_m,
+        impact_share=touched.share,
+        impact_with=other,
+        off_lanes_m=max(off),
+    )
 
 
-def _start_arc(staging: Staging, meetings: dict[str, Meeting]) -> float:
+def _start_arc(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
     """Return where base_link starts: so long before the impact, or the junction, as is meant.
 
     It starts later where its lane begins later, or where it would begin in a bend that nobody
     drives through so fast.
     """
     scenario, place, ego = staging.scenario, staging.place, staging.ego
-    end, time_s = place.ego.entry_m - staging.box.front_m, scenario.lead_time_s
+    end, time_s = place.ego.entry_m - staging.ego.front_m, scenario.lead_time_s
     for part in scenario.actors:
         if part.name in meetings:
             end = meetings[part.name].impact.ego_arc_m
@@ -143,12 +156,12 @@ def _start_arc(staging: Staging, meetings: dict[str, Meeting]) -> float:
         if part.relation == "ahead" and not place.reverse:
             time_s = closing_time_s(part, staging) or time_s
             break
-    room_s = (end - place.ego.first_m - staging.box.length_m) / ego.speed_mps
+    room_s = (end - place.ego.first_m - staging.ego.length_m) / ego.speed_mps
     start = end - ego.speed_mps * min(time_s, max(room_s, 2 * LEAST_TIME_S))
     return _past_bend(ego, start, end - 2 * LEAST_TIME_S * ego.speed_mps)
 
 
-def _past_bend(ego: Moving, start_m: float, latest_m: float) -> float:
+def _past_bend(ego: MovingBox, start_m: float, latest_m: float) -> float:
     """Return where a bend ends in which nobody can begin at that speed; else the start itself."""
     arcs = np.arange(start_m, latest_m, 1.0)
     curvature = ego.path.at_nodes(ego.path.curvature_pm, arcs)
@@ -157,7 +170,7 @@ def _past_bend(ego: Moving, start_m: float, latest_m: float) -> float:
 
 
 def _first_touched(
-    staging: Staging, actors: tuple[CastActor, ...], meetings: dict[str, Meeting]
+    staging: Staging, actors: tuple[StagedActor, ...], meetings: dict[str, PlannedMeeting]
 ) -> tuple[Touched, str]:
     """Return the planned touch and with whom; not a number where nobody is to be touched."""
     for part in staging.scenario.actors:
@@ -173,7 +186,7 @@ def _first_touched(
     return Touched(math.nan, np.full(2, math.nan), math.nan), ""
 
 
-def _in_the_way(staging: Staging, actors: tuple[CastActor, ...], met: str) -> str:
+def _in_the_way(staging: Staging, actors: tuple[StagedActor, ...], met: str) -> str:
     """Return who parks where the ego must pass, or in a building, or nothing."""
     for actor in actors:
         stands = actor.relation == "parked" and actor.name != met
@@ -187,7 +200,7 @@ def _in_the_way(staging: Staging, actors: tuple[CastActor, ...], met: str) -> st
     return ""
 
 
-def _out_of_bounds(staging: Staging, actors: tuple[CastActor, ...], time_s: float) -> str:
+def _out_of_bounds(staging: Staging, actors: tuple[StagedActor, ...], time_s: float) -> str:
     """Return what makes a case impossible to play, or nothing."""
     end_s = staging.scenario.horizon_s
     if time_s > end_s:

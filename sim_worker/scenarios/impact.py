@@ -8,18 +8,17 @@ count before which the boxes touch nowhere else, which a simulation in closed fo
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.rectangles import Rectangles, overlapping
-from foretwin.sim_worker.vehicle.road_user_kinds import KindTraits
 
 TOLERANCE_M = 0.08
 """How far from its plan the first touch may be, in place and from the front's point."""
@@ -33,31 +32,35 @@ _CLEAR_M = 0.1
 """Boxes that come so near are taken to touch where nothing may."""
 _PRESS_S, _BRUSH_M = 0.1, 0.04
 """So soon after the touch boxes overlap by more than half of this, or they merely brush."""
-_OUTLINE = np.array([
-    (0.25, 0.5), (0.25, -0.5), (0.0, 0.5), (0.0, -0.5), (0.5, 0.5), (0.5, -0.5), (0.5, 0.0),
-    (0.5, 0.25), (0.5, -0.25), (-0.25, 0.5), (-0.25, -0.5), (-0.5, 0.5), (-0.5, -0.5),
-    (-0.5, 0.0),
-])  # fmt: skip
+_OUTLINE = np.column_stack(
+    [
+        [0.25, 0.25, 0.0, 0.0, 0.5, 0.5, 0.5, 0.5, 0.5, -0.25, -0.25, -0.5, -0.5, -0.5],
+        [0.5, -0.5, 0.5, -0.5, 0.5, -0.5, 0.0, 0.25, -0.25, 0.5, -0.5, 0.5, -0.5, 0.0],
+    ]
+)
 """Points of the other's outline in its length and width, the likeliest to be hit first."""
 
 
-class EgoBox(NamedTuple):
-    """The ego's box along its path: from base_link to its leading end and to its centre."""
-
-    length_m: float
-    width_m: float
-    front_m: float
-    centre_m: float
+Span = tuple[float, float]
+"""A stretch of a path between two arc lengths."""
 
 
-class Moving(NamedTuple):
-    """A box that keeps its speed along a path, `offset_m` to the left of it, until it brakes."""
+class MovingBox(NamedTuple):
+    """A box that keeps its speed along a path, `offset_m` to the left of it, until it brakes.
+
+    From the point of it that follows the path, its leading end lies `front_m` ahead and its centre
+    `centre_m`: base_link of the ego, the centre itself of others.
+    """
 
     path: FrenetPath
     speed_mps: float
+    length_m: float
+    width_m: float
     offset_m: float = 0.0
-    brakes_after_s: float = float("inf")
+    brakes_after_s: float = math.inf
     decel_mps2: float = 0.0
+    front_m: float = 0.0
+    centre_m: float = 0.0
 
     def travelled_m(self, time_s: Array) -> Array:
         """Return how far it has come after (…) seconds."""
@@ -67,12 +70,15 @@ class Moving(NamedTuple):
         steady = np.minimum(time_s, self.brakes_after_s)
         return np.asarray(self.speed_mps * (steady + braking) - self.decel_mps2 * braking**2 / 2.0)
 
+    def rectangles(self, arc_m: Array) -> Rectangles:
+        """Return the box at arc lengths (…)."""
+        pose = self.path.pose_at(arc_m, self.offset_m)
+        ahead = self.centre_m * np.stack([np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)], axis=-1)
+        return Rectangles(pose.xy_m + ahead, pose.yaw_rad, self.length_m, self.width_m)
 
-class Span(NamedTuple):
-    """A stretch of a path between two arc lengths."""
-
-    from_m: float
-    to_m: float
+    def with_room(self, room_m: float) -> MovingBox:
+        """Return the box with so much room on all sides; its points stay where they are."""
+        return self._replace(length_m=self.length_m + 2 * room_m, width_m=self.width_m + 2 * room_m)
 
 
 class Impact(NamedTuple):
@@ -95,30 +101,37 @@ class Touch(NamedTuple):
     actor_arc_m: Array
 
 
-def ego_box(vehicle: VehicleParameters, *, reverse: bool = False) -> EgoBox:
-    """Return the ego's box; in reverse its rear leads."""
+def ego_box(
+    vehicle: VehicleParameters,
+    path: FrenetPath,
+    speed_mps: float,
+    offset_m: float = 0.0,
+    *,
+    reverse: bool = False,
+) -> MovingBox:
+    """Return the ego's box on a path; in reverse its rear leads."""
     length, rear = vehicle.length_m.value, vehicle.rear_overhang_m.value
     front, centre = length - rear, length / 2.0 - rear
     if reverse:
         front, centre = rear, -centre
-    return EgoBox(length, vehicle.width_m.value, front, centre)
+    return MovingBox(
+        path, speed_mps, length, vehicle.width_m.value, offset_m, front_m=front, centre_m=centre
+    )
 
 
-def front_point(ego: Moving, box: EgoBox, arc_m: Array, share: float, near_sign: float) -> Array:
+def front_point(ego: MovingBox, arc_m: Array, share: float, near_sign: float) -> Array:
     """Return (…, 2) the point of the ego's front at `share` of its width from the near side."""
     pose = ego.path.pose_at(arc_m, ego.offset_m)
-    across = near_sign * (share - 0.5) * box.width_m
+    across = near_sign * (share - 0.5) * ego.width_m
     cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
     forward = np.stack([cos, sin], axis=-1)
     left = np.stack([-sin, cos], axis=-1)
-    return np.asarray(pose.xy_m + box.front_m * forward + across * left)
+    return np.asarray(pose.xy_m + ego.front_m * forward + across * left)
 
 
 def find_impact(
-    ego: Moving,
-    box: EgoBox,
-    actor: Moving,
-    traits: KindTraits,
+    ego: MovingBox,
+    actor: MovingBox,
     *,
     ego_span: Span,
     actor_span: Span,
@@ -130,13 +143,12 @@ def find_impact(
 
     Nothing touches in the `lead_time_s` before it.
     """
-    at_ego = np.arange(ego_span.from_m, ego_span.to_m, _SPACING_M)
-    at_actor = np.arange(actor_span.from_m, actor_span.to_m, _SPACING_M)
+    at_ego, at_actor = np.arange(*ego_span, _SPACING_M), np.arange(*actor_span, _SPACING_M)
     if len(at_ego) < 2 or len(at_actor) < 2:
         return None
-    front = front_point(ego, box, at_ego, share, near_sign)
+    front = front_point(ego, at_ego, share, near_sign)
     pose = actor.path.pose_at(at_actor, actor.offset_m)
-    offset = _OUTLINE * (traits.length_m, traits.width_m)
+    offset = _OUTLINE * (actor.length_m, actor.width_m)
     cos, sin = np.cos(pose.yaw_rad)[:, None], np.sin(pose.yaw_rad)[:, None]
     x = pose.xy_m[:, :1] + cos * offset[:, 0] - sin * offset[:, 1]
     y = pose.xy_m[:, 1:] + sin * offset[:, 0] + cos * offset[:, 1]
@@ -144,63 +156,32 @@ def find_impact(
     if found is None:
         return None
     which, ego_share, actor_share = found
-    ego_arc = ego_span.from_m + ego_share * _SPACING_M
-    actor_arc = actor_span.from_m + actor_share * _SPACING_M
+    ego_arc = ego_span[0] + ego_share * _SPACING_M
+    actor_arc = actor_span[0] + actor_share * _SPACING_M
+    ego_start = ego_arc - ego.speed_mps * lead_time_s
+    actor_start = actor_arc - actor.speed_mps * lead_time_s
     touch = first_touch(
-        ego, box, actor, traits, ego_arc_m=ego_arc - ego.speed_mps * lead_time_s,
-        actor_arc_m=actor_arc - actor.speed_mps * lead_time_s, until_s=lead_time_s + _AFTER_S,
-        early_ticks=True,
-    )  # fmt: skip
-    planned = front_point(ego, box, ego_arc, share, near_sign)
-    met = front_point(ego, box, touch.ego_arc_m, share, near_sign)
+        ego, actor, ego_start, actor_start, until_s=lead_time_s + _AFTER_S, early_ticks=True
+    )
+    planned = front_point(ego, ego_arc, share, near_sign)
+    met = front_point(ego, touch.ego_arc_m, share, near_sign)
     good = np.isfinite(touch.time_s) & (np.hypot(*(met - planned).T) <= TOLERANCE_M)
-    good &= gap_m(met, actor, traits, touch.actor_arc_m) <= TOLERANCE_M
-    good &= _goes_on(ego, box, actor, traits, touch)
-    order = np.lexsort((ego_arc, which, ~good))
+    good &= gap_m(met, actor, touch.actor_arc_m) <= TOLERANCE_M
+    # Boxes that press into each other after the touch do not merely brush.
+    good &= overlapping(
+        ego.rectangles(touch.ego_arc_m + ego.speed_mps * _PRESS_S),
+        actor.with_room(-_BRUSH_M / 2).rectangles(touch.actor_arc_m + actor.speed_mps * _PRESS_S),
+    )
+    order, wider = np.lexsort((ego_arc, which, ~good)), actor.with_room(_CLEAR_M)
     for best in order[: int(good.sum())].tolist():
-        impact = Impact(float(ego_arc[best]), float(actor_arc[best]), planned[best], share)
-        if _is_first(ego, box, actor, traits, impact, lead_time_s):
-            return impact
+        # Nothing may come near a touch until shortly before an impact.
+        starts, early_s = (ego_start[best], actor_start[best]), lead_time_s - _FINE_FOR_S
+        if early_s <= 0.0 or np.isinf(first_touch(ego, wider, *starts, until_s=early_s).time_s[0]):
+            return Impact(float(ego_arc[best]), float(actor_arc[best]), planned[best], share)
     return None
 
 
-def _is_first(
-    ego: Moving,
-    box: EgoBox,
-    actor: Moving,
-    traits: KindTraits,
-    impact: Impact,
-    lead_time_s: float,
-) -> bool:
-    """Return whether nothing comes near a touch until shortly before an impact."""
-    until_s = lead_time_s - _FINE_FOR_S
-    if until_s <= 0.0:
-        return True
-    wider = traits._replace(
-        length_m=traits.length_m + 2 * _CLEAR_M, width_m=traits.width_m + 2 * _CLEAR_M
-    )
-    touch = first_touch(
-        ego, box, actor, wider, until_s=until_s,
-        ego_arc_m=np.array([impact.ego_arc_m - ego.speed_mps * lead_time_s]),
-        actor_arc_m=np.array([impact.actor_arc_m - actor.speed_mps * lead_time_s]),
-    )  # fmt: skip
-    return not np.isfinite(touch.time_s[0])
-
-
-def _goes_on(
-    ego: Moving, box: EgoBox, actor: Moving, traits: KindTraits, touch: Touch
-) -> npt.NDArray[np.bool_]:
-    """Return (C,) whether boxes press into each other after the touch, and do not merely brush."""
-    smaller = traits._replace(
-        length_m=traits.length_m - _BRUSH_M, width_m=traits.width_m - _BRUSH_M
-    )
-    return overlapping(
-        ego_rectangles(ego, box, touch.ego_arc_m + ego.speed_mps * _PRESS_S),
-        rectangles(actor, smaller, touch.actor_arc_m + actor.speed_mps * _PRESS_S),
-    )
-
-
-def _meetings(front: Array, x: Array, y: Array) -> tuple[npt.NDArray[np.intp], Array, Array] | None:
+def _meetings(front: Array, x: Array, y: Array) -> tuple[Indices, Array, Array] | None:
     """Return where outline curves cross the front's: (C,) curve, and places along both in points.
 
     `front` (M, 2); `x`, `y` (N, K) for K outline points.
@@ -231,29 +212,28 @@ def _places(distance_m: Array, xy_m: Array) -> Array:
 
 
 def first_touch(
-    ego: Moving,
-    box: EgoBox,
-    actor: Moving,
-    traits: KindTraits,
+    ego: MovingBox,
+    actor: MovingBox,
+    ego_arc_m: Array | float,
+    actor_arc_m: Array | float,
     *,
-    ego_arc_m: Array,
-    actor_arc_m: Array,
     until_s: float,
     early_ticks: bool = False,
 ) -> Touch:
-    """Return the first touch of boxes that start at arc lengths (C,) before `until_s`.
+    """Return the first touch of boxes that start at arc lengths (C,), or one, before `until_s`.
 
     With `early_ticks` only what happens shortly before the end is looked at closely.
     """
+    ego_from, actor_from = np.atleast_1d(ego_arc_m), np.atleast_1d(actor_arc_m)
     fine_from_s = max(0.0, until_s - _FINE_FOR_S) if early_ticks else 0.0
     ticks = np.concatenate(
         [np.arange(0.0, fine_from_s, _EARLY_TICK_S), np.arange(fine_from_s, until_s, _TICK_S)]
     )
 
-    def touching(time_s: Array, rows: slice | npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
-        ego_at = ego_arc_m[rows, None] + ego.travelled_m(time_s)
-        actor_at = actor_arc_m[rows, None] + actor.travelled_m(time_s)
-        return overlapping(ego_rectangles(ego, box, ego_at), rectangles(actor, traits, actor_at))
+    def touching(time_s: Array, rows: slice | Indices) -> Flags:
+        ego_at = ego_from[rows, None] + ego.travelled_m(time_s)
+        actor_at = actor_from[rows, None] + actor.travelled_m(time_s)
+        return overlapping(ego.rectangles(ego_at), actor.rectangles(actor_at))
 
     hit = touching(ticks[None, :], slice(None))
     rows = np.flatnonzero(hit.any(axis=1))
@@ -264,30 +244,17 @@ def first_touch(
         middle = (early + late) / 2.0
         inside = touching(middle[:, None], rows)[:, 0]
         early, late = np.where(inside, early, middle), np.where(inside, middle, late)
-    time = np.full(len(ego_arc_m), np.inf)
+    time = np.full(len(ego_from), np.inf)
     time[rows] = late
     end = np.minimum(time, until_s)
-    return Touch(time, ego_arc_m + ego.travelled_m(end), actor_arc_m + actor.travelled_m(end))
+    return Touch(time, ego_from + ego.travelled_m(end), actor_from + actor.travelled_m(end))
 
 
-def ego_rectangles(ego: Moving, box: EgoBox, arc_m: Array) -> Rectangles:
-    """Return the ego's box with base_link at arc lengths (…)."""
-    pose = ego.path.pose_at(arc_m, ego.offset_m)
-    ahead = box.centre_m * np.stack([np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)], axis=-1)
-    return Rectangles(pose.xy_m + ahead, pose.yaw_rad, box.length_m, box.width_m)
-
-
-def rectangles(actor: Moving, traits: KindTraits, arc_m: Array) -> Rectangles:
-    """Return another road user's box with its centre at arc lengths (…)."""
-    pose = actor.path.pose_at(arc_m, actor.offset_m)
-    return Rectangles(pose.xy_m, pose.yaw_rad, traits.length_m, traits.width_m)
-
-
-def gap_m(point: Array, actor: Moving, traits: KindTraits, arc_m: Array) -> Array:
+def gap_m(point: Array, actor: MovingBox, arc_m: Array) -> Array:
     """Return (…) the distance from points (…, 2) to the box at arc lengths (…)."""
     pose = actor.path.pose_at(arc_m, actor.offset_m)
     cos, sin = np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)
     dx, dy = point[..., 0] - pose.xy_m[..., 0], point[..., 1] - pose.xy_m[..., 1]
-    along = np.maximum(np.abs(cos * dx + sin * dy) - traits.length_m / 2.0, 0.0)
-    across = np.maximum(np.abs(cos * dy - sin * dx) - traits.width_m / 2.0, 0.0)
+    along = np.maximum(np.abs(cos * dx + sin * dy) - actor.length_m / 2.0, 0.0)
+    across = np.maximum(np.abs(cos * dy - sin * dx) - actor.width_m / 2.0, 0.0)
     return np.asarray(np.hypot(along, across))

@@ -1,14 +1,16 @@
-"""Scenarios around a car as it drives: cases cast beforehand, timed to where the car is now.
+"""The scenarios of a World as jobs play them: at named places, or around a car as it drives.
 
-Where two paths meet does not change while a car approaches; only when it gets there does. So a
-case is cast once for each place, and for each new state all that come from elsewhere are moved
-along their ways by the time that the car is early or late.
+Places are named, as a placement names them, so that a case can be written down and staged again
+anywhere; there the case says where everybody begins. Live, where two paths meet does not change
+while a car approaches; only when it gets there does. So a case is cast once for each place, and for
+each new state all that come from elsewhere are moved along their ways by the time that the car is
+early or late.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,57 +20,96 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.driver_model import LEAST_START_MPS
 from foretwin.sim_worker.road_users.cast import Player
-from foretwin.sim_worker.scenarios.casting import cast
+from foretwin.sim_worker.scenarios.beyond_junctions import other_places
+from foretwin.sim_worker.scenarios.casting import cast_all
 from foretwin.sim_worker.scenarios.meeting import LEAST_TIME_S
 from foretwin.sim_worker.scenarios.placement import passage_on_path, places_on_passage
-from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
-from foretwin.sim_worker.scenarios.roles import ALONG, Cast, CastActor
+from foretwin.sim_worker.scenarios.roles import ALONG, StagedActor, StagedCase
 from foretwin.sim_worker.scenarios.staged import player_on
 from foretwin.sim_worker.scenarios.ways import Way
 
 _LATE = ".arrives_after_s"
 
 
-class LiveScenarios:
+class KnownScenarios:
     """The scenarios of one World; keeps what was placed and cast before."""
 
     def __init__(self, network: RoadNetwork) -> None:
         self._network = network
-        self._places: dict[tuple[Scenario, str], tuple[Place, ...]] = {}
-        self._casts: dict[tuple[object, ...], Cast | Unplaced] = {}
+        self._places: dict[tuple[Scenario, str], tuple[ScenarioPlace, ...]] = {}
+        self._named: dict[tuple[Scenario, str], ScenarioPlace | None] = {}
+        self._casts: dict[tuple[object, ...], StagedCase | Unplaced] = {}
+        self._ways: dict[int, Way | None] = {}
+        """Those that cases were cast on: as long as they are kept, no other has their identity."""
 
     def on(self, path: FrenetPath, from_arc_m: float, vehicle: VehicleParameters) -> PathScenarios:
         """Return the scenarios on a path, for a car at `from_arc_m` of it."""
         found = passage_on_path(self._network, path, from_arc_m)
         return PathScenarios(self, path, vehicle, found)
 
-    def places(self, scenario: Scenario, passage: Passage) -> tuple[Place, ...]:
+    def places(self, scenario: Scenario, passage: Passage) -> tuple[ScenarioPlace, ...]:
         """Return where a scenario can take place on a passage, none where it does not apply."""
         key = (scenario, passage.name)
         if key not in self._places:
             self._places[key] = places_on_passage(scenario, self._network, passage)
         return self._places[key]
 
+    def named(self, scenario: Scenario, name: str) -> ScenarioPlace | None:
+        """Return the place of that name, None where the scenario has none so named."""
+        key = (scenario, name)
+        if key not in self._named:
+            places = (place for place in self._all_places(scenario, name) if place.name == name)
+            self._named[key] = next(places, None)
+        return self._named[key]
+
+    def _all_places(self, scenario: Scenario, name: str) -> Iterator[ScenarioPlace]:
+        if scenario.where.setting != "junction":
+            yield from other_places(scenario, self._network)[0]
+            return
+        for junction in self._network.world.junctions:
+            for passage in self._network.passages(junction.summary.id):
+                if passage.name == name.split("/")[0]:
+                    yield from self.places(scenario, passage)
+
     def cast(
         self,
         scenario: Scenario,
-        values: Mapping[str, float],
-        place: Place,
+        cases: Sequence[Mapping[str, float]],
+        place: ScenarioPlace | str,
         vehicle: VehicleParameters,
-    ) -> Cast | Unplaced:
-        """Return a case at a place with nobody early or late, as if it began there."""
-        punctual = {name: 0.0 if name.endswith(_LATE) else v for name, v in values.items()}
-        key = (scenario, place.name, vehicle, *punctual.items())
-        if key not in self._casts:
-            self._casts[key] = cast(scenario, punctual, place, vehicle=vehicle)
-        return self._casts[key]
+        *,
+        ego_way: Way | None = None,
+        ego_arc_m: float | None = None,
+    ) -> tuple[StagedCase | Unplaced, ...]:
+        """Return cases of a scenario at a place, or one so named, begun where the case begins.
+
+        `ego_way` is the line that the ego really drives, in place of the place's own; with
+        `ego_arc_m` it starts there, and not where the case says.
+        """
+        found = self.named(scenario, place) if isinstance(place, str) else place
+        if found is None:
+            own = self._network.world.intersection.id
+            reason = f"the World has no place {place!r} for {scenario.id}"
+            return tuple(Unplaced(own, reason, True) for _ in cases)
+        if ego_way is not None:
+            found = found._replace(ego=ego_way)
+        common = (scenario, vehicle, found.name, id(ego_way), ego_arc_m)
+        keys = [(*common, *values.items()) for values in cases]
+        new = {key: dict(c) for key, c in zip(keys, cases, strict=True) if key not in self._casts}
+        played = cast_all(
+            scenario, tuple(new.values()), found, vehicle=vehicle, ego_arc_m=ego_arc_m
+        )
+        self._casts.update(zip(new, played, strict=True))
+        self._ways[id(ego_way)] = ego_way
+        return tuple(self._casts[key] for key in keys)
 
 
 class PathScenarios(NamedTuple):
     """The scenarios of a World on one path; `passage` is the junction that it takes next."""
 
-    known: LiveScenarios
+    known: KnownScenarios
     path: FrenetPath
     vehicle: VehicleParameters
     passage: Passage | None
@@ -94,7 +135,9 @@ class PathScenarios(NamedTuple):
         if not places:
             return Unplaced(junction, "the scenario does not apply on this path", False)
         place = places[place_rank % len(places)]
-        played = self.known.cast(scenario, values, place, self.vehicle)
+        # Cast with nobody early or late: who is so is moved along its way below.
+        punctual = {name: 0.0 if name.endswith(_LATE) else v for name, v in values.items()}
+        (played,) = self.known.cast(scenario, [punctual], place, self.vehicle)
         if isinstance(played, Unplaced):
             return played
         speed = max(ego_speed_mps, LEAST_START_MPS)
@@ -115,7 +158,9 @@ class PathScenarios(NamedTuple):
             for actor in played.actors
         )
 
-    def _beside(self, actor: CastActor, played: Cast, place: Place, ego_arc_m: float) -> Player:
+    def _beside(
+        self, actor: StagedActor, played: StagedCase, place: ScenarioPlace, ego_arc_m: float
+    ) -> Player:
         """Return who moves along the ego's path; what is parked stays where it stands."""
         arc = actor.start_on(place.ego)
         if actor.relation == "parked":
@@ -126,5 +171,5 @@ class PathScenarios(NamedTuple):
         return player_on(actor, self.path, arc)
 
 
-def _coming(actor: CastActor, way: Way, later_s: float) -> Player:
+def _coming(actor: StagedActor, way: Way, later_s: float) -> Player:
     return player_on(actor, way.path, actor.start_on(way) - actor.speed_mps * later_s)

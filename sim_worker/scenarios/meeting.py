@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from foretwin.contracts.scenario import ActorPart
-from foretwin.sim_worker.scenarios.impact import Moving, Span, find_impact
-from foretwin.sim_worker.scenarios.roles import CastActor, Meeting, Staging
+from foretwin.sim_worker.scenarios.impact import MovingBox, find_impact
+from foretwin.sim_worker.scenarios.roles import PlannedMeeting, StagedActor, Staging
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 
@@ -18,7 +18,7 @@ _AROUND_M, _MOUTH_M = 40.0, 15.0
 
 def meet(
     part: ActorPart, ways: tuple[Way, ...], staging: Staging, ego_arc_m: float | None
-) -> Meeting | str:
+) -> PlannedMeeting | str:
     """Return where and by which way an actor meets the ego, as near the wished share as can be.
 
     Nobody on foot comes through a building. Says why, where there is no such way.
@@ -39,25 +39,29 @@ def meet(
     walks = part.relation in ("crosses_exit", "crosses_entry")
     before, after = (2.0, 2.0) if walks else (10.0, 30.0)
     walled = False
+    size, speed = KINDS[part.kind], staging.number(part, "speed_mps")
     for share in sorted({wished, *_SHARES}, key=lambda other: abs(other - wished)):
         for way in ways:
             impact = find_impact(
-                ego, staging.box, Moving(way.path, staging.number(part, "speed_mps")),
-                KINDS[part.kind], ego_span=Span(low, high),
-                actor_span=Span(way.entry_m - before, way.exit_m + after),
-                share=share, near_sign=place.near_sign, lead_time_s=lead,
-            )  # fmt: skip
+                ego,
+                MovingBox(way.path, speed, size.length_m, size.width_m),
+                ego_span=(low, high),
+                actor_span=(way.entry_m - before, way.exit_m + after),
+                share=share,
+                near_sign=place.near_sign,
+                lead_time_s=lead,
+            )
             if impact is None:
                 continue
-            if not (walks and _through_walls(part, staging, Meeting(impact, way))):
-                return Meeting(impact, way)
+            if not (walks and _through_walls(part, staging, PlannedMeeting(impact, way))):
+                return PlannedMeeting(impact, way)
             walled = True
     if walled:
         return f"{part.name} would have to come through a building"
     return f"no way of {part.name} touches the ego's front before anything else"
 
 
-def _through_walls(part: ActorPart, staging: Staging, meeting: Meeting) -> bool:
+def _through_walls(part: ActorPart, staging: Staging, meeting: PlannedMeeting) -> bool:
     """Return whether a building stands on what an actor covers before it meets the ego."""
     if staging.place.walls is None:
         return False
@@ -65,10 +69,10 @@ def _through_walls(part: ActorPart, staging: Staging, meeting: Meeting) -> bool:
     on_the_way_s = staging.scenario.lead_time_s + staging.number(part, "arrives_after_s")
     traits = KINDS[part.kind]
     from_m = met_m - staging.number(part, "speed_mps") * on_the_way_s - traits.length_m / 2.0
-    return staging.place.walls.block(way.path, from_m=from_m, to_m=met_m, width_m=traits.width_m)
+    return staging.place.walls.block(way.path, from_m, met_m, width_m=traits.width_m)
 
 
-def incoming(part: ActorPart, staging: Staging, meeting: Meeting) -> CastActor:
+def incoming(part: ActorPart, staging: Staging, meeting: PlannedMeeting) -> StagedActor:
     """Return an actor that is at its place of impact when the ego is, or as much later as meant."""
     impact, way = meeting
     until_s = (impact.ego_arc_m - staging.start_m) / staging.ego.speed_mps

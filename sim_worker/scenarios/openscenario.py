@@ -17,25 +17,29 @@ from foretwin.contracts.numbers import FUTURE_NUMBERS
 from foretwin.contracts.scenario import FAULTS, Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import ATTRIBUTION, World
-from foretwin.sim_worker.scenarios.openscenario_entities import actor_object, ego_object
+from foretwin.sim_worker.scenarios.openscenario_entities import (
+    actor_object,
+    ego_object,
+    make,
+    properties,
+)
 from foretwin.sim_worker.scenarios.openscenario_motion import (
-    Motion,
+    EntityMotion,
     actor_motion,
     after,
     ego_motion,
     maneuver_group,
     starts,
 )
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.world_gen.export.opendrive import write_opendrive
-from foretwin.world_gen.export.opendrive_elements import number
 from foretwin.world_gen.export.xml_text import in_comment, legal
 
 UNSAID = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 
 
 def write_openscenario(
-    played: Cast,
+    played: StagedCase,
     scenario: Scenario,
     world: World,
     path: Path,
@@ -60,7 +64,7 @@ def write_openscenario(
 
 
 def openscenario_element(
-    played: Cast,
+    played: StagedCase,
     scenario: Scenario,
     world: World,
     *,
@@ -74,45 +78,40 @@ def openscenario_element(
     """
     motions = [ego_motion(played, horizon_s=scenario.horizon_s)]
     motions += [actor_motion(actor, horizon_s=scenario.horizon_s) for actor in played.actors]
-    root = etree.Element("OpenSCENARIO")
-    root.append(etree.Comment(f" Made by foretwin from map data: {in_comment(world.attribution)} "))
-    root.append(_header(played, scenario, world, written_at))
     parameters = {"horizon_s": scenario.horizon_s}
     if (friction := _friction_factor(played)) != 1.0:
         parameters["friction_factor"] = friction
     for motion in motions:
         parameters |= motion.parameters
-    declared = etree.SubElement(root, "ParameterDeclarations")
-    for name, value in parameters.items():
-        etree.SubElement(
-            declared, "ParameterDeclaration", name=name, parameterType="double",
-            value=number(value),
-        )  # fmt: skip
-    etree.SubElement(root, "CatalogLocations")
-    network = etree.SubElement(root, "RoadNetwork")
-    etree.SubElement(network, "LogicFile", filepath=logic_file)
-    entities = etree.SubElement(root, "Entities")
-    entities.append(ego_object(vehicle))
-    entities.extend(actor_object(actor) for actor in played.actors)
-    root.append(_storyboard(played, motions))
-    return root
+    declared = [
+        make.ParameterDeclaration(name=name, parameterType="double", value=value)
+        for name, value in parameters.items()
+    ]
+    return make.OpenSCENARIO(
+        etree.Comment(f" Made by foretwin from map data: {in_comment(world.attribution)} "),
+        _header(played, scenario, world, written_at),
+        make.ParameterDeclarations(*declared),
+        make.CatalogLocations(),
+        make.RoadNetwork(make.LogicFile(filepath=logic_file)),
+        make.Entities(ego_object(vehicle), *(actor_object(actor) for actor in played.actors)),
+        _storyboard(played, motions),
+    )
 
 
 def _header(
-    played: Cast, scenario: Scenario, world: World, written_at: datetime.datetime
+    played: StagedCase, scenario: Scenario, world: World, written_at: datetime.datetime
 ) -> etree._Element:
-    place = played.place
-    header = etree.Element(
-        "FileHeader", revMajor="1", revMinor="2", author="foretwin",
-        date=written_at.astimezone(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        description=legal(f"{scenario.title}: {scenario.shows} Map: {world.attribution}"),
-    )  # fmt: skip
+    place, licences = played.place, []
     if world.attribution == ATTRIBUTION:
-        etree.SubElement(
-            header, "License", name="Open Data Commons Open Database License 1.0",
-            spdxId="ODbL-1.0", resource="https://www.openstreetmap.org/copyright",
-        ).text = world.attribution  # fmt: skip
-    said = {
+        licences = [
+            make.License(
+                words=world.attribution,
+                name="Open Data Commons Open Database License 1.0",
+                spdxId="ODbL-1.0",
+                resource="https://www.openstreetmap.org/copyright",
+            )
+        ]
+    said: dict[str, str | float] = {
         "attribution": world.attribution,
         "scenario": scenario.id,
         "source": scenario.source,
@@ -124,20 +123,21 @@ def _header(
     }
     if played.impact_with:
         x, y = played.impact_point_m
-        said |= {
-            "impact_with": played.impact_with,
-            "impact_time_s": number(played.impact_time_s),
-            "impact_x_m": number(x),
-            "impact_y_m": number(y),
-        }
-    said |= {name: number(value) for name, value in played.values.items()}
-    properties = etree.SubElement(header, "Properties")
-    for name, words in said.items():
-        etree.SubElement(properties, "Property", name=name, value=legal(words))
-    return header
+        impact = {"time_s": played.impact_time_s, "x_m": x, "y_m": y}
+        said["impact_with"] = played.impact_with
+        said |= {f"impact_{name}": value for name, value in impact.items()}
+    return make.FileHeader(
+        *licences,
+        properties(said | played.values),
+        revMajor="1",
+        revMinor="2",
+        author="foretwin",
+        date=written_at.astimezone(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        description=legal(f"{scenario.title}: {scenario.shows} Map: {world.attribution}"),
+    )
 
 
-def _friction_factor(played: Cast) -> float:
+def _friction_factor(played: StagedCase) -> float:
     """Return what the case's numbers make of the ground's friction: all that OpenSCENARIO takes."""
     factor = 1.0
     for name, row in FUTURE_NUMBERS.items():
@@ -146,19 +146,20 @@ def _friction_factor(played: Cast) -> float:
     return factor
 
 
-def _storyboard(played: Cast, motions: list[Motion]) -> etree._Element:
-    board = etree.Element("Storyboard")
-    init = etree.SubElement(etree.SubElement(board, "Init"), "Actions")
+def _storyboard(played: StagedCase, motions: list[EntityMotion]) -> etree._Element:
+    actions = []
     if _friction_factor(played) != 1.0:
-        action = etree.SubElement(init, "GlobalAction")
-        action = etree.SubElement(action, "EnvironmentAction")
-        road = etree.SubElement(action, "Environment", name="road surface")
-        etree.SubElement(road, "RoadCondition", frictionScaleFactor="$friction_factor")
-    for motion in motions:
-        init.append(starts(motion))
-    story = etree.SubElement(board, "Story", name=played.scenario_id)
-    act = etree.SubElement(story, "Act", name=f"{played.scenario_id} as cast")
-    act.extend(maneuver_group(motion) for motion in motions if motion.moves)
-    act.append(after("0", tag="StartTrigger", name="from the beginning"))
-    board.append(after("$horizon_s", tag="StopTrigger", name="end of the case"))
-    return board
+        road = make.RoadCondition(frictionScaleFactor="$friction_factor")
+        action = make.EnvironmentAction(make.Environment(road, name="road surface"))
+        actions.append(make.GlobalAction(action))
+    actions += [starts(motion) for motion in motions]
+    act = make.Act(
+        *(maneuver_group(motion) for motion in motions if motion.moves),
+        after("0", tag="StartTrigger", name="from the beginning"),
+        name=f"{played.place.scenario_id} as cast",
+    )
+    return make.Storyboard(
+        make.Init(make.Actions(*actions)),
+        make.Story(act, name=played.place.scenario_id),
+        after("$horizon_s", tag="StopTrigger", name="end of the case"),
+    )

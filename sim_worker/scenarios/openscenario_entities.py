@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from lxml import etree
@@ -10,10 +11,32 @@ from lxml import etree
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.scenario import EGO
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.scenarios.roles import CastActor
+from foretwin.sim_worker.scenarios.roles import StagedActor
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.world_gen.export.opendrive_elements import number
 from foretwin.world_gen.export.xml_text import legal
+
+
+def element(
+    tag: str, *children: etree._Element, words: str | None = None, **attributes: str | float
+) -> etree._Element:
+    """Return an element with its children, and with numbers as attributes written out."""
+    found = etree.Element(tag)
+    found.text = words
+    for name, value in attributes.items():
+        found.set(name, value if isinstance(value, str) else number(value))
+    found.extend(children)
+    return found
+
+
+class ElementMaker:
+    """Makes elements by their tags: `make.Center(x=0.0, y=0.0)`."""
+
+    def __getattr__(self, tag: str) -> Callable[..., etree._Element]:
+        return functools.partial(element, tag)
+
+
+make = ElementMaker()
 
 
 class Axles(NamedTuple):
@@ -52,93 +75,74 @@ def reference_behind_centre_m(kind: RoadUserKind) -> float:
 
 def ego_object(vehicle: VehicleParameters) -> etree._Element:
     """Return the ego, whose reference point is base_link."""
-    length = vehicle.length_m.value
-    entity = _vehicle(EGO, "car", vehicle.mass_kg.value)
-    _box(
-        entity, length, vehicle.width_m.value, vehicle.height_m.value,
-        centre_m=length / 2.0 - vehicle.rear_overhang_m.value,
-    )  # fmt: skip
-    _performance(
-        entity, KINDS["car"].speed_mps, vehicle.max_drive_accel_mps2.value,
-        vehicle.max_brake_decel_mps2.value,
-    )  # fmt: skip
-    _axles(
-        entity, vehicle.wheelbase_m.value, vehicle.width_m.value, _WHEEL_M,
-        vehicle.max_tire_angle_rad.value,
-    )  # fmt: skip
+    length, width = vehicle.length_m.value, vehicle.width_m.value
+    entity = make.Vehicle(
+        _box(length, width, vehicle.height_m.value, length / 2.0 - vehicle.rear_overhang_m.value),
+        make.Performance(
+            maxSpeed=KINDS["car"].speed_mps,
+            maxAcceleration=vehicle.max_drive_accel_mps2.value,
+            maxDeceleration=vehicle.max_brake_decel_mps2.value,
+        ),
+        _axles(vehicle.wheelbase_m.value, width, _WHEEL_M, vehicle.max_tire_angle_rad.value),
+        name=EGO,
+        vehicleCategory="car",
+        mass=vehicle.mass_kg.value,
+    )
     return _object(entity, {"vehicle": vehicle.name})
 
 
-def actor_object(actor: CastActor) -> etree._Element:
+def actor_object(actor: StagedActor) -> etree._Element:
     """Return another road user with the size and limits of its kind."""
-    traits = actor.traits
+    traits, length, width = actor.traits, actor.traits.length_m, actor.traits.width_m
+    box = _box(length, width, traits.height_m, reference_behind_centre_m(actor.kind))
+    if traits.keeps_lane:
+        axles = AXLES[actor.kind]
+        wheelbase_m, wheel_m = axles.wheelbase_share * length, axles.wheel_diameter_m
+        entity = make.Vehicle(
+            box,
+            make.Performance(
+                maxSpeed=traits.speed_mps,
+                maxAcceleration=traits.accel_mps2,
+                maxDeceleration=traits.hard_decel_mps2,
+            ),
+            _axles(wheelbase_m, width, wheel_m, axles.max_steering_rad),
+            name=actor.name,
+            vehicleCategory=axles.category,
+            mass=traits.mass_kg,
+        )
+    else:
+        entity = make.Pedestrian(
+            box, name=actor.name, mass=traits.mass_kg, pedestrianCategory="pedestrian"
+        )
     said = {"kind": actor.kind, "conduct": actor.conduct, "size and limits": traits.source}
-    if not traits.keeps_lane:
-        entity = etree.Element(
-            "Pedestrian", name=actor.name, mass=number(traits.mass_kg),
-            pedestrianCategory="pedestrian",
-        )  # fmt: skip
-        _box(entity, traits.length_m, traits.width_m, traits.height_m, centre_m=0.0)
-        return _object(entity, said)
-    axles = AXLES[actor.kind]
-    entity = _vehicle(actor.name, axles.category, traits.mass_kg)
-    _box(
-        entity, traits.length_m, traits.width_m, traits.height_m,
-        centre_m=reference_behind_centre_m(actor.kind),
-    )  # fmt: skip
-    _performance(entity, traits.speed_mps, traits.accel_mps2, traits.hard_decel_mps2)
-    _axles(
-        entity, axles.wheelbase_share * traits.length_m, traits.width_m, axles.wheel_diameter_m,
-        axles.max_steering_rad,
-    )  # fmt: skip
     return _object(entity, said)
 
 
+def properties(said: Mapping[str, str | float]) -> etree._Element:
+    """Return words and numbers by name, for readers: simulators leave them alone."""
+    values = {name: v if isinstance(v, float) else legal(v) for name, v in said.items()}
+    return make.Properties(*(make.Property(name=name, value=v) for name, v in values.items()))
+
+
 def _object(entity: etree._Element, said: Mapping[str, str]) -> etree._Element:
-    properties = etree.SubElement(entity, "Properties")
-    for name, words in said.items():
-        etree.SubElement(properties, "Property", name=name, value=legal(words))
-    found = etree.Element("ScenarioObject", name=str(entity.get("name")))
-    found.append(entity)
-    return found
+    entity.append(properties(said))
+    return make.ScenarioObject(entity, name=str(entity.get("name")))
 
 
-def _vehicle(name: str, category: str, mass_kg: float) -> etree._Element:
-    return etree.Element("Vehicle", name=name, vehicleCategory=category, mass=number(mass_kg))
-
-
-def _box(
-    entity: etree._Element, length_m: float, width_m: float, height_m: float, *, centre_m: float
-) -> None:
-    box = etree.SubElement(entity, "BoundingBox")
-    etree.SubElement(box, "Center", x=number(centre_m), y="0", z=number(height_m / 2.0))
-    etree.SubElement(
-        box, "Dimensions", length=number(length_m), width=number(width_m), height=number(height_m)
+def _box(length_m: float, width_m: float, height_m: float, centre_m: float) -> etree._Element:
+    return make.BoundingBox(
+        make.Center(x=centre_m, y="0", z=height_m / 2.0),
+        make.Dimensions(length=length_m, width=width_m, height=height_m),
     )
 
 
-def _performance(
-    entity: etree._Element, speed_mps: float, accel_mps2: float, decel_mps2: float
-) -> None:
-    etree.SubElement(
-        entity, "Performance", maxSpeed=number(speed_mps), maxAcceleration=number(accel_mps2),
-        maxDeceleration=number(decel_mps2),
-    )  # fmt: skip
-
-
 def _axles(
-    entity: etree._Element,
-    wheelbase_m: float,
-    width_m: float,
-    wheel_m: float,
-    max_steering_rad: float,
-) -> None:
-    axles = etree.SubElement(entity, "Axles")
-    for tag, ahead_m, steering in (
-        ("FrontAxle", wheelbase_m, max_steering_rad), ("RearAxle", 0.0, 0.0),
-    ):  # fmt: skip
-        etree.SubElement(
-            axles, tag, maxSteering=number(steering), wheelDiameter=number(wheel_m),
-            trackWidth=number(_TRACK_SHARE * width_m), positionX=number(ahead_m),
-            positionZ=number(wheel_m / 2.0),
-        )  # fmt: skip
+    wheelbase_m: float, width_m: float, wheel_m: float, max_steering_rad: float
+) -> etree._Element:
+    rows = ("FrontAxle", wheelbase_m, max_steering_rad), ("RearAxle", 0.0, 0.0)
+    wheels = {"wheelDiameter": wheel_m, "trackWidth": _TRACK_SHARE * width_m}
+    axles = (
+        getattr(make, tag)(maxSteering=angle, **wheels, positionX=ahead, positionZ=wheel_m / 2.0)
+        for tag, ahead, angle in rows
+    )
+    return make.Axles(*axles)

@@ -12,15 +12,16 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.contracts.world import IntersectionSummary, World, WorldJunction
+from foretwin.contracts.world import IntersectionSummary, World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.scenarios.beyond_junctions import other_places
 from foretwin.sim_worker.scenarios.casting import cast
-from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
-from foretwin.sim_worker.scenarios.places import Place, Placement, Unplaced
+from foretwin.sim_worker.scenarios.drawing import draw_cases
+from foretwin.sim_worker.scenarios.places import Placement, ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.relations import ways_of
 from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
-from foretwin.sim_worker.scenarios.ways import Way, unlike_its_turn
+from foretwin.sim_worker.scenarios.roles import ALONG
+from foretwin.sim_worker.scenarios.ways import unlike_its_turn
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
 _ON_CONNECTION_M = 3.0
@@ -48,78 +49,55 @@ def places(
     vehicle = vehicle or load_vehicle()
     cases = draw_cases(scenario)
     case = cases[len(cases) // 2]
+    found: list[ScenarioPlace] = []
+    unplaced: list[Unplaced] = []
+    for junction_id, candidates, reason in _candidates(scenario, network):
+        here: list[ScenarioPlace] = []
+        failure: Unplaced | None = None
+        for place in candidates:
+            played = cast(scenario, case, place, vehicle=vehicle)
+            if isinstance(played, Unplaced):
+                failure = failure or played
+                continue
+            here.append(place)
+            if most is not None and len(here) >= most:
+                break
+        found += here
+        if not here:
+            unplaced.append(failure or Unplaced(junction_id, reason, False))
+    return Placement(tuple(found), tuple(unplaced))
+
+
+_Candidates = tuple[str, Iterator[ScenarioPlace], str]
+"""A junction, its places for a scenario, and why there is none if so."""
+
+
+def _candidates(scenario: Scenario, network: RoadNetwork) -> Iterator[_Candidates]:
+    own = network.world.intersection
     if scenario.where.setting != "junction":
-        found, reason = other_places(scenario, network)
-        return _cast_ones(scenario, case, vehicle, world.intersection.id, found, reason, most)
-    results = [
-        _at_junction(scenario, network, junction, vehicle, case, most)
-        for junction in _junctions(world)
-    ]
-    return Placement(
-        tuple(place for result in results for place in result.places),
-        tuple(unplaced for result in results for unplaced in result.unplaced),
-    )
-
-
-def _junctions(world: World) -> tuple[WorldJunction, ...]:
-    if world.intersection.kind == "region":
-        return world.junctions
-    return tuple(j for j in world.junctions if j.summary.id == world.intersection.id)
+        yield (own.id, *other_places(scenario, network))
+        return
+    for junction in network.world.junctions:
+        if own.kind == "region" or junction.summary.id == own.id:
+            yield (junction.summary.id, *_at_junction(scenario, network, junction.summary))
 
 
 def _at_junction(
-    scenario: Scenario,
-    network: RoadNetwork,
-    junction: WorldJunction,
-    vehicle: VehicleParameters,
-    case: Values,
-    most: int | None,
-) -> Placement:
-    refused = _refused(scenario, junction.summary)
-    if refused:
-        return Placement((), (Unplaced(junction.summary.id, refused, False),))
-    passages = [p for p in network.passages(junction.summary.id) if p.turn == scenario.ego.turn]
+    scenario: Scenario, network: RoadNetwork, junction: IntersectionSummary
+) -> tuple[Iterator[ScenarioPlace], str]:
+    if refused := _refused(scenario, junction):
+        return iter(()), refused
+    passages = [p for p in network.passages(junction.id) if p.turn == scenario.ego.turn]
     passages.sort(key=lambda p: unlike_its_turn(p.turn, p.exit_heading_rad - p.entry_heading_rad))
     if any(part.relation == "parked" for part in scenario.actors):
         passages.sort(key=network.lanes_to_kerb)
     if not passages:
-        reason = f"no way through it for an ego that {_TURNS[scenario.ego.turn]}"
-        return Placement((), (Unplaced(junction.summary.id, reason, False),))
-    candidates = (
-        place
-        for passage in passages
-        for place in _places_of(scenario, network, passage, network.way(passage))
-    )
-    nobody = _nobody(scenario)
-    return _cast_ones(scenario, case, vehicle, junction.summary.id, candidates, nobody, most)
+        return iter(()), f"no way through it for an ego that {_TURNS[scenario.ego.turn]}"
+    found = (place for passage in passages for place in _places_of(scenario, network, passage))
+    return found, _nobody(scenario)
 
 
 _TURNS = {"straight": "goes straight on", "across": "turns across", "near": "turns near"}
-
-
-def _cast_ones(
-    scenario: Scenario,
-    case: Values,
-    vehicle: VehicleParameters,
-    junction_id: str,
-    candidates: Iterator[Place],
-    nobody: str,
-    most: int | None,
-) -> Placement:
-    """Return the candidates on which the case can be cast, or why there is none."""
-    found: list[Place] = []
-    failure: Unplaced | None = None
-    for place in candidates:
-        played = cast(scenario, case, place, vehicle=vehicle)
-        if isinstance(played, Unplaced):
-            failure = failure or played
-            continue
-        found.append(place)
-        if most is not None and len(found) >= most:
-            break
-    if found:
-        return Placement(tuple(found), ())
-    return Placement((), (failure or Unplaced(junction_id, nobody, False),))
 
 
 def _refused(scenario: Scenario, summary: IntersectionSummary) -> str:
@@ -132,9 +110,7 @@ def _refused(scenario: Scenario, summary: IntersectionSummary) -> str:
 
 
 def _nobody(scenario: Scenario) -> str:
-    parts = [
-        a for a in scenario.actors if a.relation not in ("ahead", "behind", "beside", "parked")
-    ]
+    parts = [a for a in scenario.actors if a.relation not in ALONG]
     what = " and ".join(
         f"{part.relation.replace('_', ' ')} {part.turn}".replace(" straight", " straight on")
         for part in parts
@@ -143,44 +119,36 @@ def _nobody(scenario: Scenario) -> str:
 
 
 def _places_of(
-    scenario: Scenario, network: RoadNetwork, passage: Passage, ego: Way
-) -> Iterator[Place]:
+    scenario: Scenario, network: RoadNetwork, passage: Passage
+) -> Iterator[ScenarioPlace]:
     """Yield a place for each way of the first other road user, with all ways of the rest."""
-    along = ("ahead", "behind", "beside", "parked")
+    ego = network.way(passage)
     ways = [
-        () if part.relation in along else tuple(ways_of(part, network, passage, ego))
+        () if part.relation in ALONG else tuple(ways_of(part, network, passage, ego))
         for part in scenario.actors
     ]
-    needs = [i for i, part in enumerate(scenario.actors) if part.relation not in along]
-    if any(not ways[i] for i in needs):
+    needs = [i for i, part in enumerate(scenario.actors) if part.relation not in ALONG]
+    if not all(ways[i] for i in needs):
         return
-    first = needs[0] if needs else None
-    for way in (None,) if first is None else ways[first]:
-        chosen = tuple(
-            (way,) if i == first and way is not None else each for i, each in enumerate(ways)
-        )
-        yield Place(
+    for way in ways[needs[0]] if needs else (None,):
+        chosen = ways.copy()
+        if way is not None:
+            chosen[needs[0]] = (way,)
+        yield ScenarioPlace(
             scenario_id=scenario.id,
-            world_id=network.world.id,
             junction_id=passage.junction_id,
             name=passage.name if way is None else f"{passage.name}/{way.name}",
             driving_side=network.driving_side,
             ego=ego,
-            actor_ways=chosen,
+            actor_ways=tuple(chosen),
             walls=network.walls,
             edges_m=network.edges_beside(passage.connections[0].from_lane_id),
         )
 
 
-def _any_turn(scenario: Scenario) -> bool:
-    """Return whether which way the ego turns does not matter."""
-    along = ("ahead", "behind", "beside", "parked", "crosses_entry")
-    return all(part.relation in along for part in scenario.actors)
-
-
 def places_on_passage(
     scenario: Scenario, network: RoadNetwork, passage: Passage
-) -> tuple[Place, ...]:
+) -> tuple[ScenarioPlace, ...]:
     """Return the places of a scenario for an ego that takes a passage; none where it is not for."""
     if scenario.where.setting != "junction":
         return ()
@@ -189,9 +157,10 @@ def places_on_passage(
     )
     if _refused(scenario, summary):
         return ()
-    if passage.turn != scenario.ego.turn and not _any_turn(scenario):
+    any_turn = all(part.relation in (*ALONG, "crosses_entry") for part in scenario.actors)
+    if passage.turn != scenario.ego.turn and not any_turn:
         return ()
-    return tuple(_places_of(scenario, network, passage, network.way(passage)))
+    return tuple(_places_of(scenario, network, passage))
 
 
 def passage_on_path(network: RoadNetwork, ego_path: FrenetPath, ego_arc_m: float) -> Passage | None:

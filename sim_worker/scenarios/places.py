@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 from foretwin.contracts.world import DrivingSide
 from foretwin.sim_worker.scenarios.walls import Walls
-from foretwin.sim_worker.scenarios.ways import Way
+from foretwin.sim_worker.scenarios.ways import Way, near_sign
 
 
-class Place(NamedTuple):
+class ScenarioPlace(NamedTuple):
     """Where a scenario can take place: the ego's way, and by which ways the others may come.
 
     `actor_ways` has one entry for each actor of the scenario: the ways it may take, the likeliest
@@ -17,7 +17,6 @@ class Place(NamedTuple):
     """
 
     scenario_id: str
-    world_id: str
     junction_id: str
     name: str
     """The connections that the ego takes and, after a `/`, those of the first other road user."""
@@ -39,7 +38,7 @@ class Place(NamedTuple):
     @property
     def near_sign(self) -> float:
         """Return +1 where the near side is the right one, else -1."""
-        return 1.0 if self.driving_side == "right" else -1.0
+        return near_sign(self.driving_side)
 
 
 class Unplaced(NamedTuple):
@@ -56,5 +55,5 @@ class Unplaced(NamedTuple):
 class Placement(NamedTuple):
     """Every place of a scenario in a World, and the reason for each junction without one."""
 
-    places: tuple[Place, ...]
+    places: tuple[ScenarioPlace, ...]
     unplaced: tuple[Unplaced, ...]

@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import get_args
+from typing import get_args, get_origin
 
 import msgspec
 
@@ -23,6 +23,7 @@ from foretwin.contracts.scenario import (
     Number,
     Relation,
     Scenario,
+    Where,
 )
 
 CATALOGUE = Path(__file__).with_name("catalogue")
@@ -206,22 +207,21 @@ def _words(message: str) -> str:
 
 
 def _known(part: str) -> str:
-    from foretwin.contracts.scenario import Where
-
     kinds: dict[str, type[msgspec.Struct]] = {
-        "scenario": Scenario, "ego": EgoPart, "actors": ActorPart, "faults": FaultPart,
+        "scenario": Scenario,
+        "ego": EgoPart,
+        "actors": ActorPart,
+        "faults": FaultPart,
         "where": Where,
-    }  # fmt: skip
+    }
     return ", ".join(field.name for field in msgspec.structs.fields(kinds.get(part, Distribution)))
 
 
 def _choices(field: str) -> str:
-    from foretwin.contracts.drive import RoadUserKind
-    from foretwin.contracts.scenario import Conduct, Setting, TrafficTurn
-    from foretwin.contracts.world import Control, JunctionKind
-
-    literals = {
-        "turn": TrafficTurn, "relation": Relation, "conduct": Conduct, "kind": RoadUserKind,
-        "setting": Setting, "kinds": JunctionKind, "controls": Control,
-    }  # fmt: skip
-    return ", ".join(get_args(literals[field])) if field in literals else "see docs"
+    """Return the choices of the field of that name, wherever in a scenario it is."""
+    for kind in (Scenario, EgoPart, ActorPart, Where):
+        for known in msgspec.structs.fields(kind):
+            if known.name == field:
+                listed = get_args(known.type) if get_origin(known.type) is tuple else (known.type,)
+                return ", ".join(get_args(listed[0]))
+    return "see docs"

@@ -21,6 +21,7 @@ from foretwin.sim_worker.scenarios.ways import (
     bend_between,
     heading_of,
     lengthened,
+    near_sign,
     traffic_turn,
     turn_by_heading,
 )
@@ -53,6 +54,7 @@ class RoadNetwork:
     def __init__(self, world: World) -> None:
         self.world = world
         self.driving_side: DrivingSide = world.intersection.driving_side
+        self.near_sign = near_sign(self.driving_side)
         self.lanes = {lane.id: lane for lane in world.lanes}
         self.connections = {c.id: c for c in world.connections}
         self.roads = {road.id: road for road in world.roads}
@@ -78,10 +80,9 @@ class RoadNetwork:
         """Return the World's buildings."""
         return Walls(self.world)
 
-    @property
-    def near_sign(self) -> float:
-        """Return +1 where the near side is the right one, else -1."""
-        return 1.0 if self.driving_side == "right" else -1.0
+    def beside(self, lane: Lane, *, near: bool) -> str | None:
+        """Return the lane next to one on the near side, or else the across side, if there is."""
+        return lane.right_id if near == (self.near_sign > 0.0) else lane.left_id
 
     def passages(self, junction_id: str) -> tuple[Passage, ...]:
         """Return the passages for cars through a junction, in the World's order."""
@@ -136,26 +137,19 @@ class RoadNetwork:
         return found
 
     def _passage(self, junction_id: str, chain: tuple[Connection, ...]) -> Passage:
-        entry = self._heading_at_end(chain[0].from_lane_id, chain[0])
-        leave = self._heading_at_start(chain[-1].to_lane_id, chain[-1])
+        entry, leave = self._heading(chain[0], at_end=False), self._heading(chain[-1], at_end=True)
         if len(chain) == 1:
             turn = traffic_turn(chain[0].turn, self.driving_side)
         else:
             turn = turn_by_heading(float(wrap_angle(leave - entry)), self.driving_side)
         return Passage(junction_id, chain, turn, entry, leave)
 
-    def _heading_at_end(self, lane_id: str, connection: Connection) -> float:
-        """Return where a lane heads at its end; that of the connection if it is short."""
-        line = self.lanes[lane_id].centerline
+    def _heading(self, connection: Connection, *, at_end: bool) -> float:
+        """Return where the lane at an end of a connection heads; the connection if it is short."""
+        line = self.lanes[connection.to_lane_id if at_end else connection.from_lane_id].centerline
         if len(line) < 2 or length(line) < 1.0:
-            line = connection.centerline[:2]
-        return heading_of(line[::-1], backwards=True)
-
-    def _heading_at_start(self, lane_id: str, connection: Connection) -> float:
-        line = self.lanes[lane_id].centerline
-        if len(line) < 2 or length(line) < 1.0:
-            line = connection.centerline[-2:]
-        return heading_of(line, backwards=False)
+            line = connection.centerline[-2:] if at_end else connection.centerline[:2]
+        return heading_of(line if at_end else line[::-1], backwards=not at_end)
 
     def edges_beside(self, lane_id: str) -> tuple[float, float]:
         """Return how far left and right of a lane's middle its road's edges lie, as drivers see it.
@@ -174,7 +168,7 @@ class RoadNetwork:
         """Return how many lanes driven the same way lie between a passage's entry and the kerb."""
         lane, count = self.lanes[passage.connections[0].from_lane_id], 0
         while count < len(self.lanes):
-            near = lane.right_id if self.near_sign > 0.0 else lane.left_id
+            near = self.beside(lane, near=True)
             if near is None or near not in self.lanes:
                 break
             lane, count = self.lanes[near], count + 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,10 +10,11 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import RoadUserKind
 from foretwin.contracts.scenario import ActorPart, Conduct, Relation, Scenario
+from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import length
 from foretwin.sim_worker.scenarios.drawing import Values
-from foretwin.sim_worker.scenarios.impact import EgoBox, Impact, Moving
-from foretwin.sim_worker.scenarios.places import Place
+from foretwin.sim_worker.scenarios.impact import Impact, MovingBox
+from foretwin.sim_worker.scenarios.places import ScenarioPlace
 from foretwin.sim_worker.scenarios.ways import Way
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS, KindTraits
 
@@ -20,7 +22,7 @@ ALONG: tuple[Relation, ...] = ("ahead", "behind", "beside", "parked")
 """Relations of those who have no way of their own: they are on the ego's path or beside it."""
 
 
-class CastActor(NamedTuple):
+class StagedActor(NamedTuple):
     """Another road user of a case.
 
     `xy_m` (N, 2) is its own path; its box's centre starts at `start_arc_m` of it, `lateral_m` to
@@ -46,31 +48,39 @@ class CastActor(NamedTuple):
         """Return where it starts on the way that it takes; its own path may begin before that."""
         return self.start_arc_m - (length(self.xy_m) - length(way.xy_m))
 
+    def moving(self, path: FrenetPath) -> MovingBox:
+        """Return it as it moves on a path unless something intervenes."""
+        size, brakes = self.traits, self.acts_after_s if self.conduct == "stops" else math.inf
+        return MovingBox(
+            path,
+            self.speed_mps,
+            size.length_m,
+            size.width_m,
+            self.lateral_m,
+            brakes,
+            self.decel_mps2,
+        )
+
     @property
     def traits(self) -> KindTraits:
         """Return the sizes and limits of its kind."""
         return KINDS[self.kind]
 
 
-class Cast(NamedTuple):
+class StagedCase(NamedTuple):
     """Everybody's start in one case, in the World's frame.
 
-    The ego's base_link starts at `ego_arc_m` of `ego_xy_m` (N, 2), `ego_lateral_m` to its left;
-    `reverse` says that it drives backwards along it. Where a touch is planned, an ego that keeps
-    its speed touches the first road user after `impact_time_s` with its front's point
-    `impact_share` at `impact_point_m` (2,); else the three are NaN.
+    The ego's base_link starts at `ego_arc_m` of its way, `ego_lateral_m` to its left. Where a touch
+    is planned, an ego that keeps its speed touches the first road user after `impact_time_s` with
+    its front's point `impact_share` at `impact_point_m` (2,); else the three are NaN.
     """
 
-    scenario_id: str
-    place: Place
+    place: ScenarioPlace
     values: Values
-    actors: tuple[CastActor, ...]
-    ego_xy_m: Array
-    ego_speed_limit_mps: Array
+    actors: tuple[StagedActor, ...]
     ego_arc_m: float
     ego_lateral_m: float
     ego_speed_mps: float
-    reverse: bool
     impact_time_s: float
     impact_point_m: Array
     impact_share: float
@@ -79,7 +89,7 @@ class Cast(NamedTuple):
     """How far beyond the World's lanes the ego or an actor starts, on a road prolonged."""
 
 
-class Meeting(NamedTuple):
+class PlannedMeeting(NamedTuple):
     """Where the ego and an actor meet, and by which way the actor comes."""
 
     impact: Impact
@@ -91,9 +101,8 @@ class Staging(NamedTuple):
 
     scenario: Scenario
     values: Values
-    place: Place
-    ego: Moving
-    box: EgoBox
+    place: ScenarioPlace
+    ego: MovingBox
     start_m: float = 0.0
 
     def number(self, part: ActorPart, field: str) -> float:
@@ -102,14 +111,14 @@ class Staging(NamedTuple):
 
     def actor(
         self, part: ActorPart, xy_m: Array, start_arc_m: float, lateral_m: float, way: str
-    ) -> CastActor:
+    ) -> StagedActor:
         """Return an actor that starts on a path, led straight back where it starts before it."""
         if start_arc_m < _LEAST_ARC_M:
             more = _LEAST_ARC_M - start_arc_m
             back = (xy_m[0] - xy_m[1]) / max(float(np.hypot(*(xy_m[0] - xy_m[1]))), 1e-9)
             xy_m = np.concatenate([(xy_m[0] + more * back)[None], xy_m])
             start_arc_m = _LEAST_ARC_M
-        return CastActor(
+        return StagedActor(
             name=part.name,
             kind=part.kind,
             relation=part.relation,

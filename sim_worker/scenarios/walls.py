@@ -21,7 +21,7 @@ class Walls:
         return len(self._tree.query(shape, "intersects")) > 0
 
     def block(
-        self, path: FrenetPath, *, from_m: float, to_m: float, width_m: float, left_m: float = 0.0
+        self, path: FrenetPath, from_m: float, to_m: float, *, width_m: float, left_m: float = 0.0
     ) -> bool:
         """Return whether what is so wide touches one on its way between two arc lengths, `left_m`
         to the left of the path."""

@@ -12,7 +12,7 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import TrafficTurn
 from foretwin.contracts.world import DrivingSide
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.geometry.polyline import arc_lengths
+from foretwin.geometry.polyline import arc_lengths, points_at, unit
 
 APPROACH_M, DEPARTURE_M = 150.0, 120.0
 """How far ways are led back and on along the lanes."""
@@ -44,8 +44,8 @@ def lengthened(name: str, xy: Array, limit: Array, entry_m: float, exit_m: float
     before = max(0.0, APPROACH_M - entry_m)
     after = max(0.0, DEPARTURE_M - (float(arc[-1]) - exit_m))
     # Ends clipped at the World's edge can be short: a few metres tell where the road heads.
-    first = _unit(xy[0] - _point_at(xy, arc, _HEADING_OVER_M / 2))
-    last = _unit(xy[-1] - _point_at(xy, arc, float(arc[-1]) - _HEADING_OVER_M / 2))
+    first = unit(xy[0] - points_at(xy, _HEADING_OVER_M / 2))
+    last = unit(xy[-1] - points_at(xy, float(arc[-1]) - _HEADING_OVER_M / 2))
     parts, limits = [xy], [limit]
     if before > 0.5:
         parts.insert(0, (xy[0] + before * first)[None])
@@ -66,6 +66,11 @@ def lengthened(name: str, xy: Array, limit: Array, entry_m: float, exit_m: float
         first_m=before,
         last_m=before + float(arc[-1]),
     )
+
+
+def near_sign(side: DrivingSide) -> float:
+    """Return +1 where the near side is the right one, else -1."""
+    return 1.0 if side == "right" else -1.0
 
 
 def traffic_turn(turn: str, side: DrivingSide) -> TrafficTurn | None:
@@ -97,8 +102,7 @@ def turn_by_heading(change_rad: float, side: DrivingSide) -> TrafficTurn | None:
 
 def heading_of(line: Array, *, backwards: bool) -> float:
     """Return where a line heads at its first point, looked at over a few metres."""
-    arc = arc_lengths(line)
-    step = _point_at(line, arc, _HEADING_OVER_M) - line[0]
+    step = points_at(line, _HEADING_OVER_M) - line[0]
     if backwards:
         step = -step
     return math.atan2(float(step[1]), float(step[0]))
@@ -110,13 +114,3 @@ def bend_between(before: Array, after: Array) -> float:
         return math.pi
     turn = heading_of(after, backwards=False) - heading_of(before[::-1], backwards=True)
     return abs(float(wrap_angle(turn)))
-
-
-def _point_at(line: Array, arc: Array, at_m: float) -> Array:
-    at = min(max(at_m, 0.0), float(arc[-1]))
-    return np.array([np.interp(at, arc, line[:, 0]), np.interp(at, arc, line[:, 1])])
-
-
-def _unit(vector: Array) -> Array:
-    norm = float(np.hypot(*vector))
-    return vector / norm if norm > 1e-9 else np.array([1.0, 0.0])

@@ -13,11 +13,13 @@ from foretwin.contracts.placement import (
     PlaceRequest,
     WorldPlaces,
 )
+from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.scenarios.live import LiveScenarios
+from foretwin.sim_worker.scenarios.live import KnownScenarios
 from foretwin.sim_worker.scenarios.placement import places
+from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 
 
@@ -30,68 +32,60 @@ def places_in(world: World, asked: PlaceRequest, vehicle: VehicleParameters) -> 
     ways: dict[str, PathAhead] = {}
     for scenario in asked.scenarios:
         found = places(scenario, world, network=network, vehicle=vehicle, most=asked.most)
-        for place in found.places:
-            placed.append(
-                PlacedHere(
-                    scenario_id=scenario.id, junction_id=place.junction_id, place=place.name,
-                    ego=place.ego.name,
-                )
-            )  # fmt: skip
-            ways[place.ego.name] = PathAhead(
-                xy_m=place.ego.xy_m, speed_limit_mps=place.ego.speed_limit_mps
-            )
-        unplaced += [
-            NotPlaced(
-                scenario_id=scenario.id, junction_id=one.junction_id, reason=one.reason,
-                applies=one.applies,
-            )
-            for one in found.unplaced
-        ]  # fmt: skip
-    return WorldPlaces(
-        world_id=world.id, frame=world.frame, placed=tuple(placed), unplaced=tuple(unplaced),
-        ways=ways,
-    )  # fmt: skip
+        for here in found.places:
+            ego = here.ego
+            placed.append(_placed(scenario, here.junction_id, here.name, ego.name))
+            ways[ego.name] = PathAhead(xy_m=ego.xy_m, speed_limit_mps=ego.speed_limit_mps)
+        unplaced += [NotPlaced(scenario_id=scenario.id, **u._asdict()) for u in found.unplaced]
+    return _world_places(world, placed, unplaced, ways)
 
 
 def _places_recorded(
     network: RoadNetwork, asked: PlaceRequest, vehicle: VehicleParameters
 ) -> WorldPlaces:
     """Return which scenarios can happen on the ways that a recorded car took from its starts."""
-    world, known = network.world, LiveScenarios(network)
+    world, known = network.world, KnownScenarios(network)
     placed, unplaced = [], []
     for number, start in asked.starts:
         path = FrenetPath(start.path(world.frame).xy_m)
-        here = local_from_geo(
-            world.frame, start.state.position.lat_deg, start.state.position.lon_deg
-        )
+        position = start.state.position
+        here = local_from_geo(world.frame, position.lat_deg, position.lon_deg)
         arc = path.locate(np.asarray(here)[None])
         passage = known.on(path, float(arc.arc_m[0]), vehicle).passage
         for scenario in asked.scenarios:
             name = f"round {start.round_id}"
-            if scenario.id == AS_RECORDED:
-                placed.append(
-                    PlacedHere(
-                        scenario_id=scenario.id, junction_id=start.junction_id, place=name,
-                        ego=name, start=number,
-                    )
-                )  # fmt: skip
-                continue
             found = () if passage is None else known.places(scenario, passage)
+            names = [f"{name}: {place.name}" for place in found[: asked.most]]
+            if scenario.id == AS_RECORDED:
+                names = [name]
+            elif not found:
+                why = Unplaced(start.junction_id, f"{name}: {_NOT_FOR_WAY}", False)
+                unplaced.append(NotPlaced(scenario_id=scenario.id, **why._asdict()))
             placed += [
-                PlacedHere(
-                    scenario_id=scenario.id, junction_id=start.junction_id,
-                    place=f"{name}: {place.name}", ego=name, start=number, rank=rank,
-                )
-                for rank, place in enumerate(found[: asked.most])
-            ]  # fmt: skip
-            if not found:
-                reason = "does not apply on the recorded way"
-                unplaced.append(
-                    NotPlaced(
-                        scenario_id=scenario.id, junction_id=start.junction_id,
-                        reason=f"{name}: {reason}", applies=False,
-                    )
-                )  # fmt: skip
+                _placed(scenario, start.junction_id, place, name, start=number, rank=rank)
+                for rank, place in enumerate(names)
+            ]
+    return _world_places(world, placed, unplaced, {})
+
+
+_NOT_FOR_WAY = "does not apply on the recorded way"
+
+
+def _placed(
+    scenario: Scenario, junction_id: str, place: str, ego: str, **recorded: int
+) -> PlacedHere:
+    return PlacedHere(
+        scenario_id=scenario.id, junction_id=junction_id, place=place, ego=ego, **recorded
+    )
+
+
+def _world_places(
+    world: World, placed: list[PlacedHere], unplaced: list[NotPlaced], ways: dict[str, PathAhead]
+) -> WorldPlaces:
     return WorldPlaces(
-        world_id=world.id, frame=world.frame, placed=tuple(placed), unplaced=tuple(unplaced)
+        world_id=world.id,
+        frame=world.frame,
+        placed=tuple(placed),
+        unplaced=tuple(unplaced),
+        ways=ways,
     )

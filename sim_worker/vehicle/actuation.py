@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.vehicle import compiled
 from foretwin.sim_worker.vehicle.lag import ForceLag, lags_of_force
@@ -64,7 +63,7 @@ class Actuation:
         forcerange: Array,
         tick_s: float | None = None,
         accel_mps2: Array | None = None,
-        backwards: npt.NDArray[np.bool_] | None = None,
+        backwards: Flags | None = None,
     ) -> None:
         tyres = slice(ids.tyre_front, ids.tyre_rear + 1)
         if ids.tyre_rear != ids.tyre_front + 1:
@@ -120,7 +119,7 @@ class Actuation:
         self._grip_square = np.square(grip)
         self._least_square = self._grip_square * _MIN_LATERAL_SHARE**2
 
-    def restart(self, rows: npt.NDArray[np.intp], *, friction: Array, accel_mps2: Array) -> None:
+    def restart(self, rows: Indices, *, friction: Array, accel_mps2: Array) -> None:
         """Let the vehicles of `rows` (K,) begin anew with `accel_mps2` (K,) on `friction` (K,)."""
         self._friction[rows] = friction
         self._limit()

@@ -7,16 +7,27 @@ import math
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.compiled import IN, IN_ROWS, OUT, OUT_ROWS, REAL, kernel, types
 
+_CARS, _AXLES, _CONSTANTS = [IN] * 4, [IN_ROWS] * 3, types.UniTuple(REAL, 5)
 
-@kernel(
-    types.void, IN, IN, IN, IN, IN_ROWS, IN_ROWS, IN_ROWS, types.UniTuple(REAL, 5), IN,
-    OUT_ROWS, OUT_ROWS, OUT_ROWS, OUT_ROWS, OUT, OUT,
-)  # fmt: skip
+
+@kernel(types.void, *_CARS, *_AXLES, _CONSTANTS, IN, *[OUT_ROWS] * 4, OUT, OUT)
 def forces(
-    accel: Array, speed: Array, grip_square: Array, least_square: Array, transfer: Array,
-    axles_kg: Array, stiffness: Array, constants: tuple[float, ...], gear: Array,
-    damping: Array, low: Array, high: Array, drive_n: Array, along_low: Array, along_high: Array,
-) -> None:  # fmt: skip
+    accel: Array,
+    speed: Array,
+    grip_square: Array,
+    least_square: Array,
+    transfer: Array,
+    axles_kg: Array,
+    stiffness: Array,
+    constants: tuple[float, ...],
+    gear: Array,
+    damping: Array,
+    low: Array,
+    high: Array,
+    drive_n: Array,
+    along_low: Array,
+    along_high: Array,
+) -> None:
     """Fill what `Actuation.apply` writes, from accelerations that are carried out (S,)."""
     mass, rolling, drag, least_kg, least_mps = constants
     for car in range(len(accel)):

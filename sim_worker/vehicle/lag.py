@@ -6,9 +6,8 @@ import math
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.contracts.arrays import Array
+from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 
 
@@ -33,7 +32,7 @@ class ForceLag:
         self._acting = np.stack([np.maximum(start, 0.0), np.minimum(start, 0.0)])
         self._commands = [start] * (self._whole + 2)
 
-    def restart(self, rows: npt.NDArray[np.intp], accel_mps2: Array) -> None:
+    def restart(self, rows: Indices, accel_mps2: Array) -> None:
         """Let some begin anew with `accel_mps2` (K,) acting."""
         self._acting[:, rows] = np.maximum(accel_mps2, 0.0), np.minimum(accel_mps2, 0.0)
         self._commands = [command.copy() for command in self._commands]

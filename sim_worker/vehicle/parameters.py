@@ -20,10 +20,9 @@ MAX_VEHICLE_DELAY_S = 0.6
 MAX_FORCE_DELAY_S = 1.0
 """Beyond it, nobody would speak of an actuator's dead time."""
 
-_MAY_BE_ZERO = {
-    "drag_npv2", "rolling_resistance_n", "steering_delay_s", "rear_overhang_m", "drive_lag_s",
-    "brake_lag_s", "accel_delay_s", "steering_lag_s",
-}  # fmt: skip
+_RESISTANCES = ("drag_npv2", "rolling_resistance_n")
+_LAGS = ("steering_delay_s", "drive_lag_s", "brake_lag_s", "accel_delay_s", "steering_lag_s")
+_MAY_BE_ZERO = {*_RESISTANCES, *_LAGS, "rear_overhang_m"}
 _ANY_SIGN = {"steering_offset_rad"}
 
 

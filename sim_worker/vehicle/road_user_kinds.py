@@ -30,36 +30,33 @@ class KindTraits(NamedTuple):
     keeps_lane: bool = True
 
 
+_SIZES_AND_LIMITS: dict[RoadUserKind, tuple[float, ...]] = {
+    "car": (4.5, 1.8, 1.5, 1500.0, 2.6, 4.5, 9.0, 55.6),
+    "van": (6.0, 2.04, 2.6, 2800.0, 2.6, 4.5, 9.0, 44.4),
+    "lorry": (7.1, 2.4, 2.8, 9000.0, 1.3, 4.0, 7.0, 36.1),
+    "bus": (12.0, 2.5, 3.4, 12000.0, 1.2, 4.0, 7.0, 27.8),
+    "tram": (22.0, 2.4, 3.2, 37900.0, 1.0, 3.0, 7.0, 22.2),
+    "motorcycle": (2.2, 0.9, 1.5, 280.0, 6.0, 4.5, 9.0, 55.6),
+    "bicycle": (1.89, 0.5, 1.87, 95.0, 1.2, 3.0, 7.0, 8.3),
+    "pedestrian": (0.5, 0.5, 1.8, 75.0, 1.5, 2.0, 5.0, 3.0),
+    "unknown": (4.5, 1.8, 1.5, 1500.0, 2.6, 4.5, 9.0, 55.6),
+}
+"""In the order of `KindTraits`."""
+_SOURCES = {
+    "car": f"{_SUMO} passenger; 4.5 m long, as compact cars are",
+    "van": "Volkswagen Crafter, medium wheelbase, rounded and half laden; "
+    f"limits of {_SUMO} delivery",
+    "lorry": f"{_SUMO} truck, laden with as much again",
+    "bus": f"{_SUMO} bus",
+    "tram": f"{_SUMO} tram",
+    "motorcycle": f"{_SUMO} motorcycle with a rider of 80 kg, who brakes as car drivers do",
+    "bicycle": f"{_TARGETS}, bicyclist (rounded); {_SUMO} bicycle with 80 kg of rider and 15 of "
+    "bicycle",
+    "pedestrian": f"{_TARGETS}, adult (rounded, with its stride); {_SUMO} pedestrian; running at "
+    "3 m/s",
+    "unknown": "taken for a car: the most frequent",
+}
 KINDS: dict[RoadUserKind, KindTraits] = {
-    "car": KindTraits(
-        4.5, 1.8, 1.5, 1500.0, 2.6, 4.5, 9.0, 55.6,
-        f"{_SUMO} passenger; 4.5 m long, as compact cars are",
-    ),
-    "van": KindTraits(
-        6.0, 2.04, 2.6, 2800.0, 2.6, 4.5, 9.0, 44.4,
-        "Volkswagen Crafter, medium wheelbase, rounded and half laden; "
-        f"limits of {_SUMO} delivery",
-    ),
-    "lorry": KindTraits(
-        7.1, 2.4, 2.8, 9000.0, 1.3, 4.0, 7.0, 36.1,
-        f"{_SUMO} truck, laden with as much again",
-    ),
-    "bus": KindTraits(12.0, 2.5, 3.4, 12000.0, 1.2, 4.0, 7.0, 27.8, f"{_SUMO} bus"),
-    "tram": KindTraits(22.0, 2.4, 3.2, 37900.0, 1.0, 3.0, 7.0, 22.2, f"{_SUMO} tram"),
-    "motorcycle": KindTraits(
-        2.2, 0.9, 1.5, 280.0, 6.0, 4.5, 9.0, 55.6,
-        f"{_SUMO} motorcycle with a rider of 80 kg, who brakes as car drivers do",
-    ),
-    "bicycle": KindTraits(
-        1.89, 0.5, 1.87, 95.0, 1.2, 3.0, 7.0, 8.3,
-        f"{_TARGETS}, bicyclist (rounded); {_SUMO} bicycle with 80 kg of rider and 15 of bicycle",
-    ),
-    "pedestrian": KindTraits(
-        0.5, 0.5, 1.8, 75.0, 1.5, 2.0, 5.0, 3.0,
-        f"{_TARGETS}, adult (rounded, with its stride); {_SUMO} pedestrian; running at 3 m/s",
-        keeps_lane=False,
-    ),
-    "unknown": KindTraits(
-        4.5, 1.8, 1.5, 1500.0, 2.6, 4.5, 9.0, 55.6, "taken for a car: the most frequent",
-    ),
-}  # fmt: skip
+    kind: KindTraits._make([*numbers, _SOURCES[kind], kind != "pedestrian"])
+    for kind, numbers in _SIZES_AND_LIMITS.items()
+}

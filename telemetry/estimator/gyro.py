@@ -36,12 +36,6 @@ class Gyro:
         self.bias_radps = 0.0
         self._bias_var = GYRO_BIAS_STD_RADPS**2
 
-    def copy(self) -> Gyro:
-        """Return another one that goes on from here by itself."""
-        other = object.__new__(Gyro)
-        other.__dict__.update(self.__dict__)
-        return other
-
     @property
     def std_radps(self) -> float:
         """The standard deviation of one sample's white noise."""

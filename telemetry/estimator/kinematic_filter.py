@@ -9,6 +9,7 @@ whatever its positions jitter; and the gyro's bias is learnt for free while it s
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -55,8 +56,7 @@ class KinematicFilter:
 
     def copy(self) -> KinematicFilter:
         """Return another filter that goes on from the same state."""
-        other = object.__new__(KinematicFilter)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other.mean, other.covariance = self.mean.copy(), self.covariance.copy()
         return other
 

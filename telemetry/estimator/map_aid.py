@@ -70,12 +70,6 @@ class MapAid:
         self._heading_m = math.inf
         self._doubt_m = 0.0
 
-    def copy(self) -> MapAid:
-        """Return another one that goes on from here by itself."""
-        other = object.__new__(MapAid)
-        other.__dict__.update(self.__dict__)
-        return other
-
     def take(
         self, filter_: KinematicFilter, place: LocalPlace, line: RoadLine, *, receiver_std_m: float
     ) -> bool:

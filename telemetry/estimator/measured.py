@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import Counter
 from typing import Any
@@ -50,8 +51,7 @@ class MotionSamples:
 
     def copy(self, *, skipped: Counter[str]) -> MotionSamples:
         """Return another memory of the same samples that counts into `skipped`."""
-        other = object.__new__(MotionSamples)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other._skipped = skipped
         other._sample_ns, other._field_ns = self._sample_ns.copy(), self._field_ns.copy()
         return other
@@ -131,12 +131,6 @@ class Doubt:
     def __init__(self, least: float) -> None:
         self._least = least
         self._mean_square = 0.0
-
-    def copy(self) -> Doubt:
-        """Return another one that goes on from here by itself."""
-        other = Doubt(self._least)
-        other._mean_square = self._mean_square
-        return other
 
     def std(self, surprise: float) -> float:
         """Take the latest surprise and return the standard deviation to use for it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import Any
 
@@ -26,12 +27,11 @@ class MotionCorrections:
 
     def copy(self, measured: MotionSamples) -> MotionCorrections:
         """Return others with the same doubts, which read `measured`."""
-        other = object.__new__(MotionCorrections)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other._measured = measured
-        other._speed_doubt = self._speed_doubt.copy()
-        other._yaw_doubt = self._yaw_doubt.copy()
-        other._gyro = self._gyro.copy()
+        other._speed_doubt = copy.copy(self._speed_doubt)
+        other._yaw_doubt = copy.copy(self._yaw_doubt)
+        other._gyro = copy.copy(self._gyro)
         return other
 
     def watch(self, message: Any, *, standing: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import Counter
 from typing import Any
@@ -67,12 +68,11 @@ class MotionTrack:
 
     def copy(self) -> MotionTrack:
         """Return another track that goes on from here by itself."""
-        other = object.__new__(MotionTrack)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other._gate = self._gate.copy()
         other._measured = self._measured.copy(skipped=other._gate.skipped)
         other._corrections = self._corrections.copy(other._measured)
-        other._aid = self._aid.copy()
+        other._aid = copy.copy(self._aid)
         if self._filter is not None:
             other._filter = self._filter.copy()
         return other

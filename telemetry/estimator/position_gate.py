@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import Counter, deque
 from typing import Literal, NamedTuple
@@ -50,8 +51,7 @@ class PositionGate:
 
     def copy(self) -> PositionGate:
         """Return another gate that goes on from here by itself."""
-        other = object.__new__(PositionGate)
-        other.__dict__.update(self.__dict__)
+        other = copy.copy(self)
         other.skipped, other.recent = self.skipped.copy(), self.recent.copy()
         other._elsewhere = self._elsewhere.copy()
         return other

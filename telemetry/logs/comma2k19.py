@@ -13,24 +13,14 @@ mounting, which is left in.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import (
-    GnssFix,
-    HeadingSample,
-    ImuSample,
-    SpeedSample,
-    SteeringSample,
-    VehicleInfo,
-)
-from foretwin.contracts.frames import GeoPoint, geo_from_ecef
-from foretwin.telemetry.logs.log import Declared, Log, LogError, Sample
-from foretwin.telemetry.logs.merge import merged
+from foretwin.contracts.frames import geo_from_ecef
+from foretwin.telemetry.logs.columns import Stamps, stream_of, table_log
+from foretwin.telemetry.logs.log import Log, LogError
 
 
 def is_comma2k19(folder: Path) -> bool:
@@ -40,39 +30,27 @@ def is_comma2k19(folder: Path) -> bool:
 
 def open_comma2k19(folder: Path) -> Log:
     """Open a segment folder; raises LogError for arrays that are broken or do not fit."""
-    streams = {
+    read = {
         "gnss": _positions(folder),
         "heading": _headings(folder),
         "imu": _imu(folder),
         "speed": _column(folder, "processed_log/CAN/speed", 1),
-        "steering": _column(folder, "processed_log/CAN/steering_angle", 1),
+        "steering": _steering_wheel(folder),
     }
-    present = {name: stream for name, stream in streams.items() if stream is not None}
+    present = {
+        channel: stream_of(channel, _stamps_ns(timed[0]), timed[1])
+        for channel, timed in read.items()
+        if timed is not None
+    }
     if "gnss" not in present:
         raise LogError(f"{folder}: no global_pose/frame_positions: a drive needs positions")
-    stamps_ns = np.concatenate([_stamps_ns(time_s) for time_s, _ in present.values()])
-    known_ns = stamps_ns[stamps_ns >= 0]
-
-    def read(_skipped: Counter[str]) -> Iterator[Sample]:
-        return merged(*(_samples(name, *stream) for name, stream in present.items()))
-
-    return Log(
-        info=VehicleInfo(
-            vehicle_id="car",
-            time_base="boot",
-            start_stamp_ns=int(known_ns.min()),
-            end_stamp_ns=int(known_ns.max()),
-            source=folder.name,
-            reference_point="camera",
-            sends=tuple(present),
-        ),
-        declared=Declared(
-            units="m/s, degrees at the steering wheel, rad/s, m/s², m",
-            frame="ECEF, WGS84; IMU axes forward, right, down",
-            time_base="seconds since the device booted",
-            reference_point="camera",
-        ),
-        read=read,
+    stamps_ns = np.sort(np.concatenate([stream.stamps_ns for stream in present.values()]))
+    return table_log(
+        folder.name,
+        present,
+        stamps_ns=stamps_ns[stamps_ns >= 0],
+        time_base="boot",
+        reference_point="camera",
     )
 
 
@@ -139,23 +117,11 @@ def _imu(folder: Path) -> tuple[Array, Array] | None:
     return accel[0], np.hstack([accel[1] * left_up, rate[1] * left_up])
 
 
-def _stamps_ns(time_s: Array) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def _steering_wheel(folder: Path) -> tuple[Array, Array] | None:
+    angle = _column(folder, "processed_log/CAN/steering_angle", 1)
+    return None if angle is None else (angle[0], np.radians(angle[1]))
+
+
+def _stamps_ns(time_s: Array) -> Stamps:
     # An unreadable time becomes one before zero, which is refused and counted with the others.
     return np.round(np.where(np.isfinite(time_s), time_s * 1e9, -1.0)).astype(np.int64)
-
-
-def _samples(name: str, time_s: Array, value: Array) -> Iterator[Sample]:
-    for stamp_ns, row in zip(_stamps_ns(time_s).tolist(), value.tolist(), strict=True):
-        match name:
-            case "gnss":
-                yield name, GnssFix(stamp_ns=stamp_ns, position=GeoPoint(*row))
-            case "heading":
-                yield name, HeadingSample(stamp_ns=stamp_ns, yaw_rad=row[0])
-            case "imu":
-                accel, rate = (row[0], row[1], row[2]), (row[3], row[4], row[5])
-                yield name, ImuSample(stamp_ns=stamp_ns, accel_mps2=accel, rate_radps=rate)
-            case "speed":
-                yield name, SpeedSample(stamp_ns=stamp_ns, speed_mps=row[0])
-            case "steering":
-                wheel_rad = float(np.radians(row[0]))
-                yield name, SteeringSample(stamp_ns=stamp_ns, steering_wheel_rad=wheel_rad)

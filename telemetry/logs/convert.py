@@ -63,8 +63,8 @@ def convert(
 
 def _check(source: Path, log: Log, counts: Counter[str]) -> None:
     if not counts:
-        told = ", ".join(f"{count} x {reason}" for reason, count in log.skipped.items())
-        raise LogError(f"{source}: holds no valid sample ({told or 'it is empty'})")
+        reasons = ", ".join(f"{count} x {reason}" for reason, count in log.skipped.items())
+        raise LogError(f"{source}: holds no valid sample ({reasons or 'it is empty'})")
 
 
 @contextlib.contextmanager

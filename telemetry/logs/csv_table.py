@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import csv
 import math
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 import pyproj
 
-from foretwin.contracts import drive
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.frames import GeoPoint, geo_from_ecef, wrap_angle
+from foretwin.contracts.frames import geo_from_ecef, wrap_angle
 from foretwin.telemetry.logs import units
+from foretwin.telemetry.logs.columns import Stream, stream_of, table_log
 from foretwin.telemetry.logs.declaration import (
     Declaration,
     HeadingSection,
@@ -30,9 +28,8 @@ from foretwin.telemetry.logs.declaration import (
     read_declaration,
     sections_of,
 )
-from foretwin.telemetry.logs.gpx import stamp_ns_from_iso
-from foretwin.telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
-from foretwin.telemetry.logs.merge import merged
+from foretwin.telemetry.logs.gpx import representable_ns, stamp_ns_from_iso
+from foretwin.telemetry.logs.log import Log, LogError
 
 Cells = list[str]
 Flags = npt.NDArray[np.bool_]
@@ -68,49 +65,29 @@ def open_csv(path: Path, *, declaration: Path | None = None) -> Log:
         unreadable += broken
         picks[channel] = np.flatnonzero(usable & _is_new(table, section))
     geo = _positions(declaration_path, declared.position, values["gnss"])
+    values["gnss"] |= stream_of("gnss", table.stamp_ns, geo).columns
+    if (speed := values.get("speed")) is not None and "forward" not in speed:
+        speed["forward"] = np.hypot(speed["east"], speed["north"])
     if declared.heading is not None:
         heading = values["heading"]
         heading["yaw"] = _true_yaw(declared.position, declared.heading, heading["yaw"], geo)
-        picks["heading"] = _fast_enough(declared.heading, picks["heading"], values.get("speed"))
+        if speed is not None and declared.heading.min_speed_mps > 0.0:
+            rows = picks["heading"]
+            picks["heading"] = rows[speed["forward"][rows] >= declared.heading.min_speed_mps]
     if declared.imu is not None:
         _turn_axes(declared.imu, values["imu"])
-
-    def rows(channel: str) -> Iterator[Sample]:
-        make = _MAKERS[channel]
-        columns = {"geo": geo, **values[channel]} if channel == "gnss" else values[channel]
-        for row, stamp_ns in zip(
-            picks[channel], table.stamp_ns[picks[channel]].tolist(), strict=True
-        ):
-            yield channel, make(stamp_ns, {name: column[row] for name, column in columns.items()})
-
-    def read(skipped: Counter[str]) -> Iterator[Sample]:
-        if unreadable:
-            skipped[UNREADABLE_ROW] += unreadable
-        return merged(*(rows(channel) for channel in values))
-
-    return Log(
-        info=drive.VehicleInfo(
-            vehicle_id="car",
-            time_base=declared.time.base,
-            start_stamp_ns=int(table.stamp_ns[0]),
-            end_stamp_ns=int(table.stamp_ns.max()),
-            source=path.name,
-            reference_point=declared.reference_point,
-            body_from_antenna_m=declared.body_from_antenna_m,
-            sends=tuple(values),
-        ),
-        declared=Declared(
-            units=", ".join(
-                f"{column.column} {column.unit}"
-                for section in sections_of(declared).values()
-                for column in columns_of(section).values()
-            ),
-            frame=declared.position.frame
-            + (f" EPSG:{declared.position.epsg}" if declared.position.epsg else ""),
-            time_base=declared.time.base,
-            reference_point=declared.reference_point,
-        ),
-        read=read,
+    streams = {
+        channel: Stream(table.stamp_ns[rows], {n: v[rows] for n, v in values[channel].items()})
+        for channel, rows in picks.items()
+    }
+    return table_log(
+        path.name,
+        streams,
+        stamps_ns=table.stamp_ns,
+        time_base=declared.time.base,
+        reference_point=declared.reference_point,
+        body_from_antenna_m=declared.body_from_antenna_m,
+        unreadable=unreadable,
     )
 
 
@@ -157,7 +134,7 @@ def _stamp_reader(unit: str) -> Callable[[str], int | None]:
 
     def read(text: str) -> int | None:
         try:
-            return int((Decimal(text.strip()) * factor).to_integral_value())
+            return representable_ns(int((Decimal(text.strip()) * factor).to_integral_value()))
         except (InvalidOperation, ValueError, OverflowError):
             return None
 
@@ -236,64 +213,7 @@ def _true_yaw(
     return wrap_angle(yaw)
 
 
-def _fast_enough(
-    heading: HeadingSection, rows: npt.NDArray[np.int64], speed: dict[str, Array] | None
-) -> npt.NDArray[np.int64]:
-    if speed is None or heading.min_speed_mps <= 0.0:
-        return rows
-    return rows[_speed(speed)[rows] >= heading.min_speed_mps]
-
-
 def _turn_axes(imu: ImuSection, columns: dict[str, Array]) -> None:
     if imu.axes == "forward-right-down":
         for name in ("accel_y", "accel_z", "rate_y", "rate_z"):
             columns[name] = -columns[name]
-
-
-def _speed(columns: dict[str, Array]) -> Array:
-    if "forward" in columns:
-        return columns["forward"]
-    return np.hypot(columns["east"], columns["north"])
-
-
-def _gnss(stamp_ns: int, row: dict[str, Array]) -> msgspec.Struct:
-    lat_deg, lon_deg, alt_m = row["geo"].tolist()
-    std_m = float(row["std"]) if "std" in row else None
-    return drive.GnssFix(stamp_ns=stamp_ns, position=GeoPoint(lat_deg, lon_deg, alt_m), std_m=std_m)
-
-
-def _imu(stamp_ns: int, row: dict[str, Array]) -> msgspec.Struct:
-    return drive.ImuSample(
-        stamp_ns=stamp_ns,
-        accel_mps2=(float(row["accel_x"]), float(row["accel_y"]), float(row["accel_z"])),
-        rate_radps=(float(row["rate_x"]), float(row["rate_y"]), float(row["rate_z"])),
-    )
-
-
-def _optional(row: dict[str, Array], name: str) -> float | None:
-    return float(row[name]) if name in row else None
-
-
-_MAKERS: dict[str, Callable[[int, dict[str, Array]], msgspec.Struct]] = {
-    "gnss": _gnss,
-    "imu": _imu,
-    "speed": lambda stamp_ns, row: drive.SpeedSample(
-        stamp_ns=stamp_ns, speed_mps=float(_speed(row))
-    ),
-    "heading": lambda stamp_ns, row: drive.HeadingSample(
-        stamp_ns=stamp_ns,
-        yaw_rad=float(row["yaw"]),
-        yaw_rate_radps=_optional(row, "yaw_rate"),
-    ),
-    "steering": lambda stamp_ns, row: drive.SteeringSample(
-        stamp_ns=stamp_ns,
-        steering_wheel_rad=_optional(row, "wheel"),
-        tire_angle_rad=_optional(row, "tire"),
-    ),
-    "control": lambda stamp_ns, row: drive.ControlCommand(
-        stamp_ns=stamp_ns,
-        accel_mps2=float(row["accel"]),
-        steering_wheel_rad=_optional(row, "wheel"),
-        tire_angle_rad=_optional(row, "tire"),
-    ),
-}

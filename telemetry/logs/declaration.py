@@ -20,7 +20,7 @@ where one of these columns differs from the row before, for sources that repeat 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -28,6 +28,7 @@ import msgspec
 
 from foretwin.contracts.drive import TimeBase
 from foretwin.telemetry.logs import units
+from foretwin.telemetry.logs.columns import CHANNEL_COLUMNS
 from foretwin.telemetry.logs.log import LogError
 
 
@@ -145,7 +146,7 @@ UNITS: dict[str, Mapping[str, float]] = {
     **dict.fromkeys(("rate_x", "rate_y", "rate_z", "yaw_rate"), units.ANGULAR_RATE),
     **dict.fromkeys(("yaw", "wheel", "tire"), units.ANGLE),
 }
-"""Valid units by field, with the factor into the project's unit."""
+"""Valid units by field, the project's own first, with the factor into it."""
 
 
 def read_declaration(path: Path) -> Declaration:
@@ -154,7 +155,7 @@ def read_declaration(path: Path) -> Declaration:
         declaration = msgspec.toml.decode(path.read_bytes(), type=Declaration)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: {error}") from None
-    _check_time(path, declaration.time)
+    _known_unit(path, declaration.time, (*units.TIME_NS, units.ISO_TIME))
     _check_position(path, declaration.position, declaration.heading)
     if declaration.speed is not None:
         present = set(columns_of(declaration.speed))
@@ -168,15 +169,8 @@ def read_declaration(path: Path) -> Declaration:
 
 def sections_of(declaration: Declaration) -> dict[str, Section]:
     """Return the present sections by the channel that they feed."""
-    given = {
-        "gnss": declaration.position,
-        "speed": declaration.speed,
-        "heading": declaration.heading,
-        "imu": declaration.imu,
-        "steering": declaration.steering,
-        "control": declaration.control,
-    }
-    return {channel: section for channel, section in given.items() if section is not None}
+    given = ((name, getattr(declaration, row.section)) for name, row in CHANNEL_COLUMNS.items())
+    return {channel: section for channel, section in given if section is not None}
 
 
 def columns_of(section: Section) -> dict[str, Column]:
@@ -194,17 +188,15 @@ def factor_of(path: Path, field: str, column: Column) -> float:
     Raises LogError naming the column and the valid units.
     """
     valid = UNITS[field]
-    if column.unit is None or column.unit not in valid:
-        told = "no unit" if column.unit is None else f"unknown unit {column.unit!r}"
-        raise LogError(f"{path}: column {column.column!r}: {told}; valid: {', '.join(valid)}")
-    return -valid[column.unit] if column.negate else valid[column.unit]
+    unit = _known_unit(path, column, valid)
+    return -valid[unit] if column.negate else valid[unit]
 
 
-def _check_time(path: Path, time: TimeSection) -> None:
-    valid = (*units.TIME_NS, units.ISO_TIME)
-    if time.unit not in valid:
-        told = "no unit" if time.unit is None else f"unknown unit {time.unit!r}"
-        raise LogError(f"{path}: column {time.column!r}: {told}; valid: {', '.join(valid)}")
+def _known_unit(path: Path, given: Column | TimeSection, valid: Collection[str]) -> str:
+    if given.unit is None or given.unit not in valid:
+        problem = "no unit" if given.unit is None else f"unknown unit {given.unit!r}"
+        raise LogError(f"{path}: column {given.column!r}: {problem}; valid: {', '.join(valid)}")
+    return given.unit
 
 
 def _check_position(path: Path, position: PositionSection, heading: HeadingSection | None) -> None:

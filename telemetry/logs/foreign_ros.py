@@ -19,7 +19,6 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.logs.log import (
     FILE_CUT_SHORT,
     UNREADABLE_ROW,
-    Declared,
     Log,
     LogError,
     Sample,
@@ -79,12 +78,11 @@ def open_foreign(
     # Header stamps differ from log times by the transport's delay, and at times by a whole epoch.
     lag_ns, antenna_frame = _first_fix(recording, positions.topic, decode)
     start_ns = contents.first_ns - lag_ns
-    antenna_m, reference = declared.body_from_antenna_m, "antenna, placed by declaration"
+    antenna_m = declared.body_from_antenna_m
     if positions.how is POSE:
-        antenna_m, reference = (0.0, 0.0, 0.0), BASE_FRAME
+        antenna_m = (0.0, 0.0, 0.0)
     elif antenna_m is None:
         antenna_m = _antenna_m(recording, antenna_frame)
-        reference = f"antenna, {'place unknown' if antenna_m is None else 'placed by transforms'}"
     return Log(
         info=drive.VehicleInfo(
             vehicle_id="car",
@@ -95,13 +93,6 @@ def open_foreign(
             reference_point=BASE_FRAME if positions.how is POSE else "antenna",
             body_from_antenna_m=antenna_m,
             sends=tuple(dict.fromkeys(channel for one in chosen for channel in one.how.channels)),
-        ),
-        declared=Declared(
-            units="degrees, m/s, rad, m/s²; "
-            + ", ".join(f"{one.how.stream} from {one.topic}" for one in chosen),
-            frame="WGS84, body axes forward, left, up",
-            time_base="stamp of the header, log time where it is 0",
-            reference_point=reference,
         ),
         read=read,
     )

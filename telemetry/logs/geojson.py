@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from foretwin.contracts.drive import GnssFix
-from foretwin.contracts.frames import GeoPoint
-from foretwin.telemetry.logs.gpx import stamp_ns_from_iso
-from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample, fixes_log
+import numpy as np
+
+from foretwin.telemetry.logs.columns import stream_of, table_log
+from foretwin.telemetry.logs.gpx import representable_ns, stamp_ns_from_iso
+from foretwin.telemetry.logs.log import Log, LogError
 
 _TIME_NAMES = ("coordTimes", "times")
 
@@ -86,20 +86,19 @@ def open_geojson(path: Path) -> Log:
     line, times = _timed_line(path)
     if len(times) != len(line.positions):
         raise LogError(f"{path}: {len(times)} times for a line of {len(line.positions)} positions")
-    stamps_ns = [_stamp_ns(time) for time in times]
-    known_ns = [stamp for stamp in stamps_ns if stamp is not None]
-    if not known_ns:
+    stamped = zip(map(_stamp_ns, times), line.positions, strict=True)
+    timed = [(stamp, (lat, lon, alt)) for stamp, (lon, lat, alt) in stamped if stamp is not None]
+    if not timed:
         raise LogError(f"{path}: no time of the line is ISO 8601 or a number, such as {times[0]!r}")
-
-    def read(skipped: Counter[str]) -> Iterator[Sample]:
-        for stamp_ns, (lon_deg, lat_deg, alt_m) in zip(stamps_ns, line.positions, strict=True):
-            if stamp_ns is None:
-                skipped[UNREADABLE_ROW] += 1
-                continue
-            position = GeoPoint(lat_deg, lon_deg, alt_m)
-            yield "gnss", GnssFix(stamp_ns=stamp_ns, position=position)
-
-    return fixes_log(path, known_ns, read)
+    stamps_ns = np.array([stamp_ns for stamp_ns, _ in timed], dtype=np.int64)
+    return table_log(
+        path.name,
+        {"gnss": stream_of("gnss", stamps_ns, np.array([place for _, place in timed]))},
+        stamps_ns=stamps_ns,
+        time_base="utc",
+        reference_point="antenna",
+        unreadable=len(times) - len(timed),
+    )
 
 
 def _timed_line(path: Path) -> tuple[GeoLine, list[Any]]:
@@ -118,4 +117,4 @@ def _stamp_ns(time: object) -> int | None:
         return stamp_ns_from_iso(time)
     if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
         return None
-    return round(time * 1e6) if abs(time) > 1e11 else round(time * 1e9)
+    return representable_ns(round(time * 1e6) if abs(time) > 1e11 else round(time * 1e9))

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from foretwin.contracts.drive import GnssFix
-from foretwin.contracts.frames import GeoPoint
-from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample, fixes_log
+import numpy as np
+
+from foretwin.telemetry.logs.columns import stream_of, table_log
+from foretwin.telemetry.logs.log import Log, LogError
 
 
 class GpxPoint(NamedTuple):
@@ -34,16 +33,15 @@ def open_gpx(path: Path) -> Log:
     timed = [point for point in points if point.stamp_ns is not None]
     if not timed:
         raise LogError(f"{path}: track without time; usable as --route only")
-    stamps_ns = [point.stamp_ns for point in timed if point.stamp_ns is not None]
-
-    def read(skipped: Counter[str]) -> Iterator[Sample]:
-        if len(timed) < len(points):
-            skipped[UNREADABLE_ROW] += len(points) - len(timed)
-        for point in timed:
-            position = GeoPoint(point.lat_deg, point.lon_deg, point.alt_m)
-            yield "gnss", GnssFix(stamp_ns=point.stamp_ns or 0, position=position)
-
-    return fixes_log(path, stamps_ns, read)
+    stamps_ns = np.array([point.stamp_ns for point in timed], dtype=np.int64)
+    return table_log(
+        path.name,
+        {"gnss": stream_of("gnss", stamps_ns, np.array([point[:3] for point in timed]))},
+        stamps_ns=stamps_ns,
+        time_base="utc",
+        reference_point="antenna",
+        unreadable=len(points) - len(timed),
+    )
 
 
 def gpx_lines(path: Path) -> list[tuple[list[float], list[float]]]:
@@ -98,4 +96,10 @@ def stamp_ns_from_iso(text: str) -> int | None:
     if time.tzinfo is None:
         time = time.replace(tzinfo=datetime.UTC)
     since = time - _EPOCH
-    return (since.days * 86_400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
+    seconds = since.days * 86_400 + since.seconds
+    return representable_ns(seconds * 1_000_000_000 + since.microseconds * 1000)
+
+
+def representable_ns(stamp_ns: int) -> int | None:
+    """Return a stamp that 64 bits hold (the years 1677 to 2262), None for any other."""
+    return stamp_ns if abs(stamp_ns) < 2**63 else None

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts import drive
-from foretwin.contracts.drive import VehicleInfo
 from foretwin.contracts.errors import UserError
 
 Sample = tuple[str, msgspec.Struct]
@@ -29,18 +28,19 @@ UNREADABLE_ROW = "unreadable row"
 FILE_CUT_SHORT = "file cut short"
 
 
+_MOTION = (
+    drive.ImuSample,
+    drive.SpeedSample,
+    drive.HeadingSample,
+    drive.SteeringSample,
+    drive.ControlCommand,
+    drive.PlannedTrajectory,
+)
+"""Messages that are of no use where one number is missing."""
+
+
 class LogError(UserError):
     """A log that cannot be read: one line with the file, the line or field, and what would do."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Declared:
-    """What a reader holds to be true of its source, in words for people."""
-
-    units: str
-    frame: str
-    time_base: str
-    reference_point: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,6 @@ class Log:
     """
 
     info: drive.VehicleInfo
-    declared: Declared
     read: Callable[[Counter[str]], Iterator[Sample]]
     skipped: Counter[str] = field(default_factory=Counter)
     """Samples refused by reason, as far as the latest `samples()` has come."""
@@ -91,12 +90,23 @@ def fault_of(message: msgspec.Struct) -> str | None:
         return TIME_BEFORE_ZERO
     if isinstance(message, drive.GnssFix):
         return fault_of_position(message.position.lat_deg, message.position.lon_deg)
-    numbers = _NUMBERS.get(type(message))
-    if numbers is not None and not all(
-        math.isfinite(value) for value in numbers(message) if value is not None
-    ):
+    if isinstance(message, _MOTION) and not is_finite(message):
         return VALUE_NOT_FINITE
     return None
+
+
+def is_finite(value: Any) -> bool:
+    """Tell whether all numbers in a message, or in a field of one, are finite."""
+    match value:
+        case float():
+            return math.isfinite(value)
+        case np.ndarray():
+            return bool(np.isfinite(value).all())
+        case msgspec.Struct():
+            return all(is_finite(getattr(value, name)) for name in value.__struct_fields__)
+        case tuple():
+            return all(map(is_finite, value))
+    return True
 
 
 def fault_of_position(lat_deg: float, lon_deg: float) -> str | None:
@@ -108,40 +118,3 @@ def fault_of_position(lat_deg: float, lon_deg: float) -> str | None:
     if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
         return POSITION_OFF_EARTH
     return None
-
-
-def _plan_numbers(plan: drive.PlannedTrajectory) -> tuple[float, ...]:
-    # One sum tells of any NaN or infinity without a loop over the points.
-    arrays = (plan.time_from_stamp_s, plan.lat_deg, plan.lon_deg, plan.yaw_rad, plan.speed_mps)
-    return tuple(float(array.sum()) for array in arrays)
-
-
-_NUMBERS: dict[type, Callable[[Any], tuple[float | None, ...]]] = {
-    drive.ImuSample: lambda m: (*m.accel_mps2, *m.rate_radps),
-    drive.SpeedSample: lambda m: (m.speed_mps,),
-    drive.HeadingSample: lambda m: (m.yaw_rad, m.yaw_rate_radps),
-    drive.SteeringSample: lambda m: (m.steering_wheel_rad, m.tire_angle_rad),
-    drive.ControlCommand: lambda m: (m.accel_mps2, m.steering_wheel_rad, m.tire_angle_rad),
-    drive.PlannedTrajectory: _plan_numbers,
-}
-
-
-def fixes_log(
-    path: Path, stamps_ns: Sequence[int], read: Callable[[Counter[str]], Iterator[Sample]]
-) -> Log:
-    """Return the log of a file that holds timed satellite positions in UTC and nothing else."""
-    return Log(
-        info=VehicleInfo(
-            vehicle_id="car",
-            time_base="utc",
-            start_stamp_ns=stamps_ns[0],
-            end_stamp_ns=max(stamps_ns),
-            source=path.name,
-            reference_point="antenna",
-            sends=("gnss",),
-        ),
-        declared=Declared(
-            units="degrees, m", frame="WGS84", time_base="UTC", reference_point="antenna"
-        ),
-        read=read,
-    )

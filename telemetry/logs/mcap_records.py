@@ -58,20 +58,20 @@ def read_contents(path: Path) -> Contents:
         with contextlib.suppress(*_BROKEN, OSError, StopIteration):
             summary = reader.get_summary()
             if summary is not None and summary.statistics is not None and summary.chunk_indexes:
-                told = summary.statistics
+                statistics = summary.statistics
                 schemas, counts = _by_topic(
                     (
                         channel.topic,
                         summary.schemas.get(channel.schema_id),
-                        told.channel_message_counts.get(channel.id, 0),
+                        statistics.channel_message_counts.get(channel.id, 0),
                     )
                     for channel in summary.channels.values()
                 )
                 return Contents(
                     schemas=schemas,
                     counts=counts,
-                    first_ns=told.message_start_time,
-                    last_ns=told.message_end_time,
+                    first_ns=statistics.message_start_time,
+                    last_ns=statistics.message_end_time,
                     metadata={item.name: dict(item.metadata) for item in reader.iter_metadata()},
                     indexed=True,
                     cut_short=False,

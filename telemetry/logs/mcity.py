@@ -16,17 +16,11 @@ from pathlib import Path
 import msgspec
 
 from foretwin.contracts.drive import RoadUserKind
-from foretwin.telemetry.logs.log import Declared, LogError
+from foretwin.telemetry.logs.log import LogError
 from foretwin.telemetry.logs.road_users import Detection
 from foretwin.telemetry.logs.units import SPEED
 
 _KINDS: dict[str, RoadUserKind] = {"2": "car", "10": "pedestrian"}
-DECLARED = Declared(
-    units="degrees, km/h, m, rad, s",
-    frame="WGS84; box direction counter-clockwise from east, by either end",
-    time_base="UTC",
-    reference_point="box centre; of satellite positions undocumented",
-)
 
 
 class _Object(msgspec.Struct, frozen=True, kw_only=True, rename={"kind": "classType"}):

@@ -23,7 +23,7 @@ from typing import NamedTuple
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, wrap_angle
 from foretwin.telemetry.logs import units
-from foretwin.telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+from foretwin.telemetry.logs.log import UNREADABLE_ROW, Log, LogError, Sample
 from foretwin.telemetry.logs.merge import reordered
 from foretwin.telemetry.ros_messages.foreign import NO_FIX
 
@@ -38,11 +38,15 @@ _MODES_WITHOUT_FIX = ("N", "E", "M", "S")
 """Mode indicators: not valid, estimated, manual, simulator."""
 
 
+Fields = list[str]
+Skipped = Counter[str]
+
+
 class Sentence(NamedTuple):
     """One sentence: its formatter such as RMC, and the fields after it."""
 
     formatter: str
-    fields: list[str]
+    fields: Fields
 
 
 class _Found(NamedTuple):
@@ -66,11 +70,11 @@ def sentence_of(line: str) -> Sentence | str | None:
     match = _SENTENCE.match(line, start) if start >= 0 else None
     if match is None:
         return None
-    _, formatter, body, told = match.groups()
-    if told is not None:
+    _, formatter, body, checksum = match.groups()
+    if checksum is not None:
         between = line[start + 1 : line.index("*", start)]
         summed = functools.reduce(operator.xor, between.encode("utf-8", "replace"), 0)
-        if told.upper() != f"{summed:02X}":
+        if checksum.upper() != f"{summed:02X}":
             return CHECKSUM_WRONG
     return Sentence(formatter, body.split(","))
 
@@ -82,7 +86,6 @@ def open_nmea(path: Path) -> Log:
     if not any(channel == "gnss" for channel, _ in samples):
         raise LogError(f"{path}: no RMC or GGA sentence with a fix, so no positions")
     stamps = [message.stamp_ns for _, message in samples]  # type: ignore[attr-defined]
-    course = "heading" if "HDT" in found.formatters else "course over ground"
     return Log(
         info=drive.VehicleInfo(
             vehicle_id="car",
@@ -92,12 +95,6 @@ def open_nmea(path: Path) -> Log:
             source=path.name,
             reference_point="antenna",
             sends=tuple(dict.fromkeys(channel for channel, _ in samples)),
-        ),
-        declared=Declared(
-            units=f"degrees, knots, {course} in degrees clockwise from true north",
-            frame="WGS84",
-            time_base="UTC",
-            reference_point="antenna, place unknown",
         ),
         read=lambda skipped: reordered(_samples(path, found, skipped), window_ns=_WINDOW_NS),
     )
@@ -142,9 +139,8 @@ def _samples(path: Path, found: _Found, skipped: Counter[str]) -> Iterator[Sampl
         try:
             time_ns = _time_ns(sentence)
             if time_ns is not None:
-                told = _date(sentence)
-                if told is not None:
-                    date = told
+                if (stated := _date(sentence)) is not None:
+                    date = stated
                 elif latest_ns - time_ns > _DAY_NS // 2:
                     date += datetime.timedelta(days=1)
                 latest_ns = time_ns
@@ -203,9 +199,7 @@ def _yaw_rad(clockwise_deg: str) -> float:
     return float(wrap_angle(math.radians(90.0 - float(clockwise_deg))))
 
 
-def _rmc(
-    fields: list[str], stamp_ns: int, found: _Found, skipped: Counter[str]
-) -> Iterator[Sample]:
+def _rmc(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iterator[Sample]:
     mode = fields[11] if len(fields) > 11 else ""
     if fields[1] != "A" or mode in _MODES_WITHOUT_FIX:
         skipped[NO_FIX] += 1
@@ -216,15 +210,10 @@ def _rmc(
         )
         yield "gnss", drive.GnssFix(stamp_ns=stamp_ns, position=position)
     if fields[6]:
-        speed_mps = float(fields[6]) * units.SPEED["kn"]
-        yield "speed", drive.SpeedSample(stamp_ns=stamp_ns, speed_mps=speed_mps)
-        if fields[7] and speed_mps >= MIN_COURSE_MPS and "HDT" not in found.formatters:
-            yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=_yaw_rad(fields[7]))
+        yield from _velocity(stamp_ns, float(fields[6]) * units.SPEED["kn"], fields[7], found)
 
 
-def _gga(
-    fields: list[str], stamp_ns: int, _found: _Found, skipped: Counter[str]
-) -> Iterator[Sample]:
+def _gga(fields: Fields, stamp_ns: int, _found: _Found, skipped: Skipped) -> Iterator[Sample]:
     quality = fields[5]
     # 6 estimated, 7 manual, 8 simulator: none of them was measured.
     if quality not in ("1", "2", "3", "4", "5", "9"):
@@ -240,9 +229,7 @@ def _gga(
     yield "gnss", drive.GnssFix(stamp_ns=stamp_ns, position=position)
 
 
-def _vtg(
-    fields: list[str], stamp_ns: int, found: _Found, skipped: Counter[str]
-) -> Iterator[Sample]:
+def _vtg(fields: Fields, stamp_ns: int, found: _Found, skipped: Skipped) -> Iterator[Sample]:
     if "RMC" in found.formatters:
         return
     mode = fields[8] if len(fields) > 8 else ""
@@ -251,28 +238,26 @@ def _vtg(
         return
     knots = bool(fields[4])
     speed_mps = float(fields[4 if knots else 6]) * units.SPEED["kn" if knots else "km/h"]
+    yield from _velocity(stamp_ns, speed_mps, fields[0], found)
+
+
+def _velocity(stamp_ns: int, speed_mps: float, course: str, found: _Found) -> Iterator[Sample]:
+    """Yield a speed, and the course over ground where it is the only heading and means one."""
     yield "speed", drive.SpeedSample(stamp_ns=stamp_ns, speed_mps=speed_mps)
-    if fields[0] and speed_mps >= MIN_COURSE_MPS and "HDT" not in found.formatters:
-        yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=_yaw_rad(fields[0]))
+    if course and speed_mps >= MIN_COURSE_MPS and "HDT" not in found.formatters:
+        yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=_yaw_rad(course))
 
 
-def _hdt(
-    fields: list[str], stamp_ns: int, _found: _Found, _skipped: Counter[str]
-) -> Iterator[Sample]:
+def _hdt(fields: Fields, stamp_ns: int, _found: _Found, _skipped: Skipped) -> Iterator[Sample]:
     if fields[0]:
         yield "heading", drive.HeadingSample(stamp_ns=stamp_ns, yaw_rad=_yaw_rad(fields[0]))
 
 
-def _zda(
-    _fields: list[str], _stamp_ns: int, _found: _Found, _skipped: Counter[str]
-) -> Iterator[Sample]:
-    return iter(())
-
-
-_READERS: dict[str, Callable[[list[str], int, _Found, Counter[str]], Iterator[Sample]]] = {
+_READERS: dict[str, Callable[[Fields, int, _Found, Skipped], Iterator[Sample]]] = {
     "RMC": _rmc,
     "GGA": _gga,
     "VTG": _vtg,
     "HDT": _hdt,
-    "ZDA": _zda,
+    # A date and a time, which count for all sentences, and no sample.
+    "ZDA": lambda *_: iter(()),
 }

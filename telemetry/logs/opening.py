@@ -9,7 +9,7 @@ from foretwin.telemetry.logs.comma2k19 import is_comma2k19, open_comma2k19
 from foretwin.telemetry.logs.geojson import open_geojson
 from foretwin.telemetry.logs.gpx import open_gpx
 from foretwin.telemetry.logs.log import Log, LogError
-from foretwin.telemetry.logs.mcity import DECLARED, is_mcity, read_mcity
+from foretwin.telemetry.logs.mcity import is_mcity, read_mcity
 from foretwin.telemetry.logs.nmea import is_nmea, open_nmea
 from foretwin.telemetry.logs.road_users import (
     LONGEST_GAP_S,
@@ -89,12 +89,11 @@ def open_road_users(path: Path, *, longest_gap_s: float = LONGEST_GAP_S) -> Road
     """
     path = Path(path)
     if path.is_file() and is_mcity(_head(path).decode("utf-8", errors="replace")):
-        found = log_of_detections(read_mcity(path), DECLARED, longest_gap_s=longest_gap_s)
+        found = log_of_detections(read_mcity(path), longest_gap_s=longest_gap_s)
     else:
         log = open_log(path)
         found = log_of_detections(
             (detections_of(said) for _, said in log.samples() if isinstance(said, RoadUsers)),
-            log.declared,
             longest_gap_s=longest_gap_s,
         )
     if not found.tracks:

@@ -24,7 +24,7 @@ from foretwin.contracts.frames import (
     wrap_angle,
 )
 from foretwin.telemetry.estimator.position_gate import MAX_SPEED_MPS
-from foretwin.telemetry.logs.log import TIME_DOUBLED, VALUE_NOT_FINITE, Declared, fault_of_position
+from foretwin.telemetry.logs.log import TIME_DOUBLED, VALUE_NOT_FINITE, fault_of_position
 
 LONGEST_GAP_S = 1.0
 """Who is not seen for longer is taken to be away until seen again."""
@@ -82,7 +82,6 @@ class RoadUserLog:
     are of no use by reason.
     """
 
-    declared: Declared
     stamps_ns: Stamps
     tracks: tuple[RoadUserTrack, ...]
     skipped: Counter[str] = field(default_factory=Counter)
@@ -90,7 +89,6 @@ class RoadUserLog:
 
 def log_of_detections(
     instants: Iterable[tuple[int, Sequence[Detection]]],
-    declared: Declared,
     *,
     longest_gap_s: float = LONGEST_GAP_S,
 ) -> RoadUserLog:
@@ -113,7 +111,6 @@ def log_of_detections(
                 skipped[fault] += 1
     found = (_track(mine, longest_gap_s, skipped) for mine in seen.values())
     return RoadUserLog(
-        declared=declared,
         stamps_ns=np.array(sorted(stamps), dtype=np.int64),
         tracks=tuple(track for track in found if track is not None),
         skipped=skipped,

@@ -19,7 +19,6 @@ from foretwin.telemetry.logs.foreign_ros import WINDOW_NS, Decode, open_foreign,
 from foretwin.telemetry.logs.log import (
     FILE_CUT_SHORT,
     VALUE_NOT_FINITE,
-    Declared,
     Log,
     LogError,
     Sample,
@@ -45,11 +44,12 @@ def open_mcap(path: Path, *, declaration: Path | None = None) -> Log:
     """
     recording = mcap_recording(path)
     metadata = recording.contents.metadata
-    frame, info = metadata.get(FRAME_METADATA), metadata.get(INFO_METADATA)
-    told = _Told(None if frame is None else frame["json"], None if info is None else info["json"])
+    own = _OwnMetadata(
+        *(metadata.get(name, {}).get("json") for name in (FRAME_METADATA, INFO_METADATA))
+    )
     if FORMAT_METADATA in metadata:
-        return _open_own(recording, told)
-    return open_foreign(recording, declared_of(path, declaration), frame=told.frame())
+        return _open_own(recording, own)
+    return open_foreign(recording, declared_of(path, declaration), frame=own.frame())
 
 
 def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
@@ -65,10 +65,10 @@ def open_bag(path: Path, *, declaration: Path | None = None) -> Log:
     decode = decoder(recording, known)
     for record in recording.chosen(known, Counter()):
         texts[record.topic] = decode(record).data
-    return _open_own(recording, _Told(texts.get(FRAME_TOPIC), texts.get(INFO_TOPIC)))
+    return _open_own(recording, _OwnMetadata(texts.get(FRAME_TOPIC), texts.get(INFO_TOPIC)))
 
 
-class _Told(NamedTuple):
+class _OwnMetadata(NamedTuple):
     """What a file of ours says of itself, as JSON."""
 
     frame_json: str | None
@@ -80,9 +80,9 @@ class _Told(NamedTuple):
         return msgspec.json.decode(self.frame_json, type=LocalFrame)
 
 
-def _open_own(recording: RosRecording, told: _Told) -> Log:
+def _open_own(recording: RosRecording, own: _OwnMetadata) -> Log:
     path, contents = recording.path, recording.contents
-    frame = told.frame()
+    frame = own.frame()
     topics = {
         topic
         for topic in contents.counts
@@ -92,8 +92,8 @@ def _open_own(recording: RosRecording, told: _Told) -> Log:
     channels = sorted({topic.removeprefix(TOPIC_PREFIX).removesuffix("_json") for topic in topics})
     if not channels:
         raise LogError(f"{path}: holds no telemetry")
-    if told.info_json is not None:
-        info = msgspec.json.decode(told.info_json, type=drive.VehicleInfo)
+    if own.info_json is not None:
+        info = msgspec.json.decode(own.info_json, type=drive.VehicleInfo)
         info = msgspec.structs.replace(info, end_stamp_ns=contents.last_ns)
     else:
         info = drive.VehicleInfo(
@@ -115,12 +115,6 @@ def _open_own(recording: RosRecording, told: _Told) -> Log:
 
     return Log(
         info=info,
-        declared=Declared(
-            units="degrees, m/s, rad, m/s²",
-            frame="WGS84",
-            time_base=info.time_base,
-            reference_point=info.reference_point,
-        ),
         read=read,
     )
 

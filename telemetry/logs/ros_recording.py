@@ -62,12 +62,9 @@ def decoder(recording: RosRecording, topics: set[str]) -> Callable[[Record], Any
     for topic, schema in schemas.items():
         try:
             _types(schema.name, schema.encoding, schema.data)
-        except LogError as error:
-            raise LogError(f"{recording.path}: topic {topic}: {error}") from None
         except Exception as error:  # rosbags raises many kinds over texts it cannot parse
-            raise LogError(
-                f"{recording.path}: topic {topic}: unreadable definition: {error}"
-            ) from None
+            reason = error if isinstance(error, LogError) else f"unreadable definition: {error}"
+            raise LogError(f"{recording.path}: topic {topic}: {reason}") from None
     store = _store(frozenset((one.name, one.encoding, one.data) for one in schemas.values()))
     if any(schema.encoding == ROS1 for schema in schemas.values()):
         return lambda record: store.deserialize_ros1(record.data, record.kind)

@@ -7,16 +7,14 @@ where the antenna sits on the car is unknown, so `body_from_antenna_m` is None.
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.drive import GnssFix, VehicleInfo
-from foretwin.contracts.frames import GeoPoint, geo_from_ecef
-from foretwin.telemetry.logs.log import UNREADABLE_ROW, Declared, Log, LogError, Sample
+from foretwin.contracts.frames import geo_from_ecef
+from foretwin.telemetry.logs.columns import stream_of, table_log
+from foretwin.telemetry.logs.log import Log, LogError
 
 KEYWORD = "point3"
 _COLUMNS = "point3 TIME_S X_M Y_M Z_M [9 covariances]"
@@ -50,30 +48,13 @@ def open_smartloc(path: Path) -> Log:
     table = np.array(rows)
     stamps_ns = np.round(table[:, 0] * 1e9).astype(np.int64)
     geo = _geo_from_ecef_or_nan(table[:, 1:])
-
-    def read(skipped: Counter[str]) -> Iterator[Sample]:
-        if unreadable:
-            skipped[UNREADABLE_ROW] += unreadable
-        for stamp_ns, (lat, lon, alt) in zip(stamps_ns.tolist(), geo.tolist(), strict=True):
-            yield "gnss", GnssFix(stamp_ns=stamp_ns, position=GeoPoint(lat, lon, alt))
-
-    return Log(
-        info=VehicleInfo(
-            vehicle_id="car",
-            time_base="log",
-            start_stamp_ns=int(stamps_ns[0]),
-            end_stamp_ns=int(stamps_ns.max()),
-            source=path.name,
-            reference_point="undocumented point of a NovAtel SPAN system",
-            sends=("gnss",),
-        ),
-        declared=Declared(
-            units="m, s",
-            frame="ECEF, WGS84",
-            time_base="seconds from the start of the log",
-            reference_point="undocumented",
-        ),
-        read=read,
+    return table_log(
+        path.name,
+        {"gnss": stream_of("gnss", stamps_ns, geo)},
+        stamps_ns=stamps_ns,
+        time_base="log",
+        reference_point="undocumented point of a NovAtel SPAN system",
+        unreadable=unreadable,
     )
 
 

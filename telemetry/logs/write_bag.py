@@ -16,13 +16,13 @@ import msgspec
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import LocalFrame
 from foretwin.telemetry.logs.write_mcap import position_of
-from foretwin.telemetry.ros_messages.definitions import DEFINITIONS
-from foretwin.telemetry.ros_messages.parts import STRING, json_string, schema_text, typestore
+from foretwin.telemetry.ros_messages import parts
+from foretwin.telemetry.ros_messages.parts import STRING, typestore
 from foretwin.telemetry.ros_messages.table import FRAME_TOPIC, INFO_TOPIC, messages_from
 
 
@@ -50,11 +50,11 @@ class BagWriter:
         """Write one message; raises ValueError for what `messages_from` refuses."""
         stamp_ns = message.stamp_ns  # type: ignore[attr-defined]
         if self._info is not None:
-            self._tell(INFO_TOPIC, self._info, stamp_ns)
+            self._describe(INFO_TOPIC, self._info, stamp_ns)
             self._info = None
         if self._frame is None and (origin := position_of(message)) is not None:
             self._frame = LocalFrame(origin)
-            self._tell(FRAME_TOPIC, self._frame, stamp_ns)
+            self._describe(FRAME_TOPIC, self._frame, stamp_ns)
         for topic, kind, data in messages_from(channel, message, self._frame):
             self._write(topic, kind, data, stamp_ns)
         self.counts[channel] += 1
@@ -67,14 +67,14 @@ class BagWriter:
         """Give the bag up."""
         self._writer.abort()
 
-    def _tell(self, topic: str, what: msgspec.Struct, stamp_ns: int) -> None:
-        data = typestore().serialize_cdr(json_string(what), STRING)
+    def _describe(self, topic: str, what: msgspec.Struct, stamp_ns: int) -> None:
+        data = typestore().serialize_cdr(parts.json_string(what), STRING)
         self._write(topic, STRING, bytes(data), stamp_ns)
 
     def _write(self, topic: str, kind: str, data: bytes, stamp_ns: int) -> None:
         if topic not in self._connections:
-            told = _ros1_definition(kind) if self._ros1 else _ros2_definition(kind)
-            self._connections[topic] = self._writer.add_connection(topic, kind, **told)
+            definition = _ros1_definition(kind) if self._ros1 else _ros2_definition(kind)
+            self._connections[topic] = self._writer.add_connection(topic, kind, **definition)
         if self._ros1:
             data = bytes(typestore().cdr_to_ros1(data, kind))
         self._writer.write(self._connections[topic], stamp_ns, data)
@@ -82,7 +82,7 @@ class BagWriter:
 
 @functools.cache
 def _ros2_definition(kind: str) -> dict[str, str]:
-    return {"msgdef": schema_text(kind), "rihs01": typestore().hash_rihs01(kind)}
+    return {"msgdef": parts.schema_text(kind), "rihs01": typestore().hash_rihs01(kind)}
 
 
 @functools.cache
@@ -94,8 +94,8 @@ def _ros1_definition(kind: str) -> dict[str, str]:
 @functools.cache
 def _ros1_types() -> Any:
     store = get_typestore(Stores.ROS1_NOETIC)
-    types: dict[str, Any] = {}
-    for name, text in DEFINITIONS.items():
-        types.update(get_types_from_msg(text, name))
-    store.register({name: one for name, one in types.items() if name not in store.types})
+    missing = {
+        name: one for name, one in parts.types_beside_ros().items() if name not in store.types
+    }
+    store.register(missing)
     return store

@@ -13,62 +13,20 @@ import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+
+import msgspec
 
 from foretwin.contracts.drive import VehicleInfo
+from foretwin.telemetry.logs.columns import CHANNEL_COLUMNS
+from foretwin.telemetry.logs.declaration import UNITS
 from foretwin.telemetry.logs.log import LogError, Sample
 
-
-class _Column(NamedTuple):
-    """A field of a declaration's section and its unit."""
-
-    field: str
-    unit: str
-
-
-class _Section(NamedTuple):
-    """How one channel becomes columns; `more` are further lines of its section."""
-
-    name: str
-    columns: tuple[_Column, ...]
-    values: Callable[[Any], tuple[float | None, ...]]
-    more: str = ""
-
-
-_ANGLES = (_Column("wheel", "rad"), _Column("tire", "rad"))
-_SECTIONS: dict[str, _Section] = {
-    "gnss": _Section(
-        "position",
-        (
-            _Column("latitude", "deg"),
-            _Column("longitude", "deg"),
-            _Column("altitude", "m"),
-            _Column("std", "m"),
-        ),
-        lambda m: (m.position.lat_deg, m.position.lon_deg, m.position.alt_m, m.std_m),
-        more='frame = "wgs84"\n',
-    ),
-    "speed": _Section("speed", (_Column("forward", "m/s"),), lambda m: (m.speed_mps,)),
-    "heading": _Section(
-        "heading",
-        (_Column("yaw", "rad"), _Column("yaw_rate", "rad/s")),
-        lambda m: (m.yaw_rad, m.yaw_rate_radps),
-        more='zero = "east"\ndirection = "counterclockwise"\n',
-    ),
-    "imu": _Section(
-        "imu",
-        tuple(_Column(f"accel_{axis}", "m/s2") for axis in "xyz")
-        + tuple(_Column(f"rate_{axis}", "rad/s") for axis in "xyz"),
-        lambda m: (*m.accel_mps2, *m.rate_radps),
-        more='axes = "forward-left-up"\n',
-    ),
-    "steering": _Section("steering", _ANGLES, lambda m: (m.steering_wheel_rad, m.tire_angle_rad)),
-    "control": _Section(
-        "control",
-        (_Column("accel", "m/s2"), *_ANGLES),
-        lambda m: (m.accel_mps2, m.steering_wheel_rad, m.tire_angle_rad),
-    ),
+_MORE = {
+    "gnss": 'frame = "wgs84"\n',
+    "heading": 'zero = "east"\ndirection = "counterclockwise"\n',
+    "imu": 'axes = "forward-left-up"\n',
 }
+"""Further lines of a channel's section in the declaration."""
 
 
 def write_csv(
@@ -82,11 +40,7 @@ def write_csv(
     kept = _columns(samples(), left_out)
     if "gnss" not in kept:
         raise LogError(f"{table}: a CSV needs positions, and there are none")
-    names = [
-        f"{channel}_{_SECTIONS[channel].columns[place].field}"
-        for channel, places in kept.items()
-        for place in places
-    ]
+    names = [f"{channel}_{field}" for channel, fields in kept.items() for field in fields]
     with table.open("w", encoding="utf-8", newline="") as text:
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(["stamp_ns", *names])
@@ -96,34 +50,35 @@ def write_csv(
     return counts, left_out
 
 
-def _columns(samples: Iterable[Sample], left_out: Counter[str]) -> dict[str, tuple[int, ...]]:
-    """Return the places of each channel's columns that every sample of it has."""
+def _columns(samples: Iterable[Sample], left_out: Counter[str]) -> dict[str, tuple[str, ...]]:
+    """Return the fields of each channel that every sample of it has."""
     totals: Counter[str] = Counter()
-    present: dict[str, list[int]] = {}
+    present: Counter[tuple[str, str]] = Counter()
     for channel, message in samples:
-        if channel not in _SECTIONS:
+        if channel not in CHANNEL_COLUMNS:
             left_out[f"{channel} has no place in a CSV"] += 1
             continue
         totals[channel] += 1
-        values = _SECTIONS[channel].values(message)
-        seen = present.setdefault(channel, [0] * len(values))
-        for place, value in enumerate(values):
-            seen[place] += value is not None
-    kept: dict[str, tuple[int, ...]] = {}
-    for channel in (name for name in _SECTIONS if name in present):
-        seen, total = present[channel], totals[channel]
-        places = tuple(place for place, count in enumerate(seen) if count == total)
-        for place, count in enumerate(seen):
-            if 0 < count < total:
-                field = _SECTIONS[channel].columns[place].field
+        numbers = _numbers(channel, message)
+        present.update((channel, field) for field, number in numbers.items() if number is not None)
+    kept: dict[str, tuple[str, ...]] = {}
+    for channel, row in CHANNEL_COLUMNS.items():
+        for field in row.fields:
+            count = present[channel, field]
+            if count and count == totals[channel]:
+                kept[channel] = (*kept.get(channel, ()), field)
+            elif count:
                 left_out[f"{channel} {field}, which only some samples have"] += count
-        if places:
-            kept[channel] = places
     return kept
 
 
+def _numbers(channel: str, message: msgspec.Struct) -> dict[str, float | None]:
+    row = CHANNEL_COLUMNS[channel]
+    return dict(zip(row.fields, row.numbers(message), strict=True))
+
+
 def _rows(
-    samples: Iterable[Sample], kept: dict[str, tuple[int, ...]], counts: Counter[str]
+    samples: Iterable[Sample], kept: dict[str, tuple[str, ...]], counts: Counter[str]
 ) -> Iterator[tuple[int, list[str]]]:
     wanted = (sample for sample in samples if sample[0] in kept)
     grouped = itertools.groupby(wanted, key=lambda sample: sample[1].stamp_ns)  # type: ignore[attr-defined]
@@ -131,26 +86,21 @@ def _rows(
         found = dict(group)
         counts.update(found.keys())
         row: list[str] = []
-        for channel, places in kept.items():
-            if channel in found:
-                values = _SECTIONS[channel].values(found[channel])
-                row += [repr(float(values[place] or 0.0)) for place in places]
-            else:
-                row += [""] * len(places)
+        for channel, fields in kept.items():
+            numbers = _numbers(channel, found[channel]) if channel in found else {}
+            row += [repr(float(numbers[name] or 0.0)) if numbers else "" for name in fields]
         yield stamp_ns, row
 
 
-def _declaration(info: VehicleInfo, kept: dict[str, tuple[int, ...]]) -> str:
+def _declaration(info: VehicleInfo, kept: dict[str, tuple[str, ...]]) -> str:
     # JSON's strings are TOML's.
     text = f"reference_point = {json.dumps(info.reference_point)}\n"
     if info.body_from_antenna_m is not None:
         text += f"body_from_antenna_m = {list(map(float, info.body_from_antenna_m))}\n"
     text += f'\n[time]\ncolumn = "stamp_ns"\nunit = "ns"\nbase = "{info.time_base}"\n'
-    for channel, places in kept.items():
-        section = _SECTIONS[channel]
-        text += f"\n[{section.name}]\n{section.more}"
-        for place in places:
-            column = section.columns[place]
-            name = f"{channel}_{column.field}"
-            text += f'{column.field} = {{ column = "{name}", unit = "{column.unit}" }}\n'
+    for channel, fields in kept.items():
+        text += f"\n[{CHANNEL_COLUMNS[channel].section}]\n{_MORE.get(channel, '')}"
+        for field in fields:
+            own_unit = next(iter(UNITS[field]))
+            text += f'{field} = {{ column = "{channel}_{field}", unit = "{own_unit}" }}\n'
     return text

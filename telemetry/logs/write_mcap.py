@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import msgspec
 from mcap.opcode import Opcode
@@ -32,32 +32,13 @@ CHUNK_BYTES = 256 * 1024
 """Small, so that a killed recorder loses little."""
 
 
-class RawFile(Protocol):
-    """What is needed of an unbuffered file, such as io.FileIO."""
-
-    def write(self, data: bytes | memoryview, /) -> int | None:
-        """Write some of the bytes and return how many."""
-
-    def tell(self) -> int:
-        """Return the position."""
-
-    def seek(self, offset: int, /) -> int:
-        """Go to a position."""
-
-    def truncate(self, size: int, /) -> int:
-        """Cut the file."""
-
-    def close(self) -> None:
-        """Close the file."""
-
-
 class _Whole:
     """Writes everything or raises; no buffer, so that an error belongs to the call that made it.
 
     No io.RawIOBase, since the mcap writer would put a buffer around one.
     """
 
-    def __init__(self, raw: RawFile) -> None:
+    def __init__(self, raw: io.FileIO) -> None:
         self._raw = raw
 
     def write(self, data: bytes) -> int:
@@ -80,7 +61,7 @@ class DriveWriter:
     there, without the index, which readers rebuild; later messages are refused with the same error.
     """
 
-    def __init__(self, raw: RawFile, *, info: drive.VehicleInfo | None = None) -> None:
+    def __init__(self, raw: io.FileIO, *, info: drive.VehicleInfo | None = None) -> None:
         self.counts: Counter[str] = Counter()
         """Messages accepted, by channel."""
         self.error: OSError | None = None

@@ -66,7 +66,7 @@ class RecorderProcess:
         self._messages = Mailbox(DEPTH, when_full="block" if lossless else "drop_oldest")
         # Apart, so that a flood of samples never drops an answer.
         self._answers = Mailbox(64)
-        self._told_lost = 0
+        self._reported_lost = 0
         self._unreadable = 0
         self._lost = 0
         self._next_seq: dict[str, int] = {}
@@ -96,7 +96,7 @@ class RecorderProcess:
         if now_s - self._flushed_s >= _FLUSH_EVERY_S:
             self._flushed_s = now_s
             self._publish(self._recording.flush())
-            self._tell_of_losses()
+            self._report_losses()
         return not self._life.over
 
     def finish(self) -> None:
@@ -112,7 +112,7 @@ class RecorderProcess:
             self._take_messages(item)
         left = len(self._messages)
         self._messages.close()
-        self._tell_of_losses(at_the_end=True)
+        self._report_losses(at_the_end=True)
         self._publish(self._recording.finish())
         log.info(
             "recorded %s; unwritten %d, refused %s, missing %d, dropped %d, unreadable %d, left %d",
@@ -161,12 +161,12 @@ class RecorderProcess:
             "info", InfoRequest(), self._answers, timeout_s=_ASK_EVERY_S, vehicle=self._vehicle_id
         )
 
-    def _tell_of_losses(self, *, at_the_end: bool = False) -> None:
+    def _report_losses(self, *, at_the_end: bool = False) -> None:
         # Gaps in the sequence count what the mailbox dropped, and what the bus lost before it.
         # On a busy machine more are lost every second: told when there are twice as many.
-        enough = self._told_lost if at_the_end else 2 * self._told_lost
+        enough = self._reported_lost if at_the_end else 2 * self._reported_lost
         if self._lost > enough:
-            self._told_lost = self._lost
+            self._reported_lost = self._lost
             text = (
                 f"{self._lost} messages are missing in the recording so far"
                 f" ({self._messages.dropped} dropped since the disk is slow, the rest by the bus)"

@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 
 from foretwin.contracts.bus import Bus
-from foretwin.contracts.drive import GnssFix, VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import ReplaySetup
+from foretwin.telemetry.logs.log import Log, Sample
+from foretwin.telemetry.logs.merge import stamp_ns_of
 from foretwin.telemetry.processes.vehicle_process import serve_vehicle
-
-
-class ReplayableLog(Protocol):
-    """What replay needs of a log; `foretwin.telemetry.logs.open_log` gives it."""
-
-    @property
-    def info(self) -> VehicleInfo:
-        """What the log says of its vehicle."""
-
-    @property
-    def skipped(self) -> Any:
-        """What the reader refused: a count, or counts by reason."""
-
-    def samples(self) -> Iterator[tuple[str, Any]]:
-        """Yield (channel, message) in stamp order."""
 
 
 class ReplaySource:
@@ -41,7 +26,7 @@ class ReplaySource:
 
     def __init__(
         self,
-        drive: ReplayableLog,
+        drive: Log,
         *,
         vehicle_id: str,
         start_s: float = 0.0,
@@ -59,9 +44,7 @@ class ReplaySource:
             end_ns = wanted_ns if end_ns is None else min(end_ns, wanted_ns)
         self._end_ns = end_ns
         self.info = msgspec.structs.replace(drive.info, vehicle_id=vehicle_id, end_stamp_ns=end_ns)
-        self._refused = 0
-        self._next_sample: tuple[str, Any] | None = None
-        self._samples = self._believable()
+        self._samples = self._within()
         self._next_sample = next(self._samples, None)
         if self._next_sample is None:
             raise UserError(
@@ -69,19 +52,12 @@ class ReplaySource:
                 f"{'its end' if end_s is None else f'{end_s} s'}"
             )
 
-    def _believable(self) -> Iterator[tuple[str, Any]]:
-        last_ns: int | None = None
-        for channel, message in self._drive.samples():
-            if message.stamp_ns < self.first_stamp_ns:
-                continue
-            if self._end_ns is not None and message.stamp_ns > self._end_ns:
+    def _within(self) -> Iterator[Sample]:
+        for sample in self._drive.samples():
+            if self._end_ns is not None and stamp_ns_of(sample) > self._end_ns:
                 return
-            backwards = last_ns is not None and message.stamp_ns < last_ns
-            if backwards or (isinstance(message, GnssFix) and not _placed(message)):
-                self._refused += 1
-                continue
-            last_ns = message.stamp_ns
-            yield channel, message
+            if stamp_ns_of(sample) >= self.first_stamp_ns:
+                yield sample
 
     @property
     def ended(self) -> bool:
@@ -90,22 +66,14 @@ class ReplaySource:
 
     @property
     def skipped_invalid(self) -> int:
-        """What the reader and the replay have refused so far."""
-        skipped = self._drive.skipped
-        count = sum(skipped.values()) if isinstance(skipped, Mapping) else int(skipped)
-        return count + self._refused
+        """What the log has refused so far."""
+        return self._drive.skipped.total()
 
     def advance(self, until_stamp_ns: int) -> Iterator[tuple[str, Any]]:
         """Yield the samples up to and including the stamp, each once."""
-        while self._next_sample is not None and self._next_sample[1].stamp_ns <= until_stamp_ns:
-            sample = self._next_sample
+        while (sample := self._next_sample) is not None and stamp_ns_of(sample) <= until_stamp_ns:
             self._next_sample = next(self._samples, None)
             yield sample
-
-
-def _placed(fix: GnssFix) -> bool:
-    lat, lon = fix.position.lat_deg, fix.position.lon_deg
-    return math.isfinite(lat) and math.isfinite(lon) and (lat, lon) != (0.0, 0.0)
 
 
 def serve(setup: ReplaySetup, bus: Bus, life: ProcessLife) -> None:

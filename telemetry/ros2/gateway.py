@@ -21,6 +21,7 @@ from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.simulation import Event, MirrorSample
 from foretwin.contracts.towards_vehicle import Authority, VehicleCommand
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.telemetry.ros2.diagnostics import DiagnosticLevels
 from foretwin.telemetry.ros2.introduction import Introduction
 from foretwin.telemetry.ros2.inwards import Inwards
 from foretwin.telemetry.ros2.mapping import Mapping, OutRow, Source
@@ -28,11 +29,10 @@ from foretwin.telemetry.ros2.mirrored import MirroredObjects, without_own_twin
 from foretwin.telemetry.ros2.outwards import Outwards
 from foretwin.telemetry.ros2.safety import VehicleGate
 from foretwin.telemetry.ros2.sender import RosSender
-from foretwin.telemetry.ros2.told import Told
 from foretwin.telemetry.ros2.virtual_objects import UnfitError, VirtualObjects
 
 _PORTION = 16
-"""So many samples at most between two looks at the orchestrator's words."""
+"""So many samples at most between two looks at the orchestrator's orders."""
 _DIAGNOSTICS_NS = 1_000_000_000
 _MEASURED_WITHIN_NS = 500_000_000
 """A measured steering angle that is older says nothing of now."""
@@ -70,7 +70,7 @@ class Gateway:
         self.introduction = Introduction(mapping, self.inwards, vehicle_id=vehicle_id)
         self._out = Outwards(mapping, drive_frame=drive_frame, vehicle_id=vehicle_id)
         self.gate = VehicleGate(
-            mapping.towards_vehicle.limits(),
+            mapping.towards_vehicle,
             config_on=mapping.towards_vehicle.enabled,
             flag_on=flag_on,
         )
@@ -87,9 +87,9 @@ class Gateway:
             drive_frame=drive_frame,
             alt_m=(mapping.map_frame or drive_frame).origin.alt_m,
         )
-        self._told = Told()
-        self._inbox, self._words, self._views = Mailbox(2048), Mailbox(64), Mailbox(256)
-        self._gate_told = self.gate.state
+        self._diagnostics = DiagnosticLevels()
+        self._inbox, self._orders, self._views = Mailbox(2048), Mailbox(64), Mailbox(256)
+        self._logged_gate = self.gate.state
         self._out.warm_up()
         for key, history in self.inwards.key_expressions():
             foreign.subscribe(key, self._inbox, history=history)
@@ -111,7 +111,7 @@ class Gateway:
         """Wait a moment for samples, then pass on what has come from either side."""
         arrived: Any = self._inbox.take(wait_s)
         for left in reversed(range(_PORTION)):
-            self._hear()
+            self._take_orders()
             if arrived is None:
                 break
             for channel, message in self.inwards.take(arrived):
@@ -122,7 +122,7 @@ class Gateway:
             if item is None:
                 break
             self._pass_on(item)
-            self._hear()
+            self._take_orders()
         if self.inwards.route is not None and self._due("route", _ROUTE_EVERY_NS):
             self._bus.publish("route", self.inwards.route, vehicle=self._vehicle_id)
         self.introduction.answer(now_ns=self._mono_ns())
@@ -139,7 +139,7 @@ class Gateway:
             "gate": dict(self.gate.counts),
             "dropped": {
                 "samples": self._inbox.dropped,
-                "words": self._words.dropped,
+                "words": self._orders.dropped,
                 "views": self._views.dropped,
             },
         }
@@ -147,9 +147,9 @@ class Gateway:
     def _listen(self, run_id: str) -> None:
         sources = {row.source for row in self._mapping.outwards}
         if self.gate.state != "off":
-            self._bus.subscribe("authority", self._words, run=run_id)
+            self._bus.subscribe("authority", self._orders, run=run_id)
             if "vehicle_command" in sources:
-                self._bus.subscribe("vehicle_command", self._words, run=run_id)
+                self._bus.subscribe("vehicle_command", self._orders, run=run_id)
         mirrored = bool(self._mapping.mirrored)
         if sources & {"state", "clock"} or self._virtual.has_own or mirrored:
             self._bus.subscribe("state", self._views, vehicle=self._vehicle_id)
@@ -161,18 +161,18 @@ class Gateway:
             for channel in ("event", "gap_alarm", "verdict"):
                 self._bus.subscribe(channel, self._views, run=run_id)
 
-    def _hear(self) -> None:
-        """Take every word of the orchestrator, then look whether the gate may stay open."""
-        while (item := self._words.take()) is not None:
+    def _take_orders(self) -> None:
+        """Take all orders of the orchestrator, then look whether the gate may stay open."""
+        while (item := self._orders.take()) is not None:
             message = _decoded(item)
             if isinstance(message, Authority):
-                self.gate.hear(message.sent_mono_ns, now_ns=self._mono_ns())
+                self.gate.heartbeat(message.sent_mono_ns, now_ns=self._mono_ns())
             elif isinstance(message, VehicleCommand):
                 self._command(message)
         if self.gate.state == "open":
             self.gate.look(now_ns=self._mono_ns(), link_up=self._foreign.connected)
-        if self.gate.state != self._gate_told:
-            self._gate_told = self.gate.state
+        if self.gate.state != self._logged_gate:
+            self._logged_gate = self.gate.state
             log.warning("towards the vehicle: %s: %s", self.gate.state, self.gate.why)
 
     def _command(self, message: VehicleCommand) -> None:
@@ -194,7 +194,7 @@ class Gateway:
 
     def _pass_on(self, item: Any) -> None:
         if isinstance(item, Request):
-            self.introduction.asked(item, now_ns=self._mono_ns())
+            self.introduction.take(item, now_ns=self._mono_ns())
             return
         match _decoded(item):
             case drive.VehicleState() as state:
@@ -211,8 +211,8 @@ class Gateway:
                     self._objects(lambda: self._mirrored.users(mirror))
             case drive.RoadUsers() as users:
                 self._objects(lambda: users)
-            case Event() | gap.GapAlarm() | gap.Verdict() as told:
-                self._told.take(told)
+            case Event() | gap.GapAlarm() | gap.Verdict() as finding:
+                self._diagnostics.take(finding)
 
     def _objects(self, users: Callable[[], drive.RoadUsers]) -> None:
         """Send virtual road users together with those that others have said lately."""
@@ -264,7 +264,7 @@ class Gateway:
     def _diagnose(self) -> None:
         if not self._due("diagnostics", _DIAGNOSTICS_NS):
             return
-        levels = self._told.levels(self.report(), gate=self.gate)
+        levels = self._diagnostics.levels(self.report(), gate=self.gate)
         stamp_ns = self._wall_ns()
         self._send("diagnostics", lambda _: self._out.diagnostics(stamp_ns, levels))
 

@@ -33,8 +33,8 @@ class Introduction:
             sends=self._inwards.channels,
         )
 
-    def asked(self, request: Request, *, now_ns: int) -> None:
-        """Take a question."""
+    def take(self, request: Request, *, now_ns: int) -> None:
+        """Take a request for the vehicle's info."""
         self._waiting.append((now_ns, request))
 
     def answer(self, *, now_ns: int) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from typing import Any, NamedTuple
 
 import msgspec
-import numpy as np
 
 from foretwin.contracts import drive
 from foretwin.contracts.foreign_bus import Arrived
+from foretwin.telemetry.logs.log import is_finite
 from foretwin.telemetry.logs.units import ANGLE, SPEED
 from foretwin.telemetry.ros2.attachment import unpack
 from foretwin.telemetry.ros2.mapping import InRow, Mapping
@@ -151,7 +150,7 @@ class Inwards:
             if isinstance(message, drive.VehicleStatus):
                 message = self._joiner.join(message)
             message = _in_our_units(message, row)
-            if not _is_finite(message):
+            if not is_finite(message):
                 raise UnusableError("a number that is not finite")
             self._note(message, arrived)
             channel = channel_of(message)
@@ -184,16 +183,3 @@ def _in_our_units(message: msgspec.Struct, row: InRow) -> msgspec.Struct:
                 message, accel_mps2=(a[0], -a[1], -a[2]), rate_radps=(w[0], -w[1], -w[2])
             )
     return message
-
-
-def _is_finite(value: Any) -> bool:
-    match value:
-        case float():
-            return math.isfinite(value)
-        case np.ndarray():
-            return bool(np.isfinite(value).all())
-        case msgspec.Struct():
-            return all(_is_finite(getattr(value, name)) for name in value.__struct_fields__)
-        case tuple():
-            return all(map(_is_finite, value))
-    return True

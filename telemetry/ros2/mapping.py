@@ -137,12 +137,6 @@ class TowardsVehicle(CommandLimits, frozen=True, kw_only=True, forbid_unknown_fi
     enabled: bool = False
     max_objects: int = 64
 
-    def limits(self) -> CommandLimits:
-        """Return the bounds alone."""
-        return CommandLimits(
-            **{name: getattr(self, name) for name in CommandLimits.__struct_fields__}
-        )
-
 
 class Mapping(
     msgspec.Struct,
@@ -208,7 +202,7 @@ def parse_mapping(text: str, *, name: str) -> Mapping:
     except msgspec.DecodeError as error:
         raise MappingError(f"{name}: not TOML: {error}") from error
     try:
-        mapping.towards_vehicle.limits().validate()
+        mapping.towards_vehicle.validate()
         _check_head(mapping)
         _check_mirrored(mapping)
     except ValueError as error:

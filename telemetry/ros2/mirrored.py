@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
-from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.simulation import MirrorSample, PlaneState
 from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
 from foretwin.telemetry.ros2.virtual_objects import LIVES_NS, UnfitError
@@ -27,6 +28,12 @@ class Mirrored(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def __bool__(self) -> bool:
         return self.own_twin or bool(self.vehicles)
+
+
+class _Size(NamedTuple):
+    length_m: float
+    width_m: float
+    rear_overhang_m: float
 
 
 class MirroredObjects:
@@ -67,46 +74,32 @@ class MirroredObjects:
     def _there(self, sample: MirrorSample) -> Iterator[RoadUser]:
         if self._wanted.own_twin and sample.role in ("all", "twin"):
             assert self._car is not None
-            yield self._user(
-                OWN_TWIN,
-                sample.twin,
-                length_m=self._car.length_m.value,
-                width_m=self._car.width_m.value,
-                rear_overhang_m=self._car.rear_overhang_m.value,
-            )
+            car = self._car
+            size = _Size(car.length_m.value, car.width_m.value, car.rear_overhang_m.value)
+            yield self._user(OWN_TWIN, sample.twin, size)
         for one in sample.others:
             if one.vehicle_id in self._wanted.vehicles and one.role in ("twin", "shadow"):
-                yield self._user(
-                    f"mirrored {one.vehicle_id}",
-                    one.shown,
-                    length_m=one.length_m,
-                    width_m=one.width_m,
-                    rear_overhang_m=one.rear_overhang_m,
-                )
+                size = _Size(one.length_m, one.width_m, one.rear_overhang_m)
+                yield self._user(f"mirrored {one.vehicle_id}", one.shown, size)
 
-    def _user(
-        self,
-        user_id: str,
-        base: PlaneState,
-        *,
-        length_m: float,
-        width_m: float,
-        rear_overhang_m: float,
-    ) -> RoadUser:
-        ahead_m = 0.5 * length_m - rear_overhang_m
-        along = np.array([np.cos(base.yaw_rad), np.sin(base.yaw_rad)])
-        xy_m = np.array([base.x_m, base.y_m]) + ahead_m * along
-        lat_deg, lon_deg = geo_from_local(self._frame, xy_m).tolist()
-        yaw = geo_from_local_yaw(self._frame, np.array([base.yaw_rad]), xy_m[None])
+    def _user(self, user_id: str, base: PlaneState, size: _Size) -> RoadUser:
+        ahead_m = 0.5 * size.length_m - size.rear_overhang_m
+        at = geo_pose(
+            self._frame,
+            base.x_m + ahead_m * float(np.cos(base.yaw_rad)),
+            base.y_m + ahead_m * float(np.sin(base.yaw_rad)),
+            base.yaw_rad,
+            alt_m=self._alt_m,
+        )
         return RoadUser(
             user_id=user_id,
-            kind=kind_by_length(length_m),
+            kind=kind_by_length(size.length_m),
             virtual=True,
-            position=GeoPoint(lat_deg, lon_deg, self._alt_m),
-            yaw_rad=float(yaw[0]),
+            position=at.position,
+            yaw_rad=at.yaw_rad,
             speed_mps=base.speed_mps,
-            length_m=length_m,
-            width_m=width_m,
+            length_m=size.length_m,
+            width_m=size.width_m,
         )
 
 

@@ -33,14 +33,6 @@ class TopicKey(NamedTuple):
     type_hash: str
 
 
-class QosProfile(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of a ROS QoS profile that matters here."""
-
-    reliable: bool = True
-    transient_local: bool = False
-    depth: int = 10
-
-
 class Entity(msgspec.Struct, frozen=True, kw_only=True):
     """A node, or an end of a topic at a node, as a liveliness token announces it."""
 
@@ -53,8 +45,8 @@ class Entity(msgspec.Struct, frozen=True, kw_only=True):
     node: str
     topic: str | None = None
     kind: str | None = None
-    type_hash: str | None = None
-    qos: str | None = None
+    transient_local: bool = False
+    """Whether it keeps what was said for those that come later; the rest is ROS's default."""
 
 
 def check_topic(topic: str) -> str:
@@ -114,38 +106,24 @@ def bridge_key(topic: str, *, namespace: str = "/") -> str:
     return "/".join(part for part in parts if part)
 
 
-def qos_text(qos: QosProfile) -> str:
-    """Return a QoS profile as in a token: what is the default of ROS is left empty.
+def qos_text(*, transient_local: bool) -> str:
+    """Return a QoS profile as in a token: reliable, ten deep, what is the default left empty.
 
     `reliability:durability:history,depth:deadline:lifespan:liveliness,lease`.
     """
-    reliability = "" if qos.reliable else "2"
-    durability = "1" if qos.transient_local else ""
-    return f"{reliability}:{durability}:,{qos.depth}:,:,:,,"
+    return f":{'1' if transient_local else ''}:,10:,:,:,,"
 
 
 def token(entity: Entity) -> str:
     """Return the liveliness token of an entity."""
-    parts = [
-        _TOKEN_ROOT,
-        str(entity.domain),
-        entity.session,
-        str(entity.node_id),
-        str(entity.entity_id),
-        entity.entity,
-        "%",
-        _mangled(entity.namespace),
-        entity.node,
-    ]
-    if entity.topic is not None:
-        assert entity.kind is not None
-        parts += [
-            _mangled(check_topic(entity.topic)),
-            dds_type(entity.kind),
-            entity.type_hash or type_hash(entity.kind),
-            entity.qos or qos_text(QosProfile()),
-        ]
-    return "/".join(parts)
+    at = f"{_TOKEN_ROOT}/{entity.domain}/{entity.session}/{entity.node_id}/{entity.entity_id}"
+    node = f"{at}/{entity.entity}/%/{_mangled(entity.namespace)}/{entity.node}"
+    if entity.topic is None:
+        return node
+    assert entity.kind is not None
+    topic, kind = _mangled(check_topic(entity.topic)), dds_type(entity.kind)
+    digest, qos = type_hash(entity.kind), qos_text(transient_local=entity.transient_local)
+    return f"{node}/{topic}/{kind}/{digest}/{qos}"
 
 
 def _mangled(name: str) -> str:

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from foretwin.contracts import drive
-from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, geo_from_local_yaw
+from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.simulation import MirrorSample
 from foretwin.contracts.towards_vehicle import VehicleCommand
 from foretwin.telemetry.ros2.mapping import DIAGNOSTICS, Mapping, OutRow, Source
 from foretwin.telemetry.ros_messages.commands import ackermann_from_command, control_from_command
-from foretwin.telemetry.ros_messages.motion import ros_from_state
+from foretwin.telemetry.ros_messages.motion import odometry_from_state
 from foretwin.telemetry.ros_messages.objects import detected_from_users, predicted_from_users
 from foretwin.telemetry.ros_messages.parts import (
     CLOCK,
     CONTROL,
     DETECTED_OBJECTS,
+    ODOMETRY,
     header_from,
-    ros_type,
+    ros_message,
     time_from,
+    typestore,
 )
-from foretwin.telemetry.ros_messages.parts import typestore as ros_types
 
 DRIVE_FRAME = "foretwin_drive"
 """The frame of what goes out where the mapping does not place `map`: the drive's own plane."""
@@ -91,21 +90,19 @@ class Outwards:
     def state(self, message: drive.VehicleState) -> bytes:
         """Return the Odometry of a state."""
         frame = self._map or self._drive_frame
-        (_, kind, odometry), *_ = ros_from_state(message, frame)
-        return _cdr(self._framed(odometry), kind)
+        return _cdr(self._framed(odometry_from_state(message, frame)), ODOMETRY)
 
     def twin(self, message: MirrorSample) -> bytes:
         """Return the Odometry of the twin."""
         twin, frame = message.twin, self._drive_frame
-        xy_m = np.array([[twin.x_m, twin.y_m]])
-        lat_deg, lon_deg = geo_from_local(frame, xy_m)[0].tolist()
-        yaw = float(geo_from_local_yaw(frame, np.array([twin.yaw_rad]), xy_m)[0])
+        alt_m = (self._map or frame).origin.alt_m
+        at = geo_pose(frame, twin.x_m, twin.y_m, twin.yaw_rad, alt_m=alt_m)
         return self.state(
             drive.VehicleState(
                 vehicle_id=self._vehicle_id,
                 stamp_ns=message.stamp_ns,
-                position=GeoPoint(lat_deg, lon_deg, (self._map or frame).origin.alt_m),
-                yaw_rad=yaw,
+                position=at.position,
+                yaw_rad=at.yaw_rad,
                 speed_mps=twin.speed_mps,
                 yaw_rate_radps=message.twin_yaw_rate_radps,
                 accel_mps2=0.0,
@@ -120,25 +117,23 @@ class Outwards:
 
     def clock(self, stamp_ns: int) -> bytes:
         """Return a Clock."""
-        return _cdr(ros_type(CLOCK)(clock=time_from(stamp_ns)), CLOCK)
+        return _cdr(ros_message(CLOCK, clock=time_from(stamp_ns)), CLOCK)
 
     def diagnostics(self, stamp_ns: int, levels: list[Level]) -> bytes:
         """Return a DiagnosticArray."""
-        status = ros_type("diagnostic_msgs/msg/DiagnosticStatus")
-        pair = ros_type("diagnostic_msgs/msg/KeyValue")
-        array = ros_type(DIAGNOSTICS)(
-            header=header_from(stamp_ns, ""),
-            status=[
-                status(
-                    level=one.level,
-                    name=one.name,
-                    message=one.text,
-                    hardware_id=self._vehicle_id,
-                    values=[pair(key=key, value=value) for key, value in one.values.items()],
-                )
-                for one in levels
-            ],
-        )
+        pair = "diagnostic_msgs/msg/KeyValue"
+        status = [
+            ros_message(
+                "diagnostic_msgs/msg/DiagnosticStatus",
+                level=one.level,
+                name=one.name,
+                message=one.text,
+                hardware_id=self._vehicle_id,
+                values=[ros_message(pair, key=key, value=text) for key, text in one.values.items()],
+            )
+            for one in levels
+        ]
+        array = ros_message(DIAGNOSTICS, header=header_from(stamp_ns, ""), status=status)
         return _cdr(array, DIAGNOSTICS)
 
     def command(self, message: VehicleCommand, kind: str, *, stamp_ns: int) -> bytes:
@@ -161,4 +156,4 @@ class Outwards:
 
 
 def _cdr(ros: Any, kind: str) -> bytes:
-    return bytes(ros_types().serialize_cdr(ros, kind))
+    return bytes(typestore().serialize_cdr(ros, kind))

@@ -36,7 +36,7 @@ class CommandLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     def validate(self) -> CommandLimits:
         """Return self; raises ValueError naming the first limit that is not positive and finite."""
-        for name in self.__struct_fields__:
+        for name in CommandLimits.__struct_fields__:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} = {value}: positive and finite")
@@ -53,9 +53,11 @@ class VehicleGate:
     def __init__(self, limits: CommandLimits, *, config_on: bool, flag_on: bool) -> None:
         self._limits = limits.validate()
         self._state: GateState = "waiting" if config_on and flag_on else "off"
-        self._last_word_ns: int | None = None
+        self._last_heartbeat_ns: int | None = None
         self._last_sent: tuple[int, VehicleCommand] | None = None
-        self.why = "both switches are on" if self._state == "waiting" else _which(config_on)
+        self.why = (
+            "both switches are on" if self._state == "waiting" else _missing_switch(config_on)
+        )
         self.counts: Counter[str] = Counter()
 
     @property
@@ -63,21 +65,21 @@ class VehicleGate:
         """off: a switch is missing; waiting: no word yet; open; shut: for good."""
         return self._state
 
-    def hear(self, sent_ns: int, *, now_ns: int) -> None:
-        """Take in a word of the orchestrator, sent at `sent_ns`; one that is too old is none."""
+    def heartbeat(self, sent_ns: int, *, now_ns: int) -> None:
+        """Take a heartbeat of the orchestrator, sent at `sent_ns`; one that is too old is none."""
         self.look(now_ns=now_ns, link_up=True)
         if self._state not in ("waiting", "open") or not _is_fresh(sent_ns, now_ns):
             return
         self._state = "open"
-        self._last_word_ns = max(sent_ns, self._last_word_ns or sent_ns)
+        self._last_heartbeat_ns = max(sent_ns, self._last_heartbeat_ns or sent_ns)
 
     def look(self, *, now_ns: int, link_up: bool) -> GateState:
         """Shut where the word is overdue or the link down; return the state at `now_ns`."""
         if self._state == "open":
-            assert self._last_word_ns is not None
+            assert self._last_heartbeat_ns is not None
             if not link_up:
                 self.shut("the link is down")
-            elif not _is_fresh(self._last_word_ns, now_ns):
+            elif not _is_fresh(self._last_heartbeat_ns, now_ns):
                 self.shut(f"no word of the orchestrator for {DEAD_MAN_NS / 1e6:.0f} ms")
         return self._state
 
@@ -139,7 +141,7 @@ class VehicleGate:
         return None
 
 
-def _which(config_on: bool) -> str:
+def _missing_switch(config_on: bool) -> str:
     if config_on:
         return "off: the command line lacks --towards-vehicle"
     return "off: the mapping lacks [towards_vehicle] enabled = true"

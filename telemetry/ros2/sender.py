@@ -14,9 +14,7 @@ from foretwin.telemetry.ros2.mapping import InRow, Mapping, OutRow
 from foretwin.telemetry.ros2.names import (
     Entity,
     EntityKind,
-    QosProfile,
     bridge_key,
-    qos_text,
     rmw_key,
     token,
     type_hash,
@@ -52,15 +50,13 @@ class RosSender:
         self._foreign.declare_alive(token(node))
         for number, row in enumerate(rows, 1):
             entity: EntityKind = "MS" if isinstance(row, InRow) else "MP"
-            qos = QosProfile(transient_local=isinstance(row, InRow) and row.is_latched)
             end = msgspec.structs.replace(
                 node,
                 entity_id=number,
                 entity=entity,
                 topic=row.topic,
                 kind=row.type,
-                type_hash=type_hash(row.type),
-                qos=qos_text(qos),
+                transient_local=isinstance(row, InRow) and row.is_latched,
             )
             self._foreign.declare_alive(token(end))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from foretwin.contracts.drive import RoadUser, RoadUserKind, RoadUsers
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.telemetry.logs.log import is_finite
 
 _MOST_SPEED_MPS, _MOST_SIZE_M = 100.0, 50.0
 _STEP_BACK_NS = 1_000_000_000
@@ -74,7 +75,7 @@ class PlacedObject(
         return msgspec.structs.replace(there, yaw_rad=turned)
 
 
-class _Said(NamedTuple):
+class _Latest(NamedTuple):
     heard_ns: int
     stamp_ns: int
     user: RoadUser
@@ -87,7 +88,7 @@ class VirtualObjects:
         """`placed` are there from the first state of the vehicle on."""
         self._at_most, self._placed = at_most, placed
         self._begun_ns: int | None = None
-        self._said: dict[str, _Said] = {}
+        self._latest: dict[str, _Latest] = {}
         self._newest_ns = 0
 
     @property
@@ -111,32 +112,30 @@ class VirtualObjects:
         """
         if not all(user.virtual for user in message.users):
             raise UnfitError("road users that are not marked as virtual")
-        if not all(map(_is_finite, message.users)):
+        if not is_finite(message):
             raise UnfitError("virtual objects that are not finite")
         if not all(map(_is_possible, message.users)):
             raise UnfitError("virtual objects of an impossible size or speed")
         fresh = {
-            name: said for name, said in self._said.items() if now_ns - said.heard_ns <= LIVES_NS
+            name: one for name, one in self._latest.items() if now_ns - one.heard_ns <= LIVES_NS
         }
-        fresh |= {user.user_id: _Said(now_ns, message.stamp_ns, user) for user in message.users}
+        fresh |= {user.user_id: _Latest(now_ns, message.stamp_ns, user) for user in message.users}
         if len(fresh) > self._at_most:
             raise UnfitError("virtual objects that are too many")
-        self._said = fresh
+        self._latest = fresh
         stamp_ns = message.stamp_ns
         if 0 < self._newest_ns - stamp_ns < _STEP_BACK_NS:
             stamp_ns = self._newest_ns
         self._newest_ns = stamp_ns
         return RoadUsers(
             stamp_ns=stamp_ns,
-            users=tuple(_at(said, stamp_ns) for _, said in sorted(fresh.items())),
+            users=tuple(_at(one, stamp_ns) for _, one in sorted(fresh.items())),
         )
 
 
-def _at(said: _Said, stamp_ns: int) -> RoadUser:
-    older_s = (stamp_ns - said.stamp_ns) * 1e-9
-    if not 0.0 < abs(older_s) < 1.0:
-        return said.user
-    return moved(said.user, said.user.speed_mps * older_s)
+def _at(latest: _Latest, stamp_ns: int) -> RoadUser:
+    user, older_s = latest.user, (stamp_ns - latest.stamp_ns) * 1e-9
+    return moved(user, user.speed_mps * older_s) if 0.0 < abs(older_s) < 1.0 else user
 
 
 def moved(user: RoadUser, way_m: float) -> RoadUser:
@@ -144,20 +143,6 @@ def moved(user: RoadUser, way_m: float) -> RoadUser:
     step = way_m * np.array([math.cos(user.yaw_rad), math.sin(user.yaw_rad)])
     lat_deg, lon_deg = geo_from_local(LocalFrame(user.position), step).tolist()
     return msgspec.structs.replace(user, position=GeoPoint(lat_deg, lon_deg, user.position.alt_m))
-
-
-def _is_finite(user: RoadUser) -> bool:
-    at = user.position
-    numbers = (
-        at.lat_deg,
-        at.lon_deg,
-        at.alt_m,
-        user.yaw_rad,
-        user.speed_mps,
-        user.length_m,
-        user.width_m,
-    )
-    return all(map(math.isfinite, numbers))
 
 
 def _is_possible(user: RoadUser) -> bool:

@@ -14,20 +14,8 @@ import msgspec
 
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.telemetry.ros_messages.commands import (
-    command_from_ackermann,
-    command_from_control,
-    state_from_odometry,
-)
-from foretwin.telemetry.ros_messages.motion import plan_from_trajectory
-from foretwin.telemetry.ros_messages.objects import users_from_detected, users_from_predicted
-from foretwin.telemetry.ros_messages.parts import stamp_ns_of
-from foretwin.telemetry.ros_messages.status import (
-    gear_from_ros,
-    indicator_from_ros,
-    mode_from_ros,
-    signals_from_ros,
-)
+from foretwin.contracts.keys import CHANNELS, TELEMETRY_CHANNELS
+from foretwin.telemetry.ros_messages import motion, objects, parts, status
 
 NO_FIX = "receiver without fix"
 
@@ -54,8 +42,8 @@ class Foreign(NamedTuple):
 def stamp_of(ros: Any) -> int:
     """Return the stamp that a message carries, 0 where it carries none."""
     if hasattr(ros, "header"):
-        return stamp_ns_of(ros.header.stamp)
-    return stamp_ns_of(ros.stamp) if hasattr(ros, "stamp") else 0
+        return parts.stamp_ns_of(ros.header.stamp)
+    return parts.stamp_ns_of(ros.stamp) if hasattr(ros, "stamp") else 0
 
 
 def _fix(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
@@ -88,12 +76,9 @@ def _imu(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
 
 
 def _pose(ros: Any, stamp_ns: int, frame: LocalFrame | None) -> Messages:
+    placed = _placed("odometry", frame)
     try:
-        state = state_from_odometry(
-            ros, _placed("odometry", frame), vehicle_id="", stamp_ns=stamp_ns
-        )
-    except UnusableError:
-        raise
+        state = motion.state_from_odometry(ros, placed, vehicle_id="", stamp_ns=stamp_ns)
     except ValueError:
         raise UnusableError("odometry in another frame than map") from None
     return (
@@ -117,15 +102,17 @@ def _steering(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
 
 
 def _control(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
-    return (command_from_control(ros, stamp_ns=stamp_ns),)
+    accel, angle = float(ros.longitudinal.acceleration), float(ros.lateral.steering_tire_angle)
+    return (drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle),)
 
 
 def _ackermann(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
-    return (command_from_ackermann(ros, stamp_ns=stamp_ns),)
+    accel, angle = float(ros.drive.acceleration), float(ros.drive.steering_angle)
+    return (drive.ControlCommand(stamp_ns=stamp_ns, accel_mps2=accel, tire_angle_rad=angle),)
 
 
 def _plan(ros: Any, _stamp_ns: int, frame: LocalFrame | None) -> Messages:
-    return (plan_from_trajectory(ros, _placed("plan", frame)),)
+    return (motion.plan_from_trajectory(ros, _placed("plan", frame)),)
 
 
 def _placed(what: str, frame: LocalFrame | None) -> LocalFrame:
@@ -145,12 +132,14 @@ def _users_by(convert: Callable[..., drive.RoadUsers]) -> Foreign:
     return Foreign("objects", ("objects",), read)
 
 
-def _status(name: str, convert: Callable[..., drive.VehicleStatus]) -> Foreign:
+def _status(name: str, convert: Callable[[Any, int], drive.VehicleStatus]) -> Foreign:
     return Foreign(
-        f"status/{name}",
-        ("status",),
-        lambda ros, stamp_ns, _: (convert(ros, stamp_ns=stamp_ns),),
+        f"status/{name}", ("status",), lambda ros, stamp_ns, _: (convert(ros, stamp_ns),)
     )
+
+
+def _signals(ros: Any, stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+    return status.signals_from_ros(ros, stamp_ns)
 
 
 _VELOCITY = _speed_by(lambda ros: ros.longitudinal_velocity)
@@ -159,47 +148,34 @@ _CONTROL = Foreign("control", ("control",), _control)
 _PLAN = Foreign("plan", ("plan",), _plan)
 
 FOREIGN: dict[str, Foreign] = {
-    "sensor_msgs/msg/NavSatFix": Foreign("gnss", ("gnss",), _fix),
-    "sensor_msgs/msg/Imu": Foreign("imu", ("imu",), _imu),
-    "autoware_vehicle_msgs/msg/VelocityReport": _VELOCITY,
+    parts.NAV_SAT_FIX: Foreign("gnss", ("gnss",), _fix),
+    parts.IMU: Foreign("imu", ("imu",), _imu),
+    parts.VELOCITY_REPORT: _VELOCITY,
     "autoware_auto_vehicle_msgs/msg/VelocityReport": _VELOCITY,
-    "geometry_msgs/msg/TwistStamped": _speed_by(lambda ros: ros.twist.linear.x),
+    parts.TWIST_STAMPED: _speed_by(lambda ros: ros.twist.linear.x),
     "geometry_msgs/msg/TwistWithCovarianceStamped": _speed_by(lambda ros: ros.twist.twist.linear.x),
-    "nav_msgs/msg/Odometry": _speed_by(lambda ros: ros.twist.twist.linear.x),
-    "autoware_vehicle_msgs/msg/SteeringReport": _STEERING,
+    parts.ODOMETRY: _speed_by(lambda ros: ros.twist.twist.linear.x),
+    parts.STEERING_REPORT: _STEERING,
     "autoware_auto_vehicle_msgs/msg/SteeringReport": _STEERING,
-    "autoware_control_msgs/msg/Control": _CONTROL,
+    parts.CONTROL: _CONTROL,
     "autoware_auto_control_msgs/msg/AckermannControlCommand": _CONTROL,
-    "ackermann_msgs/msg/AckermannDriveStamped": Foreign("control", ("control",), _ackermann),
-    "autoware_planning_msgs/msg/Trajectory": _PLAN,
+    parts.ACKERMANN: Foreign("control", ("control",), _ackermann),
+    parts.TRAJECTORY: _PLAN,
     "autoware_auto_planning_msgs/msg/Trajectory": _PLAN,
-    "autoware_vehicle_msgs/msg/ControlModeReport": _status("mode", mode_from_ros),
-    "autoware_vehicle_msgs/msg/GearReport": _status("gear", gear_from_ros),
-    "autoware_vehicle_msgs/msg/TurnIndicatorsReport": _status("indicator", indicator_from_ros),
+    parts.CONTROL_MODE_REPORT: _status("mode", status.mode_from_ros),
+    parts.GEAR_REPORT: _status("gear", status.gear_from_ros),
+    parts.TURN_INDICATORS_REPORT: _status("indicator", status.indicator_from_ros),
     # Predicted before detected: they have identities, and lie in `map`.
-    "autoware_perception_msgs/msg/PredictedObjects": _users_by(users_from_predicted),
-    "autoware_perception_msgs/msg/DetectedObjects": _users_by(users_from_detected),
-    "autoware_perception_msgs/msg/TrafficLightGroupArray": Foreign(
-        "signals", ("signals",), lambda ros, stamp_ns, _: signals_from_ros(ros, stamp_ns=stamp_ns)
-    ),
+    parts.PREDICTED_OBJECTS: _users_by(objects.users_from_predicted),
+    parts.DETECTED_OBJECTS: _users_by(objects.users_from_detected),
+    parts.TRAFFIC_LIGHTS: Foreign("signals", ("signals",), _signals),
 }
 """Types that are read, by full name; earlier ones win within a stream."""
 
 POSE = Foreign("gnss", ("gnss", "heading"), _pose)
 """How an Odometry of base_link in `map` stands in for a receiver, where that frame is placed."""
 
-_CHANNELS: dict[type[msgspec.Struct], str] = {
-    drive.GnssFix: "gnss",
-    drive.ImuSample: "imu",
-    drive.SpeedSample: "speed",
-    drive.HeadingSample: "heading",
-    drive.SteeringSample: "steering",
-    drive.ControlCommand: "control",
-    drive.PlannedTrajectory: "plan",
-    drive.VehicleStatus: "status",
-    drive.RoadUsers: "objects",
-    drive.SignalState: "signals",
-}
+_CHANNELS = {CHANNELS[name].kind: name for name in TELEMETRY_CHANNELS}
 
 
 def channel_of(message: msgspec.Struct) -> str:

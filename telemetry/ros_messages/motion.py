@@ -1,4 +1,4 @@
-"""Commands, plans and states as ROS 2 messages, and back; the table stands in ros_messages."""
+"""Plans, routes and states as ROS 2 messages, and back; the table stands in ros_messages.table."""
 
 from __future__ import annotations
 
@@ -7,95 +7,56 @@ from typing import Any
 
 import numpy as np
 
-from foretwin.contracts import drive
-from foretwin.contracts.frames import (
-    GeoPoint,
-    LocalFrame,
-    geo_from_local,
-    geo_from_local_yaw,
-    local_from_geo,
-    local_from_geo_yaw,
-)
+from foretwin.contracts import drive, frames
+from foretwin.contracts.frames import LocalFrame
+from foretwin.telemetry.ros_messages import parts
 from foretwin.telemetry.ros_messages.parts import (
-    ACKERMANN,
-    BASE_FRAME,
     MAP_FRAME,
-    ODOMETRY,
-    STRING,
-    TRAJECTORY,
-    Parts,
     covariance,
     header_from,
-    json_string,
-    point_from,
-    ros_type,
+    ros_message,
     stamp_ns_of,
-    turn_from,
-    twist_from,
     within_float32,
     yaw_of,
 )
 
 
-def ros_from_control(message: drive.ControlCommand, _frame: LocalFrame | None) -> Parts:
-    """Return the ROS 2 messages of one control message."""
-    tire = math.nan if message.tire_angle_rad is None else message.tire_angle_rad
-    command = ros_type("ackermann_msgs/msg/AckermannDrive")(
-        steering_angle=within_float32(tire),
-        steering_angle_velocity=0.0,
-        speed=0.0,
-        acceleration=within_float32(message.accel_mps2),
-        jerk=0.0,
-    )
-    stamped = ros_type(ACKERMANN)(header=header_from(message.stamp_ns, BASE_FRAME), drive=command)
-    return [("control", ACKERMANN, stamped), ("control_json", STRING, json_string(message))]
-
-
-def ros_from_plan(message: drive.PlannedTrajectory, frame: LocalFrame | None) -> Parts:
-    """Return the ROS 2 messages of one plan message."""
+def trajectory_from_plan(message: drive.PlannedTrajectory, frame: LocalFrame | None) -> Any:
+    """Return the Autoware Trajectory of a plan in the local frame `frame`."""
     assert frame is not None
     lat, lon = np.asarray(message.lat_deg), np.asarray(message.lon_deg)
-    xy_m = local_from_geo(frame, lat, lon).tolist()
-    yaw = local_from_geo_yaw(frame, message.yaw_rad, lat, lon).tolist()
-    offsets_ns = np.round(message.time_from_stamp_s * 1e9).astype(np.int64).tolist()
-    point, pose = (
-        ros_type("autoware_planning_msgs/msg/TrajectoryPoint"),
-        ros_type("geometry_msgs/msg/Pose"),
+    columns = zip(
+        np.round(message.time_from_stamp_s * 1e9).astype(np.int64).tolist(),
+        frames.local_from_geo(frame, lat, lon).tolist(),
+        frames.local_from_geo_yaw(frame, message.yaw_rad, lat, lon).tolist(),
+        message.speed_mps.tolist(),
+        strict=True,
     )
-    duration = ros_type("builtin_interfaces/msg/Duration")
     points = [
-        point(
-            time_from_start=duration(sec=offset // 10**9, nanosec=offset % 10**9),
-            pose=pose(position=point_from(x, y, 0.0), orientation=turn_from(heading)),
-            longitudinal_velocity_mps=within_float32(speed),
-            lateral_velocity_mps=0.0,
-            acceleration_mps2=0.0,
-            heading_rate_rps=0.0,
-            front_wheel_angle_rad=0.0,
-            rear_wheel_angle_rad=0.0,
+        ros_message(
+            "autoware_planning_msgs/msg/TrajectoryPoint",
+            time_from_start=parts.duration_from(offset_ns),
+            pose=parts.pose_from(x_m, y_m, 0.0, yaw_rad),
+            longitudinal_velocity_mps=within_float32(speed_mps),
         )
-        for offset, (x, y), heading, speed in zip(
-            offsets_ns, xy_m, yaw, message.speed_mps.tolist(), strict=True
-        )
+        for offset_ns, (x_m, y_m), yaw_rad, speed_mps in columns
     ]
     header = header_from(message.stamp_ns, MAP_FRAME)
-    return [("plan", TRAJECTORY, ros_type(TRAJECTORY)(header=header, points=points))]
+    return ros_message(parts.TRAJECTORY, header=header, points=points)
 
 
-def plan_from_trajectory(ros: Any, frame: LocalFrame | None) -> drive.PlannedTrajectory:
+def plan_from_trajectory(ros: Any, frame: LocalFrame) -> drive.PlannedTrajectory:
     """Return the plan of an Autoware Trajectory whose frame is `frame`."""
-    if frame is None:
-        raise ValueError("a trajectory needs the origin of its frame")
     points = ros.points
     xy_m = np.array([(p.pose.position.x, p.pose.position.y) for p in points]).reshape(-1, 2)
     yaw = np.array([yaw_of(p.pose.orientation) for p in points])
-    geo = geo_from_local(frame, xy_m)
+    geo = frames.geo_from_local(frame, xy_m)
     return drive.PlannedTrajectory(
         stamp_ns=stamp_ns_of(ros.header.stamp),
         time_from_stamp_s=np.array([stamp_ns_of(p.time_from_start) / 1e9 for p in points]),
         lat_deg=geo[:, 0],
         lon_deg=geo[:, 1],
-        yaw_rad=geo_from_local_yaw(frame, yaw, xy_m),
+        yaw_rad=frames.geo_from_local_yaw(frame, yaw, xy_m),
         speed_mps=np.array([p.longitudinal_velocity_mps for p in points]),
     )
 
@@ -117,35 +78,65 @@ def route_from_lanelets(ros: Any, frame: LocalFrame | None) -> drive.RouteToGoal
 
 
 def _route_pose(pose: Any, frame: LocalFrame) -> drive.RoutePose:
-    xy_m = np.array([[pose.position.x, pose.position.y]])
-    yaw = geo_from_local_yaw(frame, np.array([yaw_of(pose.orientation)]), xy_m)
-    lat_deg, lon_deg = geo_from_local(frame, xy_m)[0].tolist()
-    if not np.isfinite([lat_deg, lon_deg, yaw[0]]).all():
+    at = frames.geo_pose(frame, pose.position.x, pose.position.y, yaw_of(pose.orientation))
+    if not np.isfinite([at.position.lat_deg, at.position.lon_deg, at.yaw_rad]).all():
         raise ValueError("a route from or to nowhere")
-    return drive.RoutePose(GeoPoint(lat_deg, lon_deg), float(yaw[0]))
+    return drive.RoutePose(at.position, at.yaw_rad)
 
 
-def ros_from_state(message: drive.VehicleState, frame: LocalFrame | None) -> Parts:
-    """Return the ROS 2 messages of one state message."""
+def odometry_from_state(message: drive.VehicleState, frame: LocalFrame | None) -> Any:
+    """Return the Odometry of a state in the local frame `frame`."""
     assert frame is not None
-    lat, lon = message.position.lat_deg, message.position.lon_deg
-    x_m, y_m = local_from_geo(frame, lat, lon).tolist()
+    x_m, y_m, yaw_rad = frames.local_pose(frame, message.position, message.yaw_rad)
     z_m = message.position.alt_m - frame.origin.alt_m
-    yaw = float(local_from_geo_yaw(frame, message.yaw_rad, lat, lon))
     position, heading = message.position_std_m or 0.0, message.yaw_std_rad or 0.0
-    pose = ros_type("geometry_msgs/msg/Pose")(
-        position=point_from(x_m, y_m, z_m), orientation=turn_from(yaw)
-    )
-    odometry = ros_type(ODOMETRY)(
+    return ros_message(
+        parts.ODOMETRY,
         header=header_from(message.stamp_ns, MAP_FRAME),
-        child_frame_id=BASE_FRAME,
-        pose=ros_type("geometry_msgs/msg/PoseWithCovariance")(
-            pose=pose,
+        child_frame_id=parts.BASE_FRAME,
+        pose=ros_message(
+            "geometry_msgs/msg/PoseWithCovariance",
+            pose=parts.pose_from(x_m, y_m, z_m, yaw_rad),
             covariance=covariance(6, d0=position**2, d1=position**2, d5=heading**2),
         ),
-        twist=ros_type("geometry_msgs/msg/TwistWithCovariance")(
-            twist=twist_from(message.speed_mps, message.yaw_rate_radps),
+        twist=ros_message(
+            "geometry_msgs/msg/TwistWithCovariance",
+            twist=parts.twist_from(message.speed_mps, message.yaw_rate_radps),
             covariance=covariance(6, d0=(message.speed_std_mps or 0.0) ** 2),
         ),
     )
-    return [("state", ODOMETRY, odometry), ("state_json", STRING, json_string(message))]
+
+
+def state_from_odometry(
+    ros: Any, frame: LocalFrame, *, vehicle_id: str, stamp_ns: int
+) -> drive.VehicleState:
+    """Return the state of an Odometry of base_link in `map`, whose plane is `frame`.
+
+    Standard deviations are those of its covariances, None where they are 0; acceleration is not in
+    an Odometry and is named as estimated. Raises ValueError for another frame.
+    """
+    if ros.header.frame_id.lstrip("/") != MAP_FRAME:
+        raise ValueError(f"odometry in frame {ros.header.frame_id!r}; readable: {MAP_FRAME!r}")
+    pose, twist = ros.pose.pose, ros.twist.twist
+    alt_m = frame.origin.alt_m + pose.position.z
+    at = frames.geo_pose(
+        frame, pose.position.x, pose.position.y, yaw_of(pose.orientation), alt_m=alt_m
+    )
+    variances = np.asarray(ros.pose.covariance).reshape(6, 6).diagonal()
+    return drive.VehicleState(
+        vehicle_id=vehicle_id,
+        stamp_ns=stamp_ns,
+        position=at.position,
+        yaw_rad=at.yaw_rad,
+        speed_mps=float(twist.linear.x),
+        yaw_rate_radps=float(twist.angular.z),
+        accel_mps2=0.0,
+        position_std_m=_std(0.5 * float(variances[0] + variances[1])),
+        yaw_std_rad=_std(float(variances[5])),
+        speed_std_mps=_std(float(ros.twist.covariance[0])),
+        estimated=("accel_mps2",),
+    )
+
+
+def _std(variance: float) -> float | None:
+    return math.sqrt(variance) if variance > 0.0 else None

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import FieldDesc, Typesdict
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from foretwin.contracts.arrays import Array
-from foretwin.telemetry.ros_messages.definitions import DEFINITIONS
+from foretwin.contracts.frames import LocalFrame
 
 MAP_FRAME, BASE_FRAME, ANTENNA_FRAME = "map", "base_link", "antenna"
 
@@ -37,18 +41,19 @@ TRAFFIC_LIGHTS = "autoware_perception_msgs/msg/TrafficLightGroupArray"
 TF = "tf2_msgs/msg/TFMessage"
 CLOCK = "rosgraph_msgs/msg/Clock"
 
-Parts = list[tuple[str, str, Any]]
-"""Topic below our prefix, type name and message, of each ROS 2 message of one of ours."""
+
+@functools.cache
+def types_beside_ros() -> Typesdict:
+    """Return the types of `autoware.msg`: Ackermann's and Autoware's."""
+    text = Path(__file__).with_name("autoware.msg").read_text(encoding="utf-8")
+    return get_types_from_msg(text, "ackermann_msgs/msg/AckermannDrive")
 
 
 @functools.cache
 def typestore() -> Any:
-    """Return the types of ROS 2 Jazzy with Ackermann's and Autoware's; about 0.15 s at first."""
+    """Return the types of ROS 2 Jazzy and `types_beside_ros`; about 0.15 s at first."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    types: dict[str, Any] = {}
-    for name, text in DEFINITIONS.items():
-        types.update(get_types_from_msg(text, name))
-    store.register(types)
+    store.register(types_beside_ros())
     return store
 
 
@@ -74,39 +79,67 @@ def ros_type(kind: str) -> Any:
     return typestore().types[kind]
 
 
+def ros_message(kind: str, **fields: Any) -> Any:
+    """Return a message of a full type name; what is not given is zero or empty, as in ROS."""
+    return dataclasses.replace(_blank(kind), **fields)
+
+
+@functools.cache
+def _blank(kind: str) -> Any:
+    fields = typestore().get_msgdef(kind).fields
+    return ros_type(kind)(**{name: _zero(description) for name, description in fields})
+
+
+def _zero(description: FieldDesc) -> Any:
+    """Return the value of a field of which nothing is said."""
+    match description:
+        case (Nodetype.NAME, str(kind)):
+            return _blank(kind)
+        case (Nodetype.BASE, (str(name), _)):
+            return "" if name == "string" else np.zeros(1, name)[0].item()
+        case (Nodetype.ARRAY, ((Nodetype.BASE, (str(name), _)), int(length))):
+            return np.zeros(length, name)
+        case (Nodetype.SEQUENCE, ((Nodetype.BASE, (str(name), _)), _)) if name != "string":
+            return np.zeros(0, name)
+    return []
+
+
 def time_from(stamp_ns: int) -> Any:
     """Return a ROS time."""
-    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
-    return ros_type("builtin_interfaces/msg/Time")(sec=sec, nanosec=nanosec)
+    return ros_type("builtin_interfaces/msg/Time")(*divmod(stamp_ns, 1_000_000_000))
+
+
+def duration_from(duration_ns: int) -> Any:
+    """Return a ROS duration."""
+    return ros_type("builtin_interfaces/msg/Duration")(*divmod(duration_ns, 1_000_000_000))
 
 
 def header_from(stamp_ns: int, frame_id: str) -> Any:
     """Return a header."""
-    return ros_type("std_msgs/msg/Header")(stamp=time_from(stamp_ns), frame_id=frame_id)
+    return ros_type("std_msgs/msg/Header")(time_from(stamp_ns), frame_id)
 
 
 def vector_from(x: float, y: float, z: float) -> Any:
     """Return a Vector3."""
-    return ros_type("geometry_msgs/msg/Vector3")(x=x, y=y, z=z)
-
-
-def point_from(x: float, y: float, z: float) -> Any:
-    """Return a Point."""
-    return ros_type("geometry_msgs/msg/Point")(x=x, y=y, z=z)
+    return ros_type("geometry_msgs/msg/Vector3")(x, y, z)
 
 
 def turn_from(yaw_rad: float) -> Any:
     """Return the quaternion of a yaw."""
-    return ros_type("geometry_msgs/msg/Quaternion")(
-        x=0.0, y=0.0, z=math.sin(0.5 * yaw_rad), w=math.cos(0.5 * yaw_rad)
-    )
+    half = 0.5 * yaw_rad
+    return ros_type("geometry_msgs/msg/Quaternion")(0.0, 0.0, math.sin(half), math.cos(half))
+
+
+def pose_from(x_m: float, y_m: float, z_m: float, yaw_rad: float) -> Any:
+    """Return a Pose."""
+    point = ros_type("geometry_msgs/msg/Point")(x_m, y_m, z_m)
+    return ros_type("geometry_msgs/msg/Pose")(point, turn_from(yaw_rad))
 
 
 def twist_from(forward_mps: float, yaw_rate_radps: float) -> Any:
     """Return a planar twist."""
-    return ros_type("geometry_msgs/msg/Twist")(
-        linear=vector_from(forward_mps, 0.0, 0.0), angular=vector_from(0.0, 0.0, yaw_rate_radps)
-    )
+    forward, turning = vector_from(forward_mps, 0.0, 0.0), vector_from(0.0, 0.0, yaw_rate_radps)
+    return ros_type("geometry_msgs/msg/Twist")(forward, turning)
 
 
 def covariance(size: int, **diagonal: float) -> Array:
@@ -122,6 +155,6 @@ def within_float32(value: float) -> float:
     return min(max(value, -3.4e38), 3.4e38) if math.isfinite(value) else value
 
 
-def json_string(message: msgspec.Struct) -> Any:
+def json_string(message: msgspec.Struct, _frame: LocalFrame | None = None) -> Any:
     """Return a message as a String that holds its JSON."""
-    return ros_type(STRING)(data=msgspec.json.encode(message).decode())
+    return ros_type(STRING)(msgspec.json.encode(message).decode())

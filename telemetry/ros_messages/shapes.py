@@ -8,27 +8,28 @@ from typing import Any
 import numpy as np
 
 from foretwin.contracts import drive
-from foretwin.telemetry.ros_messages.parts import ros_type, vector_from, within_float32
+from foretwin.telemetry.ros_messages.parts import ros_message, vector_from, within_float32
 
-_LABELS: tuple[drive.RoadUserKind, ...] = (
-    *("unknown", "car", "lorry", "bus", "lorry", "motorcycle", "bicycle", "pedestrian"),
-)
-_KIND_BY_LABEL = dict(enumerate(_LABELS))
-"""ObjectClassification.label; the rest is unknown."""
-_PASSABLE = (10, 11)
-"""OVER_DRIVABLE, UNDER_DRIVABLE."""
-_LABEL_BY_KIND = {
+_TRAILER = 4
+_LABEL_BY_KIND: dict[drive.RoadUserKind, int] = {
     # Autoware knows no vans and no trams: what plans around a tram must leave a bus's room.
-    "car": 1,
     "van": 1,
+    "tram": 3,
+    "unknown": 0,
+    "car": 1,
     "lorry": 2,
     "bus": 3,
-    "tram": 3,
     "motorcycle": 5,
     "bicycle": 6,
     "pedestrian": 7,
-    "unknown": 0,
 }
+"""ObjectClassification.label; what comes in with another one is unknown."""
+_KIND_BY_LABEL: dict[int, drive.RoadUserKind] = {
+    **{label: kind for kind, label in _LABEL_BY_KIND.items()},
+    _TRAILER: "lorry",
+}
+_PASSABLE = (10, 11)
+"""OVER_DRIVABLE, UNDER_DRIVABLE."""
 _HEIGHT_M = {"van": 2.5, "lorry": 3.5, "bus": 3.2, "tram": 3.6, "pedestrian": 1.8, "bicycle": 1.8}
 _OTHER_HEIGHT_M = 1.6
 _BOX, _CYLINDER, _POLYGON = 0, 1, 2
@@ -67,27 +68,25 @@ def height_m(user: drive.RoadUser) -> float:
 
 def classes_from(user: drive.RoadUser) -> list[Any]:
     """Return the ObjectClassification array of a road user."""
-    classified = ros_type("autoware_perception_msgs/msg/ObjectClassification")
-    return [classified(label=_LABEL_BY_KIND[user.kind], probability=1.0)]
+    kind = "autoware_perception_msgs/msg/ObjectClassification"
+    return [ros_message(kind, label=_LABEL_BY_KIND[user.kind], probability=1.0)]
 
 
 def shape_from(user: drive.RoadUser) -> Any:
     """Return the Shape of a road user: a box."""
-    return ros_type("autoware_perception_msgs/msg/Shape")(
+    length_m, width_m = within_float32(user.length_m), within_float32(user.width_m)
+    return ros_message(
+        "autoware_perception_msgs/msg/Shape",
         type=_BOX,
-        footprint=ros_type("geometry_msgs/msg/Polygon")(points=[]),
-        dimensions=vector_from(
-            within_float32(user.length_m), within_float32(user.width_m), height_m(user)
-        ),
+        dimensions=vector_from(length_m, width_m, height_m(user)),
     )
 
 
-def uuid_from(user_id: str) -> Any:
-    """Return the UUID that `user_id` spells in 32 hexadecimal digits, else one derived from it."""
+def uuid_from(user: drive.RoadUser) -> Any:
+    """Return the UUID that an id spells in 32 hexadecimal digits, else one derived from it."""
     try:
-        found = uuid.UUID(hex=user_id)
+        found = uuid.UUID(hex=user.user_id)
     except ValueError:
-        found = uuid.uuid5(_IDS, user_id)
-    return ros_type("unique_identifier_msgs/msg/UUID")(
-        uuid=np.frombuffer(found.bytes, dtype=np.uint8).copy()
-    )
+        found = uuid.uuid5(_IDS, user.user_id)
+    octets = np.frombuffer(found.bytes, dtype=np.uint8).copy()
+    return ros_message("unique_identifier_msgs/msg/UUID", uuid=octets)

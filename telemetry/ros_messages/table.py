@@ -24,42 +24,66 @@ from typing import Any, NamedTuple
 import msgspec
 
 from foretwin.contracts.frames import LocalFrame
-from foretwin.contracts.keys import CHANNELS
-from foretwin.telemetry.ros_messages.motion import (
-    plan_from_trajectory,
-    ros_from_control,
-    ros_from_plan,
-    ros_from_state,
-)
-from foretwin.telemetry.ros_messages.parts import (
-    IMU,
-    JOINT_STATE,
-    NAV_SAT_FIX,
-    STRING,
-    TRAJECTORY,
-    TWIST_STAMPED,
-    Parts,
-    json_string,
-    typestore,
-)
-from foretwin.telemetry.ros_messages.sensors import (
-    gnss_from_ros,
-    heading_from_ros,
-    imu_from_ros,
-    ros_from_gnss,
-    ros_from_heading,
-    ros_from_imu,
-    ros_from_speed,
-    ros_from_steering,
-    speed_from_ros,
-    steering_from_ros,
-)
+from foretwin.contracts.keys import CHANNELS, TELEMETRY_CHANNELS
+from foretwin.telemetry.ros_messages import commands, motion, parts, sensors
+from foretwin.telemetry.ros_messages.foreign import FOREIGN, Messages, stamp_of
+from foretwin.telemetry.ros_messages.parts import STRING, json_string, typestore
 
 TOPIC_PREFIX = "/foretwin/"
 INFO_TOPIC, FRAME_TOPIC = f"{TOPIC_PREFIX}vehicle_info", f"{TOPIC_PREFIX}frame"
 """Of bags: std_msgs/String with the JSON of VehicleInfo and of the LocalFrame named "map"."""
-_JSON_ALONE = ("status", "objects", "signals", "end")
-_JSON_BESIDE_A_VIEW = ("control", "state")
+
+
+class _Topic(NamedTuple):
+    """One topic of a channel below our prefix; what has no `read` is a view for other programs.
+
+    `write` returns a message of type `kind`, or None where there is nothing to show.
+    """
+
+    name: str
+    kind: str
+    write: Callable[[Any, LocalFrame | None], Any]
+    read: Callable[[Any, int, LocalFrame | None], Messages] | None = None
+
+
+def _json(channel: str, name: str) -> _Topic:
+    def read(ros: Any, _stamp_ns: int, _frame: LocalFrame | None) -> Messages:
+        return (msgspec.json.decode(ros.data, type=CHANNELS[channel].kind),)
+
+    return _Topic(name, STRING, json_string, read)
+
+
+def _typed(name: str, kind: str, write: Callable[[Any, LocalFrame | None], Any]) -> _Topic:
+    return _Topic(name, kind, write, FOREIGN[kind].read)
+
+
+_TOPICS: dict[str, tuple[_Topic, ...]] = {
+    **{channel: (_json(channel, channel),) for channel in TELEMETRY_CHANNELS},
+    "gnss": (_Topic("gnss", parts.NAV_SAT_FIX, sensors.ros_from_gnss, sensors.gnss_from_ros),),
+    "imu": (_typed("imu", parts.IMU, sensors.ros_from_imu),),
+    "speed": (_typed("speed", parts.TWIST_STAMPED, sensors.ros_from_speed),),
+    "heading": (_Topic("heading", parts.IMU, sensors.ros_from_heading, sensors.heading_from_ros),),
+    "steering": (
+        _Topic("steering", parts.JOINT_STATE, sensors.ros_from_steering, sensors.steering_from_ros),
+        _Topic("steering_report", parts.STEERING_REPORT, sensors.steering_report),
+    ),
+    "control": (
+        _Topic("control", parts.ACKERMANN, commands.ackermann_view),
+        _json("control", "control_json"),
+    ),
+    "plan": (_typed("plan", parts.TRAJECTORY, motion.trajectory_from_plan),),
+    "state": (
+        _Topic("state", parts.ODOMETRY, motion.odometry_from_state),
+        _json("state", "state_json"),
+    ),
+}
+"""What stands in a file by channel: a channel without a row of its own as JSON alone."""
+_READ = {
+    TOPIC_PREFIX + topic.name: (channel, topic)
+    for channel, topics in _TOPICS.items()
+    for topic in topics
+    if topic.read is not None
+}
 
 
 class RosMessage(NamedTuple):
@@ -84,59 +108,26 @@ def messages_from(
         raise ValueError(
             f"{channel}: stamp {message.stamp_ns} ns fits no ROS time (1970 to 2038)"  # type: ignore[attr-defined]
         )
-    if channel in _WRITERS:
-        parts = _WRITERS[channel](message, frame)
-    elif channel in _JSON_ALONE:
-        parts = [(channel, STRING, json_string(message))]
-    else:
-        raise ValueError(f"channel {channel!r} is not written; known: {', '.join(written())}")
-    store = typestore()
+    if channel not in _TOPICS:
+        raise ValueError(f"channel {channel!r} is not written; known: {', '.join(_TOPICS)}")
+    made = ((topic, topic.write(message, frame)) for topic in _TOPICS[channel])
     return [
-        RosMessage(TOPIC_PREFIX + name, kind, bytes(store.serialize_cdr(ros, kind)))
-        for name, kind, ros in parts
+        RosMessage(
+            TOPIC_PREFIX + topic.name, topic.kind, bytes(typestore().serialize_cdr(ros, topic.kind))
+        )
+        for topic, ros in made
+        if ros is not None
     ]
-
-
-def written() -> tuple[str, ...]:
-    """Return the channels that can be written."""
-    return (*_WRITERS, *_JSON_ALONE)
 
 
 def kind_of(topic: str) -> str | None:
     """Return the type of one of our own topics that is read back, None for any other."""
-    name = topic.removeprefix(TOPIC_PREFIX)
-    if topic == name:
-        return None
-    channel = name.removesuffix("_json")
-    if channel in _JSON_ALONE or (channel in _JSON_BESIDE_A_VIEW and channel != name):
-        return STRING
-    return _READERS[name][0] if name in _READERS else None
+    return _READ[topic][1].kind if topic in _READ else None
 
 
 def message_of(topic: str, ros: Any, frame: LocalFrame | None) -> tuple[str, msgspec.Struct]:
     """Return channel and message of a decoded message of a topic that has a `kind_of`."""
-    name = topic.removeprefix(TOPIC_PREFIX)
-    if kind_of(topic) == STRING:
-        channel = name.removesuffix("_json")
-        return channel, msgspec.json.decode(ros.data, type=CHANNELS[channel].kind)
-    return name, _READERS[name][1](ros, frame)
-
-
-_WRITERS: dict[str, Callable[[Any, LocalFrame | None], Parts]] = {
-    "gnss": ros_from_gnss,
-    "imu": ros_from_imu,
-    "speed": ros_from_speed,
-    "heading": ros_from_heading,
-    "steering": ros_from_steering,
-    "control": ros_from_control,
-    "plan": ros_from_plan,
-    "state": ros_from_state,
-}
-_READERS: dict[str, tuple[str, Callable[[Any, LocalFrame | None], msgspec.Struct]]] = {
-    "gnss": (NAV_SAT_FIX, gnss_from_ros),
-    "imu": (IMU, imu_from_ros),
-    "speed": (TWIST_STAMPED, speed_from_ros),
-    "heading": (IMU, heading_from_ros),
-    "steering": (JOINT_STATE, steering_from_ros),
-    "plan": (TRAJECTORY, plan_from_trajectory),
-}
+    channel, row = _READ[topic]
+    assert row.read is not None
+    (message,) = row.read(ros, stamp_of(ros), frame)
+    return channel, message

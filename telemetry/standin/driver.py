@@ -7,6 +7,7 @@ and by feedback along the distance (offset and heading), the speed by the profil
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from foretwin.geometry.steering import MAX_CURVATURE_PM
@@ -35,51 +36,39 @@ class PlanPoint(NamedTuple):
     speed_mps: float
 
 
+@dataclass(kw_only=True)
 class Driver:
     """Drives a path from its beginning, waits at each stop, and is `arrived` after the last."""
 
-    def __init__(
-        self,
-        path: DrivenPath,
-        parameters: DriverParameters,
-        *,
-        car: CarParameters,
-        wheelbase_m: float,
-        period_s: float,
-    ) -> None:
-        """`period_s` is the time between two `command` calls."""
-        self._path = path
-        self._parameters = parameters
-        self._car = car
-        self._wheelbase_m = wheelbase_m
-        self._period_s = period_s
-        self._s_m = 0.0
-        self._next_stop = 0
-        self._waited_s = 0.0
-        self.arrived = False
-
-    @property
-    def s_m(self) -> float:
-        """How far along the path the car was at the last command."""
-        return self._s_m
+    path: DrivenPath
+    parameters: DriverParameters
+    car: CarParameters
+    wheelbase_m: float
+    period_s: float
+    """Between two `command` calls."""
+    s_m: float = 0.0
+    """How far along the path the car was at the last command."""
+    arrived: bool = False
+    _next_stop: int = 0
+    _waited_s: float = 0.0
 
     def command(self, motion: CarMotion) -> DriverCommand:
         """Return what to ask of the car, and keep track of the stops."""
-        self._s_m = self._path.locate(motion.x_m, motion.y_m, near_s_m=self._s_m)
+        self.s_m = self.path.locate(motion.x_m, motion.y_m, near_s_m=self.s_m)
         self._wait(motion.vx_mps)
         return DriverCommand(
-            accel_mps2=self._accel(self._s_m, motion.vx_mps, self._next_stop),
+            accel_mps2=self._accel(self.s_m, motion.vx_mps, self._next_stop),
             steering_wheel_rad=self._steering_wheel(motion),
         )
 
     def _wait(self, speed_mps: float) -> None:
-        remaining = self._path.stops_m[self._next_stop] - self._s_m
+        remaining = self.path.stops_m[self._next_stop] - self.s_m
         if speed_mps > _STANDING_MPS or remaining > 1.0:
             return
-        self._waited_s += self._period_s
-        if self._waited_s < self._parameters.dwell_s:
+        self._waited_s += self.period_s
+        if self._waited_s < self.parameters.dwell_s:
             return
-        if self._next_stop + 1 < len(self._path.stops_m):
+        if self._next_stop + 1 < len(self.path.stops_m):
             self._next_stop += 1
             self._waited_s = 0.0
         else:
@@ -87,16 +76,16 @@ class Driver:
 
     def _wished_speed(self, s_m: float, stop: int) -> float:
         """Return the speed at a place, braking for stop number `stop`."""
-        remaining = self._path.stops_m[stop] - s_m
-        profile = self._path.speed_at(s_m)
-        braking = math.sqrt(2.0 * self._parameters.comfort_decel_mps2 * max(0.0, remaining))
+        remaining = self.path.stops_m[stop] - s_m
+        profile = self.path.speed_at(s_m)
+        braking = math.sqrt(2.0 * self.parameters.comfort_decel_mps2 * max(0.0, remaining))
         return min(profile, braking)
 
     def _accel(self, s_m: float, speed_mps: float, stop: int) -> float:
-        given = self._parameters
-        if self._path.stops_m[stop] - s_m < _NEAR_STOP_M and speed_mps < 1.2:
+        given = self.parameters
+        if self.path.stops_m[stop] - s_m < _NEAR_STOP_M and speed_mps < 1.2:
             return -1.0 if speed_mps < 0.5 else -given.comfort_decel_mps2
-        ahead = s_m + speed_mps * self._car.drive_delay_s
+        ahead = s_m + speed_mps * self.car.drive_delay_s
         wished = self._wished_speed(ahead, stop)
         later = self._wished_speed(ahead + 0.5, stop)
         slope = (later * later - wished * wished) / 1.0
@@ -106,9 +95,9 @@ class Driver:
 
     def _steering_wheel(self, motion: CarMotion) -> float:
         speed = motion.vx_mps
-        here = self._path.at(self._s_m)
-        lag_s = self._car.steering_delay_s + _STEERING_LAG_S
-        ahead = self._path.at(self._s_m + speed * lag_s)
+        here = self.path.at(self.s_m)
+        lag_s = self.car.steering_delay_s + _STEERING_LAG_S
+        ahead = self.path.at(self.s_m + speed * lag_s)
         offset = math.cos(here.yaw_rad) * (motion.y_m - here.y_m) - math.sin(here.yaw_rad) * (
             motion.x_m - here.x_m
         )
@@ -119,22 +108,22 @@ class Driver:
             ahead.curvature_pm - stiffness * stiffness * offset - 2.0 * stiffness * math.sin(turned)
         )
         curvature = min(max(curvature, -MAX_CURVATURE_PM), MAX_CURVATURE_PM)
-        angle = math.atan(self._wheelbase_m * curvature)
-        return angle * self._car.steering_ratio
+        angle = math.atan(self.wheelbase_m * curvature)
+        return angle * self.car.steering_ratio
 
     def plan(self, speed_mps: float) -> list[PlanPoint]:
         """Return where the driver means to be at each `plan_step_s` over its horizon, now first."""
-        given = self._parameters
-        s, speed, stop, waited = self._s_m, max(0.0, speed_mps), self._next_stop, self._waited_s
+        given = self.parameters
+        s, speed, stop, waited = self.s_m, max(0.0, speed_mps), self._next_stop, self._waited_s
         points = []
         for _ in range(round(given.plan_horizon_s / given.plan_step_s) + 1):
             points.append(PlanPoint(s, speed))
             accel = self._accel(s, speed, stop)
             faster = max(0.0, speed + accel * given.plan_step_s)
-            s = min(s + 0.5 * (speed + faster) * given.plan_step_s, self._path.length_m)
+            s = min(s + 0.5 * (speed + faster) * given.plan_step_s, self.path.length_m)
             speed = faster
-            if speed == 0.0 and self._path.stops_m[stop] - s < 1.0:
+            if speed == 0.0 and self.path.stops_m[stop] - s < 1.0:
                 waited += given.plan_step_s
-                if waited >= given.dwell_s and stop + 1 < len(self._path.stops_m):
+                if waited >= given.dwell_s and stop + 1 < len(self.path.stops_m):
                     stop, waited = stop + 1, 0.0
         return points

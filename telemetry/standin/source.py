@@ -48,8 +48,8 @@ class StandinSource:
             parameters.car, x_m=start.x_m, y_m=start.y_m, yaw_rad=start.yaw_rad
         )
         self._driver = Driver(
-            path,
-            parameters.driver,
+            path=path,
+            parameters=parameters.driver,
             car=parameters.car,
             wheelbase_m=self._car.wheelbase_m,
             period_s=_CONTROL_TICKS * STEP_S,

@@ -75,9 +75,12 @@ def zenoh_sides(*, lossless: bool = False) -> Iterator[Sides]:
 def python(*arguments: str) -> Iterator[subprocess.Popen[str]]:
     """Run a fresh interpreter whose program says `ready`; it is ended with the block."""
     process = subprocess.Popen(
-        [sys.executable, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        [sys.executable, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
-    )  # fmt: skip
+    )
     with process:
         try:
             assert process.stdout is not None

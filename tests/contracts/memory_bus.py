@@ -52,9 +52,15 @@ class MemoryBus:
             self._subscribers.append((channel_key(channel, **ids), channel, mailbox))
 
     def request(
-        self, channel: str, message: msgspec.Struct, mailbox: Mailbox, *, tag: Any = None,
-        timeout_s: float = 10.0, **ids: str,
-    ) -> None:  # fmt: skip
+        self,
+        channel: str,
+        message: msgspec.Struct,
+        mailbox: Mailbox,
+        *,
+        tag: Any = None,
+        timeout_s: float = 10.0,
+        **ids: str,
+    ) -> None:
         """Ask; a question nobody serves is answered at once with an error."""
         full_key = channel_key(channel, **ids)
         kind = CHANNELS[channel].reply

@@ -28,6 +28,20 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from tests.contracts.messages import messages, same
 
+COVERS = (
+    "foretwin.contracts.arrays",
+    "foretwin.contracts.drive",
+    "foretwin.contracts.gap",
+    "foretwin.contracts.planner_link",
+    "foretwin.contracts.provenance",
+    "foretwin.contracts.side_by_side",
+    "foretwin.contracts.signals",
+    "foretwin.contracts.simulation",
+    "foretwin.contracts.towards_vehicle",
+    "foretwin.contracts.tuning",
+    "foretwin.contracts.world",
+)
+
 KINDS = {channel.kind for channel in CHANNELS.values()}
 KINDS |= {channel.reply for channel in CHANNELS.values() if channel.reply is not None}
 KINDS |= {World, VehicleParameters}
@@ -65,9 +79,13 @@ def test_equal_messages_have_equal_content_whatever_their_header() -> None:
 @pytest.mark.parametrize("array", [np.ones((2, 3))[:, ::2], np.arange(3, dtype=">f8")])
 def test_arrays_of_any_layout_arrive_contiguous_and_little_endian(array: np.ndarray) -> None:
     plan = PlannedTrajectory(
-        stamp_ns=0, time_from_stamp_s=array, lat_deg=array, lon_deg=array, yaw_rad=array,
+        stamp_ns=0,
+        time_from_stamp_s=array,
+        lat_deg=array,
+        lon_deg=array,
+        yaw_rad=array,
         speed_mps=array,
-    )  # fmt: skip
+    )
 
     arrived = decode(encode(plan), PlannedTrajectory).message.yaw_rad
 

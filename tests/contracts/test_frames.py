@@ -107,10 +107,15 @@ def test_ecef_follows_the_closed_formula(lat: float, lon: float, alt: float) -> 
     e2 = f * (2.0 - f)
     phi, lam = math.radians(lat), math.radians(lon)
     n = a / math.sqrt(1.0 - e2 * math.sin(phi) ** 2)
-    xyz = np.array([
-        [(n + alt) * math.cos(phi) * math.cos(lam), (n + alt) * math.cos(phi) * math.sin(lam),
-         (n * (1.0 - e2) + alt) * math.sin(phi)]
-    ])  # fmt: skip
+    xyz = np.array(
+        [
+            [
+                (n + alt) * math.cos(phi) * math.cos(lam),
+                (n + alt) * math.cos(phi) * math.sin(lam),
+                (n * (1.0 - e2) + alt) * math.sin(phi),
+            ]
+        ]
+    )
 
     got_lat, got_lon, got_alt = geo_from_ecef(xyz)[0]
 
@@ -119,9 +124,12 @@ def test_ecef_follows_the_closed_formula(lat: float, lon: float, alt: float) -> 
 
 
 @given(
-    source=FRAMES, east_m=st.floats(-2000.0, 2000.0), north_m=st.floats(-2000.0, 2000.0),
-    x_m=st.floats(-500.0, 500.0), yaw_rad=YAWS,
-)  # fmt: skip
+    source=FRAMES,
+    east_m=st.floats(-2000.0, 2000.0),
+    north_m=st.floats(-2000.0, 2000.0),
+    x_m=st.floats(-500.0, 500.0),
+    yaw_rad=YAWS,
+)
 def test_there_and_back_between_two_frames(
     source: LocalFrame, east_m: float, north_m: float, x_m: float, yaw_rad: float
 ) -> None:

@@ -35,9 +35,18 @@ def test_no_two_channels_share_a_key() -> None:
 
 def test_what_a_vehicle_sends() -> None:
     assert TELEMETRY_CHANNELS == (
-        "gnss", "imu", "speed", "heading", "steering", "control", "plan", "status", "objects",
-        "signals", "end",
-    )  # fmt: skip
+        "gnss",
+        "imu",
+        "speed",
+        "heading",
+        "steering",
+        "control",
+        "plan",
+        "status",
+        "objects",
+        "signals",
+        "end",
+    )
 
 
 def test_keys_in_full() -> None:

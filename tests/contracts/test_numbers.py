@@ -39,10 +39,12 @@ def test_neutral_numbers_are_in_range_and_change_nothing() -> None:
 
 def test_a_futures_own_numbers_join_those_of_its_scenario() -> None:
     future = Future(
-        index=0, name="both", scenario_id="scp",
+        index=0,
+        name="both",
+        scenario_id="scp",
         values={"faults.friction_factor": 0.5, "faults.perception_delay_s": 0.2},
         numbers={"friction_factor": 0.5, "perception_delay_s": 0.1, "target_speed_factor": 1.1},
-    )  # fmt: skip
+    )
     found = numbers_of(future)
     assert (found["friction_factor"], found["perception_delay_s"]) == (0.25, 0.2 + 0.1)
     assert (found["target_speed_factor"], found["brake_gain"]) == (1.1, 1.0)

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from foretwin.geometry.frenet_path import FrenetPath
 
+COVERS = ("foretwin.geometry.compiled",)
+
 ARC = np.linspace(0.0, 1.5 * math.pi, 200)
 CIRCLE = FrenetPath(20.0 * np.stack([np.sin(ARC), 1.0 - np.cos(ARC)], axis=1))
 
@@ -46,11 +48,13 @@ def test_a_path_goes_on_straight_beyond_both_ends() -> None:
 
 def test_a_path_that_crosses_itself_is_followed_and_not_jumped_along() -> None:
     turn = np.linspace(0.0, 1.5 * math.pi, 60)
-    loop = np.concatenate([
-        np.stack([np.arange(-30.0, 20.0), np.zeros(50)], axis=1),
-        np.stack([20.0 + 10 * np.sin(turn), 10 - 10 * np.cos(turn)], axis=1),
-        np.stack([np.full(40, 10.0), np.arange(10.0, -30.0, -1.0)], axis=1),
-    ])  # fmt: skip
+    loop = np.concatenate(
+        [
+            np.stack([np.arange(-30.0, 20.0), np.zeros(50)], axis=1),
+            np.stack([20.0 + 10 * np.sin(turn), 10 - 10 * np.cos(turn)], axis=1),
+            np.stack([np.full(40, 10.0), np.arange(10.0, -30.0, -1.0)], axis=1),
+        ]
+    )
     path = FrenetPath(loop)
     crossing = np.array([[10.0, 0.0]])
     first = path.locate(crossing, near_arc_m=np.array([38.0])).arc_m[0]

@@ -47,8 +47,10 @@ def test_points_along(some, data):
 @given(lines, st.data())
 def test_cuts(some, data):
     shares = [sorted(data.draw(st.tuples(st.floats(0, 1), st.floats(0, 1)))) for _ in some]
-    ends = [(a * polyline.length(xy), b * polyline.length(xy))
-            for (a, b), xy in zip(shares, some, strict=True)]  # fmt: skip
+    ends = [
+        (a * polyline.length(xy), b * polyline.length(xy))
+        for (a, b), xy in zip(shares, some, strict=True)
+    ]
     found = batch.cut(Polylines.of(some), *np.array(ends).T)
     for mine, xy, (a, b) in zip(found.split(), some, ends, strict=True):
         alone = polyline.cut(xy, a, b)

@@ -21,9 +21,11 @@ def _heading(angle: float) -> np.ndarray:
 
 def _turn(start, yaw, end, end_yaw) -> tuple[np.ndarray, float]:
     found = turn_curves(
-        np.array([start], dtype=float), _heading(yaw)[None],
-        np.array([end], dtype=float), _heading(end_yaw)[None],
-    )  # fmt: skip
+        np.array([start], dtype=float),
+        _heading(yaw)[None],
+        np.array([end], dtype=float),
+        _heading(end_yaw)[None],
+    )
     (path,) = found.lines.split()
     return path, float(found.radius_m[0])
 

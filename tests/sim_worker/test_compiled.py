@@ -33,6 +33,12 @@ from foretwin.sim_worker.vehicle.reference_points import base_from_cog
 from foretwin.sim_worker.vehicle.resistance import resistance_mps2
 from tests.sim_worker.places import crossroads, job, turning_path
 
+COVERS = (
+    "foretwin.sim_worker.planners.compiled",
+    "foretwin.sim_worker.planners.tracking",
+    "foretwin.sim_worker.vehicle.compiled",
+)
+
 KERNELS: dict[str, Any] = {
     name: kernel
     for module in (compiled_geometry, compiled, compiled_pursuit, compiled_pairs)

@@ -12,6 +12,13 @@ from foretwin.sim_worker.planners.registry import load_planner, planner_names
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.places import crossroads, happening, job, state_at, turning_path
 
+COVERS = (
+    "foretwin.sim_worker.planner_interface",
+    "foretwin.sim_worker.planners.constant_speed",
+    "foretwin.sim_worker.planners.pure_pursuit_idm",
+    "foretwin.sim_worker.planners.registry",
+)
+
 
 @pytest.fixture(scope="module")
 def stage() -> Stage:

@@ -31,11 +31,14 @@ from foretwin.sim_worker.futures.run_job import result_digest, run_job
 from foretwin.sim_worker.mirror.process import serve_mirror
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.worker import StageCache, serve_futures
+from foretwin.sim_worker.world_file import load_world
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.driving import altered
 from tests.sim_worker.places import FRAME, crossroads, job, state_at
 from tests.starvation import unhindered_wait_s
+
+COVERS = ("foretwin.sim_worker.world_file",)
 
 CAR = load_vehicle()
 RUN = {"run": "r1"}
@@ -136,12 +139,19 @@ def test_the_cache_keeps_the_worlds_used_last(folder: Path) -> None:
     for name in "abc":
         world = msgspec.structs.replace(crossroads(), id=name)
         write_message(world, folder / f"{name}.world")
-    cache = StageCache(folder, CAR, nsim=2, kept=2)
+    setup = msgspec.structs.replace(_setup(folder), simulations=2, kept_worlds=2)
+    cache = StageCache(setup, CAR)
     first = cache.get("a")
     cache.get("b")
     assert cache.get("a") is first
     cache.get("c")
-    assert ("a" in cache, "b" in cache, "c" in cache, len(cache)) == (True, False, True, 2)
+    assert cache.world_ids == ("a", "c")
+
+
+@pytest.mark.parametrize("world_id", ["", "../secret", "a\\\\b", ".hidden"])
+def test_a_worlds_id_names_a_file_of_its_folder_and_no_other(folder: Path, world_id: str) -> None:
+    with pytest.raises(FileNotFoundError, match="names no file in"):
+        load_world(folder, world_id)
 
 
 def _drive_past(bus: Bus, *, count: int = 101) -> None:

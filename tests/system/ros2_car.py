@@ -14,6 +14,7 @@ from foretwin.contracts.mailbox import Mailbox
 from foretwin.orchestrator.embedded import ROUTE_FILE
 from foretwin.telemetry.logs import read_line
 from foretwin.telemetry.ros_messages.parts import (
+    NAV_SAT_FIX,
     STEERING_REPORT,
     VELOCITY_REPORT,
     ros_type,
@@ -84,8 +85,8 @@ class Ros2Car:
         stamp_ns = time.time_ns()
         if self._turn % 5 == 0:
             fix = drive.GnssFix(stamp_ns=stamp_ns, position=self.place(), std_m=0.1)
-            ((_, kind, ros),) = ros_from_gnss(fix, None)
-            self._put("sensing/gnss/ublox/nav_sat_fix", ros, kind)
+            ros = ros_from_gnss(fix, None)
+            self._put("sensing/gnss/ublox/nav_sat_fix", ros, NAV_SAT_FIX)
         speed = velocity_report(stamp_ns, speed_mps=SPEED_MPS, yaw_rate_radps=0.0)
         self._put("vehicle/status/velocity_status", speed, VELOCITY_REPORT)
         steering = ros_type(STEERING_REPORT)(stamp=time_from(stamp_ns), steering_tire_angle=0.0)

@@ -21,9 +21,7 @@ from foretwin.telemetry.ros2.mapping import AUTOWARE
 from foretwin.telemetry.ros_messages.parts import (
     LANELET_ROUTE,
     header_from,
-    point_from,
-    ros_type,
-    turn_from,
+    pose_from,
 )
 from tests.system.foretwin_command import log_lines, run_folder, started, wait_for
 from tests.system.ros2_car import Ros2Car
@@ -38,16 +36,14 @@ def lanelet_route(line_deg: np.ndarray, map_frame: LocalFrame) -> bytes:
 
     def pose(at: np.ndarray, course: np.ndarray) -> object:
         yaw = float(np.arctan2(course[1], course[0]))
-        return ros_type("geometry_msgs/msg/Pose")(
-            position=point_from(float(at[0]), float(at[1]), 0.0), orientation=turn_from(yaw)
-        )
+        return pose_from(float(at[0]), float(at[1]), 0.0, yaw)
 
     return cdr(
-        LANELET_ROUTE, header=header_from(time.time_ns(), "map"),
-        start_pose=pose(xy_m[0], xy_m[1] - xy_m[0]), goal_pose=pose(xy_m[-1], xy_m[-1] - xy_m[-2]),
-        segments=[], allow_modification=False,
-        uuid=ros_type("unique_identifier_msgs/msg/UUID")(uuid=np.zeros(16, dtype=np.uint8)),
-    )  # fmt: skip
+        LANELET_ROUTE,
+        header=header_from(time.time_ns(), "map"),
+        start_pose=pose(xy_m[0], xy_m[1] - xy_m[0]),
+        goal_pose=pose(xy_m[-1], xy_m[-1] - xy_m[-2]),
+    )
 
 
 @pytest.mark.judge

@@ -37,18 +37,22 @@ def ros_from_status(message: drive.VehicleStatus) -> list[tuple[str, Any]]:
     """
     stamp = time_from(message.stamp_ns)
     reports = [
-        (CONTROL_MODE_REPORT, ros_type(CONTROL_MODE_REPORT)(
-            stamp=stamp, mode=_MODES[message.control_mode])),
+        (
+            CONTROL_MODE_REPORT,
+            ros_type(CONTROL_MODE_REPORT)(stamp=stamp, mode=_MODES[message.control_mode]),
+        ),
         (GEAR_REPORT, ros_type(GEAR_REPORT)(stamp=stamp, report=_GEARS[message.gear])),
-    ]  # fmt: skip
+    ]
     if message.indicator != "unknown":
         hazard = message.indicator == "hazard"
         side = _INDICATORS["off" if hazard else message.indicator]
         reports += [
             (TURN_INDICATORS_REPORT, ros_type(TURN_INDICATORS_REPORT)(stamp=stamp, report=side)),
-            (HAZARD_LIGHTS_REPORT, ros_type(HAZARD_LIGHTS_REPORT)(
-                stamp=stamp, report=2 if hazard else 1)),
-        ]  # fmt: skip
+            (
+                HAZARD_LIGHTS_REPORT,
+                ros_type(HAZARD_LIGHTS_REPORT)(stamp=stamp, report=2 if hazard else 1),
+            ),
+        ]
     return reports
 
 

@@ -19,9 +19,14 @@ from tests.telemetry.standin_drive import FRAME, Drive
 
 Sample = tuple[str, Any]
 LEGS = (
-    (90.0, 0.0), (6.0 * math.pi, 1 / 12), (70.0, 0.0), (7.5 * math.pi, -1 / 15), (60.0, 0.0),
-    (95.0, 1 / 32), (90.0, 0.0),
-)  # fmt: skip
+    (90.0, 0.0),
+    (6.0 * math.pi, 1 / 12),
+    (70.0, 0.0),
+    (7.5 * math.pi, -1 / 15),
+    (60.0, 0.0),
+    (95.0, 1 / 32),
+    (90.0, 0.0),
+)
 """Length and curvature of each."""
 STOP_AT_M = 140.0
 LONG_BEND_FROM_M = 262.5

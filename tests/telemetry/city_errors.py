@@ -77,6 +77,7 @@ def without(samples: Iterable[Sample], channel: str, from_s: float, to_s: float)
     """Return the samples but those of one channel in a stretch of the drive."""
     first, last = (START_STAMP_NS + round(at * 1e9) for at in (from_s, to_s))
     return [
-        sample for sample in samples
+        sample
+        for sample in samples
         if sample[0] != channel or not first < sample[1].stamp_ns < last
-    ]  # fmt: skip
+    ]

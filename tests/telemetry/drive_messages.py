@@ -153,9 +153,14 @@ def every_channel() -> list[tuple[str, msgspec.Struct]]:
     """Return one message of each channel that a recording holds, in stamp order."""
     at = START_NS
     user = drive.RoadUser(
-        user_id="u1", kind="car", position=GeoPoint(52.512, 13.392), yaw_rad=1.0, speed_mps=5.0,
-        length_m=4.5, width_m=1.8,
-    )  # fmt: skip
+        user_id="u1",
+        kind="car",
+        position=GeoPoint(52.512, 13.392),
+        yaw_rad=1.0,
+        speed_mps=5.0,
+        length_m=4.5,
+        width_m=1.8,
+    )
     plan = drive.PlannedTrajectory(
         stamp_ns=at + 6,
         time_from_stamp_s=np.arange(0.0, 8.0, 0.1),

@@ -114,9 +114,13 @@ def _line(name: str, drive: Heard, *, from_s: float = 0.0) -> str:
     at = drive.time_s >= from_s
     found = drive.estimator.clock
     exact_s = -FOREIGN.ahead_s - FOREIGN.fast_ppm * 1e-6 * drive.time_s[-1]
-    clock = "" if found.offset_ns is None else (
-        f"  clock {1e3 * (found.offset_ns * 1e-9 - exact_s):+.2f} ms {found.drift_ppm:+.1f} ppm"
-    )  # fmt: skip
+    clock = (
+        ""
+        if found.offset_ns is None
+        else (
+            f"  clock {1e3 * (found.offset_ns * 1e-9 - exact_s):+.2f} ms {found.drift_ppm:+.1f} ppm"
+        )
+    )
     return (
         f"{name:34s} position p50 {np.median(drive.position_m[at]):.3f} "
         f"p95 {np.percentile(drive.position_m[at], 95):.3f} m  "

@@ -52,8 +52,9 @@ def berlin(data: Path) -> Real:
     fixes = [m for _, m in log.samples() if isinstance(m, GnssFix)]
     stamps = np.array([fix.stamp_ns for fix in fixes], dtype=np.int64)
     kept = stamps - stamps[0] <= ON_MAP_S * 1e9
-    lat, lon = (np.array([getattr(f.position, name) for f in fixes]) for name in
-                ("lat_deg", "lon_deg"))  # fmt: skip
+    lat, lon = (
+        np.array([getattr(f.position, name) for f in fixes]) for name in ("lat_deg", "lon_deg")
+    )
     xy = local_from_geo(graph.frame, lat[kept], lon[kept])
     info = msgspec.structs.replace(log.info, sends=("gnss", "imu", "speed"))
     return Real(info, _turning_on_the_way(smooth_positions(stamps[kept], xy)), graph)
@@ -91,8 +92,16 @@ def phone_samples(real: Real, *, seed: int, wheels: bool) -> list[tuple[str, Any
             turning = 0.0 if stands else float(rate[row])
             turning += GYRO_BIAS_RADPS + float(random.normal(0.0, 0.002))
             force = float(accel[row] + random.normal(0.0, 0.05))
-            samples.append(("imu", ImuSample(stamp_ns=stamp, accel_mps2=(force, 0.0, 9.81),
-                                             rate_radps=(0.0, 0.0, turning))))  # fmt: skip
+            samples.append(
+                (
+                    "imu",
+                    ImuSample(
+                        stamp_ns=stamp,
+                        accel_mps2=(force, 0.0, 9.81),
+                        rate_radps=(0.0, 0.0, turning),
+                    ),
+                )
+            )
             said = 0.0 if stands else float(WHEEL_SCALE * speed[row] + random.normal(0.0, 0.02))
             samples.append(("speed", SpeedSample(stamp_ns=stamp, speed_mps=said)))
         if (stamp - first_ns) % 1_000_000_000 == 0:
@@ -119,8 +128,10 @@ def estimated(real: Real, *, seed: int, wheels: bool, roads: MapSeer | None) -> 
         place = state.position
         xy = local_from_geo(real.graph.frame, place.lat_deg, place.lon_deg)
         yaw = local_from_geo_yaw(real.graph.frame, state.yaw_rad, place.lat_deg, place.lon_deg)
-        truth = [np.interp(time_s, base, column) for column in
-                 (*track.xy_m.T, track.yaw_rad, track.speed_mps)]  # fmt: skip
+        truth = [
+            np.interp(time_s, base, column)
+            for column in (*track.xy_m.T, track.yaw_rad, track.speed_mps)
+        ]
         moves = truth[3] > 3.0
         off = abs(math.remainder(float(yaw) - truth[2], math.tau)) if moves else math.nan
         away = math.hypot(xy[0] - truth[0], xy[1] - truth[1])

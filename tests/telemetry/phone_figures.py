@@ -29,8 +29,13 @@ from tests.telemetry.town_map import Leg, MapSeer, seer
 
 DURATION_S = 600.0
 STD_M = {"3 m on each axis": 3.0, "3 m in the plane (2.1 m on each axis)": 3.0 / math.sqrt(2.0)}
-WINDOWS_S = {"30 s": (25, 35), "1 min": (50, 70), "2 min": (110, 130), "5 min": (280, 320),
-             "10 min": (560, 600)}  # fmt: skip
+WINDOWS_S = {
+    "30 s": (25, 35),
+    "1 min": (50, 70),
+    "2 min": (110, 130),
+    "5 min": (280, 320),
+    "10 min": (560, 600),
+}
 GYRO_BIAS_STD_RADPS = 2e-4
 """What two seconds of standing leave unknown of a gyro with 0.002 rad/s of white noise."""
 MAP_ERRORS_M = (1.0, 2.0)
@@ -109,13 +114,15 @@ def estimated(drive: Drive, *, seed: int, std_m: float, roads: MapSeer | None = 
         line = None if roads is None else roads.line(state)
         if line is not None:
             track.take("map", line)
-        rows.append((
-            (message.stamp_ns - START_STAMP_NS) * 1e-9,
-            float(np.hypot(*(xy_of(state) - xy_of(truth)))),
-            abs(float(wrap_angle(state.yaw_rad - truth.yaw_rad))),
-            state.position_std_m,
-            state.yaw_std_rad,
-        ))  # fmt: skip
+        rows.append(
+            (
+                (message.stamp_ns - START_STAMP_NS) * 1e-9,
+                float(np.hypot(*(xy_of(state) - xy_of(truth)))),
+                abs(float(wrap_angle(state.yaw_rad - truth.yaw_rad))),
+                state.position_std_m,
+                state.yaw_std_rad,
+            )
+        )
     return Errors(*np.array(rows, dtype=np.float64).T)
 
 
@@ -156,8 +163,9 @@ def bound(drive: Drive, *, std_m: float, perfect: bool) -> Errors:
 
 
 def _between(errors: list[Errors], window_s: tuple[int, int]) -> Errors:
-    cut = [np.array(one)[:, (one.time_s >= window_s[0]) & (one.time_s < window_s[1])]
-           for one in errors]  # fmt: skip
+    cut = [
+        np.array(one)[:, (one.time_s >= window_s[0]) & (one.time_s < window_s[1])] for one in errors
+    ]
     return Errors(*np.concatenate(cut, axis=1))
 
 
@@ -193,8 +201,9 @@ def main(arguments: list[str]) -> int:
     for name, std_m in STD_M.items():
         print(f"{name}, {len(seeds)} seeds on two drives:")
         found = [estimated(drives[k % 2], seed=100 + k, std_m=std_m) for k in seeds]
-        real, ideal = ([bound(drive, std_m=std_m, perfect=kind) for drive in drives]
-                       for kind in (False, True))  # fmt: skip
+        real, ideal = (
+            [bound(drive, std_m=std_m, perfect=kind) for drive in drives] for kind in (False, True)
+        )
         for label, window_s in WINDOWS_S.items():
             at = _between(found, window_s)
             line = (

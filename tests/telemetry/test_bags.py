@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from foretwin.contracts import drive
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.telemetry.logs import LogError, open_log
-from foretwin.telemetry.ros_messages.motion import ros_from_state
+from foretwin.telemetry.ros_messages.motion import odometry_from_state
 from foretwin.telemetry.ros_messages.objects import predicted_from_users
 from foretwin.telemetry.ros_messages.parts import (
     CONTROL_MODE_REPORT,
@@ -36,6 +36,13 @@ from foretwin.telemetry.ros_messages.parts import (
 from tests.telemetry import drive_messages
 from tests.telemetry.autoware_messages import ros_from_signals, transform_message
 from tests.telemetry.test_foreign_mcap import START_NS, ForeignFile, fix, velocity
+
+COVERS = (
+    "foretwin.telemetry.logs.ros_bag",
+    "foretwin.telemetry.logs.ros_log",
+    "foretwin.telemetry.logs.write_bag",
+    "foretwin.telemetry.logs.map_origin",
+)
 
 MS = 10**6
 
@@ -110,10 +117,12 @@ def test_a_ros1_bag_is_read(tmp_path: Path) -> None:
             ros = types[NAV_SAT_FIX](
                 header=head,
                 status=types["sensor_msgs/msg/NavSatStatus"](status=0, service=1),
-                latitude=52.5, longitude=13.4, altitude=30.0,
+                latitude=52.5,
+                longitude=13.4,
+                altitude=30.0,
                 position_covariance=fix(0, 52.5).position_covariance,
                 position_covariance_type=2,
-            )  # fmt: skip
+            )
             writer.write(fixes, sec * 10**9, store.serialize_ros1(ros, NAV_SAT_FIX))
             twist = types[TWIST_STAMPED](
                 header=head,
@@ -209,9 +218,14 @@ def test_bytes_that_are_no_message_are_counted(tmp_path: Path) -> None:
 
 def test_objects_without_a_known_frame_are_counted(tmp_path: Path) -> None:
     user = drive.RoadUser(
-        user_id="u", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=1.0,
-        length_m=4.0, width_m=2.0,
-    )  # fmt: skip
+        user_id="u",
+        kind="car",
+        position=GeoPoint(52.5, 13.4),
+        yaw_rad=0.0,
+        speed_mps=1.0,
+        length_m=4.0,
+        width_m=2.0,
+    )
     frame = LocalFrame(GeoPoint(52.5, 13.4))
     objects = predicted_from_users(drive.RoadUsers(stamp_ns=START_NS, users=(user,)), frame)
     messages = [
@@ -240,7 +254,7 @@ def test_objects_without_a_known_frame_are_counted(tmp_path: Path) -> None:
 def test_a_recording_without_a_receiver_is_placed_by_its_odometry(tmp_path: Path) -> None:
     frame = LocalFrame(GeoPoint(52.5, 13.4))
     state = drive_messages.state(START_NS)
-    odometry = ros_from_state(state, frame)[0][2]
+    odometry = odometry_from_state(state, frame)
     bag = write_bag(
         tmp_path / "bag", StoragePlugin.SQLITE3, [("/odometry", ODOMETRY, odometry, START_NS)]
     )

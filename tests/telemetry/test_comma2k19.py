@@ -9,6 +9,8 @@ import pytest
 
 from foretwin.telemetry.logs import LogError, open_log
 
+COVERS = ("foretwin.telemetry.logs.comma2k19",)
+
 
 def save(path: Path, array: object) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -31,11 +33,16 @@ def test_bad_values_are_counted(segment: Path) -> None:
     log = open_log(segment)
     found = [(channel, message.stamp_ns) for channel, message in log.samples()]  # type: ignore[attr-defined]
     assert found == [
-        ("gnss", 10_000_000_000), ("speed", 10_000_000_000), ("gnss", 10_200_000_000),
-    ]  # fmt: skip
+        ("gnss", 10_000_000_000),
+        ("speed", 10_000_000_000),
+        ("gnss", 10_200_000_000),
+    ]
     assert log.skipped == {
-        "time before zero": 1, "time backwards": 1, "position not finite": 1, "value not finite": 1,
-    }  # fmt: skip
+        "time before zero": 1,
+        "time backwards": 1,
+        "position not finite": 1,
+        "value not finite": 1,
+    }
     assert log.info.sends == ("gnss", "speed")
     assert (log.info.start_stamp_ns, log.info.end_stamp_ns) == (10_000_000_000, 10_300_000_000)
 

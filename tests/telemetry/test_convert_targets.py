@@ -20,6 +20,8 @@ from foretwin.telemetry.logs.write_mcap import create
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 from tests.telemetry.test_drive_mcap import assert_same
 
+COVERS = ("foretwin.telemetry.logs.write_csv",)
+
 NAMES: dict[Target, str] = {"mcap": "out.mcap", "ros1": "out.bag", "ros2": "out", "csv": "out.csv"}
 
 
@@ -163,7 +165,10 @@ def test_rerun_converts_what_was_a_bag(recorded: Path, tmp_path: Path) -> None:
     rerun, rrd = Path(sys.executable).with_name("rerun"), tmp_path / "again.rrd"
     done = subprocess.run(
         [rerun, "mcap", "convert", str(tmp_path / "again.mcap"), "-o", str(rrd)],
-        capture_output=True, text=True, timeout=240, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert rrd.stat().st_size > 1000

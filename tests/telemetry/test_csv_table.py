@@ -11,6 +11,13 @@ import pytest
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.telemetry.logs import LogError, open_log
 
+COVERS = (
+    "foretwin.telemetry.logs.csv_table",
+    "foretwin.telemetry.logs.declaration",
+    "foretwin.telemetry.logs.units",
+    "foretwin.telemetry.logs.columns",
+)
+
 DECLARATION = """
 reference_point = "antenna on the roof"
 body_from_antenna_m = [1.2, 0.0, 1.5]

@@ -19,9 +19,16 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.telemetry.logs import LogError, open_log
 from foretwin.telemetry.logs.write_mcap import create
-from foretwin.telemetry.ros_messages.table import messages_from, written
+from foretwin.telemetry.ros_messages.table import messages_from
 from tests.telemetry.drive_messages import INFO, START_NS, every_channel, samples
 from tests.telemetry.own_recordings import message_from, read_drive
+
+COVERS = (
+    "foretwin.telemetry.logs.write_mcap",
+    "foretwin.telemetry.logs.mcap_records",
+    "foretwin.telemetry.ros_messages.table",
+    "foretwin.telemetry.ros_messages.sensors",
+)
 
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
 
@@ -62,7 +69,9 @@ def test_every_message_survives_ros(sample: tuple[str, msgspec.Struct]) -> None:
 
 
 def test_all_of_telemetry_can_be_written() -> None:
-    assert set(written()) == {*TELEMETRY_CHANNELS, "state"}
+    assert {channel for channel, _ in every_channel()} == {*TELEMETRY_CHANNELS, "state"}
+    for channel, message in every_channel():
+        assert messages_from(channel, message, FRAME)
 
 
 def write(path: Path, messages: list[tuple[str, msgspec.Struct]]) -> Path:
@@ -183,8 +192,11 @@ def test_rerun_converts_it(recorded: Path, tmp_path: Path) -> None:
     rerun = Path(sys.executable).with_name("rerun")
     done = subprocess.run(
         [rerun, "mcap", "convert", str(recorded), "-o", str(rrd)],
-        capture_output=True, text=True, timeout=240, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert rrd.stat().st_size > 1000
     for topic in ("gnss", "imu", "steering", "control", "plan", "state"):

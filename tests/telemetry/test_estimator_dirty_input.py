@@ -23,6 +23,11 @@ from tests.telemetry.position_track import (
     yaw,
 )
 
+COVERS = (
+    "foretwin.telemetry.estimator.measured",
+    "foretwin.telemetry.estimator.position_gate",
+)
+
 
 def test_wild_positions_are_skipped_and_counted() -> None:
     samples = along(circle, 10.0)
@@ -30,14 +35,24 @@ def test_wild_positions_are_skipped_and_counted() -> None:
     zero = GnssFix(stamp_ns=3_010_000_000, position=GeoPoint(0.0, 0.0))
     late = GnssFix(stamp_ns=1_000_000_000, position=samples[0][1].position)
     dirty = [
-        *samples[:11], ("gnss", nowhere), *samples[11:16], ("gnss", zero),
-        *samples[16:20], ("gnss", late), *samples[20:25], fix(4.9, 500.0, 500.0), *samples[25:],
-    ]  # fmt: skip
+        *samples[:11],
+        ("gnss", nowhere),
+        *samples[11:16],
+        ("gnss", zero),
+        *samples[16:20],
+        ("gnss", late),
+        *samples[20:25],
+        fix(4.9, 500.0, 500.0),
+        *samples[25:],
+    ]
     estimator = StateEstimator(info())
     states = [estimator.handle(channel, message) for channel, message in dirty]
     assert estimator.skipped == {
-        "gnss_not_finite": 1, "gnss_zero": 1, "gnss_time_backwards": 1, "gnss_jump": 1,
-    }  # fmt: skip
+        "gnss_not_finite": 1,
+        "gnss_zero": 1,
+        "gnss_time_backwards": 1,
+        "gnss_jump": 1,
+    }
     assert [state for state in states if state] == states_of(samples)
 
 
@@ -133,9 +148,10 @@ def stepped(samples: list[Sample], *, from_s: float, by_s: float) -> list[Sample
     """Return the samples with the clock of all after `from_s` set by `by_s`."""
     return [
         (channel, msgspec.structs.replace(message, stamp_ns=message.stamp_ns + round(by_s * 1e9)))
-        if message.stamp_ns >= from_s * 1e9 else (channel, message)
+        if message.stamp_ns >= from_s * 1e9
+        else (channel, message)
         for channel, message in samples
-    ]  # fmt: skip
+    ]
 
 
 def received(estimator: StateEstimator, samples: list[Sample], times: list[Sample]) -> list:
@@ -177,8 +193,11 @@ def test_a_channel_that_changes_its_type_is_counted_and_survived() -> None:
     ]
     states = [estimator.handle(*sample) for sample in clean[:12] + wrong + clean[12:]]
     assert estimator.skipped == {
-        "speed_wrong_type": 1, "gnss_wrong_type": 1, "imu_wrong_type": 1, "steering_wrong_type": 1,
-    }  # fmt: skip
+        "speed_wrong_type": 1,
+        "gnss_wrong_type": 1,
+        "imu_wrong_type": 1,
+        "steering_wrong_type": 1,
+    }
     assert [state for state in states if state] == states_of(clean)
 
 

@@ -16,6 +16,12 @@ from foretwin.telemetry.logs import Log, open_log
 from tests.telemetry.estimator_figures import boreas
 from tests.telemetry.smoothing import SmoothedTrack, smooth_positions
 
+COVERS = (
+    "foretwin.telemetry.estimator.kinematic_filter",
+    "foretwin.telemetry.estimator.motion_corrections",
+    "foretwin.telemetry.estimator.motion_noise",
+)
+
 pytestmark = pytest.mark.real_data
 DECLARATIONS = Path(__file__).parents[1] / "data" / "declarations"
 

@@ -24,6 +24,11 @@ from foretwin.telemetry.ros_messages.parts import (
 )
 from foretwin.telemetry.ros_messages.table import messages_from
 
+COVERS = (
+    "foretwin.telemetry.logs.foreign_ros",
+    "foretwin.telemetry.logs.ros_recording",
+)
+
 START_NS = 1_772_359_200_000_000_000
 LAG_NS = 30_000_000
 
@@ -145,8 +150,10 @@ def test_no_fix_zero_stamp_and_imu_without_values(tmp_path: Path) -> None:
     found = list(log.samples())
     assert [(channel, m.stamp_ns) for channel, m in found] == [("gnss", START_NS + 10**9)]  # type: ignore[attr-defined]
     assert log.skipped == {
-        "receiver without fix": 1, "imu without values": 1, "position not finite": 1,
-    }  # fmt: skip
+        "receiver without fix": 1,
+        "imu without values": 1,
+        "position not finite": 1,
+    }
 
 
 def test_a_file_without_positions_is_no_log(tmp_path: Path) -> None:

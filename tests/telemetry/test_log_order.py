@@ -12,6 +12,11 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.telemetry.logs.log import Sample, screened
 from foretwin.telemetry.logs.merge import merged, reordered, stamp_ns_of
 
+COVERS = (
+    "foretwin.telemetry.logs.log",
+    "foretwin.telemetry.logs.merge",
+)
+
 
 def speed(stamp_ns: int) -> Sample:
     return "speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=1.0)

@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from foretwin.telemetry.logs import Log, LogError, open_log
 from foretwin.telemetry.logs.nmea import CHECKSUM_WRONG, Sentence, sentence_of
 
+COVERS = ("foretwin.telemetry.logs.nmea",)
+
 NOON_NS = 1_772_366_400 * 10**9
 """2026-03-01T12:00:00Z."""
 
@@ -142,9 +144,11 @@ def test_what_is_refused_is_counted(tmp_path: Path) -> None:
         gga("120006"),
     )
     assert log.skipped == {
-        "sentence before any time": 1, "checksum wrong": 1, "receiver without fix": 3,
+        "sentence before any time": 1,
+        "checksum wrong": 1,
+        "receiver without fix": 3,
         "unreadable row": 1,
-    }  # fmt: skip
+    }
     assert [fix.stamp_ns for fix in found["gnss"]] == [NOON_NS + 6 * 10**9]
 
 

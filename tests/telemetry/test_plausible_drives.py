@@ -123,8 +123,9 @@ def test_road_users_move_as_fast_as_they_are_said_to(data_dir: Path) -> None:
             frame = LocalFrame(GeoPoint(float(track.lat_deg[0]), float(track.lon_deg[0])))
             xy = np.asarray(local_from_geo(frame, track.lat_deg, track.lon_deg))
             way_m = np.hypot(*np.diff(xy, axis=0).T)[together].sum()
-            said_m = (0.5 * (track.speed_mps[1:] + track.speed_mps[:-1])
-                      * np.diff(track.stamps_ns) / 1e9)[together].sum()  # fmt: skip
+            said_m = (
+                0.5 * (track.speed_mps[1:] + track.speed_mps[:-1]) * np.diff(track.stamps_ns) / 1e9
+            )[together].sum()
             if way_m > 30.0 and track.kind == "car":
                 ratios.append(said_m / way_m)
     assert len(ratios) > 3

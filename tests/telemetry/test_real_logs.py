@@ -93,8 +93,12 @@ class TestComma2k19:
     def test_channels_and_clock(self, data_dir: Path, comma: dict[str, list[Any]]) -> None:
         counts = {channel: len(messages) for channel, messages in comma.items()}
         assert counts == {
-            "gnss": 1200, "heading": 1200, "imu": 6256, "speed": 4974, "steering": 4974,
-        }  # fmt: skip
+            "gnss": 1200,
+            "heading": 1200,
+            "imu": 6256,
+            "speed": 4974,
+            "steering": 4974,
+        }
         info = open_log(data_dir / "drive-comma2k19-sf" / "segment40").info
         assert info.time_base == "boot"
         assert info.reference_point == "camera"

@@ -22,6 +22,11 @@ from foretwin.telemetry.logs import LogError, open_road_users
 from foretwin.telemetry.logs.road_users import RoadUserTrack
 from foretwin.telemetry.logs.write_mcap import create
 
+COVERS = (
+    "foretwin.telemetry.logs.road_users",
+    "foretwin.telemetry.logs.mcity",
+)
+
 HERE = LocalFrame(GeoPoint(42.300947, -83.698649))
 START_S = 1_688_680_000.0
 
@@ -103,9 +108,14 @@ def test_what_a_car_detected_is_in_its_recording(tmp_path: Path) -> None:
         for k in range(10):
             lat, lon = geo_from_local(HERE, np.array([1.0, -k]))
             user = RoadUser(
-                user_id="u", kind="bus", position=GeoPoint(float(lat), float(lon)), yaw_rad=-1.5,
-                speed_mps=9.0, length_m=12.0, width_m=2.5,
-            )  # fmt: skip
+                user_id="u",
+                kind="bus",
+                position=GeoPoint(float(lat), float(lon)),
+                yaw_rad=-1.5,
+                speed_mps=9.0,
+                length_m=12.0,
+                width_m=2.5,
+            )
             message = RoadUsers(stamp_ns=k * 100_000_000, users=(user,) if k != 5 else ())
             writer.add("objects", message)
     log = open_road_users(tmp_path / "drive.mcap")

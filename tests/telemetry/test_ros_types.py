@@ -13,6 +13,8 @@ from foretwin.telemetry.ros_messages import parts as ros_parts
 from foretwin.telemetry.ros_messages.parts import ros_type, time_from, typestore
 from tests.telemetry.ros_strategies import messages
 
+COVERS = ("foretwin.telemetry.ros_messages.parts",)
+
 KINDS = (
     ros_parts.NAV_SAT_FIX,
     ros_parts.IMU,
@@ -70,22 +72,36 @@ def test_bytes_of_reports_are_as_xcdr1_says() -> None:
 def test_control_is_laid_out_as_its_three_parts() -> None:
     now = time_from(5_000_000_007)
     lateral = ros_type("autoware_control_msgs/msg/Lateral")(
-        stamp=now, control_time=now, steering_tire_angle=0.5, steering_tire_rotation_rate=0.25,
+        stamp=now,
+        control_time=now,
+        steering_tire_angle=0.5,
+        steering_tire_rotation_rate=0.25,
         is_defined_steering_tire_rotation_rate=True,
-    )  # fmt: skip
+    )
     longitudinal = ros_type("autoware_control_msgs/msg/Longitudinal")(
-        stamp=now, control_time=now, velocity=8.0, acceleration=-1.5, jerk=0.0,
-        is_defined_acceleration=True, is_defined_jerk=False,
-    )  # fmt: skip
+        stamp=now,
+        control_time=now,
+        velocity=8.0,
+        acceleration=-1.5,
+        jerk=0.0,
+        is_defined_acceleration=True,
+        is_defined_jerk=False,
+    )
     control = ros_type(ros_parts.CONTROL)(
         stamp=now, control_time=now, lateral=lateral, longitudinal=longitudinal
     )
     time = struct.pack("<iI", 5, 7)
     assert bytes(typestore().serialize_cdr(control, ros_parts.CONTROL)) == (
-        bytes([0, 1, 0, 0]) + time + time
-        + time + time + struct.pack("<ff?xxx", 0.5, 0.25, True)
-        + time + time + struct.pack("<fff??", 8.0, -1.5, 0.0, True, False)
-    )  # fmt: skip
+        bytes([0, 1, 0, 0])
+        + time
+        + time
+        + time
+        + time
+        + struct.pack("<ff?xxx", 0.5, 0.25, True)
+        + time
+        + time
+        + struct.pack("<fff??", 8.0, -1.5, 0.0, True, False)
+    )
 
 
 @pytest.mark.parametrize(

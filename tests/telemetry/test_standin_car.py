@@ -9,6 +9,8 @@ import pytest
 from foretwin.telemetry.standin.car import STEP_S, CarMotion, MultiBodyCar
 from foretwin.telemetry.standin.parameters import read_parameters
 
+COVERS = ("foretwin.telemetry.standin.car",)
+
 
 def drive(car: MultiBodyCar, duration_s: float, *, accel: float, wheel: float) -> list[CarMotion]:
     motions = []

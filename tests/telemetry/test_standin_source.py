@@ -15,6 +15,14 @@ from foretwin.telemetry.standin.parameters import read_parameters
 from foretwin.telemetry.standin.path import DrivenPath, read_path
 from tests.telemetry.standin_drive import FRAME, STOP_AT_M, new_source, whole_drive, wished_path
 
+COVERS = (
+    "foretwin.telemetry.standin.driver",
+    "foretwin.telemetry.standin.parameters",
+    "foretwin.telemetry.standin.path",
+    "foretwin.telemetry.standin.sensors",
+    "foretwin.telemetry.standin.source",
+)
+
 
 def xy_of(state: VehicleState) -> np.ndarray:
     return local_from_geo(FRAME, state.position.lat_deg, state.position.lon_deg)

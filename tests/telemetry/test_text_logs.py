@@ -10,6 +10,15 @@ import pytest
 
 from foretwin.telemetry.logs import LogError, line_of_log, open_log, read_line
 
+COVERS = (
+    "foretwin.telemetry.logs",
+    "foretwin.telemetry.logs.geojson",
+    "foretwin.telemetry.logs.gpx",
+    "foretwin.telemetry.logs.smartloc",
+    "foretwin.telemetry.logs.route_line",
+    "foretwin.telemetry.logs.opening",
+)
+
 GPX = """<?xml version="1.0"?>
 <gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1">
 <rte><rtept lat="52.0" lon="13.0"/><rtept lat="52.1" lon="13.1"/></rte>
@@ -35,8 +44,10 @@ def test_gpx_track_is_a_log_in_utc(tmp_path: Path) -> None:
     log = open_log(write(tmp_path, "ride.gpx", GPX.format(track=TRACK)))
     samples = list(log.samples())
     assert [m.stamp_ns - log.info.start_stamp_ns for _, m in samples] == [  # type: ignore[attr-defined]
-        0, 250_000_000, 2_000_000_000,
-    ]  # fmt: skip
+        0,
+        250_000_000,
+        2_000_000_000,
+    ]
     assert log.info.start_stamp_ns == 1_772_359_200_000_000_000
     assert log.info.time_base == "utc"
     assert log.skipped == {"position (0, 0)": 1, "time backwards": 1, "unreadable row": 1}
@@ -74,8 +85,9 @@ def test_geojson_line_with_times_is_a_log(tmp_path: Path, name: str, times: list
     log = open_log(write(tmp_path, "drive.geojson", feature(**{name: times})))
     fixes = [message for _, message in log.samples()]
     assert [fix.stamp_ns for fix in fixes] == [  # type: ignore[attr-defined]
-        1_772_359_200_000_000_000, 1_772_359_201_000_000_000,
-    ]  # fmt: skip
+        1_772_359_200_000_000_000,
+        1_772_359_201_000_000_000,
+    ]
     assert line_of_log(log).lon_deg.tolist() == [13.4, 13.5]
 
 
@@ -117,8 +129,11 @@ def test_smartloc_counts_what_it_cannot_use(tmp_path: Path) -> None:
     stamps = [message.stamp_ns for _, message in log.samples()]  # type: ignore[attr-defined]
     assert stamps == [0, 800_000_000, 1_000_000_000]
     assert log.skipped == {
-        "unreadable row": 2, "position not finite": 2, "time doubled": 1, "time backwards": 1,
-    }  # fmt: skip
+        "unreadable row": 2,
+        "position not finite": 2,
+        "time doubled": 1,
+        "time backwards": 1,
+    }
 
 
 def test_files_that_are_no_log(tmp_path: Path) -> None:

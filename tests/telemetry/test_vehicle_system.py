@@ -26,6 +26,8 @@ from tests.contracts.bus_sides import DEADLINE_S
 from tests.starvation import kept_waiting
 from tests.telemetry.standin_drive import wished_path
 
+COVERS = ("foretwin.telemetry.standin.__main__",)
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

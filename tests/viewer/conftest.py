@@ -44,11 +44,18 @@ class ViewerRun:
         bus_setup = BusSetup(endpoint=free_endpoint(), lossless=True)
         self.bus = ZenohBus(bus_setup, router=True)
         setup = ViewerSetup(
-            run_id=RUN, process_id="viewer", vehicle_id=VEHICLE, bus=bus_setup,
-            log_file=str(self.log), file=str(self.recording), worlds_dir=str(worlds),
-            drive_frame=scene.DRIVE_FRAME, live=live, title="hand-made drive",
+            run_id=RUN,
+            process_id="viewer",
+            vehicle_id=VEHICLE,
+            bus=bus_setup,
+            log_file=str(self.log),
+            file=str(self.recording),
+            worlds_dir=str(worlds),
+            drive_frame=scene.DRIVE_FRAME,
+            live=live,
+            title="hand-made drive",
             start_stamp_ns=start_stamp_ns,
-        )  # fmt: skip
+        )
         write_setup(setup, folder / "viewer.json")
         alive = Mailbox(8)
         self.bus.watch_alive(alive_key(run=RUN, process="viewer"), alive)

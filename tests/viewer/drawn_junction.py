@@ -95,11 +95,25 @@ def junction() -> World:
                 )
     road = np.array(
         [
-            [-far, -4], [-5, -4], [-4, -5], [-4, -far], [4, -far], [4, -5], [5, -4], [far, -4],
-            [far, 4], [5, 4], [4, 5], [4, far], [-4, far], [-4, 5], [-5, 4], [-far, 4],
+            [-far, -4],
+            [-5, -4],
+            [-4, -5],
+            [-4, -far],
+            [4, -far],
+            [4, -5],
+            [5, -4],
+            [far, -4],
+            [far, 4],
+            [5, 4],
+            [4, 5],
+            [4, far],
+            [-4, far],
+            [-4, 5],
+            [-5, 4],
+            [-far, 4],
         ],
         dtype=np.float64,
-    )  # fmt: skip
+    )
     summary = IntersectionSummary(
         id="x1",
         kind="crossing",
@@ -120,25 +134,41 @@ def junction() -> World:
         lanes=lanes,
         connections=connections,
         stop_lines=(
-            StopLine(id="s1", lane_id="w_in", ends=np.array([[-9.0, 0.0], [-9.0, -4.0]]),
-                     control=Choice("signal", "inferred")),
+            StopLine(
+                id="s1",
+                lane_id="w_in",
+                ends=np.array([[-9.0, 0.0], [-9.0, -4.0]]),
+                control=Choice("signal", "inferred"),
+            ),
         ),
         crossings=(
-            Crossing(id="c1", line=np.array([[-7.0, -4.0], [-7.0, 4.0]]),
-                     width_m=Quantity(3.0, "default"), kind=Choice("zebra", "tagged")),
+            Crossing(
+                id="c1",
+                line=np.array([[-7.0, -4.0], [-7.0, 4.0]]),
+                width_m=Quantity(3.0, "default"),
+                kind=Choice("zebra", "tagged"),
+            ),
         ),
         signals=(
-            Signal(id="g1", osm_node=7, group_id="g", lane_ids=("w_in",),
-                   position=np.array([-9.0, -5.0, 5.0]), yaw_rad=np.pi, source="tagged"),
+            Signal(
+                id="g1",
+                osm_node=7,
+                group_id="g",
+                lane_ids=("w_in",),
+                position=np.array([-9.0, -5.0, 5.0]),
+                yaw_rad=np.pi,
+                source="tagged",
+            ),
         ),
         islands=(Area(id="i1", outline=_box(-5.8, 4.8, 1.0, 1.0)),),
         kerbs=(road,),
         road_surface=(Area(id="r1", outline=road),),
         junctions=(
             WorldJunction(
-                summary=summary, arms=(),
+                summary=summary,
+                arms=(),
                 area=Area(id="j1", outline=_box(-9.0, -4.0, 18.0, 8.0)),
             ),
         ),
         buildings=tuple(buildings),
-    )  # fmt: skip
+    )

@@ -152,10 +152,13 @@ def plan_at(time_s: float) -> PlannedTrajectory:
     xy = here + np.column_stack([SPEED_MPS * time, np.ones_like(time)])
     geo = geo_from_local(WORLD_FRAME, xy)
     return PlannedTrajectory(
-        stamp_ns=START_NS + round(time_s * 1e9), time_from_stamp_s=time, lat_deg=geo[:, 0].copy(),
-        lon_deg=geo[:, 1].copy(), yaw_rad=np.zeros_like(time),
+        stamp_ns=START_NS + round(time_s * 1e9),
+        time_from_stamp_s=time,
+        lat_deg=geo[:, 0].copy(),
+        lon_deg=geo[:, 1].copy(),
+        yaw_rad=np.zeros_like(time),
         speed_mps=np.full_like(time, SPEED_MPS),
-    )  # fmt: skip
+    )
 
 
 def _error(ade_m: float) -> HorizonError:
@@ -166,8 +169,15 @@ def _error(ade_m: float) -> HorizonError:
 
 def drive(*, duration_s: float = DURATION_S, world: bool = True) -> Iterator[Message]:
     """Yield the messages of the whole drive in the order of time."""
-    yield Message("event", Event(stamp_ns=START_NS, level="info", source="mission",
-                                 text="Kronenstraße / 東京通り ahead 🚗"))  # fmt: skip
+    yield Message(
+        "event",
+        Event(
+            stamp_ns=START_NS,
+            level="info",
+            source="mission",
+            text="Kronenstraße / 東京通り ahead 🚗",
+        ),
+    )
     if world:
         yield Message(
             "world",
@@ -186,35 +196,60 @@ def drive(*, duration_s: float = DURATION_S, world: bool = True) -> Iterator[Mes
         if tick % 10 == 0:
             yield Message(
                 "progress",
-                Progress(stamp_ns=stamp_ns, drive_time_s=time_s, mission_state="rounds",
-                         next_intersection="Kronenstraße / 東京通り",
-                         arrival_in_s=max(0.0, 10.0 - time_s), futures_per_s=128.0, dropped=0),
-            )  # fmt: skip
+                Progress(
+                    stamp_ns=stamp_ns,
+                    drive_time_s=time_s,
+                    mission_state="rounds",
+                    next_intersection="Kronenstraße / 東京通り",
+                    arrival_in_s=max(0.0, 10.0 - time_s),
+                    futures_per_s=128.0,
+                    dropped=0,
+                ),
+            )
         if tick % 25 == 0:
             yield Message("round", round_at(time_s))
             for worker, busy in (("w0", tick % 50 == 0), ("w1", tick % 75 == 0)):
                 yield Message(
                     "worker_status",
-                    WorkerStatus(stamp_ns=stamp_ns, worker_id=worker,
-                                 state="busy" if busy else "idle", rtf=40.0 + tick % 7),
-                )  # fmt: skip
+                    WorkerStatus(
+                        stamp_ns=stamp_ns,
+                        worker_id=worker,
+                        state="busy" if busy else "idle",
+                        rtf=40.0 + tick % 7,
+                    ),
+                )
             for horizon_s in (1.0, 2.0, 4.0, 8.0):
                 error = 0.02 * horizon_s**1.5 * (1.2 + np.sin(time_s / 2))
                 yield Message(
                     "comparison",
-                    Comparison(round_id=tick // 25, stamp_ns=stamp_ns, intersection_id="x1",
-                               horizon_s=horizon_s, nominal=_error(error),
-                               constant_velocity=_error(1.6 * error),
-                               constant_turn_rate=_error(2.0 * error)),
-                )  # fmt: skip
+                    Comparison(
+                        round_id=tick // 25,
+                        stamp_ns=stamp_ns,
+                        intersection_id="x1",
+                        horizon_s=horizon_s,
+                        nominal=_error(error),
+                        constant_velocity=_error(1.6 * error),
+                        constant_turn_rate=_error(2.0 * error),
+                    ),
+                )
             yield Message(
                 "plan_comparison",
-                PlanComparison(round_id=tick // 25, stamp_ns=stamp_ns, plan_stamp_ns=stamp_ns,
-                               horizon_s=5.0, difference=_error(1.0), path_offset_m=1.0),
-            )  # fmt: skip
+                PlanComparison(
+                    round_id=tick // 25,
+                    stamp_ns=stamp_ns,
+                    plan_stamp_ns=stamp_ns,
+                    horizon_s=5.0,
+                    difference=_error(1.0),
+                    path_offset_m=1.0,
+                ),
+            )
         if tick == 500:
-            yield Message("event", Event(stamp_ns=stamp_ns, level="warning", source="worker w1",
-                                         text="late by 120 ms"))  # fmt: skip
+            yield Message(
+                "event",
+                Event(
+                    stamp_ns=stamp_ns, level="warning", source="worker w1", text="late by 120 ms"
+                ),
+            )
     yield Message(
         "end",
         DriveEnd(stamp_ns=START_NS + round(duration_s * 1e9), published={"gnss": 200}),

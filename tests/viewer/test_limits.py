@@ -16,9 +16,18 @@ from foretwin.viewer.rows import Row
 from tests.viewer import scene
 
 QUIET = GapSample(
-    vehicle_id="car", stamp_ns=1, horizon_s=ALARM_HORIZON_S, manoeuvre="curve", along_m=0.0,
-    across_m=0.0, yaw_rad=0.0, yaw_rate_radps=0.0, speed_mps=0.0, accel_mps2=0.0, independent=True,
-)  # fmt: skip
+    vehicle_id="car",
+    stamp_ns=1,
+    horizon_s=ALARM_HORIZON_S,
+    manoeuvre="curve",
+    along_m=0.0,
+    across_m=0.0,
+    yaw_rad=0.0,
+    yaw_rate_radps=0.0,
+    speed_mps=0.0,
+    accel_mps2=0.0,
+    independent=True,
+)
 
 
 def numbers(row: Row) -> list[float]:
@@ -41,9 +50,12 @@ def alarms(**gaps: float) -> set[str]:
 
 @pytest.mark.parametrize(
     ("plot", "field", "unit"),
-    [("across_m", "across_m", 1.0), ("along_m", "along_m", 1.0),
-     ("yaw_deg", "yaw_rad", math.radians(1.0))],
-)  # fmt: skip
+    [
+        ("across_m", "across_m", 1.0),
+        ("along_m", "along_m", 1.0),
+        ("yaw_deg", "yaw_rad", math.radians(1.0)),
+    ],
+)
 def test_beyond_the_line_of_a_gap_after_2_s_is_an_alarm(plot: str, field: str, unit: float) -> None:
     rows = TuningLog().gap(QUIET, 1)
     drawn = next(numbers(row) for row in rows if row.path == f"reality/{plot}/limit")

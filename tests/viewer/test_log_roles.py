@@ -19,9 +19,15 @@ DRAWN = TwinCorrection(along_mps2=0.5, across_mps2=-0.25, yaw_radps2=0.0)
 def van(role: Role) -> MirroredVehicle:
     sample = scene.mirror_at(3.0)
     return MirroredVehicle(
-        vehicle_id="van 7", role=role, real=sample.real, shown=sample.twin, length_m=4.6,
-        width_m=1.9, height_m=2.0, rear_overhang_m=0.9,
-    )  # fmt: skip
+        vehicle_id="van 7",
+        role=role,
+        real=sample.real,
+        shown=sample.twin,
+        length_m=4.6,
+        width_m=1.9,
+        height_m=2.0,
+        rear_overhang_m=0.9,
+    )
 
 
 def sample(at_s: float = 3.0, **changes: Any) -> MirrorSample:
@@ -45,9 +51,10 @@ def test_only_who_is_there_is_drawn_once_roles_are_used() -> None:
     for role, there in (("shadow", {"shadow"}), ("all", {"twin", "shadow", "ghost"})):
         rows = by_path(log.rows(sample(role=role), 2))
         drawn = {
-            name for name in ("twin", "shadow", "ghost")
+            name
+            for name in ("twin", "shadow", "ghost")
             if scale_of(rows[f"world/ego/{name}"]) == [1.0] * 3
-        }  # fmt: skip
+        }
         assert drawn == there
 
 
@@ -67,8 +74,9 @@ def test_a_box_is_sent_as_the_role_changes_alone_and_cleared_as_the_vehicle_goes
     boxes = []
     for role in ("twin", "twin", "ghost", "ghost"):
         rows = log.rows(sample(others=(van(role),)), 1)  # type: ignore[arg-type]
-        boxes.append(sum(row.path.startswith("world/others/") and row.path.endswith("/box")
-                         for row in rows))  # fmt: skip
+        boxes.append(
+            sum(row.path.startswith("world/others/") and row.path.endswith("/box") for row in rows)
+        )
     assert boxes == [1, 0, 1, 0]
     gone = [row.path for row in log.rows(sample(), 2) if "others" in row.path]
     assert len(gone) == 2

@@ -19,6 +19,8 @@ from foretwin.viewer.log_world import (
 from foretwin.viewer.meshes import Polygon, flat_mesh, prism_mesh, triangulate
 from tests.viewer import scene
 
+COVERS = ("foretwin.viewer.meshes",)
+
 RADII = st.lists(st.floats(2.0, 30.0), min_size=3, max_size=24)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -12,39 +11,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.codec import SchemaMismatch
-from foretwin.contracts.gap import Evidence, GapSample, Verdict
 from foretwin.contracts.side_by_side import Disagreement
 from foretwin.contracts.simulation import ActiveWorld, Event, WorldNotice
-from foretwin.contracts.tuning import Identification, ParameterChange, ParameterEstimate
 from foretwin.contracts.world import World
 from foretwin.viewer.live_viewer import NoViewerError, live_viewer
 from foretwin.viewer.log_scenarios import CRITICAL, SAFE, criticality_colours, scenario_table
 from foretwin.viewer.monitor import Monitor, read_world
-from foretwin.viewer.rows import Row, plain_text
+from foretwin.viewer.rows import plain_text
 from tests.viewer import scene
+from tests.viewer.shown import Shown, monitor_of
 
-
-def _monitor(load_world: Any = lambda _id: scene.junction()) -> Monitor:
-    return Monitor(
-        drive_frame=scene.DRIVE_FRAME,
-        find_start=lambda _first: scene.START_NS,
-        title="t",
-        load_world=load_world,
-    )
-
-
-@dataclass
-class Shown:
-    """Rows by path, the last of each."""
-
-    rows: list[Row]
-
-    def __getitem__(self, path: str) -> Any:
-        return next(row for row in reversed(self.rows) if row.path == path).components
-
-    @property
-    def paths(self) -> list[str]:
-        return [row.path for row in self.rows]
+COVERS = (
+    "foretwin.viewer.log_drive",
+    "foretwin.viewer.log_run",
+    "foretwin.viewer.log_scenarios",
+    "foretwin.viewer.rows",
+)
 
 
 def _translation(transform: Any) -> np.ndarray:
@@ -52,7 +34,7 @@ def _translation(transform: Any) -> np.ndarray:
 
 
 def test_the_car_stands_where_the_mirror_says_it_is() -> None:
-    monitor = _monitor()
+    monitor = monitor_of()
     shown = Shown(monitor.handle("state", scene.state_at(7.0)))
     real = scene.mirror_at(7.0).real
     np.testing.assert_allclose(
@@ -64,13 +46,13 @@ def test_the_car_stands_where_the_mirror_says_it_is() -> None:
 
 
 def test_states_at_50_hz_are_shown_at_10_hz() -> None:
-    monitor = _monitor()
+    monitor = monitor_of()
     shown = [monitor.handle("state", scene.state_at(tick / 50.0)) for tick in range(100)]
     assert sum(bool(rows) for rows in shown) == 20
 
 
 def test_an_unknown_heading_keeps_the_last() -> None:
-    monitor = _monitor()
+    monitor = monitor_of()
     monitor.handle("state", scene.state_at(1.0))
     lost = msgspec.structs.replace(scene.state_at(2.0), yaw_rad=2.0, yaw_valid=False)
     shown = Shown(monitor.handle("state", lost))
@@ -79,7 +61,7 @@ def test_an_unknown_heading_keeps_the_last() -> None:
 
 
 def test_the_eye_leans_from_the_car_towards_the_active_junction() -> None:
-    monitor = _monitor()
+    monitor = monitor_of()
     active = ActiveWorld(stamp_ns=scene.START_NS, world_id=scene.WORLD_ID)
     monitor.handle("active_world", active)
     shown = Shown(monitor.handle("state", scene.state_at(0.0)))
@@ -92,7 +74,7 @@ def test_the_eye_leans_from_the_car_towards_the_active_junction() -> None:
 
 
 def test_open_ground_takes_the_futures_away() -> None:
-    rows = _monitor().handle("active_world", ActiveWorld(stamp_ns=scene.START_NS, world_id=None))
+    rows = monitor_of().handle("active_world", ActiveWorld(stamp_ns=scene.START_NS, world_id=None))
     assert [row.path for row in rows] == ["world/futures"]
     assert rows[0].components.is_recursive.as_arrow_array().to_pylist() == [True]  # type: ignore[attr-defined]
 
@@ -104,7 +86,7 @@ def test_a_world_is_read_once() -> None:
         read.append(world_id)
         return scene.junction()
 
-    monitor = _monitor(load)
+    monitor = monitor_of(load)
     notice = WorldNotice(world_id=scene.WORLD_ID, intersection_id="x1", file="f")
     assert len(monitor.handle("world", notice)) > 5
     assert monitor.handle("world", notice) == []
@@ -114,13 +96,13 @@ def test_a_world_is_read_once() -> None:
 
 def test_a_message_that_cannot_be_shown_is_told_as_an_event() -> None:
     broken = msgspec.structs.replace(scene.round_at(1.0), xy_m=np.zeros(3, dtype=np.float32))
-    shown = Shown(_monitor().handle("round", broken))
+    shown = Shown(monitor_of().handle("round", broken))
     assert shown.paths == ["events"]
     assert "round at 1.00 s" in str(shown["events"].text.as_arrow_array())
 
 
 def test_futures_are_one_entity_with_the_nominal_thickest() -> None:
-    shown = Shown(_monitor().handle("round", scene.round_at(3.0)))
+    shown = Shown(monitor_of().handle("round", scene.round_at(3.0)))
     futures = shown["world/futures"]
     assert len(futures.strips.as_arrow_array()) == 64
     radii = np.array(futures.radii.as_arrow_array().to_pylist())
@@ -131,7 +113,7 @@ def test_a_diverged_future_is_left_out() -> None:
     view = scene.round_at(3.0)
     xy_m = view.xy_m.copy()
     xy_m[5, 10:] = np.nan
-    shown = Shown(_monitor().handle("round", msgspec.structs.replace(view, xy_m=xy_m)))
+    shown = Shown(monitor_of().handle("round", msgspec.structs.replace(view, xy_m=xy_m)))
     assert len(shown["world/futures"].strips.as_arrow_array()) == 63
 
 
@@ -185,9 +167,11 @@ def test_the_start_is_asked_for_when_the_vehicle_first_speaks() -> None:
         return scene.START_NS
 
     monitor = Monitor(
-        drive_frame=scene.DRIVE_FRAME, find_start=find_start, title="t",
+        drive_frame=scene.DRIVE_FRAME,
+        find_start=find_start,
+        title="t",
         load_world=lambda _id: scene.junction(),
-    )  # fmt: skip
+    )
     before = Event(stamp_ns=0, level="info", source="s", text="preparing")
     early = msgspec.structs.replace(before, stamp_ns=scene.START_NS - 5)
     assert monitor.handle("event", before)[0].drive_ns == 0
@@ -197,78 +181,23 @@ def test_the_start_is_asked_for_when_the_vehicle_first_speaks() -> None:
     assert asked == [scene.START_NS + 3_000_000_000]
 
 
-def test_findings_are_drawn_by_manoeuvre_and_told_in_words() -> None:
-    monitor = _monitor()
-    stamp_ns = scene.START_NS + 5_000_000_000
-    sample = GapSample(
-        vehicle_id="ego", stamp_ns=stamp_ns, horizon_s=2.0, manoeuvre="curve", along_m=0.1,
-        across_m=-0.4, yaw_rad=0.1, yaw_rate_radps=0.0, speed_mps=0.0, accel_mps2=0.0,
-        independent=True,
-    )  # fmt: skip
-    shown = Shown(monitor.handle("gap", sample))
-    assert shown.paths == [
-        f"reality/{name}/{drawn}"
-        for name in ("across_m", "along_m", "yaw_deg") for drawn in ("curve", "limit")
-    ]  # fmt: skip
-    assert shown["reality/across_m/curve"].scalars.as_arrow_array().to_pylist() == [-0.4]
-    assert not monitor.handle("gap", msgspec.structs.replace(sample, horizon_s=8.0))
-
-    verdict = Verdict(
-        vehicle_id="ego", stamp_ns=stamp_ns, since_stamp_ns=stamp_ns, culprit="vehicle",
-        cause="steering_gain", text="turns too little", confidence=0.9,
-        evidence=(Evidence(name="gain", value=0.7, expected=1.0, std=0.02, text="by the tyre"),),
-    )  # fmt: skip
-    monitor.handle("verdict", msgspec.structs.replace(verdict, cause="brake_gain"))
-    text = _text(Shown(monitor.handle("verdict", verdict))["reality/verdict"])
-    assert text.index("steering_gain") < text.index("brake_gain"), "the newest first"
-    assert "gain: 0.7 ± 0.02, expected 1" in text
-
-
-def test_parameters_have_curves_with_intervals_and_a_table() -> None:
-    monitor = _monitor()
-    stamp_ns = scene.START_NS + 5_000_000_000
-    told = Identification(
-        vehicle_id="ego", from_stamp_ns=0, stamp_ns=stamp_ns,
-        estimates=(
-            ParameterEstimate(name="steering_ratio", value=15.3, low=15.1, high=15.5, prior=16.0),
-            ParameterEstimate(
-                name="brake_gain", value=None, low=None, high=None, prior=1.0, reason="no | grade"
-            ),
-        ),
-    )  # fmt: skip
-    shown = Shown(monitor.handle("identification", told))
-    for curve, value in (("in_use", 16.0), ("value", 15.3), ("low", 15.1), ("high", 15.5)):
-        scalars = shown[f"parameters/steering_ratio/{curve}"].scalars
-        assert scalars.as_arrow_array().to_pylist() == [value]
-    assert "parameters/brake_gain/value" not in shown.paths
-    table = _text(shown["parameters/table"])
-    assert "| steering_ratio | 16 | 15.3 | 15.1 to 15.5 |  |" in table
-    assert "| brake_gain | 1 | - |  | no / grade |" in table
-
-    change = ParameterChange(
-        vehicle_id="ego", stamp_ns=stamp_ns, name="steering_ratio", before=16.0, value=15.3,
-        std=0.1, origin="identified",
-    )  # fmt: skip
-    rows = monitor.handle("parameter", change)
-    assert [row.drive_ns for row in rows] == [4_999_999_999, 5_000_000_000, 5_000_000_000]
-
-
-def _text(document: Any) -> str:
-    (text,) = document.text.as_arrow_array().to_pylist()
-    return str(text)
-
-
 def test_where_human_and_ads_disagree_a_mark_stays() -> None:
     one = Disagreement(
-        vehicle_id="ego", segment=0, aspect="pace", kind="ads_stops",
-        stamp_ns=scene.START_NS + 2_000_000_000, end_stamp_ns=scene.START_NS + 3_000_000_000,
-        over=False, position=scene.DRIVE_FRAME.origin, junction_id=None, route_m=None,
-        lateral_m=0.0, along_m=-9.0, speed_mps=-6.0,
-    )  # fmt: skip
-    monitor = Monitor(
-        drive_frame=scene.DRIVE_FRAME, find_start=lambda _ns: scene.START_NS, title="t",
-        load_world=lambda _id: scene.junction(),
-    )  # fmt: skip
+        vehicle_id="ego",
+        segment=0,
+        aspect="pace",
+        kind="ads_stops",
+        stamp_ns=scene.START_NS + 2_000_000_000,
+        end_stamp_ns=scene.START_NS + 3_000_000_000,
+        over=False,
+        position=scene.DRIVE_FRAME.origin,
+        junction_id=None,
+        route_m=None,
+        lateral_m=0.0,
+        along_m=-9.0,
+        speed_mps=-6.0,
+    )
+    monitor = monitor_of()
     (row,) = monitor.handle("disagreement", one)
     assert row.path.startswith("world/disagreements/pace_")
     assert row.drive_ns == 2_000_000_000

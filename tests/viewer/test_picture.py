@@ -21,6 +21,8 @@ from foretwin.viewer.picture import Picture, has_vulkan, main, take_picture
 from foretwin.viewer.sinks import FileStream
 from tests.viewer import scene
 
+COVERS = ("foretwin.viewer.blueprint",)
+
 pytestmark = pytest.mark.picture
 SIZE = (1200, 800)
 AT_S = 7.0

@@ -25,6 +25,11 @@ from tests.viewer import scene
 from tests.viewer.conftest import RUN, ViewerRun, wait_until
 from tests.viewer.readback import Recorded
 
+COVERS = (
+    "foretwin.viewer.__main__",
+    "foretwin.viewer.live_viewer",
+)
+
 StartViewer = Callable[..., ViewerRun]
 
 
@@ -50,17 +55,39 @@ def test_a_whole_drive_is_in_the_file(start_viewer: StartViewer) -> None:
     world = f"/world/map/{scene.WORLD_ID}"
     assert recorded.paths >= {
         *(f"/world/ego/{car}" for car in ("real", "twin", "shadow", "ghost")),
-        *(f"/gap/{quantity}/{curve}" for quantity in ("pos_m", "yaw_deg", "speed_mps")
-          for curve in ("twin", "shadow", "limit")),
-        *(f"/comparison/ade_m/{horizon}/{name}" for horizon in (1, 2, 4, 8)
-          for name in ("nominal", "constant_velocity", "constant_turn_rate")),
-        *(f"{world}/{part}" for part in (
-            "roads/surface", "roads/lanes", "crossings", "stop_lines", "buildings", "signals",
-            "islands")),
-        "/world/ego/trail/real", "/world/futures", "/world/plan", "/scenarios/table", "/events",
-        f"/geo/roads/{scene.WORLD_ID}", "/geo/ego/real", "/status",
-        "/workers/state/w0", "/workers/rtf/w1",
-    }  # fmt: skip
+        *(
+            f"/gap/{quantity}/{curve}"
+            for quantity in ("pos_m", "yaw_deg", "speed_mps")
+            for curve in ("twin", "shadow", "limit")
+        ),
+        *(
+            f"/comparison/ade_m/{horizon}/{name}"
+            for horizon in (1, 2, 4, 8)
+            for name in ("nominal", "constant_velocity", "constant_turn_rate")
+        ),
+        *(
+            f"{world}/{part}"
+            for part in (
+                "roads/surface",
+                "roads/lanes",
+                "crossings",
+                "stop_lines",
+                "buildings",
+                "signals",
+                "islands",
+            )
+        ),
+        "/world/ego/trail/real",
+        "/world/futures",
+        "/world/plan",
+        "/scenarios/table",
+        "/events",
+        f"/geo/roads/{scene.WORLD_ID}",
+        "/geo/ego/real",
+        "/status",
+        "/workers/state/w0",
+        "/workers/rtf/w1",
+    }
     assert len(recorded.times_s("/world/futures")) == 40
     assert len(recorded.times_s("/gap/pos_m/twin")) == 200
     np.testing.assert_allclose(

@@ -12,7 +12,14 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.contracts.world import ATTRIBUTION, World
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.find_intersections import find_intersections
-from foretwin.world_gen.osm.osm_map import LatLonBounds, OsmMap, OsmMember, OsmRelation, OsmWay
+from foretwin.world_gen.osm.osm_map import (
+    LatLonBounds,
+    NodeLocations,
+    OsmMap,
+    OsmMember,
+    OsmRelation,
+    OsmWay,
+)
 from foretwin.world_gen.roads.build_graph import build_road_graph
 
 GERMANY, ENGLAND = GeoPoint(52.0, 10.0), GeoPoint(53.0, -1.5)
@@ -30,7 +37,8 @@ def drawn_map(
     """Return a map whose `nodes` are metres east and north of `origin`."""
     frame = LocalFrame(origin)
     geo = geo_from_local(frame, np.array(list(nodes.values()), dtype=np.float64))
-    locations = {node: (float(p[0]), float(p[1])) for node, p in zip(nodes, geo, strict=True)}
+    order = np.argsort(np.array(list(nodes)))
+    locations = NodeLocations(np.array(list(nodes), dtype=np.int64)[order], geo[order])
     return OsmMap(
         attribution=ATTRIBUTION,
         file="drawn.osm",

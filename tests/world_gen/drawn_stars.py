@@ -31,8 +31,11 @@ def tags_of_a_road(draw: st.DrawFn) -> tuple[tuple[str, str], ...]:
     if backward == 0:
         tags |= {"oneway": "yes", "lanes": str(forward)}
     else:
-        tags |= {"lanes": str(forward + backward), "lanes:forward": str(forward),
-                 "lanes:backward": str(backward)}  # fmt: skip
+        tags |= {
+            "lanes": str(forward + backward),
+            "lanes:forward": str(forward),
+            "lanes:backward": str(backward),
+        }
     if draw(st.booleans()):
         words = ["left", "through", "through;right"][-forward:]
         key = "turn:lanes" if backward == 0 else "turn:lanes:forward"
@@ -76,8 +79,10 @@ def world_of_star(arms: tuple[Arm, ...], *, left_hand: bool = False, mirror: boo
     for i, arm in enumerate(arms):
         angle = math.radians(arm.bearing_deg)
         across = angle + math.pi / 2
-        half = (ARM_M / 2 * math.cos(angle) + arm.bend_m * math.cos(across),
-                ARM_M / 2 * math.sin(angle) + arm.bend_m * math.sin(across))  # fmt: skip
+        half = (
+            ARM_M / 2 * math.cos(angle) + arm.bend_m * math.cos(across),
+            ARM_M / 2 * math.sin(angle) + arm.bend_m * math.sin(across),
+        )
         nodes[10 + i] = half
         nodes[20 + i] = (ARM_M * math.cos(angle), ARM_M * math.sin(angle))
         refs = [20 + i, 10 + i, 0] if arm.inward else [0, 10 + i, 20 + i]

@@ -51,8 +51,9 @@ def draw_town(seed: int) -> Town:
                 _add_ring(town, lat, lon, chance.uniform(0.6e-4, 1.2e-4))
                 height = f'<tag k="building:levels" v="{chance.randint(1, 6)}"/>'
                 town.ways[-1] = (town.ways[-1][0], f'<tag k="building" v="house"/>{height}')
-            town.nodes.append(((row + 0.5) * STEP_DEG, (column + 0.2) * STEP_DEG,
-                               '<tag k="natural" v="tree"/>'))  # fmt: skip
+            town.nodes.append(
+                ((row + 0.5) * STEP_DEG, (column + 0.2) * STEP_DEG, '<tag k="natural" v="tree"/>')
+            )
     yard = (STREETS - 0.5) * STEP_DEG
     outer = _add_ring(town, yard, yard, 3e-4)
     inner = _add_ring(town, yard, yard, 1e-4)
@@ -94,10 +95,9 @@ def _parts(town: Town, towns: int) -> Iterator[Iterator[str]]:
     )
     yield (node_text % _node_values(town, k) for k in range(towns))
     way_text = "".join(
-        f'<way id="%d" {META}>'
-        + '<nd ref="%d"/>' * len(nodes) + f"{tags}</way>\n"
+        f'<way id="%d" {META}>' + '<nd ref="%d"/>' * len(nodes) + f"{tags}</way>\n"
         for nodes, tags in town.ways
-    )  # fmt: skip
+    )
     yield (way_text % _way_values(town, k) for k in range(towns))
     relation_text = "".join(
         f'<relation id="%d" {META}>'

@@ -24,6 +24,13 @@ from tests.world_gen.drawn_maps import (
 )
 from tests.world_gen.sketch import star
 
+COVERS = (
+    "foretwin.world_gen.connections.lane_connections",
+    "foretwin.world_gen.connections.movements",
+    "foretwin.world_gen.lanes.clusters",
+    "foretwin.world_gen.polygon_areas",
+)
+
 TURNS = {"straight": 4, "left": 4, "right": 4}
 
 
@@ -40,8 +47,10 @@ def _headings_meet(world: World) -> float:
     worst = 0.0
     for c in world.connections:
         a, b = lanes[c.from_lane_id], lanes[c.to_lane_id]
-        for u, v in ((a[-1] - a[-2], c.centerline[1] - c.centerline[0]),
-                     (c.centerline[-1] - c.centerline[-2], b[1] - b[0])):  # fmt: skip
+        for u, v in (
+            (a[-1] - a[-2], c.centerline[1] - c.centerline[0]),
+            (c.centerline[-1] - c.centerline[-2], b[1] - b[0]),
+        ):
             worst = max(worst, abs(math.atan2(u[0] * v[1] - u[1] * v[0], u @ v)))
     return worst
 
@@ -119,9 +128,11 @@ def test_a_one_way_street_is_entered_and_left_one_way():
 
 def test_turn_lanes_are_obeyed():
     street = STREET | {
-        "lanes": "3", "lanes:forward": "2", "lanes:backward": "1",
+        "lanes": "3",
+        "lanes:forward": "2",
+        "lanes:backward": "1",
         "turn:lanes:forward": "left|through;right",
-    }  # fmt: skip
+    }
     world = world_of(crossing(street=street))
     from_west = [lane for lane in world.lanes if lane.role == "approach" and lane.osm_way == 13]
     left, right = sorted(from_west, key=lambda lane: -lane.centerline[-1][1])

@@ -23,20 +23,71 @@ STEP_M = 17.0
 CASES = int(os.environ.get("FORETWIN_FUZZ_CASES", "10000"))
 
 WORDS = st.one_of(
-    st.sampled_from(["yes", "no", "-1", "0", "3", "999", "-3", "1.5", "walk", "none", ";", "|",
-                     "left", "right", "through", "both", "12 m", "30 mph", "nan", "1e9"]),
-    st.text(st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"),
-            max_size=8),
-)  # fmt: skip
+    st.sampled_from(
+        [
+            "yes",
+            "no",
+            "-1",
+            "0",
+            "3",
+            "999",
+            "-3",
+            "1.5",
+            "walk",
+            "none",
+            ";",
+            "|",
+            "left",
+            "right",
+            "through",
+            "both",
+            "12 m",
+            "30 mph",
+            "nan",
+            "1e9",
+        ]
+    ),
+    st.text(
+        st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"),
+        max_size=8,
+    ),
+)
 CLASSES = st.sampled_from(
-    ["residential", "primary", "secondary", "motorway", "motorway_link", "service", "track",
-     "living_street", "tertiary_link", "footway", "cycleway", "steps", "raceway", "construction"]
-)  # fmt: skip
+    [
+        "residential",
+        "primary",
+        "secondary",
+        "motorway",
+        "motorway_link",
+        "service",
+        "track",
+        "living_street",
+        "tertiary_link",
+        "footway",
+        "cycleway",
+        "steps",
+        "raceway",
+        "construction",
+    ]
+)
 TURNS = st.lists(
-    st.sampled_from(["left", "right", "through", "left;through", "", "none", "reverse",
-                     "slight_left", "merge_to_left", "bad"]),
-    min_size=1, max_size=5,
-).map("|".join)  # fmt: skip
+    st.sampled_from(
+        [
+            "left",
+            "right",
+            "through",
+            "left;through",
+            "",
+            "none",
+            "reverse",
+            "slight_left",
+            "merge_to_left",
+            "bad",
+        ]
+    ),
+    min_size=1,
+    max_size=5,
+).map("|".join)
 ROAD_TAGS = st.fixed_dictionaries(
     {"highway": CLASSES},
     optional={
@@ -82,8 +133,17 @@ BUILDING_TAGS = st.fixed_dictionaries(
 NODE_TAGS = st.fixed_dictionaries(
     {},
     optional={
-        "highway": st.sampled_from(["traffic_signals", "stop", "give_way", "crossing",
-                                    "mini_roundabout", "turning_circle", "street_lamp"]),
+        "highway": st.sampled_from(
+            [
+                "traffic_signals",
+                "stop",
+                "give_way",
+                "crossing",
+                "mini_roundabout",
+                "turning_circle",
+                "street_lamp",
+            ]
+        ),
         "crossing": st.one_of(st.sampled_from(["zebra", "traffic_signals", "island"]), WORDS),
         "crossing__island": st.just("yes"),
         "direction": st.one_of(st.sampled_from(["forward", "backward", "both", "270"]), WORDS),
@@ -92,7 +152,7 @@ NODE_TAGS = st.fixed_dictionaries(
         "barrier": st.sampled_from(["bollard", "gate", "lift_gate"]),
         "railway": st.sampled_from(["level_crossing", "tram_crossing"]),
     },
-)  # fmt: skip
+)
 STEPS = st.one_of(
     st.integers(-6, 6).map(lambda n: n * STEP_M),
     st.floats(-120.0, 120.0, allow_nan=False),
@@ -113,9 +173,10 @@ RELATION_TAGS = st.one_of(
             ),
         }
     ),
-    st.fixed_dictionaries({"type": st.sampled_from(["multipolygon", "building"]),
-                           "building": WORDS}),
-)  # fmt: skip
+    st.fixed_dictionaries(
+        {"type": st.sampled_from(["multipolygon", "building"]), "building": WORDS}
+    ),
+)
 
 
 class Case(NamedTuple):

@@ -54,8 +54,12 @@ def test_the_world_misses_no_conflict_but_where_two_lanes_lead_out(
         for name, found in scores.items()
         if (words := [word for word in found.unlisted if word.endswith("(truth)")])
     }
-    two_lanes_out = {"06_dual_and_single", "07_dual_and_dual", "32_restriction_via_way",
-                     "49_left_hand_dual"}  # fmt: skip
+    two_lanes_out = {
+        "06_dual_and_single",
+        "07_dual_and_dual",
+        "32_restriction_via_way",
+        "49_left_hand_dual",
+    }
     assert missed.keys() <= two_lanes_out, missed
 
 
@@ -73,8 +77,9 @@ def test_each_pair_that_conflicts_has_one_answer() -> None:
             pairs = [frozenset((c.first_id, c.second_id)) for c in world.conflicts]
             assert len(set(pairs)) == len(pairs)
             assert all(c.yields_id in (c.first_id, c.second_id) for c in world.conflicts)
-            waits = {(c.yields_id, *({c.first_id, c.second_id} - {c.yields_id}))
-                     for c in world.conflicts}  # fmt: skip
+            waits = {
+                (c.yields_id, *({c.first_id, c.second_id} - {c.yields_id})) for c in world.conflicts
+            }
             assert waits == {(c.id, other) for c in world.connections for other in c.yields_to}
 
 

@@ -10,6 +10,8 @@ from foretwin.world_gen.lanes.cross_section import cross_section
 from tests.world_gen.drawn_maps import ENGLAND, GERMANY, crossing, drawn_map, world_of
 from tests.world_gen.road_edges import road
 
+COVERS = ("foretwin.world_gen.lanes.tram_tracks",)
+
 
 def _kinds(tags, *, forward=1, backward=1, side="right") -> list[str]:
     """Return kind and direction of lanes from left to right along the way."""
@@ -37,20 +39,31 @@ def _kinds(tags, *, forward=1, backward=1, side="right") -> list[str]:
         ({"cycleway:left": "lane", "oneway:bicycle": "no"}, 1, 0, ["bicycle-", "driving+"]),
         ({"cycleway:left": "lane"}, 1, 0, ["bicycle+", "driving+"]),
         ({"bicycle:lanes": "|designated|"}, 2, 0, ["driving+", "bicycle+", "driving+"]),
-        ({"bicycle:lanes": "|designated|", "cycleway:right": "lane"}, 2, 0,
-         ["driving+", "bicycle+", "driving+"]),
+        (
+            {"bicycle:lanes": "|designated|", "cycleway:right": "lane"},
+            2,
+            0,
+            ["driving+", "bicycle+", "driving+"],
+        ),
         ({"parking:both": "lane"}, 1, 1, ["parking-", "driving-", "driving+", "parking+"]),
         ({"parking:right": "street_side"}, 1, 0, ["driving+", "parking+"]),
         ({"parking:left": "on_kerb", "parking:right": "no"}, 1, 1, ["driving-", "driving+"]),
-        ({"parking:lane:both": "parallel"}, 1, 1,
-         ["parking-", "driving-", "driving+", "parking+"]),
-        ({"parking:lane:right": "diagonal", "parking:lane:right:diagonal": "on_kerb"}, 1, 1,
-         ["driving-", "driving+"]),
-        ({"cycleway:right": "lane", "parking:right": "lane"}, 1, 1,
-         ["driving-", "driving+", "bicycle+", "parking+"]),
+        ({"parking:lane:both": "parallel"}, 1, 1, ["parking-", "driving-", "driving+", "parking+"]),
+        (
+            {"parking:lane:right": "diagonal", "parking:lane:right:diagonal": "on_kerb"},
+            1,
+            1,
+            ["driving-", "driving+"],
+        ),
+        (
+            {"cycleway:right": "lane", "parking:right": "lane"},
+            1,
+            1,
+            ["driving-", "driving+", "bicycle+", "parking+"],
+        ),
         ({"lanes:both_ways": "1"}, 1, 1, ["driving-", "driving+", "driving+"]),
     ],
-)  # fmt: skip
+)
 def test_kinds_of_lanes_where_traffic_keeps_right(tags, forward, backward, kinds):
     assert _kinds(tags, forward=forward, backward=backward) == kinds
 
@@ -58,8 +71,12 @@ def test_kinds_of_lanes_where_traffic_keeps_right(tags, forward, backward, kinds
 def test_kinds_of_lanes_where_traffic_keeps_left():
     tags = {"cycleway": "lane", "lanes:bus:forward": "1"}
     assert _kinds(tags, forward=2, side="left") == [
-        "bicycle+", "bus+", "driving+", "driving-", "bicycle-"
-    ]  # fmt: skip
+        "bicycle+",
+        "bus+",
+        "driving+",
+        "driving-",
+        "bicycle-",
+    ]
 
 
 def test_a_road_of_bus_lanes_alone_keeps_lanes_for_all():
@@ -73,11 +90,13 @@ def test_a_road_of_bus_lanes_alone_keeps_lanes_for_all():
     [
         ({"cycleway:right": "lane", "cycleway:right:width": "1.5"}, Quantity(1.5, "tagged")),
         ({"cycleway:right": "lane"}, Quantity(1.85, "default")),
-        ({"parking:right": "lane", "parking:right:orientation": "perpendicular"},
-         Quantity(5.0, "inferred")),
+        (
+            {"parking:right": "lane", "parking:right:orientation": "perpendicular"},
+            Quantity(5.0, "inferred"),
+        ),
         ({"parking:right": "lane"}, Quantity(2.0, "default")),
     ],
-)  # fmt: skip
+)
 def test_widths_of_lanes_at_the_kerb(tags, width):
     section = cross_section(road(tags), "right")
     assert section.lanes[-1].width_m == width
@@ -105,8 +124,11 @@ def test_a_centre_lane_is_where_turns_across_the_road_begin(place):
         assert (centre.turns, centre.turns_source) == ((across,), "inferred")
         # It is driven toward the junction, whichever way the way is drawn.
         assert np.hypot(*centre.centerline[-1]) < np.hypot(*centre.centerline[0])
-        turns = {c.turn: c.from_lane_id for c in world.connections
-                 if c.from_lane_id.startswith(f"w{way}.")}  # fmt: skip
+        turns = {
+            c.turn: c.from_lane_id
+            for c in world.connections
+            if c.from_lane_id.startswith(f"w{way}.")
+        }
         assert turns[across] == centre.id
         assert turns["straight"] != centre.id
     assert any("its centre lane" in note for note in world.notes)
@@ -114,12 +136,20 @@ def test_a_centre_lane_is_where_turns_across_the_road_begin(place):
 
 
 def test_buses_keep_to_their_lane_through_a_junction():
-    street = {"highway": "secondary", "name": "Street", "oneway": "yes", "lanes": "2",
-              "bus:lanes": "|designated"}  # fmt: skip
+    street = {
+        "highway": "secondary",
+        "name": "Street",
+        "oneway": "yes",
+        "lanes": "2",
+        "bus:lanes": "|designated",
+    }
     world = world_of(crossing(street=street))
     kind = {lane.id: lane.kind for lane in world.lanes}
-    onto = {(kind[c.from_lane_id], kind[c.to_lane_id]) for c in world.connections
-            if c.turn == "straight" and c.from_lane_id.startswith("w13.")}  # fmt: skip
+    onto = {
+        (kind[c.from_lane_id], kind[c.to_lane_id])
+        for c in world.connections
+        if c.turn == "straight" and c.from_lane_id.startswith("w13.")
+    }
     assert onto == {("driving", "driving"), ("bus", "bus")}
     right = [c for c in world.connections if c.turn == "right" and "w13." in c.from_lane_id]
     assert {kind[c.from_lane_id] for c in right} == {"driving"}
@@ -128,8 +158,14 @@ def test_buses_keep_to_their_lane_through_a_junction():
 def test_a_transition_leads_lanes_from_one_place_to_the_next():
     one_way = {"highway": "secondary", "oneway": "yes", "lanes": "2", "name": "Street"}
     osm = drawn_map(
-        {0: (0.0, 0.0), 1: (40.0, 0.0), 2: (80.0, 0.0), 3: (120.0, 0.0), 4: (0.0, -90.0),
-         5: (0.0, 90.0)},
+        {
+            0: (0.0, 0.0),
+            1: (40.0, 0.0),
+            2: (80.0, 0.0),
+            3: (120.0, 0.0),
+            4: (0.0, -90.0),
+            5: (0.0, 90.0),
+        },
         [
             (11, [0, 1], one_way | {"placement": "right_of:1"}),
             (12, [1, 2], one_way | {"placement": "transition"}),
@@ -137,7 +173,7 @@ def test_a_transition_leads_lanes_from_one_place_to_the_next():
             (14, [4, 0], {"highway": "residential"}),
             (15, [0, 5], {"highway": "residential"}),
         ],
-    )  # fmt: skip
+    )
     world = world_of(osm)
     by_way = {lane.osm_way: lane for lane in world.lanes if lane.id.endswith("f0")}
     assert by_way[12].id in by_way[11].successor_ids

@@ -8,6 +8,13 @@ import pytest
 from foretwin.contracts.world import World
 from tests.world_gen.drawn_maps import STREET, drawn_map, world_of
 
+COVERS = (
+    "foretwin.world_gen.lanes.lane_curves",
+    "foretwin.world_gen.lanes.places",
+    "foretwin.world_gen.lanes.reference_lines",
+    "foretwin.world_gen.lanes.transitions",
+)
+
 WIDE = {"highway": "secondary", "name": "Street"}
 ONE_WAY = WIDE | {"oneway": "yes", "lanes": "2"}
 
@@ -43,12 +50,18 @@ def _short(lane_id: str) -> str:
 
 
 def test_a_turn_lane_becomes_the_centre_lane_for_turns():
-    first = WIDE | {"lanes": "3", "lanes:forward": "2", "lanes:backward": "1",
-                    "turn:lanes:forward": "left|through;right"}  # fmt: skip
+    first = WIDE | {
+        "lanes": "3",
+        "lanes:forward": "2",
+        "lanes:backward": "1",
+        "turn:lanes:forward": "left|through;right",
+    }
     second = WIDE | {"lanes": "3", "lanes:both_ways": "1", "turn:lanes:both_ways": "left"}
     assert _leading_on(_world(first, second)) == {
-        "w11.f0": {"w12.centre"}, "w11.f1": {"w12.f0"}, "w12.b0": {"w11.b0"},
-    }  # fmt: skip
+        "w11.f0": {"w12.centre"},
+        "w11.f1": {"w12.f0"},
+        "w12.b0": {"w11.b0"},
+    }
 
 
 @pytest.mark.parametrize("more", [{"width:lanes": "3|3|3.5"}, {"lanes": "4"}])
@@ -64,8 +77,10 @@ def test_arrows_for_what_comes_next_end_no_lane(more):
 def test_a_lane_whose_side_road_the_map_lacks_leads_back():
     first = ONE_WAY | {"lanes": "3", "turn:lanes": "left|through|right"}
     assert _leading_on(_world(first, WIDE | {"oneway": "yes", "lanes": "1"})) == {
-        "w11.f0": {"w12.f0"}, "w11.f1": {"w12.f0"}, "w11.f2": {"w12.f0"},
-    }  # fmt: skip
+        "w11.f0": {"w12.f0"},
+        "w11.f1": {"w12.f0"},
+        "w11.f2": {"w12.f0"},
+    }
 
 
 def test_a_bus_lane_ends_in_a_lane_for_all_but_none_for_all_in_it():

@@ -16,6 +16,8 @@ from tests.world_gen.chain import build_all
 from tests.world_gen.map_files import both_ways, crossing, file_of, refused, with_more
 from tests.world_gen.sketch import Sketch, star
 
+COVERS = ("foretwin.world_gen.osm.map_assembly",)
+
 
 def test_positions_that_are_not_on_earth(tmp_path: Path) -> None:
     text = with_more(

@@ -32,9 +32,13 @@ TESTFELD = "osm-testfeld-nds/TestfeldNDS_main_roads.osm.xml.gz"
 LIGHTS_ASKED = 160
 """Of larger maps a fixed sample, drawn by chance."""
 BETWEEN_JUNCTIONS = {
-    "berlin-mitte": 7, "moritzplatz": 6, "kingsway": 1, "monaco": 1, "badhersfeld": 6,
+    "berlin-mitte": 7,
+    "moritzplatz": 6,
+    "kingsway": 1,
+    "monaco": 1,
+    "badhersfeld": 6,
     "liechtenstein": 3,
-}  # fmt: skip
+}
 """Lights that no junction of the extract explains, each looked at: half of them belong to
 junctions that the extract's edge cuts off, the rest to tunnels, works, crossings on foot that the
 map does not tag as such, and roads closed to cars."""

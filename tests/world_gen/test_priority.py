@@ -87,9 +87,10 @@ def test_who_comes_from_the_right_goes_first_and_left_turns_wait():
 
     def find(side, turn):
         return next(
-            c for c in world.connections
+            c
+            for c in world.connections
             if c.turn == turn and np.dot(start[c.from_lane_id], side) > 50.0
-        )  # fmt: skip
+        )
 
     west, south, east = (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)
     assert find(south, "straight").id in find(west, "straight").yields_to

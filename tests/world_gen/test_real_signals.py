@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from foretwin.contracts.world import World
@@ -27,7 +26,7 @@ MAPS = {
 
 def whole_map(path: Path) -> tuple[OsmMap, World]:
     osm = read_map(path)
-    lat, lon = np.array(list(osm.locations.values())).T
+    lat, lon = osm.locations.lat_lon_deg.T
     bounds = LatLonBounds(lat.min() - 1e-3, lon.min() - 1e-3, lat.max() + 1e-3, lon.max() + 1e-3)
     return osm, build_region(osm, build_road_graph(osm), bounds)
 

@@ -83,8 +83,12 @@ def _check(world: World, junction: Junction) -> None:
         ways = lanes[c.from_lane_id].osm_way, lanes[c.to_lane_id].osm_way
         assert ways in tight or tightest_radius_m(c.centerline) > 0.93 * LEAST_RADIUS_M
         assert set(c.yields_to) <= set(c.conflicts_with) <= connections
-    astray = [lane.id for road in world.roads for lane in map(lanes.__getitem__, road.lane_ids)
-              if _off_reference_m(road, lane) > 0.02]  # fmt: skip
+    astray = [
+        lane.id
+        for road in world.roads
+        for lane in map(lanes.__getitem__, road.lane_ids)
+        if _off_reference_m(road, lane) > 0.02
+    ]
     # In hairpins no lane can follow the inside.
     assert len(astray) <= max(4, 0.02 * len(lanes)), astray
     paths = {part.id: part.centerline for part in (*world.lanes, *world.connections)}

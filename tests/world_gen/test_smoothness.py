@@ -13,6 +13,12 @@ from foretwin.contracts.world import Connection, World
 from tests.world_gen.drawn_stars import stars, world_of_star
 from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
 
+COVERS = (
+    "foretwin.world_gen.connections.connection_paths",
+    "foretwin.world_gen.lanes.legs",
+    "foretwin.world_gen.lanes.trims",
+)
+
 LEAST_RADIUS_M = 4.0
 
 

@@ -21,6 +21,8 @@ from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.sketch import Sketch
 from tests.world_gen.test_real_maps import MAPS
 
+COVERS = ("foretwin.world_gen.junctions.map_index",)
+
 EDITS = st.lists(
     st.tuples(
         st.sampled_from(["far crossing", "shape node", "cut way", "side road", "building", "name"]),
@@ -38,17 +40,34 @@ def _town(edits: list[tuple[str, float, bool]]) -> Sketch:
     """
     sketch = Sketch()
     low, high = 1, 10_000
-    places = {1000: (0, 0), 1001: (300, 0), 1002: (600, -8), 1003: (600, 8), 1004: (-200, 0),
-              1005: (0, 200), 1006: (0, -200), 1007: (300, 200), 1008: (600, 200),
-              1009: (600, -200), 1010: (900, -8), 1011: (900, 8), 1012: (580, 0)}  # fmt: skip
+    places = {
+        1000: (0, 0),
+        1001: (300, 0),
+        1002: (600, -8),
+        1003: (600, 8),
+        1004: (-200, 0),
+        1005: (0, 200),
+        1006: (0, -200),
+        1007: (300, 200),
+        1008: (600, 200),
+        1009: (600, -200),
+        1010: (900, -8),
+        1011: (900, 8),
+        1012: (580, 0),
+    }
     for node, (x_m, y_m) in places.items():
         sketch.node(node, x_m, y_m)
     roads = [
-        ([1004, 1000], "West", "no"), ([1000, 1001], "Mitte", "no"), ([1001, 1012], "Ost", "no"),
-        ([1000, 1005], "Nord", "no"), ([1006, 1000], "Süd", "no"), ([1001, 1007], "Stich", "no"),
-        ([1012, 1002, 1010], "Allee", "yes"), ([1011, 1003, 1012], "Allee", "yes"),
+        ([1004, 1000], "West", "no"),
+        ([1000, 1001], "Mitte", "no"),
+        ([1001, 1012], "Ost", "no"),
+        ([1000, 1005], "Nord", "no"),
+        ([1006, 1000], "Süd", "no"),
+        ([1001, 1007], "Stich", "no"),
+        ([1012, 1002, 1010], "Allee", "yes"),
+        ([1011, 1003, 1012], "Allee", "yes"),
         ([1008, 1003, 1002, 1009], "Quer", "no"),
-    ]  # fmt: skip
+    ]
     way = 5000
     pending = list(edits)
     for nodes, name, oneway in roads:
@@ -78,8 +97,10 @@ def _town(edits: list[tuple[str, float, bool]]) -> Sketch:
             for k in (1, 2, 3):
                 sketch.road(30_000 + base + k, [base, base + k], "Fern")
         elif kind == "building":
-            corners = [sketch.node(base + k, 30 + 10 * (k in (1, 2)), 30 + 10 * (k > 1) + 50 * part)
-                       for k in range(4)]  # fmt: skip
+            corners = [
+                sketch.node(base + k, 30 + 10 * (k in (1, 2)), 30 + 10 * (k > 1) + 50 * part)
+                for k in range(4)
+            ]
             sketch.way(30_000 + base, [*corners, corners[0]], building="yes")
     return sketch
 
@@ -102,8 +123,12 @@ def test_edits_between_and_beyond_junctions_change_no_id(
     for key, before in plain.items():
         after = found[key]
         assert (after.kind, after.arms, after.control, after.osm_nodes, after.name) == (
-            before.kind, before.arms, before.control, before.osm_nodes, before.name,
-        )  # fmt: skip
+            before.kind,
+            before.arms,
+            before.control,
+            before.osm_nodes,
+            before.name,
+        )
         # The map's frame moves with its bounds; places stay within a centimetre.
         assert (after.lat, after.lon) == pytest.approx((before.lat, before.lon), abs=2e-7)
     crossings = sum(kind == "far crossing" for kind, _, _ in edits)
@@ -112,8 +137,7 @@ def test_edits_between_and_beyond_junctions_change_no_id(
 
 def _without(osm: OsmMap, lat_deg: float, lon_deg: float, radius_m: float) -> OsmMap:
     """Return a map without the ways that come within a radius of a place."""
-    nodes = np.array(list(osm.locations), dtype=np.int64)
-    lat_lon = np.array(list(osm.locations.values()))
+    nodes, lat_lon = osm.locations.ids, osm.locations.lat_lon_deg
     place = local_from_geo(osm.frame, lat_deg, lon_deg)
     xy_m = local_from_geo(osm.frame, lat_lon[:, 0], lat_lon[:, 1])
     near = set(nodes[np.hypot(*(xy_m - place).T) < radius_m].tolist())

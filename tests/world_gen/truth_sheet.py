@@ -67,8 +67,20 @@ def _read(path: Path) -> TrueMap:
 
 
 def _junction(entry: Mapping[str, object], path: Path) -> TrueJunction:
-    known = {"kind", "control", "ring", "arms", "straight", "left", "right", "u_turn",
-             "any_turn", "open", "yields", "each_waits_once"}  # fmt: skip
+    known = {
+        "kind",
+        "control",
+        "ring",
+        "arms",
+        "straight",
+        "left",
+        "right",
+        "u_turn",
+        "any_turn",
+        "open",
+        "yields",
+        "each_waits_once",
+    }
     assert set(entry) <= known, f"{path.name}: unknown keys {set(entry) - known}"
     arms = entry["arms"]
     assert isinstance(arms, dict)

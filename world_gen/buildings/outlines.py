@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
 from typing import NamedTuple
 
 import msgspec
@@ -15,7 +14,7 @@ from shapely.geometry import Polygon
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.world_gen.buildings.tags import is_part, stands_above_ground
-from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation
+from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation, boxes_deg
 
 MIN_PIECE_M2 = 0.05
 """Smaller pieces of a mended outline are left out."""
@@ -96,7 +95,7 @@ def outline_table(osm: OsmMap) -> OutlineTable:
         rings.append(nodes)
         inner.append(False)
         first_ring.append(len(rings))
-    latlon, first_point = _coordinates(osm, rings)
+    latlon, first_point = osm.points_of(rings)
     return OutlineTable(
         names=tuple(names),
         tags=tuple(tags),
@@ -106,7 +105,7 @@ def outline_table(osm: OsmMap) -> OutlineTable:
         inner=np.array(inner, dtype=bool),
         first_point=first_point,
         latlon_deg=latlon,
-        boxes_deg=_boxes(latlon, first_point[np.array(first_ring, dtype=np.intp)]),
+        boxes_deg=boxes_deg(latlon, first_point[np.array(first_ring, dtype=np.intp)]),
         notes=tuple(notes),
     )
 
@@ -136,21 +135,6 @@ def _members(
             continue
         found.append((member.role == "inner", way.nodes))
     return found
-
-
-def _coordinates(osm: OsmMap, rings: Sequence[Sequence[int]]) -> tuple[Array, Indices]:
-    counts = np.fromiter(map(len, rings), dtype=np.intp, count=len(rings))
-    first = np.concatenate([[0], np.cumsum(counts)])
-    flat = chain.from_iterable(rings)
-    return osm.lat_lon_deg(np.fromiter(flat, dtype=np.int64, count=int(first[-1]))), first
-
-
-def _boxes(latlon: Array, first: Indices) -> Array:
-    if len(first) < 2:
-        return np.zeros((0, 4))
-    low = np.minimum.reduceat(latlon, first[:-1], axis=0)
-    high = np.maximum.reduceat(latlon, first[:-1], axis=0)
-    return np.concatenate([low, high], axis=1)
 
 
 def outlines(osm: OsmMap, table: OutlineTable, entries: Indices) -> BuildingOutlines:

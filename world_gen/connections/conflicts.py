@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.polyline import MITRE_LIMIT, left_of
+from foretwin.geometry.polyline_batch import Polylines, directions
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.polygon_areas import rings_of
 
 SWEPT_HALF_WIDTH_M = 1.0
 """Half of what a car sweeps: 1.8 m of body and 0.1 m to each side, whatever the lane's width."""
@@ -20,14 +22,14 @@ LEAST_AREA_M2 = 0.3
 BESIDE_M = 1.0
 """Neighbouring lanes are drawn no nearer where neither driver leaves the own one."""
 PATH_TOLERANCE_M = 0.03
-"""Paths have a point each metre; where they meet is told to within this."""
+"""Paths have a point each metre; where they meet is known to within this."""
 Indices = NDArray[np.int64]
 
 
 class Meetings(msgspec.Struct, frozen=True, kw_only=True):
     """M pairs of connections, by their indices (M,), `first` before `second`.
 
-    `merging` (M,) tells that both end in one lane; `points` (M, 2) is where their middles cross
+    `merging` (M,) is whether both end in one lane; `points` (M, 2) is where their middles cross
     or come nearest, each of `areas` (N, 2) a counter-clockwise outline. `first_m` and
     `second_m` (M,) are how far along each path the point lies, `apart_m` (M,)
     how far the middles stay from each other.
@@ -49,19 +51,6 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
     Two that begin in one lane part and do not meet; of two that follow each other neither waits.
     Two out of lanes of one road whose middles stay a metre apart keep beside each other.
     """
-    if not connections:
-        none = np.zeros(0, dtype=np.int64)
-        flat = np.zeros(0)
-        return Meetings(
-            first=none,
-            second=none,
-            merging=none.astype(bool),
-            points=np.zeros((0, 2)),
-            areas=(),
-            first_m=flat,
-            second_m=flat,
-            apart_m=flat,
-        )
     lines, swept = _swept(connections)
     a, b = shapely.STRtree(swept).query(swept)
     junction = np.array([id(c.cluster.junction) for c in connections])
@@ -71,7 +60,7 @@ def meetings(connections: Sequence[ConnectionDraft]) -> Meetings:
     near = (a < b) & (junction[a] == junction[b]) & (start[a] != start[b])
     near &= (end[a] != start[b]) & (end[b] != start[a])
     a, b = a[near], b[near]
-    # Most neighbours do not touch: prepared geometries tell that in a tenth of the time.
+    # Most neighbours do not touch: prepared geometries find that in a tenth of the time.
     shapely.prepare(swept)
     near = end[a] == end[b]
     near[~near] = shapely.intersects(swept[a[~near]], swept[b[~near]])
@@ -109,7 +98,7 @@ def _on_one_level(
 ) -> NDArray[np.bool_]:
     """Return (M,) whether the paths share a node of the map or run at one level somewhere.
 
-    A bridge often begins at the very node of a junction, so levels alone do not tell.
+    A bridge often begins at the very node of a junction, so levels alone do not decide.
     """
     layer = np.array([c.start.edge.layer for c in connections])
     alike: NDArray[np.bool_] = layer[a] == layer[b]
@@ -141,26 +130,12 @@ def _outlines(shared: Array, points: Array) -> tuple[Array, ...]:
     order = np.lexsort((shapely.area(parts), owner))
     owner = owner[order]
     largest = np.append(owner[1:] != owner[:-1], True) if len(owner) else np.zeros(0, dtype=bool)
-    rings = shapely.get_exterior_ring(parts[order][largest])
-    xy, of = shapely.get_coordinates(rings, return_index=True)
-    # Outlines are open: of each ring the last point, which is the first, is left out.
-    count = np.bincount(of, minlength=len(rings)) - 1
-    end = np.cumsum(count)
-    ring = np.repeat(np.arange(len(rings)), count)
-    place = np.arange(len(ring)) - (end - count)[ring]
-    backward = ~shapely.is_ccw(rings)
-    place = np.where(backward[ring], (count[ring] - place) % np.maximum(count[ring], 1), place)
-    xy = np.round(xy[place + (end - count)[ring] + ring], 3)
-    found: list[Array | None] = [None] * len(shared)
-    for i, first, last in zip(
-        owner[largest].tolist(), (end - count).tolist(), end.tolist(), strict=True
-    ):
-        found[i] = xy[first:last]
+    outlines = rings_of(parts[order][largest])
+    found = {i: outline for i, (outline, *_) in zip(owner[largest].tolist(), outlines, strict=True)}
     corner = 0.1 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     # Paths that end in one point but are too short to sweep anything still need an outline.
     return tuple(
-        np.round(points[i] + corner, 3) if outline is None else outline
-        for i, outline in enumerate(found)
+        found[i] if i in found else np.round(point + corner, 3) for i, point in enumerate(points)
     )
 
 
@@ -170,18 +145,12 @@ def _swept(connections: Sequence[ConnectionDraft]) -> tuple[Array, Array]:
     Vertices move out along the mean normal of their two segments. Where a bend is too sharp for
     that the area is a buffer, which is slower.
     """
-    full = [len(c.centerline) for c in connections]
-    points = np.concatenate([c.centerline for c in connections])
-    lines = shapely.linestrings(points, indices=np.repeat(np.arange(len(full)), full))
+    paths = Polylines.of([c.centerline for c in connections])
+    lines = shapely.linestrings(paths.xy_m, indices=paths.line)
     lines = shapely.simplify(lines, PATH_TOLERANCE_M, preserve_topology=False)
     xy, owner = shapely.get_coordinates(lines, return_index=True)
-    counts = np.bincount(owner, minlength=len(full))
-    step = np.diff(xy, axis=0)
-    step /= np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)[:, None]
-    last = np.cumsum(counts) - 1
-    first = last - counts + 1
-    arriving, leaving = np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]])
-    arriving[first], leaving[last] = leaving[first], arriving[last]
+    first = np.searchsorted(owner, np.arange(len(lines) + 1))
+    arriving, leaving = directions(Polylines(xy, first))
     normal = left_of(arriving + leaving)
     norm2 = (normal * normal).sum(axis=1)
     # |in + out| = 2 cos(bend / 2), and the mitre is 1 / cos(bend / 2) long.
@@ -189,7 +158,7 @@ def _swept(connections: Sequence[ConnectionDraft]) -> tuple[Array, Array]:
     outline = np.empty((2 * len(xy), 2))
     at = np.arange(len(xy)) + first[owner]
     outline[at] = xy - normal
-    outline[2 * (first + last)[owner] + 1 - at] = xy + normal
+    outline[2 * (first[:-1] + first[1:])[owner] - 1 - at] = xy + normal
     swept = shapely.polygons(shapely.linearrings(outline, indices=np.repeat(owner, 2)))
     bad = ~shapely.is_valid(swept)
     if bad.any():

@@ -7,7 +7,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.geometry.bends import rounded_through
-from foretwin.geometry.polyline import offset, without_repeats
+from foretwin.geometry.polyline import cross, offset, without_repeats
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.geometry.turn_curves import turn_curves
@@ -46,24 +46,17 @@ def draw_paths(connections: list[ConnectionDraft], around: Surroundings, notes: 
     for i, path in inside.items():
         connections[i].centerline = path
     long = [i for i, c in enumerate(connections) if i not in inside and _inner_m(c) > _LONG_PATH_M]
-    guided = _guided(
-        [
-            _along_path(begins[i], headings[i], ends[i], end_headings[i], connections[i], around)
-            for i in long
-        ]
-    )
-    far = shapely.hausdorff_distance(
-        np.array([shapely.LineString(connections[i].centerline) for i in long], dtype=object),
-        np.array([shapely.LineString(path) for path in guided], dtype=object),
-    )
+    poses = list(zip(begins, headings, ends, end_headings, connections, strict=True))
+    guided = _guided([_along_path(*poses[i], around) for i in long])
+    straight = [connections[i].centerline for i in long]
+    far = shapely.hausdorff_distance(_line_strings(straight), _line_strings(guided))
     for i, path, detour_m in zip(long, guided, far.tolist(), strict=True):
         if detour_m > _MAX_DETOUR_M:
             connections[i].centerline = path
     # Points on the millimetre grid bend a little more than the arcs that they stand for.
     least = _GRID_SHARE * LEAST_RADIUS_M
-    for c, radius_m in zip(
-        connections, _tightest_m([c.centerline for c in connections]).tolist(), strict=True
-    ):
+    tightest_m = _tightest_m([c.centerline for c in connections]).tolist()
+    for c, radius_m in zip(connections, tightest_m, strict=True):
         if radius_m < least:
             notes.append(
                 f"way {c.start.edge.way_id}: room for a radius of {radius_m:.1f} m alone "
@@ -88,10 +81,9 @@ def _tightest_m(paths: list[Array]) -> Array:
     before, after = np.roll(step, 1, axis=0), step
     both = before + after
     product = np.roll(length, 1) * length * np.hypot(both[:, 0], both[:, 1])
-    cross = np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0])
     inside = ~lines.is_last
     inside[lines.first[:-1]] = False
-    bent = np.where(inside, 2.0 * cross / np.maximum(product, 1e-12), 0.0)
+    bent = np.where(inside, 2.0 * np.abs(cross(before, after)) / np.maximum(product, 1e-12), 0.0)
     return np.asarray(1.0 / np.maximum(np.maximum.reduceat(bent, lines.first[:-1]), 1e-9))
 
 
@@ -104,22 +96,21 @@ def _units(vectors: Array) -> Array:
     return np.asarray(vectors / np.maximum(norm, 1e-9)[:, None])
 
 
+def _line_strings(lines: list[Array]) -> np.ndarray:
+    return np.array([shapely.LineString(line) for line in lines], dtype=object)
+
+
 def _guided(lines: list[Array]) -> list[Array]:
     """Return lines with their corners rounded, on the millimetre grid but for their ends."""
     if not lines:
         return []
     nothing = np.full((len(lines), 2), np.nan)
     wide = np.full(len(lines), _GUIDED_RADIUS_M)
-    found = []
-    for line, path in zip(
-        lines,
-        rounded_through(Polylines.of(lines), wide, nothing, nothing).lines.split(),
-        strict=True,
-    ):
-        path = np.round(path, 3)
-        path[0], path[-1] = line[0], line[-1]
-        found.append(path)
-    return found
+    rounded = rounded_through(Polylines.of(lines), wide, nothing, nothing).lines.split()
+    return [
+        np.concatenate([line[:1], np.round(path[1:-1], 3), line[-1:]])
+        for line, path in zip(lines, rounded, strict=True)
+    ]
 
 
 def _along_path(
@@ -133,7 +124,7 @@ def _along_path(
     """Return a path that follows the inner edges on the driver's side of them."""
     points = [begin, begin + 2.0 * heading]
     for part in connection.movement.inside:
-        lanes = around.section(part).driven(reverse=part.reverse)
+        lanes = around.lanes_along(part).driven
         middle = lanes[len(lanes) // 2].left_m if lanes else 0.0
         line = offset(without_repeats(part.xy_m), -middle if part.reverse else middle)
         keep = line[1:-1] if len(line) > 3 else (line[:1] + line[-1:]) / 2.0

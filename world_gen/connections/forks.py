@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from foretwin.world_gen.connections.movements import Movement
-from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft
+from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 _FORK_RAD = math.radians(45.0)
@@ -21,7 +21,7 @@ def beside_at_fork(cluster: Cluster, ways: list[Movement], around: Surroundings)
     soft = all(abs(m.angle_rad) < _FORK_RAD for m in ways)
     if len(ahead) != 1 or not soft or any(_two_way(leg) for leg in cluster.legs):
         return 0
-    return len(around.section(ahead[0]).driven(reverse=ahead[0].reverse))
+    return len(around.lanes_along(ahead[0]).driven)
 
 
 def _two_way(leg: DirectedEdge) -> bool:
@@ -40,29 +40,18 @@ def merges(cluster: Cluster, ways: tuple[Movement, ...]) -> list[Movement]:
 
 
 def merged_ends(
-    movement: Movement,
-    merging: list[Movement],
-    ends: list[LaneDraft],
-    around: Surroundings,
+    movement: Movement, merging: list[Movement], ends: list[LaneDraft], around: Surroundings
 ) -> list[LaneDraft]:
     """Return the lanes that are for one of the roads that merge, each of them on its side.
 
     Lanes to spare go to the road with most lanes, the one that goes on.
     """
-    counts = [len(around.section(m.toward).driven(reverse=m.toward.reverse)) for m in merging]
+    counts = [len(around.lanes_along(m.toward).driven) for m in merging]
     at = merging.index(movement)
     spare = len(ends) - sum(counts)
     if spare > 0:
-        counts[max(range(len(counts)), key=lambda i: (counts[i], -abs(merging[i].angle_rad)))] += (
-            spare
-        )
-    if spare >= 0:
-        first = sum(counts[:at])
-        return ends[first : first + counts[at]]
+        most = max(range(len(counts)), key=lambda i: (counts[i], -abs(merging[i].angle_rad)))
+        counts[most] += spare
     mine = min(counts[at], len(ends))
-    if at == 0:
-        return ends[:mine]
-    if at == len(merging) - 1:
-        return ends[-mine:]
     first = min(sum(counts[:at]), len(ends) - mine)
     return ends[first : first + mine]

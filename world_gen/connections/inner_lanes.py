@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import length, offset, points_at, without_repeats
+from foretwin.geometry.polyline import length, offset, points_at, turn_rad, without_repeats
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.geometry.turn_curves import turn_curves
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
@@ -68,11 +68,8 @@ def paths_along_inner_lanes(
         pieces.setdefault(i, []).append(piece)
         if radius_m < LEAST_RADIUS_M or _turned_rad(piece) > _MOST_TURN_RAD:
             refused.add(i)
-    return {
-        i: np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
-        for i, parts in pieces.items()
-        if i not in refused
-    }
+    kept = {i: pieces[i] for i in pieces.keys() - refused}
+    return {i: np.concatenate([mine[0], *(p[1:] for p in mine[1:])]) for i, mine in kept.items()}
 
 
 def _poses_inside(
@@ -84,7 +81,7 @@ def _poses_inside(
     """Return where a path enters and leaves its lanes inside; `starts` are its movement's lanes."""
     found: list[_Pose] = []
     for part in c.movement.inside:
-        plans = around.section(part).driven(reverse=part.reverse)
+        plans = around.lanes_along(part).driven
         if part.edge.length_m < _LONG_EDGE_M or not plans:
             continue
         left_m = _driver_left_m(plans, _lane_inside(c, starts, len(plans)))
@@ -129,6 +126,4 @@ def _unit(vector: Array) -> Array:
 
 def _turned_rad(line: Array) -> float:
     step = np.diff(line, axis=0)
-    a, b = step[:-1], step[1:]
-    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return float(np.abs(np.arctan2(cross, (a * b).sum(axis=1))).sum())
+    return float(np.abs(turn_rad(step[:-1], step[1:])).sum())

@@ -8,14 +8,14 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Connection, DrivingSide, LineControl, Turn
-from foretwin.geometry.polyline import unit
+from foretwin.geometry.polyline import cross, left_of, unit
 from foretwin.geometry.steering import LEAST_RADIUS_M
 from foretwin.world_gen.connections.forks import beside_at_fork, merged_ends, merges
 from foretwin.world_gen.connections.movements import Movement
-from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.cross_section import LanePlan
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
+from foretwin.world_gen.lanes.lane_plans import LanePlan
+from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 _UNDRAWN = np.zeros((0, 2))
@@ -75,7 +75,7 @@ def connect(
         toward = mine[0].toward
         plans = _plans(cluster, toward, around)
         starts = lanes.incoming(toward, plans)
-        middle = lanes.incoming(toward, around.section(toward).turning(reverse=toward.reverse))
+        middle = lanes.incoming(toward, around.lanes_along(toward).turning)
         named = _by_tags(mine, starts)
         beside = beside_at_fork(cluster, named, around)
         for unnamed, movement in zip(mine, named, strict=True):
@@ -83,7 +83,7 @@ def connect(
             ends = lanes.outgoing(away, _plans(cluster, away, around))
             if not starts or not ends:
                 continue
-            # Where a road merely goes on its lanes do, whatever their arrows say of what follows.
+            # Where a road merely goes on its lanes do, whatever their arrows mean for what follows.
             chosen = starts if cluster.plain else []
             chosen = chosen or [lane for lane in middle if movement.turn in lane.turns]
             chosen = chosen or _starting_lanes(
@@ -111,14 +111,12 @@ def connect(
 
 def _plans(cluster: Cluster, edge: DirectedEdge, around: Surroundings) -> tuple[LanePlan, ...]:
     """Return the lanes that lead into a cluster, or out of it, along an edge, from the left."""
-    section = around.section(edge)
-    if cluster.plain:
-        return section.abreast(reverse=edge.reverse)
-    return section.driven(reverse=edge.reverse)
+    along = around.lanes_along(edge)
+    return along.abreast if cluster.plain else along.driven
 
 
 def _by_tags(ways: list[Movement], starts: list[LaneDraft]) -> list[Movement]:
-    """Let turn lanes correct the names of turns, which angles alone cannot tell at forks.
+    """Let turn lanes correct the names of turns, which angles alone do not determine at forks.
 
     As many movements as there are tagged turns take them in order from the left; else a turn
     that no lane names takes the name of a tagged one that no other movement took up.
@@ -162,26 +160,21 @@ def _starting_lanes(
     turn = movement.turn
     far: Turn = "left" if driving_side == "right" else "right"
     cars = [lane for lane in starts if lane.kind == "driving"] or starts
-    if any(lane.plan.turns_source == "tagged" for lane in starts):
-        wanted = {turn, far} if turn == "u_turn" else {turn}
-        fits = [
-            lane
-            for lane in starts
-            if wanted & set(lane.plan.turns) or (lane.plan.turns_source != "tagged")
-        ]
-        if turn == "u_turn":
-            return _outermost(fits, far)
-        if turn == "straight":
-            return fits
-        # Lanes without an arrow go straight on; beside a tagged lane those turn that have room.
+    fits, named = cars, 1
+    tagged = any(lane.plan.turns_source == "tagged" for lane in starts)
+    if tagged:
+        meant = {turn, far} if turn == "u_turn" else {turn}
+        silent = [lane.plan.turns_source != "tagged" for lane in starts]
+        fits = [n for n, ok in zip(starts, silent, strict=True) if ok or meant & set(n.plan.turns)]
         named = sum(lane.plan.turns_source == "tagged" for lane in fits)
-        return _outermost(
-            fits, turn, max(named, min(room, len(cars) + 1 - beside) if beside else 1)
-        )
     if turn == "u_turn":
-        return _outermost(cars, far)
+        return _outermost(fits, far)
     if turn != "straight":
-        return _outermost(cars, turn, max(1, min(room, len(cars) + 1 - beside) if beside else 1))
+        # Lanes without an arrow go straight on; beside a tagged lane those turn that have room.
+        with_room = min(room, len(cars) + 1 - beside) if beside else 1
+        return _outermost(fits, turn, max(named, with_room))
+    if tagged:
+        return fits
     have = {m.turn for m in ways}
     straight = list(starts)
     # The lane on the far side, from which drivers turn across the road, is the first to be lost.
@@ -215,10 +208,8 @@ def _pairs(
             *_pairs(buses, reserved, turn, driving_side, only_way),
         ]
     if turn == "u_turn":
-        return [
-            (lane, _wide_enough(lane, ends[:: 1 if driving_side == "right" else -1]))
-            for lane in starts
-        ]
+        from_inside = ends if driving_side == "right" else ends[::-1]
+        return [(lane, _wide_enough(lane, from_inside)) for lane in starts]
     if any(lane.kind != "bus" for lane in starts):
         ends = [lane for lane in ends if lane.kind == "driving"] or ends
     from_right = turn == "right" or (turn == "straight" and driving_side == "left")
@@ -234,13 +225,9 @@ def _wide_enough(start: LaneDraft, ends: list[LaneDraft]) -> LaneDraft:
     cars = [lane for lane in ends if lane.kind == "driving"] or ends
     at = start.centerline[-1]
     ahead = unit(at - start.centerline[-2])
-    aside = [abs(_cross(ahead, lane.centerline[0] - at)) for lane in cars]
+    aside = [abs(cross(ahead, lane.centerline[0] - at)) for lane in cars]
     wide = [lane for lane, gap in zip(cars, aside, strict=True) if gap >= 2.0 * LEAST_RADIUS_M]
     return wide[0] if wide else cars[-1]
-
-
-def _cross(a: Array, b: Array) -> float:
-    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def _pairs_by_position(
@@ -248,7 +235,7 @@ def _pairs_by_position(
 ) -> list[tuple[LaneDraft, LaneDraft]]:
     """Pair each lane with the one ahead of it; where a road widens every new lane is reached."""
     ahead = unit(ends[0].centerline[1] - ends[0].centerline[0])
-    side = np.array([-ahead[1], ahead[0]])
+    side = left_of(ahead)
     at_start = np.array([lane.centerline[-1] @ side for lane in starts])
     at_end = np.array([lane.centerline[0] @ side for lane in ends])
     gaps = np.abs(at_start[:, None] - at_end[None, :])

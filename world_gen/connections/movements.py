@@ -6,17 +6,14 @@ import heapq
 import math
 
 import msgspec
-import numpy as np
 
 from foretwin.contracts.world import DrivingSide, Turn
-from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, opposed
+from foretwin.world_gen.lanes.legs import Cluster, Heads, dot, heading_out, is_ring_edge, opposed
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 
 STRAIGHT_RAD = math.radians(45.0)
-FORK_RAD = math.radians(18.0)
 U_TURN_RAD = math.radians(150.0)
 _NOSE_COS = math.cos(math.radians(60.0))
 
@@ -49,14 +46,11 @@ def movements(
                 inner.setdefault(directed.start_node, []).append(directed)
     found: list[Movement] = []
     for leg in cluster.legs:
-        toward = DirectedEdge(leg.edge, not leg.reverse)
+        toward = leg.back
         if not toward.allowed:
             continue
-        marked = any(
-            "u_turn" in lane.turns
-            for lane in around.section(toward).lanes
-            if lane.reverse == toward.reverse
-        )
+        lanes = around.section(toward).lanes
+        marked = any("u_turn" in lane.turns for lane in lanes if lane.reverse == toward.reverse)
         ways = _ways_through(cluster, toward, inner, restrictions, back=marked)
         # Who has no other way out of a street may turn back.
         ways = [
@@ -88,18 +82,16 @@ def _ways_through(
     count = 0
     while queue:
         cost, _, last, path = heapq.heappop(queue)
-        state = (last.edge.index, last.reverse)
-        if state in done:
+        if last.key in done:
             continue
-        done.add(state)
+        done.add(last.key)
         for leg in exits.get(last.end_node, ()):
-            key = (leg.edge.index, leg.reverse)
-            if key in best or not restrictions.step_allowed(last, leg):
+            if leg.key in best or not restrictions.step_allowed(last, leg):
                 continue
             if leg.edge.index == toward.edge.index and not (back and not path):
                 continue
             if restrictions.path_allowed((toward, *path, leg)):
-                best[key] = (leg, path)
+                best[leg.key] = (leg, path)
         for step in inner.get(last.end_node, ()):
             if step.edge.index == last.edge.index or not restrictions.step_allowed(last, step):
                 continue
@@ -112,11 +104,10 @@ def _around_a_nose(cluster: Cluster, toward: DirectedEdge, away: DirectedEdge) -
     """Return whether a way leads from one carriageway back into the other where they part."""
     if len(cluster.legs) != 3 or len(cluster.nodes) != 1:
         return False
-    one_way = [leg for leg in cluster.legs if leg.edge.forward != leg.edge.backward]
+    one_way = [leg for leg in cluster.legs if leg.edge.one_way]
     if {leg.edge.index for leg in one_way} != {toward.edge.index, away.edge.index}:
         return False
-    outward = DirectedEdge(toward.edge, not toward.reverse)
-    return dot(heading_out(outward), heading_out(away)) > _NOSE_COS
+    return dot(heading_out(toward.back), heading_out(away)) > _NOSE_COS
 
 
 def _back_along(toward: DirectedEdge, away: DirectedEdge) -> bool:
@@ -129,9 +120,8 @@ def _back_along(toward: DirectedEdge, away: DirectedEdge) -> bool:
 def _parting(toward: DirectedEdge, away: DirectedEdge) -> bool:
     """Return whether two one-way roads part where one ends and the other begins."""
     a, b = toward.edge, away.edge
-    if a.forward == a.backward or b.forward == b.backward or toward.end_node != away.start_node:
-        return False
-    return opposed(DirectedEdge(a, not toward.reverse), away)
+    both = a.one_way and b.one_way and toward.end_node == away.start_node
+    return both and opposed(toward.back, away)
 
 
 def _with_turns(
@@ -140,10 +130,10 @@ def _with_turns(
     heads: Heads,
     driving_side: DrivingSide,
 ) -> list[Movement]:
-    x, y = heads[toward.edge.index, not toward.reverse]
+    x, y = heads[toward.back.key]
     angles = []
     for leg, _ in ways:
-        u, v = heads[leg.edge.index, leg.reverse]
+        u, v = heads[leg.key]
         angles.append(math.atan2(y * u - x * v, -x * u - y * v))
     straightest = min((abs(a) for a in angles), default=0.0)
     off_ring = not is_ring_edge(toward.edge)
@@ -163,15 +153,11 @@ def _with_turns(
 
 
 def _turn(angle: float, straightest: float, angles: list[float]) -> Turn:
-    if abs(angle) < STRAIGHT_RAD:
-        fork = abs(angle) > straightest + 1e-9 and (
-            abs(angle) > FORK_RAD or np.sign(angle) == 0 or straightest < abs(angle)
-        )
-        if not fork:
-            return "straight"
-        best = min(angles, key=abs)
-        return "left" if angle > best else "right"
-    return "left" if angle > 0 else "right"
+    if abs(angle) >= STRAIGHT_RAD:
+        return "left" if angle > 0 else "right"
+    if abs(angle) <= straightest + 1e-9:
+        return "straight"
+    return "left" if angle > min(angles, key=abs) else "right"
 
 
 def _ring_turn(toward: DirectedEdge, away: DirectedEdge, driving_side: DrivingSide) -> Turn:

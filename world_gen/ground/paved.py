@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.legs import Cluster
 
 GRID_M = 0.001
 """Worlds are written in millimetres: areas lie on that grid, so that rounding breaks nothing."""

@@ -44,7 +44,7 @@ def ground_around(
     """Return the ground of a World, given its lanes and connections."""
     surface = areas(around, lanes, connections)
     map_frame = index.graph.frame
-    near = index.buildings_in(in_map(around.extent, around.frame, map_frame))
+    near = index.buildings.within(in_map(around.extent, around.frame, map_frame))
     buildings, cut = buildings_in_frame(near, around.frame, map_frame, surface.driven)
     mapped = mapped_islands(around, index.osm, beside, surface.driven)
     return Ground(

@@ -30,7 +30,7 @@ class Mark(NamedTuple):
 class Chain(NamedTuple):
     """A road from one branching to the next, over the places where only its tags change.
 
-    `outward` and `inward` tell whether cars may leave and reach `start` by it, as far as its
+    `outward` and `inward` are whether cars may leave and reach `start` by it, as far as its
     first edge goes; `one_way` that they may use it one way round alone. `key` is the same for
     both directions of one chain. `x_m` and `y_m` are its points from `start` to `end`, those
     between two edges twice; `marks` its lights and signs in that order, those at its ends too.
@@ -114,12 +114,8 @@ def car_roads(osm: OsmMap, graph: RoadGraph) -> CarRoads:
         if outward or node in on_ring:
             leaving[node] = outward
     highway = {node: tags["highway"] for node, tags in osm.node_tags.items() if "highway" in tags}
-    mini = {node for node, word in highway.items() if word == "mini_roundabout"}
-    ends = {
-        node
-        for node, outward in leaving.items()
-        if len(outward) != 2 or node in on_ring or node in mini
-    }
+    round_about = on_ring | {node for node, word in highway.items() if word == "mini_roundabout"}
+    ends = {node for node, out in leaving.items() if len(out) != 2 or node in round_about}
     stops = frozenset(node for node, word in highway.items() if word in STOPS)
     walk = _Walk(edges, leaving, ends, osm.node_tags, stops)
     return CarRoads(
@@ -195,7 +191,7 @@ class _Walk:
                 names.append(edge.name)
             marked = marked or not self._stops.isdisjoint(edge.node_ids)
         there = self._chain(edges, x_m, y_m, sum(lengths_m), names[0] if names else "", marked)
-        against = [DirectedEdge(edge, not reverse) for edge, reverse in reversed(edges)]
+        against = [item.back for item in reversed(edges)]
         lengths_m.reverse()
         name = names[-1] if names else ""
         back = self._chain(against, x_m[::-1], y_m[::-1], sum(lengths_m), name, marked)
@@ -210,15 +206,12 @@ class _Walk:
         name: str,
         marked: bool,
     ) -> Chain:
-        first, first_reverse = edges[0]
-        last, last_reverse = edges[-1]
-        outward, inward = first.forward, first.backward
-        if first_reverse:
-            outward, inward = inward, outward
-        a, b = first.index, last.index
+        first, last = edges[0], edges[-1]
+        outward, inward = first.allowed, first.back.allowed
+        a, b = first.edge.index, last.edge.index
         return Chain(
-            first.end_node if first_reverse else first.start_node,
-            last.start_node if last_reverse else last.end_node,
+            first.start_node,
+            last.end_node,
             tuple(edges),
             x_m,
             y_m,
@@ -234,11 +227,7 @@ class _Walk:
     def _marks(
         self, edges: list[DirectedEdge], x_m: array[float], y_m: array[float]
     ) -> Iterator[Mark]:
-        ids = [
-            node
-            for edge, reverse in edges
-            for node in (edge.node_ids[::-1] if reverse else edge.node_ids)
-        ]
+        ids = [node for item in edges for node in item.node_ids]
         along_m = 0.0
         x0, y0 = x_m[0], y_m[0]
         for node, x, y in zip(ids, x_m, y_m, strict=True):
@@ -256,26 +245,20 @@ def _ring_kind(edge: RoadEdge) -> str | None:
 def _rings(edges: list[RoadEdge]) -> Iterator[Ring]:
     """Yield the connected groups of ring edges of one kind, by their smallest node id."""
     for kind in sorted(RING_TAGS):
-        of_kind = [edge for edge in edges if edge.tags["junction"] == kind]
         touching: dict[int, list[RoadEdge]] = {}
-        for edge in of_kind:
-            touching.setdefault(edge.start_node, []).append(edge)
-            touching.setdefault(edge.end_node, []).append(edge)
-        seen: set[int] = set()
-        for first in sorted(touching):
-            if first in seen:
-                continue
-            seen.add(first)
+        for edge in edges:
+            if edge.tags["junction"] == kind:
+                touching.setdefault(edge.start_node, []).append(edge)
+                touching.setdefault(edge.end_node, []).append(edge)
+        while touching:
             group: dict[int, RoadEdge] = {}
-            nodes = {first}
-            waiting = [first]
+            nodes: set[int] = set()
+            waiting = {min(touching)}
             while waiting:
-                for edge in touching[waiting.pop()]:
+                node = waiting.pop()
+                nodes.add(node)
+                for edge in touching.pop(node):
                     group[edge.index] = edge
-                    for node in (edge.start_node, edge.end_node):
-                        if node not in seen:
-                            seen.add(node)
-                            nodes.add(node)
-                            waiting.append(node)
+                    waiting |= {edge.start_node, edge.end_node} - nodes
             members = tuple(group[index] for index in sorted(group))
             yield Ring(kind=kind, nodes=frozenset(nodes), edges=members)

@@ -15,7 +15,7 @@ from foretwin.world_gen.junctions.grouping import JunctionCluster
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.junction_arms import ArmChains, ClusterRoads, approaches, roads_of
 from foretwin.world_gen.junctions.junction_clusters import cluster_branchings
-from foretwin.world_gen.junctions.junction_control import control_of, lights_of
+from foretwin.world_gen.junctions.junction_control import control_of
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.road_graph import RoadGraph
 
@@ -45,12 +45,9 @@ def find_intersections(osm: OsmMap, graph: RoadGraph) -> tuple[Junction, ...]:
         return ()
     centres = np.array([_centre_xy_m(place.cluster, graph) for place in places])
     degrees = geo_from_local(graph.frame, centres).tolist()
-    found = [
-        _junction(place, centre, lat_lon, osm, graph)
-        for place, centre, lat_lon in zip(places, centres, degrees, strict=True)
-    ]
-    found.sort(key=lambda junction: junction.summary.id)
-    return tuple(found)
+    rows = zip(places, centres, degrees, strict=True)
+    found = (_junction(*row, osm, graph) for row in rows)
+    return tuple(sorted(found, key=lambda junction: junction.summary.id))
 
 
 class _JunctionDraft(NamedTuple):
@@ -92,15 +89,8 @@ def _junction(
     lat_deg, lon_deg = lat_lon_deg
     core = frozenset(cluster.core)
     incoming = tuple([chain for item in arms for chain in item.chains if chain.inward])
-    lights = lights_of(core, around.inside, incoming, osm.node_tags)
-    control = control_of(
-        core,
-        around.inside,
-        incoming,
-        osm.node_tags,
-        lights=bool(lights),
-        ring=kind in ("roundabout", "mini_roundabout"),
-    )
+    ring = kind in ("roundabout", "mini_roundabout")
+    control, lights = control_of(core, around.inside, incoming, osm.node_tags, ring=ring)
     return Junction(
         summary=IntersectionSummary(
             id=f"n{min(cluster.core)}",
@@ -125,9 +115,7 @@ def _junction(
 def _centre_xy_m(cluster: JunctionCluster, graph: RoadGraph) -> tuple[float, float]:
     """Return the mean of the core nodes, of a ring the middle of its line."""
     if cluster.ring is None:
-        points = [graph.node_xy_m[node] for node in sorted(cluster.core)]
-        x_m, y_m = sum([x for x, _ in points]), sum([y for _, y in points])
-        return x_m / len(points), y_m / len(points)
+        return graph.middle_of(cluster.core)
     middles, lengths = [], []
     for edge in cluster.ring.edges:
         middles.append((edge.xy_m[1:] + edge.xy_m[:-1]) / 2.0)

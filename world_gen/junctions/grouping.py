@@ -57,7 +57,7 @@ class Grouping:
         widest_m: float = math.inf,
         core: bool = False,
     ) -> bool:
-        """Add another cluster's nodes to one, to its core too if told; False where refused."""
+        """Add another cluster's nodes to one, with `core` to its core too; False where refused."""
         if cluster is other or other.ring:
             return False
         if self._width_m(cluster, other) > widest_m:

@@ -44,12 +44,8 @@ def roads_of(cluster: JunctionCluster, roads: CarRoads, graph: RoadGraph) -> Clu
         chains = roads.chains_from[node]
         if node not in [chain.end for chain in chains]:
             return ClusterRoads(inside=(), leaving=chains)
-    points = [graph.node_xy_m[node] for node in sorted(nodes)]
-    centre = (
-        sum([x for x, _ in points]) / len(points),
-        sum([y for _, y in points]) / len(points),
-    )
-    reach_m = max([math.dist(point, centre) for point in points]) + INSIDE_M
+    centre = graph.middle_of(nodes)
+    reach_m = max([math.dist(graph.node_xy_m[node], centre) for node in nodes]) + INSIDE_M
     inside: dict[tuple[int, int], Chain] = {}
     leaving: list[Chain] = []
     for node in sorted(nodes):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from itertools import combinations
+from itertools import combinations, product
 
 from foretwin.world_gen.junctions.chains import CarRoads, Chain, Tags
 from foretwin.world_gen.junctions.grouping import Grouping, JunctionCluster
@@ -79,12 +79,11 @@ def _leads_elsewhere(
 
 def _links_carriageways(chain: Chain, roads: CarRoads) -> bool:
     """Tell whether a chain leads from one carriageway of a street to the opposite one."""
-    for name_a, heading_a in _carriageways(chain.start, chain, roads):
-        for name_b, heading_b in _carriageways(chain.end, chain, roads):
-            opposed = math.cos(heading_a - heading_b) < -0.64
-            if name_a == name_b and opposed:
-                return True
-    return False
+    sides = (_carriageways(node, chain, roads) for node in (chain.start, chain.end))
+    return any(
+        name_a == name_b and math.cos(heading_a - heading_b) < -0.64
+        for (name_a, heading_a), (name_b, heading_b) in product(*sides)
+    )
 
 
 def _carriageways(node: int, besides: Chain, roads: CarRoads) -> Iterator[tuple[str, float]]:
@@ -121,24 +120,17 @@ def _in_island(chain: Chain, roads: CarRoads) -> bool:
 def _one_signal(chain: Chain, roads: CarRoads, node_tags: Mapping[int, Tags]) -> bool:
     """Tell whether both ends of a chain are signalled and nothing stops a driver in between."""
     ends = (chain.start, chain.end)
-    if any(
-        mark.node not in ends and mark.tags["highway"] == "traffic_signals" for mark in chain.marks
-    ):
+    between = (mark for mark in chain.marks if mark.node not in ends)
+    if any(mark.tags["highway"] == "traffic_signals" for mark in between):
         return False
     return all(_has_signal(node, chain, roads, node_tags) for node in ends)
 
 
 def _has_signal(node: int, besides: Chain, roads: CarRoads, node_tags: Mapping[int, Tags]) -> bool:
-    return _is_signal(node, node_tags) or any(
-        True
-        for chain in roads.chains_from[node]
-        if chain.key != besides.key and chain.inward
-        for _ in facing(chain, STOP_LINE_M, "traffic_signals")
-    )
-
-
-def _is_signal(node: int, node_tags: Mapping[int, Tags]) -> bool:
-    return node_tags.get(node, {}).get("highway") == "traffic_signals"
+    if node_tags.get(node, {}).get("highway") == "traffic_signals":
+        return True
+    into = (c for c in roads.chains_from[node] if c.key != besides.key and c.inward)
+    return any(any(facing(chain, STOP_LINE_M, "traffic_signals")) for chain in into)
 
 
 def _staggers(chain: Chain, roads: CarRoads) -> bool:
@@ -183,9 +175,6 @@ def _add_flares(grouping: Grouping, roads: CarRoads) -> None:
             and target.ring
         ]
         for (a, target), (b, other) in combinations(to_ring, 2):
-            if (
-                other is target
-                and a.outward != b.outward
-                and grouping.attach(target, own, (a.key, b.key))
-            ):
+            parting = other is target and a.outward != b.outward
+            if parting and grouping.attach(target, own, (a.key, b.key)):
                 break

@@ -1,8 +1,9 @@
-"""Who tells drivers at a junction when to go: lights, signs, or the general rules."""
+"""How a junction is controlled: lights, signs, or the general rules."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 from foretwin.contracts.world import Control
 from foretwin.world_gen.junctions.chains import Chain, Mark, Tags
@@ -12,25 +13,11 @@ PEDESTRIAN_LIGHT_M = 15.0
 """A light at a crossing farther out than this serves pedestrians alone."""
 
 
-def lights_of(
-    core: frozenset[int],
-    inside: tuple[Chain, ...],
-    incoming: tuple[Chain, ...],
-    node_tags: Mapping[int, Tags],
-) -> frozenset[int]:
-    """Return the nodes of the traffic lights in a junction and on the roads that lead to it.
+class JunctionControl(NamedTuple):
+    """How a junction is controlled, and the nodes of its traffic lights."""
 
-    A light counts for the nearer junction of the road it stands on, or the one that it faces.
-    """
-    found = {node for node in core if node in node_tags and _is_light(node_tags[node], 0.0)}
-    found.update(mark.node for chain in inside for mark in chain.marks if _is_light(mark.tags, 0.0))
-    for chain in incoming:
-        if not chain.marks:
-            continue
-        for mark in facing(chain, SIGNALS_WITHIN_M, "traffic_signals"):
-            if _is_light(mark.tags, mark.distance_m):
-                found.add(mark.node)
-    return frozenset(found)
+    control: Control
+    lights: frozenset[int]
 
 
 def control_of(
@@ -39,39 +26,41 @@ def control_of(
     incoming: tuple[Chain, ...],
     node_tags: Mapping[int, Tags],
     *,
-    lights: bool,
     ring: bool,
-) -> Control:
+) -> JunctionControl:
     """Return how the junction is controlled, from the tags in it and on its roads in.
 
-    A sign counts for the nearer junction of the road it stands on, and only where it faces
-    drivers who come in; signs on every road in make an all-way stop.
+    A light or sign counts for the nearer junction of the road it stands on, or the one that it
+    faces; signs on every road in make an all-way stop.
     """
-    if lights:
-        return "signals"
-    if ring:
-        return "roundabout"
     inner = [node_tags[node] for node in core if node in node_tags]
     inner += [mark.tags for chain in inside for mark in chain.marks]
-    if not inner and all(not chain.marks for chain in incoming):
-        return "uncontrolled"
-    stops = [_sign(chain, "stop") for chain in incoming]
-    all_way = any(
-        tags.get("highway") == "stop" and tags.get("stop") == "all" for tags in inner
-    ) or any(tags.get("stop") == "all" for tags in stops if tags is not None)
-    if all_way or (len(incoming) >= 3 and all(tags is not None for tags in stops)):
+    found = {node for node in core if node in node_tags and _is_light(node_tags[node], 0.0)}
+    found.update(mark.node for chain in inside for mark in chain.marks if _is_light(mark.tags, 0.0))
+    for chain in incoming:
+        met = facing(chain, SIGNALS_WITHIN_M, "traffic_signals")
+        found.update(mark.node for mark in met if _is_light(mark.tags, mark.distance_m))
+    if found:
+        return JunctionControl("signals", frozenset(found))
+    return JunctionControl("roundabout" if ring else _signs(inner, incoming), frozenset())
+
+
+def _signs(inner: list[Tags], incoming: tuple[Chain, ...]) -> Control:
+    """Return the control by signs among `inner` tags and on the roads in."""
+    stops = [tags for chain in incoming if (tags := _sign(chain, "stop")) is not None]
+    inner_stops = [tags for tags in inner if tags.get("highway") == "stop"]
+    all_way = any(tags.get("stop") == "all" for tags in (*inner_stops, *stops))
+    if all_way or len(stops) == len(incoming) >= 3:
         return "all_way_stop"
-    at_inner = {tags.get("highway") for tags in inner}
-    if "stop" in at_inner or any(tags is not None for tags in stops):
+    if inner_stops or stops:
         return "stop"
-    if "give_way" in at_inner or any(_sign(chain, "give_way") is not None for chain in incoming):
+    signed = any(_sign(chain, "give_way") is not None for chain in incoming)
+    if signed or any(tags.get("highway") == "give_way" for tags in inner):
         return "give_way"
     return "uncontrolled"
 
 
 def _sign(chain: Chain, word: str) -> Tags | None:
-    if not chain.marks:
-        return None
     return next((mark.tags for mark in facing(chain, SIGNS_WITHIN_M, word)), None)
 
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import msgspec
-import numpy as np
-import numpy.typing as npt
 import shapely
 
-from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.buildings.footprints import BuildingIndex
-from foretwin.world_gen.buildings.parts import Footprint
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.beside_roads import BesideIndex
@@ -36,13 +33,10 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def map_key(self) -> str:
-        """The map's SHA-256, and which roads count as car roads beyond what it says."""
+        """The map's SHA-256, and which roads count as car roads beyond its tags."""
         edges = (self.graph.edges[i] for i in self.car_edges)
-        added = [
-            f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
-            for edge in edges
-            if edge.road_class in OTHER_CLASSES
-        ]
+        others = (edge for edge in edges if edge.road_class in OTHER_CLASSES)
+        added = [f"w{edge.way_id}.{edge.start_node}.{edge.end_node}" for edge in others]
         return self.osm.sha256 if not added else f"{self.osm.sha256} with {' '.join(added)}"
 
     def car_edges_in(self, area: shapely.Polygon) -> tuple[int, ...]:
@@ -50,39 +44,20 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
         found = self.car_edge_tree.query(area, predicate="intersects")
         return tuple(sorted(self.car_edges[i] for i in found))
 
-    def buildings_in(self, area: shapely.Polygon) -> tuple[Footprint, ...]:
-        """Return buildings that reach into an area in the map's frame."""
-        return self.buildings.within(area)
-
 
 def index_map(osm: OsmMap, graph: RoadGraph, junctions: Iterable[Junction] = ()) -> MapIndex:
     """Prepare a map; `junctions` are all known ones, so that neighbours are built as such."""
-    car = tuple(
-        edge.index
-        for edge in graph.edges
-        if edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
-    )
+    car = tuple(edge.index for edge in graph.edges if edge.drivable)
     known = tuple(junctions)
-    lines = _lines([graph.edges[i].xy_m for i in car])
+    lines = Polylines.of([graph.edges[i].xy_m for i in car])
     return MapIndex(
         osm=osm,
         graph=graph,
         car_edges=car,
-        car_edge_tree=shapely.STRtree(lines),
+        car_edge_tree=shapely.STRtree(shapely.linestrings(lines.xy_m, indices=lines.line)),
         buildings=BuildingIndex(osm),
         beside=BesideIndex(osm),
         restrictions=read_turn_restrictions(osm),
         junction_of_node={node: j for j in known for node in sorted(j.nodes)},
         junction_lights=frozenset().union(*(junction.lights for junction in known)),
     )
-
-
-def _lines(xy_m: list[Array]) -> npt.NDArray[np.object_]:
-    """Return lines of many arrays of points (N, 2) in one call: shapely takes long to be called."""
-    if not xy_m:
-        return np.empty(0, dtype=object)
-    counts = [len(xy) for xy in xy_m]
-    lines: npt.NDArray[np.object_] = shapely.linestrings(
-        np.concatenate(xy_m), indices=np.repeat(np.arange(len(counts)), counts)
-    )
-    return lines

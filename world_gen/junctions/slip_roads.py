@@ -14,6 +14,8 @@ WIDEST_M, WIDEST_WITH_BARE_ENDS_M = 100.0, 170.0
 FLARE_WIDTH_M = 70.0
 THINNEST_CORNER_RAD = math.radians(18.0)
 SMOOTH_RAD, STRAIGHT_RAD = math.radians(60.0), math.radians(12.0)
+_LOOK_M = 15.0
+"""How far along a road its direction is taken."""
 
 
 def add_slips(grouping: Grouping, roads: CarRoads) -> None:
@@ -22,14 +24,8 @@ def add_slips(grouping: Grouping, roads: CarRoads) -> None:
     A slip road leaves a road before the junction and joins another one behind it, both without
     a turn, so that its driver could as well have driven through the junction.
     """
-    slips = [
-        chain
-        for chains in roads.chains_from.values()
-        for chain in chains
-        if chain.one_way
-        and chain.outward
-        and chain.length_m <= (RAMP_SLIP_M if chain.link else SLIP_M)
-    ]
+    one_way = [c for chains in roads.chains_from.values() for c in chains if c.one_way]
+    slips = [c for c in one_way if c.outward and c.length_m <= _longest_m(c)]
     for slip in sorted(slips, key=lambda chain: (chain.length_m, chain.key)):
         before, behind = grouping.of.get(slip.start), grouping.of.get(slip.end)
         if before is None or behind is None or before is behind:
@@ -38,7 +34,7 @@ def add_slips(grouping: Grouping, roads: CarRoads) -> None:
         if max(leaving, joining) > SMOOTH_RAD:
             continue
         straight_on = max(leaving, joining) < STRAIGHT_RAD
-        limit_m = RAMP_SLIP_M if slip.link else SLIP_M
+        limit_m = _longest_m(slip)
         to_corner = _next_clusters(slip.start, slip, limit_m, True, grouping, roads)
         from_corner = _next_clusters(slip.end, slip, limit_m, False, grouping, roads)
         for key, (onward, corner) in to_corner.items():
@@ -61,6 +57,10 @@ def add_slips(grouping: Grouping, roads: CarRoads) -> None:
                     grouping.attach(before, behind, keys, widest_m=WIDEST_WITH_BARE_ENDS_M)
 
 
+def _longest_m(slip: Chain) -> float:
+    return RAMP_SLIP_M if slip.link else SLIP_M
+
+
 def slip_ends(roads: CarRoads) -> dict[int, frozenset[int]]:
     """Return for each end of a slip road the other nodes of the junction that it goes around.
 
@@ -74,14 +74,11 @@ def slip_ends(roads: CarRoads) -> dict[int, frozenset[int]]:
         if max(_angle_leaving(slip, roads), _angle_joining(slip, roads)) > SMOOTH_RAD:
             continue
         limit_m = max(SLIP_M, slip.length_m)
-        sides = [
-            (c, c.outward if node == slip.start else c.inward)
+        after, before = (
+            [c for c in roads.chains_from[node] if c.key != slip.key and c.length_m <= limit_m]
             for node in (slip.start, slip.end)
-            for c in roads.chains_from[node]
-            if c.key != slip.key and c.length_m <= limit_m
-        ]
-        onward = {c.end for c, drivable in sides if c.start == slip.start and drivable}
-        back = {c.end for c, drivable in sides if c.start == slip.end and drivable}
+        )
+        onward, back = {c.end for c in after if c.outward}, {c.end for c in before if c.inward}
         for corner in (onward & back) - {slip.start, slip.end}:
             found.setdefault(slip.start, set()).update((corner, slip.end))
             found.setdefault(slip.end, set()).update((corner, slip.start))
@@ -89,12 +86,7 @@ def slip_ends(roads: CarRoads) -> dict[int, frozenset[int]]:
 
 
 def _attach_both(
-    slip: Chain,
-    onward: Chain,
-    back: Chain,
-    straight_on: bool,
-    grouping: Grouping,
-    roads: CarRoads,
+    slip: Chain, onward: Chain, back: Chain, straight_on: bool, grouping: Grouping, roads: CarRoads
 ) -> None:
     """Give the corner between two roads both ends of a slip road."""
     if straight_on:
@@ -117,30 +109,20 @@ def _is_bare(cluster: JunctionCluster, roads: CarRoads) -> bool:
 
 def _angle_leaving(slip: Chain, roads: CarRoads) -> float:
     """Return the angle by which the straightest way into a slip road turns."""
-    ahead = slip.bearing_rad(15.0)
-    return min(
-        (
-            abs(math.remainder(chain.bearing_rad(15.0) + math.pi - ahead, math.tau))
-            for chain in roads.chains_from[slip.start]
-            if chain.inward and chain.key != slip.key
-        ),
-        default=math.pi,
-    )
+    ahead = slip.bearing_rad(_LOOK_M)
+    before = [c for c in roads.chains_from[slip.start] if c.inward and c.key != slip.key]
+    turns = (c.bearing_rad(_LOOK_M) + math.pi - ahead for c in before)
+    return min((abs(math.remainder(turn, math.tau)) for turn in turns), default=math.pi)
 
 
 def _angle_joining(slip: Chain, roads: CarRoads) -> float:
     """Return the angle by which the straightest way out of a slip road turns."""
-    x_m, y_m = slip.point_at(max(0.0, slip.length_m - 15.0))
+    x_m, y_m = slip.point_at(max(0.0, slip.length_m - _LOOK_M))
     end_x_m, end_y_m = slip.point_at(slip.length_m)
     ahead = math.atan2(end_y_m - y_m, end_x_m - x_m)
-    return min(
-        (
-            abs(math.remainder(chain.bearing_rad(15.0) - ahead, math.tau))
-            for chain in roads.chains_from[slip.end]
-            if chain.outward and chain.key != slip.key
-        ),
-        default=math.pi,
-    )
+    behind = [c for c in roads.chains_from[slip.end] if c.outward and c.key != slip.key]
+    turns = (c.bearing_rad(_LOOK_M) - ahead for c in behind)
+    return min((abs(math.remainder(turn, math.tau)) for turn in turns), default=math.pi)
 
 
 def _next_clusters(

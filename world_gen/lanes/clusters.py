@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import compress
 from typing import NamedTuple
 
 import msgspec
@@ -16,9 +17,9 @@ from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.extent import Extent
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.junctions.map_index import MapIndex
-from foretwin.world_gen.lanes.cluster import Cluster
-from foretwin.world_gen.lanes.cross_section import CrossSection, cross_section
-from foretwin.world_gen.lanes.legs import RING_KINDS, Heads, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.cross_section import cross_section
+from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
+from foretwin.world_gen.lanes.legs import RING_KINDS, Cluster, Heads, heading_out, is_ring_edge
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
@@ -54,6 +55,10 @@ class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
         """Indices of the edges inside whole junctions."""
         return frozenset(i for junction in self.junctions for i in junction.inner)
 
+    def lanes_along(self, edge: DirectedEdge) -> LanesAlong:
+        """Return the lanes that are driven as an edge is."""
+        return self.sections[edge.edge.index].along(reverse=edge.reverse)
+
     def section(self, edge: DirectedEdge) -> CrossSection:
         """Return the cross-section of a directed edge's road."""
         return self.sections[edge.edge.index]
@@ -70,10 +75,7 @@ def world_frame(junction: Junction) -> LocalFrame:
 
 
 def surroundings(
-    index: MapIndex,
-    frame: LocalFrame,
-    extent: Extent,
-    made_for: tuple[Junction, ...],
+    index: MapIndex, frame: LocalFrame, extent: Extent, made_for: tuple[Junction, ...]
 ) -> Surroundings:
     """Collect the roads within `extent` of the frame's origin and cluster their nodes.
 
@@ -83,10 +85,9 @@ def surroundings(
     area = in_map(extent, frame, graph.frame)
     wanted = set(index.car_edges_in(area))
     for junction in made_for:
-        wanted.update(i for i in junction.inner if _drivable(graph.edges[i]))
-        wanted.update(
-            leg.edge.index for arm in junction.arms for leg in arm.outward if _drivable(leg.edge)
-        )
+        legs = (leg.edge for arm in junction.arms for leg in arm.outward)
+        near = (*(graph.edges[i] for i in junction.inner), *legs)
+        wanted.update(edge.index for edge in near if edge.drivable)
     edges = _in_frame([graph.edges[i] for i in sorted(wanted)], frame, graph.frame)
     sections = _sections(index, edges)
     clusters = _clusters(index, made_for, edges, extent)
@@ -94,7 +95,7 @@ def surroundings(
     inner = {i for junction in whole.values() for i in junction.inner}
     ring_edges = frozenset(i for i in inner if i in edges and is_ring_edge(edges[i]))
     shifts = transition_shifts(clusters, edges, sections)
-    heads = {(leg.edge.index, leg.reverse): heading_out(leg) for c in clusters for leg in c.legs}
+    heads = {leg.key: heading_out(leg) for c in clusters for leg in c.legs}
     return Surroundings(
         frame=frame,
         junctions=tuple(whole.values()),
@@ -111,19 +112,14 @@ def surroundings(
     )
 
 
-def _drivable(edge: RoadEdge) -> bool:
-    return edge.car and (edge.forward or edge.backward) and edge.length_m > 0.05
-
-
-_SAY_NOTHING_OF_LANES = frozenset(
+_WITHOUT_EFFECT_ON_LANES = frozenset(
     {"name", "ref", "maxspeed", "surface", "lit", "smoothness", "source", "wikidata", "note"}
 )
 
 
 def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, CrossSection]:
-    """Return cross-sections by edge index; ways whose tags say the same share theirs."""
-    of_way: dict[tuple[int, bool, bool, bool], CrossSection] = {}
-    of_tags: dict[object, CrossSection] = {}
+    """Return cross-sections by edge index; ways with the same tags share theirs."""
+    known: dict[object, CrossSection] = {}
     found: dict[int, CrossSection] = {}
     for i, edge in edges.items():
         # A centre lane for turns is driven toward the junction, where there is one.
@@ -132,47 +128,25 @@ def _sections(index: MapIndex, edges: Mapping[int, RoadEdge]) -> dict[int, Cross
             and edge.start_node in index.junction_of_node
             and edge.end_node not in index.junction_of_node
         )
-        key = (edge.way_id, edge.forward, edge.backward, centre_reverse)
-        section = of_way.get(key)
-        if section is None:
-            section = of_way[key] = _section(
-                edge, index.graph.driving_side, of_tags, centre_reverse=centre_reverse
+        driven = (edge.forward, edge.backward, centre_reverse)
+        way = (edge.way_id, *driven)
+        if way not in known:
+            tags = (kv for kv in edge.tags.items() if kv[0] not in _WITHOUT_EFFECT_ON_LANES)
+            lanes = (edge.lanes_forward, edge.lanes_backward)
+            alike = (edge.road_class, *driven, *lanes, frozenset(tags))
+            known[way] = known.get(alike) or cross_section(
+                edge, index.graph.driving_side, centre_reverse=centre_reverse
             )
-        found[i] = section
+            if not known[way].notes:  # these name the way
+                known[alike] = known[way]
+        found[i] = known[way]
     return found
-
-
-def _section(
-    edge: RoadEdge,
-    driving_side: DrivingSide,
-    of_tags: dict[object, CrossSection],
-    *,
-    centre_reverse: bool,
-) -> CrossSection:
-    lanes = (edge.lanes_forward, edge.lanes_backward)
-    tags = frozenset(item for item in edge.tags.items() if item[0] not in _SAY_NOTHING_OF_LANES)
-    key = (
-        edge.road_class,
-        edge.forward,
-        edge.backward,
-        centre_reverse,
-        *((count.value, count.source) for count in lanes),
-        tags,
-    )
-    section = of_tags.get(key)
-    if section is None:
-        section = cross_section(edge, driving_side, centre_reverse=centre_reverse)
-        if not section.notes:  # these name the way
-            of_tags[key] = section
-    return section
 
 
 def _in_frame(
     edges: list[RoadEdge], frame: LocalFrame, map_frame: LocalFrame
 ) -> dict[int, RoadEdge]:
     """Return edges in the World's frame by index, without those that are but a point."""
-    if not edges:
-        return {}
     lines = Polylines.of([edge.xy_m for edge in edges])
     moved = Polylines(target_from_source_m(frame, map_frame, lines.xy_m), lines.first)
     step_m = np.maximum.reduceat(moved.steps[1] * ~moved.is_last, moved.first[:-1]).tolist()
@@ -199,10 +173,9 @@ def _clusters(
         for directed in (DirectedEdge(edge, False), DirectedEdge(edge, True)):
             leaving.setdefault(directed.start_node, []).append(directed)
     known = list(leaving)
-    at = [leaving[node][0].xy_m[0] for node in known]
+    at = np.array([leaving[node][0].xy_m[0] for node in known]).reshape(-1, 2)
     near: set[int] = {node for junction in made_for for node in junction.nodes}
-    if known:
-        near.update(n for n, ok in zip(known, extent.holds(np.array(at)), strict=True) if ok)
+    near.update(compress(known, extent.holds(at)))
     others = {j.summary.id: j for j in made_for}
     for node in sorted(near):
         if found := index.junction_of_node.get(node):
@@ -216,12 +189,8 @@ def _clusters(
     groups.extend(_ClusterNodes(frozenset([n])) for n in sorted(near - taken))
     clusters = []
     for group in groups:
-        legs = tuple(
-            d
-            for node in sorted(group.nodes)
-            for d in leaving.get(node, ())
-            if d.edge.index not in group.inner
-        )
+        out = (d for node in sorted(group.nodes) for d in leaving.get(node, ()))
+        legs = tuple(d for d in out if d.edge.index not in group.inner)
         if len(legs) >= 2:
             clusters.append(Cluster(key=str(min(group.nodes)), legs=legs, **group._asdict()))
     return tuple(clusters)
@@ -230,7 +199,7 @@ def _clusters(
 def _drawn(junction: Junction, edges: Mapping[int, RoadEdge]) -> bool:
     """Return whether all roads of a junction that cars may use are among `edges`."""
     legs = (leg.edge for arm in junction.arms for leg in arm.outward)
-    return all(edge.index in edges for edge in legs if _drivable(edge))
+    return all(edge.index in edges for edge in legs if edge.drivable)
 
 
 def _groups_of(
@@ -241,12 +210,8 @@ def _groups_of(
         node for node in junction.nodes if any(is_ring_edge(d.edge) for d in leaving.get(node, ()))
     }
     if junction.summary.kind in RING_KINDS and on_ring:
-        # Where a street parts into entry and exit before the ring, nobody has to stop.
-        return [
-            _ClusterNodes(
-                frozenset([n]), frozenset(), junction, whole and n in on_ring, n in on_ring
-            )
-            for n in sorted(junction.nodes)
-        ]
+        # Where a street parts into entry and exit before the ring, no car has to stop.
+        places = ((frozenset([n]), n in on_ring) for n in sorted(junction.nodes))
+        return [_ClusterNodes(n, frozenset(), junction, whole and on, on) for n, on in places]
     nodes = frozenset(node for node in junction.nodes if node in leaving)
     return [_ClusterNodes(nodes, frozenset(junction.inner), junction, whole)] if nodes else []

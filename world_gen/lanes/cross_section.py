@@ -8,9 +8,7 @@ import msgspec
 
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import DrivingSide
-from foretwin.world_gen.lanes.lane_plans import CrossSection as CrossSection
-from foretwin.world_gen.lanes.lane_plans import LanePlan as LanePlan
-from foretwin.world_gen.lanes.lane_plans import metres as metres
+from foretwin.world_gen.lanes.lane_plans import CrossSection, LanePlan, metres
 from foretwin.world_gen.lanes.lane_tags import (
     BUS_WIDTH_M,
     DEFAULT_WIDTH_M,
@@ -32,7 +30,7 @@ def cross_section(
 ) -> CrossSection:
     """Return the lanes of a road by its tags, by its class where tags are missing.
 
-    The way lies in the middle of the lanes that the map counts, unless `placement` says
+    The way lies in the middle of the lanes that the map counts, unless `placement` is
     otherwise; lanes for bicycles and parking lie outside. A lane in the middle from which both
     directions turn becomes one lane, driven along the way, or against it with `centre_reverse`.
     """
@@ -48,11 +46,10 @@ def cross_section(
     centre = _centre(edge, driving_side, centre_reverse, notes) if ahead and against else []
     with_bicycles = frozenset(p.reverse for p in (*ahead, *against) if p.kind == "bicycle")
     beside = side_lanes(edge, driving_side, with_bicycles, BUS_WIDTH_M)
-    ordered = (
-        [*reversed(against), *centre, *ahead]
-        if driving_side == "right"
-        else [*ahead, *centre, *reversed(against)]
-    )
+    first, last = against[::-1], ahead
+    if driving_side == "left":
+        first, last = last, first
+    ordered = [*first, *centre, *last]
     ordered = _fit_total_width(edge, ordered)
     total = _width(ordered)
     left = total / 2 + _placement_shift(edge, ordered, total, notes)
@@ -124,29 +121,21 @@ def _placement_shift(
 ) -> float:
     """Return how far the carriageway's centre lies to the left of the way, from `placement`."""
     tags = edge.tags
-    for reverse, key in (
-        (False, "placement:forward"),
-        (True, "placement:backward"),
-        (False, "placement"),
-    ):
+    for key in ("placement:forward", "placement:backward", "placement"):
+        reverse = key == "placement:backward"
         text = tags.get(key)
         if text is None or (key == "placement" and not edge.forward) or text == TRANSITION:
             continue
         found = _PLACEMENT.match(text.strip())
         number = int(found[2]) - 1 if found else -1
-        place = next(
-            (
-                i
-                for i, lane in enumerate(ordered)
-                if lane.reverse == reverse and lane.number == number >= 0
-            ),
-            None,
-        )
-        if found is None or place is None:
+        meant = [
+            i for i, lane in enumerate(ordered) if (lane.reverse, lane.number) == (reverse, number)
+        ]
+        if found is None or number < 0 or not meant:
             notes.append(f"way {edge.way_id}: {key}={text} names no lane of this road")
             continue
-        begin = _width(ordered[:place])
-        width = ordered[place].width_m.value
+        begin = _width(ordered[: meant[0]])
+        width = ordered[meant[0]].width_m.value
         share = {"left_of": 0.0, "middle_of": 0.5, "right_of": 1.0}[found[1]]
         share = 1.0 - share if reverse else share
         # The way lies `begin + share * width` right of the left edge.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
@@ -12,12 +13,13 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.contracts.world import Lane, LaneKind, Road, Turn
 from foretwin.geometry.polyline_batch import Polylines, offset, without_repeats
-from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.cross_section import CrossSection, LanePlan
+from foretwin.world_gen.lanes.lane_plans import CrossSection, LanePlan
+from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.lanes.places import places_led_through, without_dead_places
 from foretwin.world_gen.lanes.reference_lines import Stretch, reference_lines
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.road_tags import in_tunnel, on_bridge
 
 Role = Literal["approach", "exit", "ring", "other"]
 
@@ -86,23 +88,19 @@ class LaneSet(msgspec.Struct, frozen=True):
 
     def ending(self, toward: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
         """Return the lane of a plan that ends where `toward` ends; None where it was left out."""
-        return self.ends.get((toward.edge.index, toward.reverse, plan.number))
+        return self.ends.get((*toward.key, plan.number))
 
     def beginning(self, away: DirectedEdge, plan: LanePlan) -> LaneDraft | None:
         """Return the lane of a plan that begins where `away` begins; None where it was left out."""
-        return self.begins.get((away.edge.index, away.reverse, plan.number))
+        return self.begins.get((*away.key, plan.number))
 
     def incoming(self, toward: DirectedEdge, plans: tuple[LanePlan, ...]) -> list[LaneDraft]:
         """Return the lanes that end where `toward` ends, from the left."""
-        index, reverse = toward.edge.index, toward.reverse
-        found = [self.ends.get((index, reverse, plan.number)) for plan in plans]
-        return [lane for lane in found if lane is not None]
+        return [lane for plan in plans if (lane := self.ending(toward, plan)) is not None]
 
     def outgoing(self, away: DirectedEdge, plans: tuple[LanePlan, ...]) -> list[LaneDraft]:
         """Return the lanes that begin where `away` begins, from the left."""
-        index, reverse = away.edge.index, away.reverse
-        found = [self.begins.get((index, reverse, plan.number)) for plan in plans]
-        return [lane for lane in found if lane is not None]
+        return [lane for plan in plans if (lane := self.beginning(away, plan)) is not None]
 
 
 def build_lanes(around: Surroundings) -> LaneSet:
@@ -115,22 +113,21 @@ def build_lanes(around: Surroundings) -> LaneSet:
     lines = Polylines.of([stretch.line for stretch in stretches])
     references = iter(Polylines(np.round(lines.xy_m, 3), lines.first).split())
     curves = iter(_offsets(lines, stretches, sections))
-    legs = {
-        (leg.edge.index, leg.reverse): (cluster.key, leg)
-        for cluster in around.clusters
-        for leg in cluster.legs
-    }
+    legs = {leg.key: (cluster.key, leg) for cluster in around.clusters for leg in cluster.legs}
     places = {key: place for key, (place, _) in legs.items()}
     lanes: dict[str, LaneDraft] = {}
     roads: list[Road] = []
     borders: dict[str, tuple[Array, Array]] = {}
-    names: set[str] = set()
+    names: Counter[str] = Counter()
     begins: dict[tuple[int, bool, int], LaneDraft] = {}
     ends: dict[tuple[int, bool, int], LaneDraft] = {}
     roles = _roles(around)
     for stretch, section in zip(stretches, sections, strict=True):
         index, edge = stretch.edge, around.edges[stretch.edge]
-        road = _road_id(edge, names)
+        # A name that the same map always gives; pieces and twins of an edge are counted.
+        name = f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
+        names[name] += 1
+        road = name if names[name] == 1 else f"{name}#{names[name]}"
         borders[road] = (_line(next(curves)), _line(next(curves)))
         mine: list[LaneDraft] = []
         for plan in section.lanes:
@@ -165,28 +162,19 @@ def build_lanes(around: Surroundings) -> LaneSet:
                 from_place=places.get((index, False)) if stretch.first else None,
                 to_place=places.get((index, True)) if stretch.last else None,
                 layer=edge.layer,
-                bridge=edge.tags.get("bridge", "no") != "no",
-                tunnel=edge.tags.get("tunnel", "no") not in ("no", "building_passage"),
+                bridge=on_bridge(edge.tags),
+                tunnel=in_tunnel(edge.tags),
             )
         )
-    led_through = places_led_through(
-        legs,
-        {(edge, reverse) for edge, reverse, _ in begins},
-        {(edge, reverse) for edge, reverse, _ in ends},
-    )
+    driven = ({(edge, reverse) for edge, reverse, _ in keys} for keys in (begins, ends))
+    led_through = places_led_through(legs, *driven)
     known = tuple(without_dead_places(roads, led_through))
     return LaneSet(lanes, known, borders, begins, ends, tuple(notes))
 
 
 def _lane_count_source(edge: RoadEdge) -> Provenance:
-    counts = [
-        count.source
-        for count, driven in (
-            (edge.lanes_forward, edge.forward),
-            (edge.lanes_backward, edge.backward),
-        )
-        if driven
-    ]
+    sides = (edge.lanes_forward, edge.forward), (edge.lanes_backward, edge.backward)
+    counts = [count.source for count, driven in sides if driven]
     return next((s for s in ("default", "inferred") if s in counts), "tagged")
 
 
@@ -196,10 +184,7 @@ def _offsets(
     """Return for each stretch its left and right edge and its lanes' middles, along the nodes."""
     if not stretches:
         return []
-    left_m = [
-        (section.left_m, section.right_m, *(plan.left_m for plan in section.lanes))
-        for section in sections
-    ]
+    left_m = [(s.left_m, s.right_m, *(plan.left_m for plan in s.lanes)) for s in sections]
     row = np.repeat(np.arange(len(stretches)), [len(mine) for mine in left_m])
     before = np.array([stretch.before for stretch in stretches])[row]
     after = np.array([stretch.after for stretch in stretches])[row]
@@ -211,16 +196,6 @@ def _offsets(
 def _line(points: Array) -> Array:
     """Return an edge of a carriageway as a line, even where a bend shrinks it to a point."""
     return points if len(points) > 1 else np.repeat(points, 2, axis=0)
-
-
-def _road_id(edge: RoadEdge, taken: set[str]) -> str:
-    """Return a name that the same map always gives; pieces and twins of an edge are counted."""
-    name = first = f"w{edge.way_id}.{edge.start_node}.{edge.end_node}"
-    twin = 2
-    while name in taken:
-        name, twin = f"{first}#{twin}", twin + 1
-    taken.add(name)
-    return name
 
 
 def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:
@@ -244,7 +219,7 @@ def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:
 
 
 def _join_neighbours(mine: list[LaneDraft]) -> None:
-    """Tell lanes that cars drive the same way side by side of each other."""
+    """Link lanes that cars drive the same way side by side."""
     of_number = {(lane.plan.reverse, lane.plan.number): lane for lane in mine if lane.plan.counted}
     for (reverse, number), lane in of_number.items():
         right = of_number.get((reverse, number + 1))
@@ -254,18 +229,13 @@ def _join_neighbours(mine: list[LaneDraft]) -> None:
 
 def join_straight_on(cluster: Cluster, around: Surroundings, lanes: LaneSet) -> bool:
     """Join lanes that meet exactly where one road goes on; false where they do not."""
-    if not cluster.plain or any(
-        around.trims_m[leg.edge.index, leg.reverse] for leg in cluster.legs
-    ):
+    if not cluster.plain or any(around.trims_m[leg.key] for leg in cluster.legs):
         return False
     for leg, other in (cluster.legs, cluster.legs[::-1]):
-        toward = DirectedEdge(leg.edge, not leg.reverse)
-        before, behind = around.section(leg), around.section(other)
+        toward = leg.back
+        before, behind = around.lanes_along(toward), around.lanes_along(other)
         # Plans are paired, not lanes: a lane too short to be drawn must not shift its neighbours.
-        for mine, its in (
-            (before.abreast(reverse=toward.reverse), behind.abreast(reverse=other.reverse)),
-            (before.cycled(reverse=toward.reverse), behind.cycled(reverse=other.reverse)),
-        ):
+        for mine, its in ((before.abreast, behind.abreast), (before.cycled, behind.cycled)):
             for a, b in zip(mine, its, strict=False):
                 start, end = lanes.ending(toward, a), lanes.beginning(other, b)
                 if start is not None and end is not None and a.kind in (b.kind, "bus"):

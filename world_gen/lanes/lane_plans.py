@@ -62,51 +62,38 @@ class CrossSection(msgspec.Struct, frozen=True, kw_only=True, dict=True):
         """The wider of both sides, measured from the way."""
         return max(abs(self.left_m), abs(self.right_m))
 
-    def reach_m(self, reverse: bool) -> tuple[float, float]:
-        """Return how far the middles of the outermost lanes of one direction lie from the way.
-
-        To the left and to the right as their driver sees it; NaN where there are none.
-        """
-        return self._by_direction[reverse].reach_m
-
-    def driven(self, *, reverse: bool) -> tuple[LanePlan, ...]:
-        """Return the counted lanes of one direction from the left as their driver sees them."""
-        return self._by_direction[reverse].driven
-
-    def abreast(self, *, reverse: bool) -> tuple[LanePlan, ...]:
-        """Return all lanes of one direction that cars or buses drive, from their drivers' left."""
-        return self._by_direction[reverse].abreast
-
-    def cycled(self, *, reverse: bool) -> tuple[LanePlan, ...]:
-        """Return the bicycle lanes of one direction, from left to right along the way."""
-        return self._by_direction[reverse].cycled
-
-    def turning(self, *, reverse: bool) -> tuple[LanePlan, ...]:
-        """Return the lanes in the middle from which both directions turn, of one direction."""
-        return self._by_direction[reverse].turning
+    def along(self, *, reverse: bool) -> LanesAlong:
+        """Return the lanes of one direction: along the nodes, or with `reverse` against them."""
+        return self._by_direction[reverse]
 
     @cached_property
-    def _by_direction(self) -> tuple[_OneWay, _OneWay]:
-        """Along the nodes and against them: thousands of roads ask the few sections of a town."""
-        return _one_way(self.lanes, False), _one_way(self.lanes, True)
+    def _by_direction(self) -> tuple[LanesAlong, LanesAlong]:
+        """Along the nodes and against them: thousands of roads share the few sections of a town."""
+        return _along(self.lanes, False), _along(self.lanes, True)
 
 
-class _OneWay(NamedTuple):
-    """The lanes of one direction, as the methods of `CrossSection` that are named so tell them."""
+class LanesAlong(NamedTuple):
+    """The lanes of one direction of a road."""
 
     reach_m: tuple[float, float]
+    """How far the middles of the outermost counted lanes lie from the way, to the left and to the
+    right as their driver sees it; NaN where there are none."""
     driven: tuple[LanePlan, ...]
+    """Counted lanes, from the left as their driver sees them."""
     abreast: tuple[LanePlan, ...]
+    """All lanes that cars or buses drive, from their drivers' left."""
     cycled: tuple[LanePlan, ...]
+    """Bicycle lanes, from left to right along the way."""
     turning: tuple[LanePlan, ...]
+    """Lanes in the middle from which both directions turn."""
 
 
-def _one_way(lanes: tuple[LanePlan, ...], reverse: bool) -> _OneWay:
+def _along(lanes: tuple[LanePlan, ...], reverse: bool) -> LanesAlong:
     mine = [lane for lane in lanes if lane.reverse == reverse]
     counted = [lane for lane in mine if lane.counted]
     lefts = [-lane.left_m if reverse else lane.left_m for lane in counted]
     abreast = [lane for lane in mine if lane.kind in ("driving", "bus")]
-    return _OneWay(
+    return LanesAlong(
         reach_m=(max(lefts), -min(lefts)) if lefts else (math.nan, math.nan),
         driven=tuple(sorted(counted, key=lambda lane: lane.number)),
         abreast=tuple(sorted(abreast, key=lambda lane: lane.left_m, reverse=not reverse)),
@@ -122,6 +109,12 @@ def metres(text: str | None) -> float | None:
         return None
     value = float(found[1].replace(",", "."))
     return value * 0.3048 if found[2] in ("ft", "'") else value
+
+
+def tagged_width(text: str | None, least_m: float, most_m: float) -> Quantity | None:
+    """Return a tagged width in metres; None where there is none that a lane can have."""
+    value = metres(text)
+    return Quantity(value, "tagged") if value is not None and least_m <= value <= most_m else None
 
 
 def of_side(tags: Mapping[str, str], key: str, side: str, suffix: str = "") -> str | None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from foretwin.contracts.provenance import Provenance, Quantity
 from foretwin.contracts.world import DrivingSide, LaneChange, LaneKind, Turn
-from foretwin.world_gen.lanes.lane_plans import LanePlan, metres, of_side
+from foretwin.world_gen.lanes.lane_plans import LanePlan, of_side, tagged_width
 from foretwin.world_gen.lanes.side_lanes import BICYCLE_WIDTH_M
 from foretwin.world_gen.roads.road_classes import road_class
 from foretwin.world_gen.roads.road_graph import RoadEdge
@@ -43,12 +43,17 @@ _ALLOWED = frozenset({"designated", "yes"})
 class Direction:
     """Tags of one direction of a road, as values for each of its lanes."""
 
-    def __init__(self, edge: RoadEdge, *, reverse: bool, both: bool, notes: list[str]) -> None:
-        self.edge, self.reverse, self.both, self.notes = edge, reverse, both, notes
+    def __init__(
+        self, edge: RoadEdge, count: int, *, reverse: bool, both: bool, notes: list[str]
+    ) -> None:
+        self.edge, self.count, self.reverse, self.both = edge, count, reverse, both
+        self.notes = notes
         self.word = "backward" if reverse else "forward"
+        self.bicycle = self.each("bicycle:lanes")
+        self.designated = [i for i, word in enumerate(self.bicycle) if word == "designated"]
 
     def text(self, key: str) -> str | None:
-        """Return a tag of this direction; the tag without a direction speaks for one-ways."""
+        """Return a tag of this direction; the tag without a direction holds for one-ways."""
         tags = self.edge.tags
         return tags.get(f"{key}:{self.word}") or (None if self.both else tags.get(key))
 
@@ -57,18 +62,23 @@ class Direction:
         text = self.text(key)
         return [value.strip() for value in text.split("|")] if text else []
 
-    def fitted(self, key: str, count: int, bicycles: Sequence[int]) -> list[str]:
-        """Return a tag's values for the counted lanes, and note where they do not fit."""
-        values = self.each(key)
-        if not values or len(values) == count:
-            return values
-        cars = [value for i, value in enumerate(values) if i not in bicycles]
-        if len(cars) == count:
-            return cars
-        self.notes.append(
-            f"way {self.edge.way_id}: {key} has {len(values)} entries for {count} lanes"
-        )
-        return []
+    def fitted(self, *keys: str, default: str | None = None) -> list[str]:
+        """Return for each counted lane its value of the first tag that fits, or the default.
+
+        It is noted where one does not fit.
+        """
+        for key in keys:
+            values = self.each(key)
+            cars = [value for i, value in enumerate(values) if i not in self.designated]
+            for fitting in (values, cars):
+                if len(fitting) == self.count:
+                    return fitting
+            if values:
+                self.notes.append(
+                    f"way {self.edge.way_id}: {key} has {len(values)} entries for "
+                    f"{self.count} lanes"
+                )
+        return [default or ""] * self.count
 
 
 def lanes_of_direction(
@@ -87,18 +97,14 @@ def lanes_of_direction(
     """
     if count == 0:
         return []
-    tags = Direction(edge, reverse=reverse, both=both, notes=notes)
-    single = tags.text("turn")
-    bicycle = tags.each("bicycle:lanes")
-    designated = [i for i, word in enumerate(bicycle) if word == "designated"]
-    beside = designated if len(bicycle) == count + len(designated) else []
-    turns = tags.fitted("turn:lanes", count, designated) or [single or ""] * count
-    widths = tags.fitted("width:lanes", count, designated)
-    changes = tags.fitted("change:lanes", count, designated) or [tags.text("change") or ""] * count
-    kinds = _kinds(tags, count, bicycle, designated, driving_side)
-    source: Provenance = (
-        "tagged" if "oneway" in edge.tags or "junction" in edge.tags else "inferred"
-    )
+    tags = Direction(edge, count, reverse=reverse, both=both, notes=notes)
+    beside = tags.designated if len(tags.bicycle) == count + len(tags.designated) else []
+    turns = tags.fitted("turn:lanes", default=tags.text("turn"))
+    widths = tags.fitted("width:lanes")
+    changes = tags.fitted("change:lanes", default=tags.text("change"))
+    kinds = _kinds(tags, driving_side)
+    tagged = "oneway" in edge.tags or "junction" in edge.tags
+    source: Provenance = "tagged" if tagged else "inferred"
     letter = "b" if reverse else "f"
     lanes = []
     for i in range(count):
@@ -110,7 +116,7 @@ def lanes_of_direction(
                 reverse=reverse,
                 number=i,
                 kind=kinds[i],
-                width_m=_lane_width(edge, widths[i] if widths else None, kinds[i]),
+                width_m=_lane_width(edge, widths[i], kinds[i]),
                 turns=named,
                 turns_source="tagged" if named else "inferred",
                 direction_source=source,
@@ -136,25 +142,12 @@ def lanes_of_direction(
     return lanes
 
 
-def _kinds(
-    tags: Direction,
-    count: int,
-    bicycle: Sequence[str],
-    designated: Sequence[int],
-    driving_side: DrivingSide,
-) -> list[LaneKind]:
+def _kinds(tags: Direction, driving_side: DrivingSide) -> list[LaneKind]:
     """Return what each counted lane is for."""
+    count, bicycle = tags.count, tags.bicycle
     kinds: list[LaneKind] = ["driving"] * count
-    bus = (
-        tags.fitted("bus:lanes", count, designated)
-        or tags.fitted("psv:lanes", count, designated)
-        or [""] * count
-    )
-    barred = [""] * count
-    for key in ("motor_vehicle:lanes", "vehicle:lanes", "access:lanes"):
-        if values := tags.fitted(key, count, designated):
-            barred = values
-            break
+    bus = tags.fitted("bus:lanes", "psv:lanes")
+    barred = tags.fitted("motor_vehicle:lanes", "vehicle:lanes", "access:lanes")
     for i in range(count):
         if bus[i] == "designated" or (barred[i] == "no" and bus[i] in _ALLOWED):
             kinds[i] = "bus"
@@ -185,11 +178,10 @@ def _turns(words: str) -> tuple[Turn, ...]:
     return tuple(dict.fromkeys(turn for turn in found if turn))
 
 
-def _lane_width(edge: RoadEdge, tagged: str | None, kind: LaneKind) -> Quantity:
-    value = metres(tagged)
+def _lane_width(edge: RoadEdge, tagged: str, kind: LaneKind) -> Quantity:
     least = 0.8 if kind == "bicycle" else MIN_WIDTH_M
-    if value is not None and least <= value <= MAX_WIDTH_M:
-        return Quantity(value, "tagged")
+    if width := tagged_width(tagged, least, MAX_WIDTH_M):
+        return width
     if kind == "bus":
         return Quantity(BUS_WIDTH_M, "inferred")
     if kind == "bicycle":

@@ -1,16 +1,41 @@
-"""The roads that leave a place where lanes meet: where they head, and which lanes lie where."""
+"""Places where lanes meet, the roads that leave them, where they head and which lanes lie where."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 
-from foretwin.world_gen.lanes.cross_section import CrossSection
+import msgspec
+
+from foretwin.world_gen.junctions.intersections import Junction
+from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 _PARTED_M = 25.0
 _BESIDE_COS = math.cos(math.radians(30.0))
 RING_KINDS = ("roundabout", "circular")
+
+
+class Cluster(msgspec.Struct, frozen=True, kw_only=True):
+    """Graph nodes where lanes end and begin: one junction, one node of a ring, or a lone node.
+
+    `legs` leave the cluster outward; `inner` edges lie within and have no lanes of their own.
+    `whole` means that it belongs to a junction that lies whole in the World: such a junction
+    gets stop lines, control and right of way.
+    """
+
+    key: str
+    nodes: frozenset[int]
+    inner: frozenset[int]
+    legs: tuple[DirectedEdge, ...]
+    junction: Junction | None
+    whole: bool
+    ring: bool
+
+    @property
+    def plain(self) -> bool:
+        """Whether one road merely goes on here."""
+        return len(self.legs) == 2 and len(self.nodes) == 1 and not self.whole
 
 
 def is_ring_edge(edge: RoadEdge) -> bool:
@@ -50,14 +75,10 @@ def dot(a: tuple[float, float], b: tuple[float, float]) -> float:
 
 def opposed(leg: DirectedEdge, other: DirectedEdge) -> bool:
     """Return whether two one-way roads leave a place side by side, as carriageways of a street."""
-    if leg.edge.index == other.edge.index or any(
-        d.edge.forward == d.edge.backward for d in (leg, other)
-    ):
+    if leg.edge.index == other.edge.index or not (leg.edge.one_way and other.edge.one_way):
         return False
-    return any(
-        dot(heading_out(leg, look_m), heading_out(other, look_m)) > _BESIDE_COS
-        for look_m in (8.0, _PARTED_M)
-    )
+    heads = ((heading_out(leg, m), heading_out(other, m)) for m in (8.0, _PARTED_M))
+    return any(dot(mine, its) > _BESIDE_COS for mine, its in heads)
 
 
 def lateral_positions(

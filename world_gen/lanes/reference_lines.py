@@ -27,7 +27,7 @@ _NOWHERE = np.array([np.nan, np.nan])
 class Stretch(NamedTuple):
     """A stretch of one edge along which lanes run side by side.
 
-    `first` and `last` tell whether it reaches the edge's own start and end, or the World's edge
+    `first` and `last` are whether it reaches the edge's own start and end, or the World's edge
     cut it. `before` and `after` (2,) are the directions in which a road that merely goes on
     continues beyond them, along the nodes; NaN where it does not.
     """
@@ -79,16 +79,8 @@ def reference_lines(around: Surroundings) -> tuple[list[Stretch], list[str]]:
         for from_m, to_m in stretches_inside(line, around.extent):
             first, last = from_m == 0.0, abs(to_m - full_m) < 1e-9
             piece = line if first and last else cut(line, from_m, to_m)
-            found.append(
-                Stretch(
-                    index,
-                    piece,
-                    first,
-                    last,
-                    before if first else _NOWHERE,
-                    after if last else _NOWHERE,
-                )
-            )
+            beyond = (before if first else _NOWHERE), (after if last else _NOWHERE)
+            found.append(Stretch(index, piece, first, last, *beyond))
     return found, notes
 
 
@@ -134,9 +126,7 @@ def _points_beyond(
     row = {index: i for i, index in enumerate(indices)}
     beyond = np.full((2, len(indices), 2), np.nan)
     for cluster in around.clusters:
-        if not cluster.plain or any(
-            around.trims_m[leg.edge.index, leg.reverse] for leg in cluster.legs
-        ):
+        if not cluster.plain or any(around.trims_m[leg.key] for leg in cluster.legs):
             continue
         for leg, other in (cluster.legs, cluster.legs[::-1]):
             mine, its = row.get(leg.edge.index), row.get(other.edge.index)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import DrivingSide, LaneKind
-from foretwin.world_gen.lanes.lane_plans import LanePlan, metres, of_side
+from foretwin.world_gen.lanes.lane_plans import LanePlan, of_side, tagged_width
 from foretwin.world_gen.roads.road_graph import RoadEdge
 
 BICYCLE_WIDTH_M = 1.85
@@ -42,12 +42,8 @@ def side_lanes(
     """Return the lanes at the kerbs; `with_bicycles` names directions that have theirs already."""
     if not any(key.startswith(_KEYS) for key in edge.tags):
         return SideLanes((), ())
-    return SideLanes(
-        *(
-            tuple(_of_side(edge, side, driving_side, with_bicycles, bus_width_m))
-            for side in ("left", "right")
-        )
-    )
+    given = (driving_side, with_bicycles, bus_width_m)
+    return SideLanes(*(tuple(_of_side(edge, side, *given)) for side in ("left", "right")))
 
 
 def _of_side(
@@ -58,7 +54,7 @@ def _of_side(
     bus_width_m: float,
 ) -> list[LanePlan]:
     tags = edge.tags
-    one_way = edge.forward != edge.backward
+    one_way = edge.one_way
     kerb_of_forward = side == driving_side
     # Along a one-way street both kerbs belong to its direction.
     reverse = edge.backward if one_way else not kerb_of_forward
@@ -79,13 +75,8 @@ def _of_side(
     mine = word == "lane" and meant
     runs = not reverse if against else reverse
     if (mine or (against and word == "opposite_lane")) and runs not in with_bicycles:
-        tagged = metres(of_side(tags, "cycleway", side, ":width"))
-        width = (
-            Quantity(tagged, "tagged")
-            if tagged is not None and 0.8 <= tagged <= 4.0
-            else Quantity(BICYCLE_WIDTH_M, "default")
-        )
-        found.append(_lane(side, "bicycle", width, runs))
+        tagged = tagged_width(of_side(tags, "cycleway", side, ":width"), 0.8, 4.0)
+        found.append(_lane(side, "bicycle", tagged or Quantity(BICYCLE_WIDTH_M, "default"), runs))
     parked = _parking_width(tags, side)
     if parked is not None:
         found.append(_lane(side, "parking", parked, reverse))
@@ -110,9 +101,8 @@ def _parking_width(tags: Mapping[str, str], side: str) -> Quantity | None:
         if word not in _PARKED:
             return None
         orientation = of_side(tags, "parking", side, ":orientation")
-        tagged = metres(of_side(tags, "parking", side, ":width"))
-        if tagged is not None and 1.5 <= tagged <= 8.0:
-            return Quantity(tagged, "tagged")
+        if tagged := tagged_width(of_side(tags, "parking", side, ":width"), 1.5, 8.0):
+            return tagged
     else:
         # The scheme before 2022: parking:lane:right=parallel, its place in a key of its own.
         orientation = of_side(tags, "parking:lane", side)
@@ -122,6 +112,6 @@ def _parking_width(tags: Mapping[str, str], side: str) -> Quantity | None:
         if place is not None and place not in _OLD_ON_STREET:
             return None
     usual = PARKING_WIDTH_M.get(orientation or "")
-    if usual is not None:
-        return Quantity(usual, "inferred")
-    return Quantity(PARKING_WIDTH_M["parallel"], "default")
+    if usual is None:
+        return Quantity(PARKING_WIDTH_M["parallel"], "default")
+    return Quantity(usual, "inferred")

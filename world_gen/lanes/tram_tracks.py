@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Quantity
 from foretwin.contracts.world import Lane, Road
 from foretwin.geometry.polyline import cut, length, without_repeats
 from foretwin.world_gen.extent import stretches_inside
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.osm_map import OsmMap, OsmWay
 from foretwin.world_gen.roads.beside_roads import BesideRoads, in_frame
-from foretwin.world_gen.roads.road_tags import road_layer, speed_limit
+from foretwin.world_gen.roads.road_tags import in_tunnel, on_bridge, road_layer, speed_limit
 
 TRAM_WIDTH_M = 2.65
 """Width of a usual tram (BOStrab: no wider)."""
@@ -46,7 +46,9 @@ def tram_tracks(around: Surroundings, osm: OsmMap, beside: BesideRoads) -> TramT
         total = length(line)
         for i, (begin, stop) in enumerate(pieces):
             inside = line if (begin, stop) == (0.0, total) else cut(line, begin, stop)
-            _lay(way.id, way.tags, inside, i, roads, lanes)
+            road, lane = _laid(way, inside, i)
+            roads.append(road)
+            lanes.append(lane)
         if pieces:
             crossed = {on_roads[n].way_id for n in way.nodes if n in on_roads}
             notes.extend(
@@ -56,46 +58,34 @@ def tram_tracks(around: Surroundings, osm: OsmMap, beside: BesideRoads) -> TramT
     return TramTracks(tuple(roads), tuple(lanes), tuple(notes))
 
 
-def _lay(
-    way: int,
-    tags: Mapping[str, str],
-    line: np.ndarray,
-    piece: int,
-    roads: list[Road],
-    lanes: list[Lane],
-) -> None:
-    road = f"w{way}.tram" if piece == 0 else f"w{way}.tram#{piece + 1}"
-    rounded = np.round(line, 3)
-    name = tags.get("name", "")
-    limit = speed_limit(tags)
-    lanes.append(
-        Lane(
-            id=f"{road}.f0",
-            osm_way=way,
-            name=name,
-            kind="tram",
-            centerline=rounded,
-            width_m=Quantity(TRAM_WIDTH_M, "default"),
-            speed_limit_mps=limit,
-            role="other",
-            direction_source="default",
-            change="none",
-            road_id=road,
-            layer=road_layer(tags),
-        )
+def _laid(way: OsmWay, line: Array, piece: int) -> tuple[Road, Lane]:
+    name = f"w{way.id}.tram" if piece == 0 else f"w{way.id}.tram#{piece + 1}"
+    tags, rounded = way.tags, np.round(line, 3)
+    lane = Lane(
+        id=f"{name}.f0",
+        osm_way=way.id,
+        name=tags.get("name", ""),
+        kind="tram",
+        centerline=rounded,
+        width_m=Quantity(TRAM_WIDTH_M, "default"),
+        speed_limit_mps=speed_limit(tags),
+        role="other",
+        direction_source="default",
+        change="none",
+        road_id=name,
+        layer=road_layer(tags),
     )
-    roads.append(
-        Road(
-            id=road,
-            osm_way=way,
-            name=name,
-            road_class="tram",
-            reference_line=rounded,
-            left_m=TRAM_WIDTH_M / 2,
-            right_m=-TRAM_WIDTH_M / 2,
-            lane_ids=(f"{road}.f0",),
-            layer=road_layer(tags),
-            bridge=tags.get("bridge", "no") != "no",
-            tunnel=tags.get("tunnel", "no") not in ("no", "building_passage"),
-        )
+    road = Road(
+        id=name,
+        osm_way=way.id,
+        name=lane.name,
+        road_class="tram",
+        reference_line=rounded,
+        left_m=TRAM_WIDTH_M / 2,
+        right_m=-TRAM_WIDTH_M / 2,
+        lane_ids=(lane.id,),
+        layer=lane.layer,
+        bridge=on_bridge(tags),
+        tunnel=in_tunnel(tags),
     )
+    return road, lane

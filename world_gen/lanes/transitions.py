@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from foretwin.world_gen.lanes.cluster import Cluster
-from foretwin.world_gen.lanes.cross_section import TRANSITION, CrossSection
+from foretwin.world_gen.lanes.cross_section import TRANSITION
+from foretwin.world_gen.lanes.lane_plans import CrossSection
+from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 _KEYS = ("placement", "placement:forward", "placement:backward")

@@ -10,14 +10,18 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.polyline import Flags
 from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
 from foretwin.geometry.turn_curves import LEAD_M, WANTED_RADIUS_M
-from foretwin.world_gen.lanes.cluster import Cluster
-from foretwin.world_gen.lanes.cross_section import CrossSection
-from foretwin.world_gen.lanes.legs import Heads, heading_out, is_ring_edge, lateral_positions
+from foretwin.world_gen.lanes.lane_plans import CrossSection
+from foretwin.world_gen.lanes.legs import (
+    Cluster,
+    Heads,
+    heading_out,
+    is_ring_edge,
+    lateral_positions,
+)
 from foretwin.world_gen.roads.road_graph import RoadEdge
-
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 CORNER_M = 3.5
 """Room between the kerb of the other road and a lane's end: makes turns wider than 4 m radius."""
@@ -72,7 +76,7 @@ def trims(
             else:
                 values = np.maximum(areas[cluster.key], turning[k])
             for leg, value in zip(cluster.legs, values.tolist(), strict=True):
-                found[leg.edge.index, leg.reverse] = min(value, MAX_TRIM_M)
+                found[leg.key] = min(value, MAX_TRIM_M)
     for index, edge in edges.items():
         start, end = found.get((index, False), 0.0), found.get((index, True), 0.0)
         room = 0.8 * edge.length_m
@@ -87,13 +91,11 @@ def _legs_of(clusters: list[Cluster], sections: Mapping[int, CrossSection], head
     legs = [leg for cluster in clusters for leg in cluster.legs]
     mine = [sections[leg.edge.index] for leg in legs]
     shape = (len(clusters), len(clusters[0].legs))
-    into = [s.reach_m(not leg.reverse) for s, leg in zip(mine, legs, strict=True)]
-    out = [s.reach_m(leg.reverse) for s, leg in zip(mine, legs, strict=True)]
+    into = [s.along(reverse=not leg.reverse).reach_m for s, leg in zip(mine, legs, strict=True)]
+    out = [s.along(reverse=leg.reverse).reach_m for s, leg in zip(mine, legs, strict=True)]
     return _Legs(
-        heads=np.array([heads[leg.edge.index, leg.reverse] for leg in legs]).reshape(*shape, 2),
-        starts_m=np.array([leg.edge.xy_m[-1 if leg.reverse else 0] for leg in legs]).reshape(
-            *shape, 2
-        ),
+        heads=np.array([heads[leg.key] for leg in legs]).reshape(*shape, 2),
+        starts_m=np.array([leg.xy_m[0] for leg in legs]).reshape(*shape, 2),
         half_m=np.array([section.half_width_m for section in mine]).reshape(shape),
         into_m=np.array(into).reshape(*shape, 2),
         out_m=np.array(out).reshape(*shape, 2),
@@ -227,12 +229,5 @@ def _overlaps(
     each = np.searchsorted(part, np.arange(len(parts)))
     first_m, last_m = np.minimum.reduceat(at_m, each), np.maximum.reduceat(at_m, each)
     order = np.lexsort((first_m, leg))
-    return list(
-        zip(
-            leg[order].tolist(),
-            near_m[order].tolist(),
-            first_m[order].tolist(),
-            last_m[order].tolist(),
-            strict=True,
-        )
-    )
+    columns = (column[order].tolist() for column in (leg, near_m, first_m, last_m))
+    return list(zip(*columns, strict=True))

@@ -7,40 +7,28 @@ taken in batches, their nodes looked up, and each is put into the cells that it 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 
+from foretwin.world_gen.osm import opl
 from foretwin.world_gen.osm.map_assembly import (
     NO_WAYS,
-    UNITS_PER_DEG,
-    BoolArray,
     WayNote,
     bounds_of,
     centre_of,
+    on_earth,
+    reach_deg,
     sound_ways,
 )
-from foretwin.world_gen.osm.map_cells import Boxes, CellNodes, CellWays, differences, place
+from foretwin.world_gen.osm.map_cells import Boxes, WayTable, pack_nodes, place
 from foretwin.world_gen.osm.map_tables import NODES, NOTES, RELATIONS, WAYS, MapMeta, TableWriter
 from foretwin.world_gen.osm.node_spool import NodeSpool
-from foretwin.world_gen.osm.opl import (
-    IntArray,
-    NodeObjects,
-    NodePositions,
-    TagReader,
-    WayLines,
-    any_key,
-    read_nodes,
-    read_relations,
-    sections,
-    way_lines,
-    way_nodes,
-)
 from foretwin.world_gen.osm.opl_stream import OplStream, Progress
-from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError
-from foretwin.world_gen.osm.read_osm import NODE_KEYS, WAY_KEYS, is_kept_relation
+from foretwin.world_gen.osm.osm_map import BoolArray, IntArray, LatLonBounds, NoRoadsError, rows_of
+from foretwin.world_gen.osm.read_osm import WANTED_NODES, WANTED_WAYS, is_kept_relation
 
-WANTED_WAYS, WANTED_NODES = any_key(WAY_KEYS), any_key(NODE_KEYS)
 BATCH_BYTES = 24 << 20
 """Text of ways that is looked at in one go; some 2 million nodes of ways."""
 LINES_BYTES = 4 << 20
@@ -54,8 +42,7 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
 
     Returns the map's SHA-256. Raises `MapError` where the map cannot be read or has no roads.
     """
-    table, nodes = TableWriter(target), NodeSpool(part)
-    try:
+    with closing(TableWriter(target)) as table, closing(NodeSpool(part)) as nodes:
         with (
             OplStream(map_file, progress) as stream,
             (part / "ways.opl").open("wb") as ways,
@@ -63,9 +50,9 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
         ):
             members: list[IntArray] = []
             for block in stream.blocks():
-                for letter, section in sections(block):
+                for letter, section in opl.sections(block):
                     if letter == "n":
-                        found = read_nodes(section, WANTED_NODES.search)
+                        found = opl.read_nodes(section, WANTED_NODES.search)
                         nodes.add(found.positions)
                         _add_tagged(table, found)
                     elif letter == "w":
@@ -78,67 +65,51 @@ def build_map_store(map_file: Path, part: Path, target: Path, progress: Progress
             batches.add(lines)
         _place_relations(table, part / "relations.opl", batches, nodes.notes)
         box = batches.road_box(map_file)
-        declared = stream.header.bounds
-        near_pole = max(abs(box.south), abs(box.north)) > 89.0
-        width_deg = 0.0 if near_pole else (box.east - box.west) % 360.0
-        narrow = max(box.north - box.south, width_deg) <= WIDEST_FRAME_DEG
         centre = centre_of(box)
         meta = MapMeta(
             sha256=stream.sha256,
             attribution=stream.header.attribution,
-            bounds=declared or box,
-            origin=(centre.lat_deg, centre.lon_deg) if narrow else None,
+            bounds=stream.header.bounds or box,
+            origin=(centre.lat_deg, centre.lon_deg) if reach_deg(box) <= WIDEST_FRAME_DEG else None,
             ways=batches.count,
             nodes=nodes.count,
             notes=tuple(dict.fromkeys(nodes.notes))[:MOST_NOTES],
         )
-    except BaseException:
-        table.abandon()
-        nodes.close()
-        raise
-    table.finish(meta)
+        table.finish(meta)
     return meta.sha256
 
 
 _NONE: IntArray = np.empty(0, dtype=np.int64)
 
 
-def _add_tagged(table: TableWriter, found: NodeObjects) -> None:
+def _add_tagged(table: TableWriter, found: opl.NodeObjects) -> None:
     if not found.tag_texts:
         return
-    ids, lat, lon = found.positions
-    on_earth = (np.abs(lat) <= 90 * UNITS_PER_DEG) & (np.abs(lon) <= 180 * UNITS_PER_DEG)
-    rows = np.flatnonzero(np.isin(ids, np.array(list(found.tag_texts))) & on_earth)
-    ids, lat, lon = ids[rows], lat[rows], lon[rows]
-    placed = place(Boxes(lat, lon, lat, lon))
-    for cell, at in _by_cell(placed.cells, placed.boxes):
-        content = CellNodes(
-            ids=differences(ids[at], "<i8"),
-            lat=differences(lat[at], "<i4"),
-            lon=differences(lon[at], "<i4"),
-            tags="\n".join(found.tag_texts[node] for node in ids[at].tolist()),
-        )
-        table.add(cell, NODES, content)
+    tagged = np.isin(found.positions.ids, np.array(list(found.tag_texts)))
+    nodes = found.positions.rows(tagged & on_earth(found.positions))
+    for cell, at in _by_cell(*place(Boxes.at(nodes))):
+        mine = nodes.rows(at)
+        table.add(cell, NODES, pack_nodes(mine, [found.tag_texts[n] for n in mine.ids.tolist()]))
 
 
 def _add_relations(section: bytes, write: Callable[[bytes], object]) -> IntArray:
-    tags_of = TagReader()
+    tags_of = opl.tag_reader()
     members: list[int] = []
     for line in section.split(b"\n"):
-        found = read_relations(line, is_kept_relation, tags_of) if b"type=" in line else {}
+        found = opl.read_relations(line, is_kept_relation, tags_of) if b"type=" in line else {}
         for relation in found.values():
             write(line + b"\n")
-            members.extend(member.ref for member in relation.members if member.kind == "w")
+            members.extend(relation.way_ids)
     return np.array(members, dtype=np.int64)
 
 
-def _batches(path: Path, members: IntArray) -> Iterator[WayLines]:
+def _batches(path: Path, members: IntArray) -> Iterator[opl.WayLines]:
     """Yield the ways that matter, as many at a time as fit into a batch."""
     wanted = set(members.tolist())
-    batch, size = WayLines([], [], []), 0
+    batch, size = opl.WayLines([], [], []), 0
     with path.open("rb") as file:
         while lines := file.readlines(LINES_BYTES):
-            some = way_lines(b"".join(lines))
+            some = opl.way_lines(b"".join(lines))
             for way, tags, nodes in zip(*some, strict=True):
                 if way in wanted or WANTED_WAYS.search(tags):
                     batch.ids.append(way)
@@ -147,7 +118,7 @@ def _batches(path: Path, members: IntArray) -> Iterator[WayLines]:
                     size += len(tags) + len(nodes)
             if size >= BATCH_BYTES:
                 yield batch
-                batch, size = WayLines([], [], []), 0
+                batch, size = opl.WayLines([], [], []), 0
     if batch.ids:
         yield batch
 
@@ -162,89 +133,67 @@ class _WayBatches:
         self.count = 0
         self._table = table
         self._nodes = nodes
-        self._road_extremes: list[NodePositions] = []
+        self._road_extremes: list[opl.NodePositions] = []
 
-    def add(self, lines: WayLines) -> None:
+    def add(self, lines: opl.WayLines) -> None:
         """Look up the nodes of a batch and put its ways into their cells."""
-        nodes = way_nodes(lines.node_texts)
+        nodes = opl.way_nodes(lines.node_texts)
         positions = self._nodes.find(nodes.nodes)
         is_road = np.array([_is_road(text) for text in lines.tag_texts], dtype=bool)
         sound = sound_ways(lines.ids, is_road, nodes, positions)
         self._note(sound.notes, positions)
-        if not len(sound.picked):
-            return
-        counts = sound.nodes.counts
-        begins = np.cumsum(counts) - counts
-        lat, lon = positions.lat_1e7[sound.rows], positions.lon_1e7[sound.rows]
-        lows = [np.minimum.reduceat(values, begins) for values in (lat, lon)]
-        highs = [np.maximum.reduceat(values, begins) for values in (lat, lon)]
-        boxes = Boxes(*lows, *highs)
-        ids = np.array(lines.ids, dtype=np.int64)[sound.picked]
-        placed = place(boxes)
-        for cell, at in _by_cell(placed.cells, placed.boxes):
-            flat = np.repeat(begins[at] - np.cumsum(counts[at]) + counts[at], counts[at])
-            flat += np.arange(len(flat))
-            content = CellWays(
-                ids=differences(ids[at], "<i8"),
-                counts=counts[at].astype("<i4").tobytes(),
-                nodes=differences(sound.nodes.nodes[flat], "<i8"),
-                lat=differences(lat[flat], "<i4"),
-                lon=differences(lon[flat], "<i4"),
-                tags="\n".join(lines.tag_texts[i] for i in sound.picked[at].tolist()),
-            )
-            self._table.add(cell, WAYS, content)
-        self._remember(ids, boxes, placed.cells[: len(ids)])
-        roads = np.repeat(is_road[sound.picked], counts)
-        self._road_extremes.append(_extremes(lat[roads], lon[roads]))
-        self.count += len(ids)
+        ways = WayTable(
+            np.array(lines.ids, dtype=np.int64)[sound.picked],
+            sound.nodes.counts,
+            positions.rows(sound.rows),
+            [lines.tag_texts[i] for i in sound.picked.tolist()],
+        )
+        placed = place(ways.boxes())
+        for cell, at in _by_cell(*placed):
+            self._table.add(cell, WAYS, ways.rows(at).packed())
+        self._remember(ways, placed.cells[: len(ways.ids)])
+        roads = np.repeat(is_road[sound.picked], ways.counts)
+        self._road_extremes.append(_extremes(ways.nodes.rows(roads)))
+        self.count += len(ways.ids)
 
-    def _remember(self, ids: IntArray, boxes: Boxes, cells: IntArray) -> None:
-        if not len(self.members):
-            return
-        rows = np.minimum(np.searchsorted(self.members, ids), len(self.members) - 1)
-        named = np.flatnonzero(self.members[rows] == ids)
-        for column, values in zip(self.member_boxes, boxes, strict=True):
+    def _remember(self, ways: WayTable, cells: IntArray) -> None:
+        rows, named = rows_of(self.members, ways.ids)
+        for column, values in zip(self.member_boxes, ways.boxes(), strict=True):
             column[rows[named]] = values[named]
         self.member_placed[rows[named]] = True
-        self._table.add_members(zip(ids[named].tolist(), cells[named].tolist(), strict=True))
+        self._table.add_members(zip(ways.ids[named].tolist(), cells[named].tolist(), strict=True))
 
-    def _note(self, notes: Sequence[WayNote], positions: NodePositions) -> None:
-        """Put what is said of a way where its first known node is."""
+    def _note(self, notes: Sequence[WayNote], positions: opl.NodePositions) -> None:
+        """Put notes on a way where its first known node is."""
         for text, row in notes:
             if row is not None:
-                lat, lon = positions.lat_1e7[[row]], positions.lon_1e7[[row]]
-                cell = int(place(Boxes(lat, lon, lat, lon)).cells[0])
-                self._table.add(cell, NOTES, f"{lat[0]} {lon[0]} {text}")
+                at = positions.rows(np.array([row]))
+                cell = int(place(Boxes.at(at)).cells[0])
+                self._table.add(cell, NOTES, f"{at.lat_1e7[0]} {at.lon_1e7[0]} {text}")
             else:
                 self._nodes.notes.append(text)
 
     def road_box(self, map_file: Path) -> LatLonBounds:
         """Return the box around all roads."""
-        lat, lon = (
-            np.concatenate([_NONE, *(getattr(e, name) for e in self._road_extremes)])
-            for name in ("lat_1e7", "lon_1e7")
-        )
-        if not len(lat):
-            raise MapError(
-                f"{map_file}: the map holds no roads (no way with a highway tag and positions)"
-            )
-        return bounds_of(
-            str(map_file), np.stack([lat, lon], axis=-1) / UNITS_PER_DEG, widest_deg=360.0
-        )
+        lat_lon_deg = opl.NodePositions.joined(self._road_extremes).lat_lon_deg
+        if not len(lat_lon_deg):
+            raise NoRoadsError(str(map_file))
+        return bounds_of(str(map_file), lat_lon_deg, widest_deg=360.0)
 
 
 def _is_road(tag_text: str) -> bool:
     return tag_text.startswith("highway=") or ",highway=" in tag_text
 
 
-def _extremes(lat: IntArray, lon: IntArray) -> NodePositions:
+def _extremes(nodes: opl.NodePositions) -> opl.NodePositions:
     """Return the few positions that set a box, whether or not it crosses the antimeridian."""
+    _, lat, lon = nodes
     if not len(lat):
-        return NodePositions(_NONE, _NONE, _NONE)
-    beyond = np.where(lon < 0, lon + 360 * UNITS_PER_DEG, lon)
+        return nodes
+    beyond = np.where(lon < 0, lon + 360 * opl.UNITS_PER_DEG, lon)
     rows = [np.argmin(lat), np.argmax(lat), np.argmin(lon), np.argmax(lon)]
     rows += [np.argmin(beyond), np.argmax(beyond)]
-    return NodePositions(_NONE, lat[rows], lon[rows])
+    return nodes.rows(np.array(rows))
 
 
 def _by_cell(cells: IntArray, held: IntArray) -> Iterator[tuple[int, IntArray]]:
@@ -257,27 +206,23 @@ def _by_cell(cells: IntArray, held: IntArray) -> Iterator[tuple[int, IntArray]]:
 
 
 def _place_relations(table: TableWriter, path: Path, ways: _WayBatches, notes: list[str]) -> None:
-    tags_of = TagReader()
+    tags_of = opl.tag_reader()
     with path.open("rb") as file:
         while lines := file.readlines(LINES_BYTES):
             of_cell: dict[int, list[str]] = {}
             for line in lines:
-                (relation,) = read_relations(line, is_kept_relation, tags_of).values()
-                refs = np.array([m.ref for m in relation.members if m.kind == "w"], dtype=np.int64)
-                rows = np.searchsorted(ways.members, refs)
+                (relation,) = opl.read_relations(line, is_kept_relation, tags_of).values()
+                rows = np.searchsorted(ways.members, np.array(relation.way_ids, dtype=np.int64))
                 rows = rows[ways.member_placed[rows]]
                 if not len(rows):
                     notes.append(f"relation {relation.id}: {NO_WAYS}")
                 else:
                     south, west, north, east = (column[rows] for column in ways.member_boxes)
-                    box = Boxes(
-                        south.min(keepdims=True),
-                        west.min(keepdims=True),
-                        north.max(keepdims=True),
-                        east.max(keepdims=True),
-                    )
+                    lows = (edge.min(keepdims=True) for edge in (south, west))
+                    highs = (edge.max(keepdims=True) for edge in (north, east))
+                    box = Boxes(*lows, *highs)
                     for cell in place(box).cells.tolist():
                         of_cell.setdefault(cell, []).append(line.decode())
             for cell, texts in sorted(of_cell.items()):
                 table.add(cell, RELATIONS, "".join(texts))
-            tags_of = TagReader()
+            tags_of = opl.tag_reader()

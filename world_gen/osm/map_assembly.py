@@ -9,23 +9,24 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import GeoPoint, LocalFrame
-from foretwin.world_gen.osm.node_locations import NodeLocations
-from foretwin.world_gen.osm.opl import NO_POSITION, IntArray, NodePositions, WayNodes
+from foretwin.world_gen.osm.map_file import MapHeader
+from foretwin.world_gen.osm.opl import NO_POSITION, UNITS_PER_DEG, NodePositions, WayNodes
 from foretwin.world_gen.osm.osm_map import (
+    BoolArray,
+    IntArray,
     LatLonBounds,
     MapError,
+    NodeLocations,
     NoRoadsError,
     OsmMap,
     OsmRelation,
     OsmWay,
+    rows_of,
 )
 
-BoolArray = npt.NDArray[np.bool_]
-UNITS_PER_DEG = 10_000_000
 LONGEST_WAY_DEG = 2.0
 """A way that reaches farther has a node in the wrong place: no street spans 200 km."""
 WIDEST_MAP_DEG = 60.0
@@ -52,14 +53,13 @@ class MapObjects(msgspec.Struct, kw_only=True):
 
 def assemble_map(
     objects: MapObjects,
+    header: MapHeader,
     *,
     file: str,
     sha256: str,
-    attribution: str,
-    bounds: LatLonBounds | None,
     frame: LocalFrame | None = None,
 ) -> OsmMap:
-    """Return the map; `frame` and `bounds` are those of its roads unless given.
+    """Return the map; its frame and bounds are those of its roads unless given.
 
     Raises `NoRoadsError` where there is no road with positions, `MapError` where roads lie all
     over the Earth.
@@ -71,8 +71,7 @@ def assemble_map(
     note_places = dict(objects.note_places)
     for text, row in sound.notes:
         if row is not None:
-            lat, lon = table.lat_1e7[row], table.lon_1e7[row]
-            note_places[text] = (float(lat) / UNITS_PER_DEG, float(lon) / UNITS_PER_DEG)
+            note_places[text] = table.at(row)
     nodes = tuple(sound.nodes.nodes.tolist())
     cuts = [0, *np.cumsum(sound.nodes.counts).tolist()]
     ids = np.array(objects.way_ids, dtype=np.int64)[sound.picked]
@@ -88,21 +87,21 @@ def assemble_map(
     }
     relations = {}
     for key, relation in objects.relations.items():
-        if any(m.kind == "w" and m.ref in ways for m in relation.members):
+        if any(way in ways for way in relation.way_ids):
             relations[key] = relation
         else:
             notes.append(f"relation {key}: {NO_WAYS}")
     used = np.zeros(len(table.ids), dtype=bool)
     used[sound.rows] = True
-    tagged_rows, tagged_placed = _rows_of(table, np.array(list(objects.node_tags), dtype=np.int64))
-    used[tagged_rows[tagged_placed]] = True
-    lat_lon = np.stack([table.lat_1e7[used], table.lon_1e7[used]], axis=-1) / UNITS_PER_DEG
-    locations = NodeLocations(table.ids[used], lat_lon)
+    tagged = np.array(list(objects.node_tags), dtype=np.int64)
+    rows, placed = rows_of(table.ids, tagged)
+    used[rows[placed]] = True
+    kept = table.rows(used)
+    locations = NodeLocations(kept.ids, kept.lat_lon_deg)
     road_nodes = [node for way in ways.values() if "highway" in way.tags for node in way.nodes]
     if not road_nodes:
-        raise NoRoadsError(
-            f"{file}: the map holds no roads (no way with a highway tag and positions)"
-        )
+        raise NoRoadsError(file)
+    bounds = header.bounds
     if frame is None or bounds is None:
         box = bounds_of(file, locations.of(road_nodes))
         bounds = bounds or box
@@ -110,7 +109,7 @@ def assemble_map(
     return OsmMap(
         file=file,
         sha256=sha256,
-        attribution=attribution,
+        attribution=header.attribution,
         bounds=bounds,
         frame=frame,
         locations=locations,
@@ -124,36 +123,34 @@ def assemble_map(
 
 def sorted_positions(chunks: Sequence[NodePositions], notes: list[str]) -> NodePositions:
     """Join chunks of nodes in ascending order of ids, each once and only those on the Earth."""
-    none = (np.empty(0, dtype=np.int64),) * 3
-    ids, lat, lon = (np.concatenate(columns) for columns in zip(none, *chunks, strict=True))
-    if len(ids) > 1 and not (ids[1:] > ids[:-1]).all():
-        order = np.argsort(ids, kind="stable")
-        ids, lat, lon = ids[order], lat[order], lon[order]
-        last = np.append(ids[1:] != ids[:-1], True)
+    found = NodePositions.joined(chunks)
+    if len(found.ids) > 1 and not (found.ids[1:] > found.ids[:-1]).all():
+        found = found.rows(np.argsort(found.ids, kind="stable"))
+        last = np.append(found.ids[1:] != found.ids[:-1], True)
         notes.extend(
             f"node {node}: stands in the file more than once; its last position is used"
-            for node in sorted(set(ids[~last].tolist()))
+            for node in sorted(set(found.ids[~last].tolist()))
         )
-        ids, lat, lon = ids[last], lat[last], lon[last]
-    on_earth = (np.abs(lat) <= 90 * UNITS_PER_DEG) & (np.abs(lon) <= 180 * UNITS_PER_DEG)
-    if not on_earth.all():
-        for i in np.flatnonzero(~on_earth).tolist():
-            place = f"{lat[i] / UNITS_PER_DEG:g}, {lon[i] / UNITS_PER_DEG:g}"
-            said = "has no position" if lat[i] == NO_POSITION else f"{place} is not on Earth"
-            notes.append(f"node {ids[i]}: {said}; left out")
-        ids, lat, lon = ids[on_earth], lat[on_earth], lon[on_earth]
-    return NodePositions(ids, lat, lon)
+        found = found.rows(last)
+    there = on_earth(found)
+    if there.all():
+        return found
+    for node, lat, lon in zip(*(column.tolist() for column in found.rows(~there)), strict=True):
+        place = f"{lat / UNITS_PER_DEG:g}, {lon / UNITS_PER_DEG:g}"
+        fault = "has no position" if lat == NO_POSITION else f"{place} is not on Earth"
+        notes.append(f"node {node}: {fault}; left out")
+    return found.rows(there)
 
 
-def _rows_of(table: NodePositions, nodes: IntArray) -> tuple[IntArray, BoolArray]:
-    if not len(table.ids):
-        return np.zeros(len(nodes), dtype=np.int64), np.zeros(len(nodes), dtype=bool)
-    rows = np.minimum(np.searchsorted(table.ids, nodes), len(table.ids) - 1)
-    return rows, table.ids[rows] == nodes
+def on_earth(nodes: NodePositions) -> BoolArray:
+    """Return (N,) which of the positions are any on the Earth."""
+    lat, lon = np.abs(nodes.lat_1e7), np.abs(nodes.lon_1e7)
+    there: BoolArray = (lat <= 90 * UNITS_PER_DEG) & (lon <= 180 * UNITS_PER_DEG)
+    return there
 
 
 class WayNote(NamedTuple):
-    """What is said of a way, and which of the positions is its first; None where it has none."""
+    """A note on a way, and which of the positions is its first; None where it has none."""
 
     text: str
     row: int | None
@@ -175,7 +172,7 @@ def sound_ways(
 ) -> SoundWays:
     """Return ways without gaps, of two and more nodes, with a length that a street can have."""
     nodes, counts = way_nodes
-    rows, placed = _rows_of(positions, nodes)
+    rows, placed = rows_of(positions.ids, nodes)
     faulty = _faulty(counts, rows, placed, positions)
     begins = np.cumsum(counts) - counts
     kept = np.repeat(~faulty, counts)
@@ -212,8 +209,6 @@ def _faulty(
 ) -> BoolArray:
     """Return per way whether it has gaps, fewer than two nodes, no length or too much of it."""
     faulty: BoolArray = counts < 2
-    if not len(rows):
-        return faulty
     filled = np.flatnonzero(counts > 0)
     begins = (np.cumsum(counts) - counts)[filled]
     reach = np.zeros(len(filled), dtype=np.int64)
@@ -277,14 +272,19 @@ def bounds_of(file: str, lat_lon_deg: Array, *, widest_deg: float = WIDEST_MAP_D
         if np.ptp(beyond) < east - west:
             west, east = float(beyond.min()), float(beyond.max()) - 360.0
     box = LatLonBounds(float(lat.min()), west, float(lat.max()), east)
-    width_deg = (east - west) % 360.0
-    near_pole = max(abs(box.south), abs(box.north)) > 89.0
-    if max(0.0 if near_pole else width_deg, box.north - box.south) > widest_deg:
+    if reach_deg(box) > widest_deg:
+        width_deg = (east - west) % 360.0
         raise MapError(
             f"{file}: its roads reach over {width_deg:.0f} by {box.north - box.south:.0f} degrees; "
             f"cut out a region of less than {widest_deg:.0f}"
         )
     return box
+
+
+def reach_deg(box: LatLonBounds) -> float:
+    """Return the longer side of a box; near a pole its width in degrees means nothing."""
+    near_pole = max(abs(box.south), abs(box.north)) > 89.0
+    return max(0.0 if near_pole else (box.east - box.west) % 360.0, box.north - box.south)
 
 
 def centre_of(box: LatLonBounds) -> GeoPoint:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple, TypeVar
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
-from foretwin.world_gen.osm.map_assembly import BoolArray
-from foretwin.world_gen.osm.opl import IntArray
-from foretwin.world_gen.osm.osm_map import LatLonBounds
+from foretwin.world_gen.osm.opl import NodePositions
+from foretwin.world_gen.osm.osm_map import BoolArray, IntArray, LatLonBounds
 
 FINEST_LEVEL = 13
 """360 degrees halved this often: cells of 0.044 degrees, some 5 by 3 km in Germany."""
@@ -25,6 +25,11 @@ class Boxes(NamedTuple):
     west: IntArray
     north: IntArray
     east: IntArray
+
+    @staticmethod
+    def at(nodes: NodePositions) -> Boxes:
+        """Return boxes that are but points."""
+        return Boxes(nodes.lat_1e7, nodes.lon_1e7, nodes.lat_1e7, nodes.lon_1e7)
 
 
 class BoxCells(NamedTuple):
@@ -71,36 +76,74 @@ def cell_ranges(box: LatLonBounds) -> Iterator[tuple[int, int]]:
                 yield row | first, row | last
 
 
-class CellWays(msgspec.Struct, frozen=True, array_like=True):
-    """Ways of one cell: int64 ids and node ids and int32 positions as differences, tags as OPL."""
-
-    ids: bytes
-    counts: bytes
-    nodes: bytes
-    lat: bytes
-    lon: bytes
-    tags: str
+PackedNodes = tuple[bytes, bytes, bytes, str]
+"""Ids as int64, latitudes and longitudes as int32, all as differences; tags as OPL, by line."""
+PackedWays = tuple[bytes, bytes, bytes, bytes, bytes, str]
+"""Ids, counts of nodes, then ids and positions of all nodes and tags, packed as `PackedNodes`."""
 
 
-class CellNodes(msgspec.Struct, frozen=True, array_like=True):
-    """Tagged nodes of one cell, packed as in `CellWays`."""
+class WayTable(msgspec.Struct, frozen=True, dict=True):
+    """Ways: ids (W,), how many nodes each has (W,), the nodes one way after the other, and tags
+    as OPL."""
 
-    ids: bytes
-    lat: bytes
-    lon: bytes
-    tags: str
+    ids: IntArray
+    counts: IntArray
+    nodes: NodePositions
+    tag_texts: Sequence[str]
+
+    @cached_property
+    def _begins(self) -> IntArray:
+        return np.asarray(np.cumsum(self.counts) - self.counts)
+
+    def boxes(self) -> Boxes:
+        """Return the box around each way."""
+        edges = ((least, of) for least in (np.minimum, np.maximum) for of in self.nodes[1:])
+        return Boxes(*(least.reduceat(of, self._begins) for least, of in edges))
+
+    def rows(self, which: IntArray) -> WayTable:
+        """Return chosen ways, in the order of their places in `which`."""
+        counts = self.counts[which]
+        at = np.repeat(self._begins[which] - np.cumsum(counts) + counts, counts)
+        at += np.arange(len(at))
+        texts = [self.tag_texts[i] for i in which.tolist()]
+        return WayTable(self.ids[which], counts, self.nodes.rows(at), texts)
+
+    def packed(self) -> PackedWays:
+        """Return the ways as a cell holds them."""
+        counts = self.counts.astype("<i4").tobytes()
+        return differences(self.ids, "<i8"), counts, *pack_nodes(self.nodes, self.tag_texts)
+
+    @staticmethod
+    def unpacked(body: bytes) -> WayTable:
+        """Return the ways of a cell."""
+        ids, counts, *nodes, tags = unpack(body, PackedWays)
+        each = np.frombuffer(counts, dtype="<i4").astype(np.int64)
+        return WayTable(sums(ids, "<i8"), each, _positions(*nodes), tags.split("\n"))
 
 
-Content = TypeVar("Content", CellWays, CellNodes, str)
+def pack_nodes(nodes: NodePositions, tag_texts: Sequence[str]) -> PackedNodes:
+    """Return nodes with their tags, as OPL, as a cell holds them."""
+    ids, (lat, lon) = differences(nodes.ids, "<i8"), (differences(of, "<i4") for of in nodes[1:])
+    return ids, lat, lon, "\n".join(tag_texts)
 
 
-def pack(content: CellWays | CellNodes | str) -> bytes:
+def unpack_nodes(body: bytes) -> tuple[NodePositions, list[str]]:
+    """Return the nodes of a cell, and their tags as OPL."""
+    ids, lat, lon, tags = unpack(body, PackedNodes)
+    return _positions(ids, lat, lon), tags.split("\n")
+
+
+def _positions(ids: bytes, lat: bytes, lon: bytes) -> NodePositions:
+    return NodePositions(sums(ids, "<i8"), sums(lat, "<i4"), sums(lon, "<i4"))
+
+
+def pack(content: PackedWays | PackedNodes | str) -> bytes:
     """Return a cell's objects as they stand on disk."""
     return zlib.compress(msgspec.msgpack.encode(content), 1)
 
 
-def unpack(data: bytes, kind: type[Content]) -> Content:
-    """Return what `pack` packed."""
+def unpack(data: bytes, kind: Any) -> Any:
+    """Return what `pack` packed of a kind: `PackedWays`, `PackedNodes` or str."""
     return msgspec.msgpack.decode(zlib.decompress(data), type=kind)
 
 

@@ -1,10 +1,10 @@
-"""The packings a map file comes in, and what its header says."""
+"""The packings a map file comes in, and what its header holds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from foretwin.contracts.world import ATTRIBUTION, DRAWN_ATTRIBUTION, DRAWN_GENERATOR
 from foretwin.world_gen.osm.osm_map import LatLonBounds, MapError
@@ -39,16 +39,6 @@ def format_of(path: Path, head: bytes) -> str:
     raise MapError(
         f"{path}: not an OSM file (expected OSM XML, plain or packed with gzip or bzip2, or PBF)"
     )
-
-
-def header_of(header: Any) -> MapHeader:
-    """Return what matters of osmium's header of an open file."""
-    box = header.box()
-    bounds = None
-    if box.valid():
-        low, high = box.bottom_left, box.top_right
-        bounds = low.lat, low.lon, high.lat, high.lon
-    return MapHeader.of(header.get("generator"), bounds)
 
 
 def unreadable(path: Path, error: BaseException) -> MapError:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import msgspec
 
-from foretwin.world_gen.osm.map_cells import CellNodes, CellWays, pack
+from foretwin.world_gen.osm.map_cells import PackedNodes, PackedWays, pack
 from foretwin.world_gen.osm.osm_map import LatLonBounds
 
 FORMAT_VERSION = 2
 """Counts changes of the format and of what is kept; part of an index's name."""
-WAYS, NODES, RELATIONS, NOTES = range(4)
+KINDS = WAYS, NODES, RELATIONS, NOTES = range(4)
 _SCHEMA = """
 CREATE TABLE meta (body BLOB NOT NULL);
 CREATE TABLE piece (cell INTEGER NOT NULL, kind INTEGER NOT NULL, body BLOB NOT NULL);
@@ -36,7 +36,7 @@ class MapMeta(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class TableWriter:
-    """Writes a new index; nobody else sees the file until it is complete."""
+    """Writes a new index; no other process sees the file until it is complete."""
 
     def __init__(self, path: Path) -> None:
         self._db = sqlite3.connect(path, isolation_level=None)
@@ -45,7 +45,7 @@ class TableWriter:
         )
         self._db.execute("BEGIN")
 
-    def add(self, cell: int, kind: int, content: CellWays | CellNodes | str) -> None:
+    def add(self, cell: int, kind: int, content: PackedWays | PackedNodes | str) -> None:
         """Append a piece of a cell."""
         self._db.execute("INSERT INTO piece VALUES (?, ?, ?)", (cell, kind, pack(content)))
 
@@ -54,14 +54,13 @@ class TableWriter:
         self._db.executemany("INSERT OR REPLACE INTO member_way VALUES (?, ?)", rows)
 
     def finish(self, meta: MapMeta) -> None:
-        """Close the file."""
+        """Write what holds for the whole map."""
         self._db.execute("INSERT INTO meta VALUES (?)", (msgspec.msgpack.encode(meta),))
         self._db.execute("CREATE INDEX piece_by_cell ON piece (cell)")
         self._db.execute("COMMIT")
-        self._db.close()
 
-    def abandon(self) -> None:
-        """Close an index that will not be used."""
+    def close(self) -> None:
+        """Close the file, which is of no use unless it is finished."""
         self._db.close()
 
 
@@ -74,19 +73,20 @@ class TableReader:
         (body,) = self._db.execute("SELECT body FROM meta").fetchone()
         self.meta = msgspec.msgpack.decode(body, type=MapMeta)
 
-    def pieces(self, ranges: Iterable[tuple[int, int]]) -> Iterator[tuple[int, bytes]]:
-        """Yield kind and body of all pieces of ranges of cells, each once."""
+    def pieces(self, ranges: Iterable[tuple[int, int]]) -> list[list[bytes]]:
+        """Return by kind the bodies of all pieces of ranges of cells, each once."""
         merged: list[list[int]] = []
         for first, last in sorted(ranges):
             if merged and first <= merged[-1][1] + 1:
                 merged[-1][1] = max(merged[-1][1], last)
             else:
                 merged.append([first, last])
-        for first, last in merged:
-            yield from self._db.execute(
-                "SELECT kind, body FROM piece WHERE cell BETWEEN ? AND ? ORDER BY cell, rowid",
-                (first, last),
-            )
+        bodies: list[list[bytes]] = [[] for _ in KINDS]
+        select = "SELECT kind, body FROM piece WHERE cell BETWEEN ? AND ? ORDER BY cell, rowid"
+        for cells in merged:
+            for kind, body in self._db.execute(select, cells):
+                bodies[kind].append(body)
+        return bodies
 
     def all_of(self, kind: int) -> Iterator[bytes]:
         """Yield the bodies of all pieces of one kind."""

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from foretwin.world_gen.osm.map_assembly import sorted_positions
-from foretwin.world_gen.osm.opl import IntArray, NodePositions
+from foretwin.world_gen.osm.opl import NodePositions
+from foretwin.world_gen.osm.osm_map import IntArray
 
 RECORD = np.dtype([("id", "<i8"), ("lat", "<i4"), ("lon", "<i4")])
 WINDOW = 1 << 18
@@ -36,9 +37,7 @@ class NodeSpool:
         ids = positions.ids
         if not len(ids):
             return
-        records = np.empty(len(ids), dtype=RECORD)
-        records["id"], records["lat"], records["lon"] = positions
-        self._file.write(records.tobytes())
+        self._file.write(_records(positions))
         self._ascending &= bool((ids[1:] > ids[:-1]).all())
         self._ascending &= self._last is None or self._last < int(ids[0])
         self._last = int(ids[-1])
@@ -79,13 +78,7 @@ class NodeSpool:
                 if path.exists():
                     records = np.fromfile(path, dtype=RECORD)
                     path.unlink()
-                    columns = NodePositions(
-                        *(records[n].astype(np.int64) for n in RECORD.names or ())
-                    )
-                    columns = sorted_positions([columns], self.notes)
-                    kept = np.empty(len(columns.ids), dtype=RECORD)
-                    kept["id"], kept["lat"], kept["lon"] = columns
-                    target.write(kept.tobytes())
+                    target.write(_records(sorted_positions([_positions(records)], self.notes)))
         self._sorted_path.replace(self._path)
 
     def find(self, nodes: IntArray) -> NodePositions:
@@ -101,12 +94,16 @@ class NodeSpool:
                 part = wanted[begins[window] : ends[window]]
                 ids = records["id"].copy()
                 rows = np.searchsorted(ids, part)
-                rows = rows[ids[rows] == part]
-                found = records[rows]
-                chunks.append(
-                    NodePositions(ids[rows], *(found[n].astype(np.int64) for n in ("lat", "lon")))
-                )
+                chunks.append(_positions(records[rows[ids[rows] == part]]))
         return sorted_positions(chunks, self.notes)
+
+
+def _records(positions: NodePositions) -> bytes:
+    return np.rec.fromarrays(positions, dtype=RECORD).tobytes()
+
+
+def _positions(records: np.ndarray) -> NodePositions:
+    return NodePositions(*(records[name].astype(np.int64) for name in ("id", "lat", "lon")))
 
 
 def _distinct(values: IntArray) -> IntArray:

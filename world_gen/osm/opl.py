@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from foretwin.world_gen.osm.osm_map import OsmMember, OsmRelation
+from foretwin.contracts.arrays import Array
+from foretwin.world_gen.osm.osm_map import BoolArray, IntArray, OsmMember, OsmRelation
 
-IntArray = npt.NDArray[np.int64]
 OPL_OPTIONS = "opl,add_metadata=false"
+UNITS_PER_DEG = 10_000_000
 NO_POSITION = 2**31 - 1
 """Stands for a coordinate that the file does not give, in units of 1e-7 degrees."""
 _ESCAPE = re.compile("%([0-9a-f]+)%")
@@ -31,6 +32,25 @@ class NodePositions(NamedTuple):
     ids: IntArray
     lat_1e7: IntArray
     lon_1e7: IntArray
+
+    @staticmethod
+    def joined(parts: Iterable[NodePositions]) -> NodePositions:
+        """Return the nodes of all parts, one after the other."""
+        none = (np.empty(0, dtype=np.int64),) * 3
+        return NodePositions(*map(np.concatenate, zip(none, *parts, strict=True)))
+
+    @property
+    def lat_lon_deg(self) -> Array:
+        """Latitudes and longitudes (N, 2) in degrees."""
+        return np.stack([self.lat_1e7, self.lon_1e7], axis=-1) / UNITS_PER_DEG
+
+    def at(self, row: int) -> tuple[float, float]:
+        """Return latitude and longitude of a node in degrees."""
+        return float(self.lat_1e7[row]) / UNITS_PER_DEG, float(self.lon_1e7[row]) / UNITS_PER_DEG
+
+    def rows(self, which: IntArray | BoolArray) -> NodePositions:
+        """Return chosen nodes."""
+        return NodePositions(*(column[which] for column in self))
 
 
 class NodeObjects(NamedTuple):
@@ -55,41 +75,18 @@ class WayNodes(NamedTuple):
     counts: IntArray
 
 
-class TagReader:
-    """Turns the tags of OPL into dictionaries, which objects with the same tags share."""
-
-    def __init__(self) -> None:
-        self._known: dict[str, dict[str, str]] = {"": {}}
-
-    def __call__(self, text: str) -> dict[str, str]:
-        """Return the tags of a T field without its letter."""
-        known = self._known.get(text)
-        if known is None:
-            known = self._known[text] = _tags(text)
-        return known
+TagsOf = Callable[[str], Mapping[str, str]]
+"""Returns the tags of a T field without its letter."""
 
 
-class WantedTags(dict[str, Mapping[str, str] | None]):
-    """The tags of each T field that has one of the wanted keys, None for those that have none."""
-
-    def __init__(self, keys: Iterable[str], tags_of: TagReader) -> None:
-        super().__init__()
-        self._keys = frozenset(keys)
-        self._words = tuple(f"{key}=" for key in self._keys)
-        self._tags_of = tags_of
-
-    def __missing__(self, text: str) -> Mapping[str, str] | None:
-        found = None
-        for word in self._words:
-            if word in text:
-                tags = self._tags_of(text)
-                found = None if self._keys.isdisjoint(tags) else tags
-                break
-        self[text] = found
-        return found
+def tag_reader() -> TagsOf:
+    """Return what makes dictionaries of tags as OPL, which objects with the same tags share."""
+    return cache(_tags)
 
 
 def _tags(text: str) -> dict[str, str]:
+    if not text:
+        return {}
     escaped = text.count("%")
     if escaped and escaped == 2 * text.count("%20%"):  # spaces alone: by far the most frequent
         text, escaped = text.replace("%20%", " "), 0
@@ -117,7 +114,7 @@ def any_key(keys: Iterable[str]) -> re.Pattern[str]:
 
 
 def read_nodes(section: bytes, wanted: Callable[[str], object]) -> NodeObjects:
-    """Read lines such as `n1 Thighway=stop x8.5 y53.25`; `wanted` tells by their tags."""
+    """Read lines such as `n1 Thighway=stop x8.5 y53.25`; `wanted` decides by their tags."""
     section, texts = _without_tags(section, wanted)
     if b" x " in section or b" y\n" in section:
         section = section.replace(b" x ", b" x999 ").replace(b" y\n", b" y999\n")
@@ -158,11 +155,8 @@ def _missing_decimals(section: bytes) -> IntArray:
     ends[0::2] = starts[1::2] - 1
     ends[1::2] = np.flatnonzero(letters == ord("\n"))
     decimals = np.zeros(len(starts), dtype=np.int64)
-    of = (
-        np.arange(len(starts))
-        if len(points) == len(starts)
-        else np.searchsorted(starts, points) - 1
-    )
+    all_have = len(points) == len(starts)
+    of = np.arange(len(starts)) if all_have else np.searchsorted(starts, points) - 1
     decimals[of] = ends[of] - points - 1
     scales: IntArray = (10 ** (7 - np.arange(8, dtype=np.int64)))[decimals]
     return scales
@@ -186,7 +180,7 @@ def way_nodes(node_texts: Sequence[str]) -> WayNodes:
 
 
 def read_relations(
-    section: bytes, keeps: Callable[[Mapping[str, str]], bool], tags_of: TagReader
+    section: bytes, keeps: Callable[[Mapping[str, str]], bool], tags_of: TagsOf
 ) -> dict[int, OsmRelation]:
     """Read lines such as `r20 Ttype=restriction Mw10@from,n1@via,w11@to` that `keeps` accepts."""
     found = {}

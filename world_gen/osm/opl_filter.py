@@ -1,32 +1,55 @@
-"""The process that decodes a map: a map file on standard input, OPL on standard output.
+"""Decode a map to OPL: from memory, or as a process from standard input to standard output.
 
-A process of its own, since osmium keeps Python waiting while it decodes, and since it bounds what
-it holds by how fast its output is taken. It knows nothing of this package: run by its path.
+For large maps a process of its own, since osmium keeps Python waiting while it decodes, and since
+the process bounds what it holds by how fast its output is taken. It imports nothing of this
+package: run by its path.
 """
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import sys
+from typing import Any
 
 import osmium
 
 
-def main(form: str, options: str) -> None:
-    """Decode; the header goes as one line of JSON to standard error, a fault as plain text."""
+def decode(source: Any, target: Any) -> dict[str, Any]:
+    """Write osmium's `source` as OPL to its `target`; return the header's generator and bounds."""
+    with osmium.io.Reader(source) as reader:
+        header = reader.header()
+        box = header.box()
+        bounds = None
+        if box.valid():
+            low, high = box.bottom_left, box.top_right
+            bounds = [low.lat, low.lon, high.lat, high.lon]
+        writer = osmium.SimpleWriter(target)
+        try:
+            osmium.apply(reader, writer)
+        finally:
+            _close(writer)
+    return {"generator": header.get("generator"), "bounds": bounds}
+
+
+def _close(writer: Any) -> None:
+    """Close a writer; one that has failed, on text that is no UTF-8, must never be destroyed.
+
+    Its destructor would try once more, fail, and with it end the whole process.
+    """
     try:
-        with osmium.io.Reader(osmium.io.File("-", form)) as reader:
-            header = reader.header()
-            box = header.box()
-            bounds = None
-            if box.valid():
-                low, high = box.bottom_left, box.top_right
-                bounds = [low.lat, low.lon, high.lat, high.lon]
-            said = {"generator": header.get("generator"), "bounds": bounds}
-            os.write(2, json.dumps(said).encode() + b"\n")
-            with osmium.SimpleWriter(osmium.io.File("-", options)) as writer:
-                osmium.apply(reader, writer)
+        writer.close()
+    except BaseException:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))
+        raise
+
+
+def main(form: str, options: str) -> None:
+    """Decode; standard error gets the header as JSON, or a fault as plain text."""
+    try:
+        header = decode(osmium.io.File("-", form), osmium.io.File("-", options))
+        os.write(2, json.dumps(header).encode())
     except Exception as error:
         os.write(2, " ".join(str(error).split()).encode(errors="replace"))
         os._exit(3)  # a writer that has failed ends the process by itself when it is destroyed

@@ -2,37 +2,19 @@
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import tempfile
 from collections.abc import Mapping
+from functools import cache
 from itertools import compress
 from pathlib import Path
-from typing import Any
 
 import osmium
 
+from foretwin.world_gen.osm import opl
 from foretwin.world_gen.osm.map_assembly import MapObjects, assemble_map, sorted_positions
-from foretwin.world_gen.osm.map_file import (
-    HEAD_BYTES,
-    MapHeader,
-    file_fault,
-    format_of,
-    header_of,
-    unreadable,
-)
-from foretwin.world_gen.osm.opl import (
-    OPL_OPTIONS,
-    NodePositions,
-    TagReader,
-    WantedTags,
-    WayLines,
-    read_nodes,
-    read_relations,
-    sections,
-    way_lines,
-    way_nodes,
-)
+from foretwin.world_gen.osm.map_file import HEAD_BYTES, MapHeader, file_fault, format_of, unreadable
+from foretwin.world_gen.osm.opl_filter import decode
 from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation
 
 WAY_KEYS = ("highway", "railway", "building", "building:part", "area:highway", "barrier")
@@ -50,8 +32,7 @@ NODE_KEYS = (
     "kerb",
     "driving_side",
 )
-
-
+WANTED_WAYS, WANTED_NODES = opl.any_key(WAY_KEYS), opl.any_key(NODE_KEYS)
 DECODE_ERRORS = (RuntimeError, ValueError, IndexError, MemoryError, osmium.InvalidLocationError)
 """All that osmium raises for a file that is damaged."""
 
@@ -76,90 +57,51 @@ def read_map(path: Path) -> OsmMap:
         header, text = _as_opl(data, form)
     except DECODE_ERRORS as error:
         raise unreadable(path, error) from error
-    objects = DecodedObjects()
-    objects.add(text)
-    return assemble_map(
-        objects.for_map(),
-        file=str(path),
-        sha256=hashlib.sha256(data).hexdigest(),
-        attribution=header.attribution,
-        bounds=header.bounds,
-    )
+    digest = hashlib.sha256(data).hexdigest()
+    return assemble_map(_objects(text), header, file=str(path), sha256=digest)
 
 
 def _as_opl(data: bytes, form: str) -> tuple[MapHeader, bytes]:
     with tempfile.TemporaryDirectory(prefix="foretwin-map-") as folder:
         path = Path(folder) / "map.opl"
-        with osmium.io.Reader(osmium.io.FileBuffer(data, form)) as reader:
-            header = header_of(reader.header())
-            writer = osmium.SimpleWriter(osmium.io.File(path, OPL_OPTIONS))
-            try:
-                osmium.apply(reader, writer)
-            finally:
-                _close(writer)
-        return header, path.read_bytes()
+        header = decode(osmium.io.FileBuffer(data, form), osmium.io.File(path, opl.OPL_OPTIONS))
+        return MapHeader.of(**header), path.read_bytes()
 
 
-def _close(writer: Any) -> None:
-    """Close a writer; one that has failed, on text that is no UTF-8, must never be destroyed.
-
-    Its destructor would try once more, fail, and with it end the whole process.
-    """
-    try:
-        writer.close()
-    except BaseException:
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))
-        raise
-
-
-class DecodedObjects:
-    """What of a map's objects may matter to a driver, as they come in."""
-
-    def __init__(self) -> None:
-        self._tags_of = TagReader()
-        self._wanted_nodes = WantedTags(NODE_KEYS, self._tags_of)
-        self._positions: list[NodePositions] = []
-        self._node_tags: dict[int, Mapping[str, str]] = {}
-        self._ways = WayLines([], [], [])
-        self._relations: dict[int, OsmRelation] = {}
-
-    def add(self, text: bytes) -> None:
-        """Add whole lines of OPL."""
-        for letter, section in sections(text):
-            if letter == "n":
-                nodes = read_nodes(section, self._wanted_nodes.__getitem__)
-                self._positions.append(nodes.positions)
-                self._node_tags.update((n, self._tags_of(t)) for n, t in nodes.tag_texts.items())
-            elif letter == "w":
-                more = way_lines(section)
-                self._ways.ids.extend(more.ids)
-                self._ways.tag_texts.extend(more.tag_texts)
-                self._ways.node_texts.extend(more.node_texts)
-            else:
-                self._relations.update(read_relations(section, is_kept_relation, self._tags_of))
-
-    def for_map(self) -> MapObjects:
-        """Return the ways for drivers, the outlines that kept relations name, and their nodes."""
-        notes: list[str] = []
-        wanted = WantedTags(WAY_KEYS, self._tags_of)
-        ways = self._ways
-        tags = [wanted[text] for text in ways.tag_texts]
-        # Outlines of buildings with courtyards carry their tags on the relation alone.
-        members = {m.ref for r in self._relations.values() for m in r.members if m.kind == "w"}
-        if members:
-            for i, way in enumerate(ways.ids):
-                if way in members and tags[i] is None:
-                    tags[i] = self._tags_of(ways.tag_texts[i])
-        kept = [of_way is not None for of_way in tags]
-        return MapObjects(
-            way_ids=list(compress(ways.ids, kept)),
-            way_tags=[of_way for of_way in tags if of_way is not None],
-            way_nodes=way_nodes(list(compress(ways.node_texts, kept))),
-            positions=sorted_positions(self._positions, notes),
-            node_tags=self._node_tags,
-            relations=dict(sorted(self._relations.items())),
-            notes=notes,
-        )
+def _objects(text: bytes) -> MapObjects:
+    """Return the ways for drivers, the outlines that kept relations name, and their nodes."""
+    tags_of = opl.tag_reader()
+    # Most texts of tags come again and again.
+    is_wanted_node, is_wanted_way = cache(WANTED_NODES.search), cache(WANTED_WAYS.search)
+    positions: list[opl.NodePositions] = []
+    node_tags: dict[int, Mapping[str, str]] = {}
+    ways = opl.WayLines([], [], [])
+    relations: dict[int, OsmRelation] = {}
+    for letter, section in opl.sections(text):
+        if letter == "n":
+            nodes = opl.read_nodes(section, is_wanted_node)
+            positions.append(nodes.positions)
+            node_tags.update((node, tags_of(tags)) for node, tags in nodes.tag_texts.items())
+        elif letter == "w":
+            more = opl.way_lines(section)
+            ways.ids.extend(more.ids)
+            ways.tag_texts.extend(more.tag_texts)
+            ways.node_texts.extend(more.node_texts)
+        else:
+            relations.update(opl.read_relations(section, is_kept_relation, tags_of))
+    # Outlines of buildings with courtyards carry their tags on the relation alone.
+    members = {way for relation in relations.values() for way in relation.way_ids}
+    kept = [w in members or is_wanted_way(t) for w, t in zip(ways.ids, ways.tag_texts, strict=True)]
+    notes: list[str] = []
+    return MapObjects(
+        way_ids=list(compress(ways.ids, kept)),
+        way_tags=[tags_of(tags) for tags in compress(ways.tag_texts, kept)],
+        way_nodes=opl.way_nodes(list(compress(ways.node_texts, kept))),
+        positions=sorted_positions(positions, notes),
+        node_tags=node_tags,
+        relations=dict(sorted(relations.items())),
+        notes=notes,
+    )
 
 
 def is_kept_relation(tags: Mapping[str, str]) -> bool:

@@ -1,10 +1,10 @@
-"""What a map tells of beside its roads: sidewalks, crossings drawn as ways, tracks, islands."""
+"""What a map has beside its roads: sidewalks, crossings drawn as ways, tracks, islands."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from itertools import chain, compress
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ import shapely
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, local_from_geo
 from foretwin.world_gen.extent import box_deg
-from foretwin.world_gen.osm.osm_map import OsmMap, OsmWay
+from foretwin.world_gen.osm.osm_map import OsmMap, OsmWay, boxes_deg
 
 _RAILS = frozenset({"tram", "light_rail"})
 _WALKED = frozenset({"footway", "cycleway", "path", "pedestrian"})
@@ -50,7 +50,7 @@ def beside_roads(osm: OsmMap) -> BesideRoads:
 
 
 class BesideIndex:
-    """What lies beside a map's roads, collected once and told place by place."""
+    """What lies beside a map's roads, collected once and looked up place by place."""
 
     def __init__(self, osm: OsmMap) -> None:
         self._osm = osm
@@ -60,13 +60,9 @@ class BesideIndex:
         return beside_roads(self._osm)
 
     @cached_property
-    def _corners_deg(self) -> tuple[Array, Array, Array]:
-        every = self._all
-        return (
-            _corners_deg(every.sidewalks, self._osm),
-            _corners_deg(every.tracks, self._osm),
-            _corners_deg(every.islands, self._osm),
-        )
+    def _boxes_deg(self) -> tuple[Array, ...]:
+        lines = ([way.nodes for way in ways] for ways in self._all[:3])
+        return tuple(boxes_deg(*self._osm.points_of(of_kind)) for of_kind in lines)
 
     def within(self, area: shapely.Geometry) -> BesideRoads:
         """Return the ways that may reach into `area`, a shape in the map's frame."""
@@ -76,30 +72,14 @@ class BesideIndex:
             apart = (corners[:, :2] > (north, east)) | (corners[:, 2:] < (south, west))
             return tuple(compress(ways, np.logical_not(apart.any(axis=1))))
 
-        (*drawn, crossed_at), corners_of = self._all, self._corners_deg
+        (*drawn, crossed_at), corners_of = self._all, self._boxes_deg
         sidewalks, tracks, islands = map(near, drawn, corners_of)
         return BesideRoads(sidewalks, tracks, islands, crossed_at)
-
-
-def _corners_deg(ways: tuple[OsmWay, ...], osm: OsmMap) -> Array:
-    """Return the south-western and north-eastern corner of each way, (K, 4)."""
-    if not ways:
-        return np.zeros((0, 4))
-    lat_lon, first = _lat_lon_deg(ways, osm)
-    low, high = (f.reduceat(lat_lon, first, axis=0) for f in (np.minimum, np.maximum))
-    return np.concatenate([low, high], axis=1)
-
-
-def _lat_lon_deg(ways: tuple[OsmWay, ...], osm: OsmMap) -> tuple[Array, np.ndarray]:
-    """Return the points of ways in one row, and where each way begins."""
-    counts = np.array([len(way.nodes) for way in ways])
-    nodes = np.fromiter(chain.from_iterable(way.nodes for way in ways), np.int64, counts.sum())
-    return osm.lat_lon_deg(nodes), np.cumsum(counts) - counts
 
 
 def in_frame(ways: tuple[OsmWay, ...], osm: OsmMap, frame: LocalFrame) -> list[Array]:
     """Return the points (N, 2) of ways in a World's frame."""
     if not ways:
         return []
-    lat_lon, first = _lat_lon_deg(ways, osm)
-    return np.split(local_from_geo(frame, lat_lon[:, 0], lat_lon[:, 1]), first[1:])
+    lat_lon, first = osm.points_of([way.nodes for way in ways])
+    return np.split(local_from_geo(frame, lat_lon[:, 0], lat_lon[:, 1]), first[1:-1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from functools import cache
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -14,7 +14,6 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.provenance import Quantity
 from foretwin.world_gen.osm.driving_side import driving_side
-from foretwin.world_gen.osm.node_locations import NodeLocations
 from foretwin.world_gen.osm.osm_map import MapError, OsmMap, OsmWay
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
 from foretwin.world_gen.roads.road_tags import (
@@ -29,7 +28,7 @@ from foretwin.world_gen.roads.road_tags import (
     speed_limit,
 )
 
-_SAYS_NOTHING = ("name", "ref", "wiki", "note", "description", "addr:", "alt_name")
+_UNUSED = ("name", "ref", "wiki", "note", "description", "addr:", "alt_name")
 """Keys that begin so have no meaning for how a road is driven."""
 
 
@@ -47,7 +46,7 @@ def build_road_graph(osm: OsmMap) -> RoadGraph:
     kept = [(way, path) for way, path in zip(ways, paths, strict=True) if len(path) >= 2]
     flat = np.fromiter(chain.from_iterable(path for _, path in kept), dtype=np.int64)
     ids, row, uses = np.unique(flat, return_inverse=True, return_counts=True)
-    lat_lon = _positions(osm, ids)
+    lat_lon = osm.locations.of(ids)
     xy_m = local_from_geo(osm.frame, lat_lon[:, 0], lat_lon[:, 1])
     edges = _edges(kept, flat.tolist(), xy_m[row], uses[row] > 1)
     at = dict(zip(ids.tolist(), xy_m.tolist(), strict=True))
@@ -71,13 +70,6 @@ def _without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
     return nodes[:1] + tuple(b for a, b in pairwise(nodes) if a != b)
 
 
-def _positions(osm: OsmMap, ids: npt.NDArray[np.int64]) -> Array:
-    """Return (N, 2) degrees of nodes."""
-    if isinstance(osm.locations, NodeLocations):
-        return osm.locations.of(ids)
-    return np.array([osm.locations[node] for node in ids.tolist()], dtype=np.float64)
-
-
 class _Meaning(NamedTuple):
     """What a way's tags mean to a driver."""
 
@@ -88,22 +80,11 @@ class _Meaning(NamedTuple):
     car: bool
 
 
-def _meaning(
-    tags: Mapping[str, str], known: dict[frozenset[tuple[str, str]], _Meaning]
-) -> _Meaning:
-    """Return what tags mean; most ways of a town say the same but for their names."""
-    key = frozenset(item for item in tags.items() if not item[0].startswith(_SAYS_NOTHING))
-    found = known.get(key)
-    if found is None:
-        allowed = directions(tags)
-        found = known[key] = _Meaning(
-            allowed,
-            lane_counts(tags, allowed),
-            speed_limit(tags),
-            road_layer(tags),
-            is_car_road(tags) and open_to_cars(tags),
-        )
-    return found
+def _meaning(items: frozenset[tuple[str, str]]) -> _Meaning:
+    tags = dict(items)
+    allowed = directions(tags)
+    car = is_car_road(tags) and open_to_cars(tags)
+    return _Meaning(allowed, lane_counts(tags, allowed), speed_limit(tags), road_layer(tags), car)
 
 
 def _edges(
@@ -121,13 +102,13 @@ def _edges(
     cuts = np.nonzero(cut_here)[0]
     of_way = np.searchsorted(cuts, first).tolist()
     at = cuts.tolist()
-    # One sum from each cut to the next; those from one way to another are never asked for.
+    # One sum from each cut to the next; those from one way to another are not used.
     lengths = np.add.reduceat(steps, cuts[:-1]).tolist() if len(cuts) > 1 else []
     edges: list[RoadEdge] = []
-    known: dict[frozenset[tuple[str, str]], _Meaning] = {}
+    meaning = cache(_meaning)  # most ways of a town have the same tags but for their names
     for i, (way, _) in enumerate(ways):
         tags = way.tags
-        means = _meaning(tags, known)
+        means = meaning(frozenset(kv for kv in tags.items() if not kv[0].startswith(_UNUSED)))
         name = tags.get("name") or tags.get("ref", "")
         for k in range(of_way[i], of_way[i + 1] - 1):
             begin, end = at[k], at[k + 1]

@@ -1,4 +1,4 @@
-"""Classes of roads, and what is usual of each where a map says nothing."""
+"""Classes of roads, and what is usual of each where a map has no tag."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class RoadClass(NamedTuple):
     lane_width_m: float | None = None
     importance: float = 2.0
     public: bool = True
-    """Whether it is made for cars; others are where the map says that cars may use them."""
+    """Whether it is made for cars; others are where a tag allows cars."""
 
 
 ROAD_CLASSES = {

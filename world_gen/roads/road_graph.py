@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import msgspec
@@ -16,7 +16,7 @@ from foretwin.contracts.world import DrivingSide
 class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     """A stretch of one way between two graph nodes; `xy_m` (N, 2) in the map's frame.
 
-    `forward` and `backward` say whether cars may drive along and against the node order.
+    `forward` and `backward` are whether cars may drive along and against the node order.
     `car` is true for public car roads; pedestrian streets, service roads, tracks and the like
     are kept with `car` false, since a recorded drive may use them, but no junction counts them.
     """
@@ -39,12 +39,32 @@ class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
     layer: int
     tags: Mapping[str, str]
 
+    @property
+    def one_way(self) -> bool:
+        """Whether cars may drive it one way round alone."""
+        return self.forward != self.backward
+
+    @property
+    def drivable(self) -> bool:
+        """Whether it is a road for cars that is open to them and no mere point."""
+        return self.car and (self.forward or self.backward) and self.length_m > 0.05
+
 
 class DirectedEdge(NamedTuple):
     """An edge with the direction in which it is driven."""
 
     edge: RoadEdge
     reverse: bool
+
+    @property
+    def key(self) -> tuple[int, bool]:
+        """(edge index, reverse): what stands for it in tables."""
+        return self.edge.index, self.reverse
+
+    @property
+    def back(self) -> DirectedEdge:
+        """The same edge in the other direction."""
+        return DirectedEdge(self.edge, not self.reverse)
 
     @property
     def start_node(self) -> int:
@@ -60,6 +80,11 @@ class DirectedEdge(NamedTuple):
     def xy_m(self) -> Array:
         """Geometry (N, 2) in driving order."""
         return self.edge.xy_m[::-1] if self.reverse else self.edge.xy_m
+
+    @property
+    def node_ids(self) -> tuple[int, ...]:
+        """OSM ids of the nodes (N,) in driving order."""
+        return self.edge.node_ids[::-1] if self.reverse else self.edge.node_ids
 
     @property
     def allowed(self) -> bool:
@@ -81,6 +106,12 @@ class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
     node_xy_m: Mapping[int, tuple[float, float]]
     leaving: Mapping[int, tuple[DirectedEdge, ...]]
     """Directed edges that start at a node, in a fixed order."""
+
+    def middle_of(self, nodes: Iterable[int]) -> tuple[float, float]:
+        """Return the mean of the places of nodes."""
+        points = [self.node_xy_m[node] for node in sorted(nodes)]
+        x_m, y_m = sum([x for x, _ in points]), sum([y for _, y in points])
+        return x_m / len(points), y_m / len(points)
 
     def at_node(self, node: int) -> tuple[DirectedEdge, ...]:
         """Return the directed edges that start at `node`, allowed or not."""

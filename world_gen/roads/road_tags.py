@@ -52,6 +52,13 @@ class Directions(NamedTuple):
     backward: bool
 
 
+ONEWAY: Mapping[str, Directions] = {
+    **dict.fromkeys(("yes", "true", "1"), Directions(True, False)),
+    **dict.fromkeys(("-1", "reverse"), Directions(False, True)),
+    **dict.fromkeys(("no", "false", "0", "reversible", "alternating"), Directions(True, True)),
+}
+
+
 def is_car_road(tags: Mapping[str, str]) -> bool:
     """Tell whether the tags describe a public road for cars, closed to them or not."""
     highway = tags.get("highway")
@@ -80,15 +87,8 @@ def directions(tags: Mapping[str, str]) -> Directions:
     if not open_to_cars(tags):
         return Directions(False, False)
     oneway = tags.get("oneway:motor_vehicle") or tags.get("oneway:vehicle") or tags.get("oneway")
-    if oneway in ("yes", "true", "1"):
-        forward, backward = True, False
-    elif oneway in ("-1", "reverse"):
-        forward, backward = False, True
-    elif oneway is None or oneway not in ("no", "false", "0", "reversible", "alternating"):
-        ring = tags.get("junction") in RING_TAGS
-        forward, backward = True, not (ring or tags.get("highway") == "motorway")
-    else:
-        forward, backward = True, True
+    implied = tags.get("junction") in RING_TAGS or tags.get("highway") == "motorway"
+    forward, backward = ONEWAY.get(oneway or "", Directions(True, not implied))
     for key in ("motor_vehicle", "vehicle"):
         forward = forward and tags.get(f"{key}:forward") != "no"
         backward = backward and tags.get(f"{key}:backward") != "no"
@@ -96,7 +96,7 @@ def directions(tags: Mapping[str, str]) -> Directions:
 
 
 class LaneCounts(NamedTuple):
-    """Lanes along and against the order of the nodes; 0 where nobody may drive."""
+    """Lanes along and against the order of the nodes; 0 where no car may drive."""
 
     forward: Quantity
     backward: Quantity
@@ -157,15 +157,11 @@ def speed_limit(tags: Mapping[str, str]) -> Quantity:
     Where the two directions differ the higher one counts. An unlimited motorway gets the
     recommended 130 km/h.
     """
-    numbers = [
-        speed
-        for key in ("maxspeed", "maxspeed:forward", "maxspeed:backward")
-        if (speed := _signed_kmph(tags.get(key))) is not None
-    ]
-    if "maxspeed" in tags and numbers:
-        numbers = numbers[:1] if _signed_kmph(tags["maxspeed"]) is not None else numbers
-    if numbers:
-        return Quantity(max(numbers) / 3.6, "tagged")
+    keys = ("maxspeed", "maxspeed:forward", "maxspeed:backward")
+    both, *each = (_signed_kmph(tags.get(key)) for key in keys)
+    signed = both or max((speed for speed in each if speed is not None), default=None)
+    if signed is not None:
+        return Quantity(signed / 3.6, "tagged")
     if tags.get("maxspeed") == "none":
         return Quantity(130.0 / 3.6, "inferred")
     for key in ("maxspeed", "maxspeed:type", "source:maxspeed", "zone:maxspeed", "zone:traffic"):
@@ -203,6 +199,14 @@ def road_layer(tags: Mapping[str, str]) -> int:
         return int(tags["layer"])
     except (KeyError, ValueError):
         pass
-    if tags.get("bridge", "no") != "no":
-        return 1
-    return -1 if tags.get("tunnel", "no") not in ("no", "building_passage") else 0
+    return 1 if on_bridge(tags) else -int(in_tunnel(tags))
+
+
+def on_bridge(tags: Mapping[str, str]) -> bool:
+    """Tell whether the road runs over a bridge."""
+    return tags.get("bridge", "no") != "no"
+
+
+def in_tunnel(tags: Mapping[str, str]) -> bool:
+    """Tell whether the road runs below ground, which the way through a house does not."""
+    return tags.get("tunnel", "no") not in ("no", "building_passage")

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import msgspec
 
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.roads.road_tags import ONEWAY
 
 
 def with_service_roads(graph: RoadGraph) -> RoadGraph:
@@ -16,12 +17,8 @@ def with_service_roads(graph: RoadGraph) -> RoadGraph:
 
 def open_service_roads(edges: Iterable[RoadEdge]) -> tuple[int, ...]:
     """Return the indices, ascending, of those edges that are service roads open to cars."""
-    found = {
-        edge.index
-        for edge in edges
-        if edge.road_class == "service" and not edge.car and (edge.forward or edge.backward)
-    }
-    return tuple(sorted(found))
+    service = (edge for edge in edges if edge.road_class == "service" and not edge.car)
+    return tuple(sorted({edge.index for edge in service if edge.forward or edge.backward}))
 
 
 def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
@@ -29,7 +26,7 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
 
     They are open to the car that is to use them even where the public may not drive.
 
-    Junctions and Worlds found in it know the places where they meet a street; edges keep their
+    Junctions and Worlds found in it have the places where they meet a street; edges keep their
     indices, so what was found in one graph holds in the other.
     """
     added = {index for index in edges if not graph.edges[index].car}
@@ -37,9 +34,8 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
         return graph
     changed = tuple(_opened(edge) if edge.index in added else edge for edge in graph.edges)
     leaving = dict(graph.leaving)
-    ends = {
-        node for index in added for node in (changed[index].start_node, changed[index].end_node)
-    }
+    opened = [changed[index] for index in added]
+    ends = {node for edge in opened for node in (edge.start_node, edge.end_node)}
     for node in ends:
         leaving[node] = tuple(
             DirectedEdge(changed[item.edge.index], item.reverse) for item in graph.leaving[node]
@@ -50,6 +46,5 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
 def _opened(edge: RoadEdge) -> RoadEdge:
     if edge.forward or edge.backward:
         return msgspec.structs.replace(edge, car=True)
-    against = edge.tags.get("oneway") in ("-1", "reverse")
-    along = edge.tags.get("oneway") in ("yes", "true", "1")
-    return msgspec.structs.replace(edge, car=True, forward=not against, backward=not along)
+    forward, backward = ONEWAY.get(edge.tags.get("oneway", ""), (True, True))
+    return msgspec.structs.replace(edge, car=True, forward=forward, backward=backward)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import NamedTuple
 
 import msgspec
 
-from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.osm_map import OsmMap, OsmRelation
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 _KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehicle", "restriction")
@@ -15,31 +16,25 @@ _KEYS = ("restriction:motorcar", "restriction:motor_vehicle", "restriction:vehic
 _CARS = frozenset({"motorcar", "motor_vehicle", "vehicle"})
 
 
-class NodeRule(NamedTuple):
-    """A restriction at one node; `only` means: from there nowhere but to `to_ways`."""
+class TurnRule(NamedTuple):
+    """A restriction at one node, or over one or more ways between.
 
-    relation: int
-    from_way: int
-    to_ways: frozenset[int]
-    only: bool
-    u_turn: bool
-
-
-class WayRule(NamedTuple):
-    """A restriction over one or more ways between."""
+    `only` means: from there nowhere but to `to_ways`.
+    """
 
     relation: int
     from_way: int
     via_ways: tuple[int, ...]
     to_ways: frozenset[int]
     only: bool
+    u_turn: bool
 
 
 class TurnRestrictions(msgspec.Struct, frozen=True):
     """All restrictions for cars, by via node, and those with via ways."""
 
-    at_node: Mapping[int, tuple[NodeRule, ...]]
-    over_ways: tuple[WayRule, ...]
+    at_node: Mapping[int, tuple[TurnRule, ...]]
+    over_ways: tuple[TurnRule, ...]
 
     def step_allowed(self, before: DirectedEdge, after: DirectedEdge) -> bool:
         """Return whether a car may go from one edge onto the next at their common node."""
@@ -52,7 +47,7 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
                 continue
             meant = after.edge.way_id in rule.to_ways
             if meant and rule.from_way == after.edge.way_id:
-                # A way that goes on beyond the node: only the word tells straight on from back.
+                # A way that goes on beyond the node: only the word parts straight on from back.
                 meant = meant and turns_back == rule.u_turn
             if meant != rule.only:
                 return False
@@ -62,10 +57,7 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
         """Return whether no restriction over via ways forbids this sequence of edges."""
         if len(path) < 3:
             return True
-        ways = [path[0].edge.way_id]
-        for part in path[1:]:
-            if part.edge.way_id != ways[-1]:
-                ways.append(part.edge.way_id)
+        ways = [way for way, _ in groupby(part.edge.way_id for part in path)]
         for rule in self.over_ways:
             start = (rule.from_way, *rule.via_ways)
             n = len(start)
@@ -77,8 +69,8 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
 
 def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
     """Return the map's restrictions that hold for cars at all times."""
-    at_node: dict[int, list[NodeRule]] = {}
-    over_ways: list[WayRule] = []
+    at_node: dict[int, list[TurnRule]] = {}
+    over_ways: list[TurnRule] = []
     for relation in sorted(osm.relations.values(), key=lambda r: r.id):
         tags = relation.tags
         if tags.get("type") != "restriction":
@@ -87,28 +79,27 @@ def read_turn_restrictions(osm: OsmMap) -> TurnRestrictions:
         exempt = {part.strip() for part in tags.get("except", "").split(";")}
         if not word.startswith(("no_", "only_")) or exempt & _CARS:
             continue
-        role = {
-            name: [m for m in relation.members if m.role == name] for name in ("from", "to", "via")
-        }
         only = word.startswith("only_")
-        via_ways = tuple(m.ref for m in role["via"] if m.kind == "w")
-        via_nodes = [m.ref for m in role["via"] if m.kind == "n"]
-        ends = frozenset(m.ref for m in role["to"] if m.kind == "w")
+        via_ways = tuple(_members(relation, "via", "w"))
+        via_nodes = _members(relation, "via", "n")
+        ends = frozenset(_members(relation, "to", "w"))
         if not ends:
             continue
-        for start in (m.ref for m in role["from"] if m.kind == "w"):
+        for start in _members(relation, "from", "w"):
+            rule = TurnRule(relation.id, start, via_ways, ends, only, word.endswith("u_turn"))
             if via_ways:
-                over_ways.append(WayRule(relation.id, start, via_ways, ends, only))
+                over_ways.append(rule)
             for node in via_nodes:
-                rule = NodeRule(relation.id, start, ends, only, word.endswith("u_turn"))
                 at_node.setdefault(node, []).append(rule)
     return TurnRestrictions({k: tuple(v) for k, v in at_node.items()}, tuple(over_ways))
 
 
+def _members(relation: OsmRelation, role: str, kind: str) -> list[int]:
+    return [m.ref for m in relation.members if m.role == role and m.kind == kind]
+
+
 def restriction_notes(
-    restrictions: TurnRestrictions,
-    inner: Sequence[frozenset[int]],
-    edges: Mapping[int, RoadEdge],
+    restrictions: TurnRestrictions, inner: Sequence[frozenset[int]], edges: Mapping[int, RoadEdge]
 ) -> tuple[str, ...]:
     """Return a line for each restriction over ways that do not lie within one place.
 

@@ -1,1 +1,1 @@
-"""The rules of junctions: stop lines, signs, lights, and who waits for whom."""
+"""The rules of junctions: stop lines, signs, lights, and right of way."""

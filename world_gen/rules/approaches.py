@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 import msgspec
 
 from foretwin.contracts.provenance import Choice
 from foretwin.contracts.world import LineControl, YieldRule
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
-from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.legs import RING_KINDS, dot, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.legs import RING_KINDS, Cluster, dot, heading_out, is_ring_edge
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from foretwin.world_gen.rules.control_devices import (
     Met,
@@ -49,7 +49,7 @@ class Approach(msgspec.Struct, kw_only=True):
 
     `line_m` is where vehicles stop, metres along the leg from its node; None: where lanes end.
     `signal_nodes` are the map's nodes whose light governs it, the first one met first.
-    `standing` tells how the road ranks where no light says who goes.
+    `standing` is how the road ranks where no light decides.
     """
 
     cluster: Cluster
@@ -74,10 +74,10 @@ class Approach(msgspec.Struct, kw_only=True):
     @property
     def key(self) -> tuple[int, bool]:
         """(edge index, reverse) of the road as it is driven toward the junction."""
-        return self.toward.edge.index, self.toward.reverse
+        return self.toward.key
 
 
-class _ApproachDraft(msgspec.Struct, frozen=True, kw_only=True):
+class _ApproachDraft(NamedTuple):
     """What is known of an approach before the junction's roads are compared."""
 
     cluster: Cluster
@@ -106,16 +106,11 @@ def approaches(
     inside: dict[tuple[int, bool], list[Met]] = {}
     for connection in connections:
         if connection.cluster.whole and connection.movement.inside:
-            toward = connection.movement.toward
-            met = inside.setdefault((toward.edge.index, toward.reverse), [])
+            met = inside.setdefault(connection.movement.toward.key, [])
             met.extend(lights_inside(connection.movement.inside, node_tags))
     shared = shared_signs(connections, signs, around.driving_side)
-    plain_from = {
-        leg.start_node: cluster
-        for cluster in around.clusters
-        if cluster.plain
-        for leg in cluster.legs
-    }
+    plain = [cluster for cluster in around.clusters if cluster.plain]
+    plain_from = {leg.start_node: cluster for cluster in plain for leg in cluster.legs}
     whole = {id(junction) for junction in around.junctions}
     drafts: dict[str, list[_ApproachDraft]] = {}
     behind: dict[str, list[tuple[int, DirectedEdge]]] = {}
@@ -125,7 +120,7 @@ def approaches(
             continue
         signalled = cluster.whole and not cluster.ring and junction.summary.control == "signals"
         for leg in cluster.legs:
-            toward = DirectedEdge(leg.edge, not leg.reverse)
+            toward = leg.back
             if not toward.allowed:
                 passed_out = lights_behind(leg, node_tags, LIGHT_NEAR_M) if signalled else []
                 lights_out = [(n, leg) for n in passed_out if n not in junction_lights]
@@ -140,26 +135,13 @@ def approaches(
             sign = own_sign(met, toward, cluster, around.edges)
             if (on_ring and not lights) or (past_ring and sign is None):
                 continue
-            passed = inside.get((toward.edge.index, toward.reverse), [])
-            lights = lights or passed
+            lights = lights or inside.get(toward.key, [])
             if signalled and not lights:
                 # A light on a crossing that the finder took for one of walkers alone.
-                lights = [
-                    m
-                    for m in met
-                    if is_light(m.tags)
-                    and m.distance_m <= LIGHT_NEAR_M
-                    and m.node not in junction_lights
-                ]
+                near = [m for m in met if is_light(m.tags) and m.distance_m <= LIGHT_NEAR_M]
+                lights = [m for m in near if m.node not in junction_lights]
             drafts.setdefault(junction.summary.id, []).append(
-                _ApproachDraft(
-                    cluster=cluster,
-                    toward=toward,
-                    met=met,
-                    lights=lights,
-                    sign=sign,
-                    sign_inside=shared.get((toward.edge.index, toward.reverse)),
-                )
+                _ApproachDraft(cluster, toward, met, lights, sign, shared.get(toward.key))
             )
     found: list[Approach] = []
     for items in drafts.values():
@@ -173,7 +155,7 @@ def _claim_the_rest(mine: list[Approach], behind: list[tuple[int, DirectedEdge]]
     """Name the junction's other lights with the heads that show the same.
 
     Lights on the way through go with the nearest road in; those on a one-way road out stop
-    nobody there, but go with the road in that leads straight to them.
+    no car there, but go with the road in that leads straight to them.
     """
     junction = mine[0].cluster.junction
     lit = [approach for approach in mine if approach.control.value == "signal"]
@@ -197,12 +179,8 @@ def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approa
     words: list[YieldRule | None] = [
         sign_of(d.sign.tags) if d.sign else d.sign_inside for d in drafts
     ]
-    at_node = {
-        sign_of(m.tags)
-        for d in drafts
-        for m in d.met
-        if m.distance_m <= 0.1 and sign_of(m.tags) and not d.cluster.ring
-    }
+    off_ring = [m for d in drafts if not d.cluster.ring for m in d.met]
+    at_node = {sign_of(m.tags) for m in off_ring if m.distance_m <= 0.1} - {None}
     clusters = {d.cluster.key: d.cluster for d in drafts}.values()
     ahead_of = opposites([d.toward for d in drafts], [leg for c in clusters for leg in c.legs])
     entries = [
@@ -218,24 +196,20 @@ def _compared(drafts: list[_ApproachDraft], around: Surroundings) -> list[Approa
     elif at_node and not any(words):
         # A sign on the very node belongs to the lesser roads there.
         word: YieldRule = "stop" if "stop" in at_node else "give_way"
-        ranks = [
-            Standing(rank.rank, word, "inferred") if rank.rank <= Rank.MINOR else rank
-            for rank in ranks
-        ]
+        ranks = [Standing(r.rank, word, "inferred") if r.rank <= Rank.MINOR else r for r in ranks]
     ring_has_way = kind == "roundabout" or (
         kind == "circular" and any(d.cluster.ring and d.sign for d in drafts)
     )
     lights_for_all = control == "signals" and kind not in RING_KINDS and _for_all(drafts)
     found = []
     for d, entry, standing in zip(drafts, entries, ranks, strict=True):
-        ahead = None if entry.opposite is None else drafts[entry.opposite].toward
         entering = d.cluster.ring and not is_ring_edge(d.toward.edge)
         if (entering and ring_has_way) or kind == "mini_roundabout":
             source = "tagged" if d.sign or kind != "circular" else "inferred"
             standing = Standing(Rank.MINOR, "roundabout", source)  # type: ignore[arg-type]
         approach = _approach(d, standing, control == "signals", lights_for_all)
-        if ahead is not None:
-            approach.opposite = (ahead.edge.index, ahead.reverse)
+        if entry.opposite is not None:
+            approach.opposite = drafts[entry.opposite].toward.key
         found.append(approach)
     return found
 
@@ -291,10 +265,6 @@ def _word(standing: Standing) -> Choice:
 
 def _before_crossing(met: list[Met]) -> float | None:
     """Return where cars wait for a light before the crossing that they would else block."""
-    at = [
-        m.distance_m
-        for m in met
-        if (m.tags.get("highway") == "crossing" or "crossing" in m.tags)
-        and 1.0 < m.distance_m <= _CROSSING_NEAR_M
-    ]
+    crossings = [m for m in met if m.tags.get("highway") == "crossing" or "crossing" in m.tags]
+    at = [m.distance_m for m in crossings if 1.0 < m.distance_m <= _CROSSING_NEAR_M]
     return max(at) + BEFORE_CROSSING_M if at else None

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from foretwin.contracts.world import YieldRule
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.geometry.polyline_batch import Polylines
-from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
 LOOK_BACK_M = 40.0
@@ -51,11 +51,8 @@ def passed_on(edges: Mapping[int, RoadEdge], node_tags: NodeTags) -> dict[int, P
     found = {}
     rows = zip(edges.items(), paths.first[:-1].tolist(), paths.length_m.tolist(), strict=True)
     for (index, edge), first, length_m in rows:
-        tagged = tuple(
-            (node, float(paths.arc_m[first + i]))
-            for i, node in enumerate(edge.node_ids)
-            if node in node_tags
-        )
+        nodes = enumerate(edge.node_ids, first)
+        tagged = tuple((node, float(paths.arc_m[i])) for i, node in nodes if node in node_tags)
         found[index] = Passed(length_m, tagged)
     return found
 
@@ -69,7 +66,7 @@ def met_toward(
 ) -> list[Met]:
     """Walk outward along the leg, on through nodes where the road merely goes on.
 
-    A node that does not say which way it faces counts for the nearer junction. `passed`
+    A node without a tagged direction counts for the nearer junction. `passed`
     is that of `passed_on`.
     """
     found: list[tuple[Met, bool]] = []
@@ -84,12 +81,9 @@ def met_toward(
         gone += length_m
         cluster = plain_from.get(current.end_node)
         meets_another = cluster is None
-        if (
-            gone > 2.0 * LOOK_BACK_M
-            or cluster is None
-            or cluster.whole
-            or current.end_node in junction_nodes
-        ):
+        if cluster is None or cluster.whole or current.end_node in junction_nodes:
+            break
+        if gone > 2.0 * LOOK_BACK_M:
             break
         onward = [d for d in cluster.legs if d.edge.index != current.edge.index]
         if not onward:
@@ -103,7 +97,7 @@ def met_toward(
 def own_sign(
     met: Sequence[Met], toward: DirectedEdge, cluster: Cluster, edges: Mapping[int, RoadEdge]
 ) -> Met | None:
-    """Return the nearest sign on a road; one on a node that others come to as well cannot tell."""
+    """Return the nearest sign on a road; one on a node that others come to as well is no clue."""
     signs = (m for m in met if sign_of(m.tags) and m.distance_m <= LOOK_BACK_M)
     for sign in sorted(signs, key=lambda m: m.distance_m):
         if sign.distance_m > 0.1 or cluster.ring or _comes_alone(toward, cluster, edges):
@@ -126,8 +120,7 @@ def lights_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[M
     """Return the lights met between a junction's nodes, in driving order."""
     found = []
     for part in inside:
-        nodes = part.edge.node_ids[::-1] if part.reverse else part.edge.node_ids
-        for node in nodes:
+        for node in part.node_ids:
             tags = node_tags.get(node)
             # Who drives along the nodes meets what faces forward.
             if tags and is_light(tags) and faces(tags, not part.reverse) is not False:
@@ -137,19 +130,15 @@ def lights_inside(inside: Sequence[DirectedEdge], node_tags: NodeTags) -> list[M
 
 def lights_behind(leg: DirectedEdge, node_tags: NodeTags, within_m: float) -> list[int]:
     """Return the lights on a road out of a junction, no farther than `within_m` from it."""
-    nodes = leg.edge.node_ids[::-1] if leg.reverse else leg.edge.node_ids
-    along = arc_lengths(leg.xy_m)
-    return [
-        node
-        for node, at in zip(nodes, along, strict=False)
-        if is_light(node_tags.get(node, {})) and 0.1 < at <= within_m
-    ]
+    places = zip(leg.node_ids, arc_lengths(leg.xy_m), strict=False)
+    near = [node for node, at_m in places if 0.1 < at_m <= within_m]
+    return [node for node in near if is_light(node_tags.get(node, {}))]
 
 
 def faces(tags: Mapping[str, str], against_outward: bool) -> bool | None:
     """Return whether a sign or light is for those who drive along (true) the way's nodes.
 
-    `against_outward` is whether traffic in question runs along the nodes. None: it does not say.
+    `against_outward` is whether traffic in question runs along the nodes. None: it is not tagged.
     """
     for key in ("traffic_signals:direction", "stop:direction", "give_way:direction", "direction"):
         word = tags.get(key)

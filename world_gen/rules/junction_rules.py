@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 from foretwin.contracts.signals import Signal, SignalPlan
@@ -22,7 +23,7 @@ from foretwin.world_gen.rules.stop_lines import line_controls, lines_at_signs, s
 
 
 class TrafficControl(NamedTuple):
-    """What tells drivers when to go.
+    """Control devices and conflicts of a World.
 
     `plans` are by junction id, `crossing_plans` those of lights away from junctions.
     """
@@ -45,7 +46,7 @@ def junction_rules(
     """Return the rules of every whole junction, and of every light away from one.
 
     `junction_lights` are the nodes of the lights of all junctions of the map.
-    Connections learn their control, their signal group and their conflicts.
+    Control, signal group and conflicts are entered into the connections.
     """
     signs = signs_inside(connections, node_tags, around)
     found = approaches(around, node_tags, connections, junction_lights, signs)
@@ -56,7 +57,8 @@ def junction_rules(
     conflicts, met = right_of_way(ruled, found, signs, around.driving_side)
     groups = lane_groups(found, around, lanes, ruled)
     walks = walk_groups(groups, crossings, around)
-    heads = signal_heads(groups, {line.lane_id: line for line in lines}, around)
+    line_of = {line.lane_id: line for line in lines}
+    heads = signal_heads(list(chain(*groups.values())), line_of, around)
     known = {node for approach in found for node in approach.signal_nodes}.union(junction_lights)
     lone = lone_lights(around, node_tags, lanes, crossings, known)
     return TrafficControl(
@@ -87,16 +89,15 @@ def _control(
     by_road = {approach.key: approach for approach in found}
     for c in connections:
         c.control = controls.get(c.start.id, "none")
-        toward = c.movement.toward
-        approach = by_road.get((toward.edge.index, toward.reverse))
+        approach = by_road.get(c.movement.toward.key)
         if approach is None or not c.movement.inside:
             continue
         sign = next((sign.rule for sign in signs.get(c.id, ())), None)
-        told = approach.control
+        own = approach.control
         if c.turn == near:
             slips = not lights_inside(c.movement.inside, node_tags)
         else:
-            slips = told.value == "none" or (told.value != "signal" and told.source != "tagged")
+            slips = own.value == "none" or (own.value != "signal" and own.source != "tagged")
         if slips and sign is not None:
             c.control = "stop" if sign == "stop" else "give_way"
         elif slips and c.turn == near and approach.lit_inside:

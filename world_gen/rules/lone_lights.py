@@ -49,7 +49,7 @@ def lone_lights(
     """Return what governs the lanes at each light that belongs to no junction.
 
     `known` are the map's nodes of the lights at junctions.
-    Where the light does not say whom it faces it stops both directions; its plan lets cars drive
+    A light without a tagged direction stops both; its plan lets cars drive
     for most of the time, and those on foot after them.
     """
     taken = set(known)
@@ -97,7 +97,7 @@ def _line(
     if "crossing" in tags[node]:
         at_m -= BEFORE_CROSSING_M
     back_m = length(lane.centerline) - at_m
-    (line,) = lines_across([lane], [back_m], [Choice("signal", "tagged")], f"light{node}")
+    (line,) = lines_across([(lane, back_m, Choice("signal", "tagged"))], f"light{node}")
     return line
 
 
@@ -130,16 +130,13 @@ def _heads(
 
 def _plan(node: int, crossing: Crossing | None) -> SignalPlan:
     drive = SignalGroup(id=f"n{node}:g0", connection_ids=())
-    walk = (
-        [SignalGroup(id=f"n{node}:g1", connection_ids=(), crossing_ids=(crossing.id,))]
-        if crossing
-        else []
-    )
+    crossed = () if crossing is None else (crossing.id,)
+    walk = SignalGroup(id=f"n{node}:g1", connection_ids=(), crossing_ids=crossed)
     return SignalPlan(
-        groups=(drive, *walk),
+        groups=(drive, walk) if crossed else (drive,),
         phases=(
             SignalPhase(green_s=DRIVING_S, green_group_ids=(drive.id,)),
-            SignalPhase(green_s=WALKING_S, green_group_ids=tuple(group.id for group in walk)),
+            SignalPhase(green_s=WALKING_S, green_group_ids=(walk.id,) if crossed else ()),
         ),
         amber_s=AMBER_S,
         all_red_s=ALL_RED_S,

@@ -1,4 +1,4 @@
-"""How roads that meet rank by sign, by tag and by class: whose drivers wait at the edge."""
+"""How roads that meet rank by sign, by tag and by class: which drivers wait at the edge."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NUMBERED, _CLASSIFIED = 4.0, 5.0
 secondary up every junction has signs."""
 
 LOOK_M = 15.0
-"""Where a road leads is told by its first metres out of the junction."""
+"""Where a road leads follows from its first metres out of the junction."""
 _OPPOSITE_COS = math.cos(math.radians(135.0))
 
 
@@ -34,7 +34,7 @@ class Rank(IntEnum):
 
 
 class Standing(NamedTuple):
-    """How a road ranks where it meets others, the rule that says so, and who said it."""
+    """How a road ranks where it meets others, the rule for that, and where it is from."""
 
     rank: Rank
     rule: YieldRule
@@ -45,7 +45,7 @@ class Entry(NamedTuple):
     """One road driven toward a junction, as `standings` weighs it.
 
     `sign` is a stop or give-way sign that is tagged for it, `opposite` the place in the list of
-    the road that goes straight on from it. `leads_on` tells that it goes straight on at all, be
+    the road that goes straight on from it. `leads_on` is whether it goes straight on at all, be
     it into a road that leads out alone.
     """
 
@@ -60,12 +60,12 @@ def opposites(
 ) -> list[tuple[int | None, bool]]:
     """Return for each road in which of them lies straight ahead, and whether any leg does.
 
-    `roads` are driven toward the junction, `legs` out of it; a leg that nobody enters by has no
+    `roads` are driven toward the junction, `legs` out of it; a leg that no car enters by has no
     place among the roads.
     """
     # A junction has few roads: plain floats are faster here than arrays.
     out = [outward(road) for road in roads]
-    out_only = [leg for leg in legs if not DirectedEdge(leg.edge, not leg.reverse).allowed]
+    out_only = [leg for leg in legs if not leg.back.allowed]
     ways_out = [heading_out(leg, LOOK_M) for leg in out_only]
     found: list[tuple[int | None, bool]] = []
     for x, y in out:
@@ -79,7 +79,7 @@ def opposites(
 
 def outward(toward: DirectedEdge) -> tuple[float, float]:
     """Return the unit direction in which a road in leaves the junction."""
-    return heading_out(DirectedEdge(toward.edge, not toward.reverse), LOOK_M)
+    return heading_out(toward.back, LOOK_M)
 
 
 def importance(edge: RoadEdge) -> float:
@@ -109,13 +109,13 @@ def standings(entries: list[Entry], arms: int, driving_side: DrivingSide) -> lis
     """
     found: list[Standing | None] = [_by_tags(entry) for entry in entries]
     _yards(entries, found)
-    if any(entry.sign for entry in entries):
-        for i, entry in enumerate(entries):
-            j = entry.opposite
-            if found[i] is not None or j is None or entries[j].sign is None:
-                continue
-            if importance(entry.edge) <= importance(entries[j].edge) and _others(found, i, j):
-                found[i] = Standing(Rank.MINOR, entries[j].sign or "give_way", "inferred")
+    for i, entry in enumerate(entries):
+        j = entry.opposite
+        sign = None if j is None else entries[j].sign
+        if found[i] is not None or j is None or sign is None:
+            continue
+        if importance(entry.edge) <= importance(entries[j].edge) and _others(found, i, j):
+            found[i] = Standing(Rank.MINOR, sign, "inferred")
     _lesser(entries, found)
     if not any(found):
         _through(entries, found, arms, driving_side)

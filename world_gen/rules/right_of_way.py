@@ -1,12 +1,12 @@
 """Who waits where the paths of two connections meet: exactly one of them, by the rules of the road.
 
-Rules stand in the order in which they are asked:
+Rules stand in the order in which they apply:
 
 1. A U-turn on the spot waits for everyone (StVO §9 (5); UVC 11-602); one by way of a road through
    the median is two left turns.
 2. Who enters a roundabout waits for those on it (StVO §8 (1a); Highway Code 185; UVC 11-402); at a
    mini-roundabout for those who pass the driver's own entry. A ring tagged `junction=circular`
-   has no such right unless signs at its entries say so (Code de la route R415-10): then rule 5.
+   has no such right unless signs at its entries give it (Code de la route R415-10): then rule 5.
 3. Lanes of one road: who turns across a lane beside waits (§7 (5), §9 (1)); where lanes merge, who
    comes from the lane that ends (§7 (4)).
 4. Under lights of both, who turns across oncoming traffic waits (§37 (2) 1, §9 (3), (4); Highway
@@ -49,7 +49,7 @@ _FAST = ("motorway", "motorway_link", "trunk", "trunk_link")
 
 
 class Yielding(NamedTuple):
-    """Whether the first of a pair waits, by which rule, and who said so."""
+    """Whether the first of a pair waits, by which rule, and where that is from."""
 
     first_waits: bool
     rule: YieldRule
@@ -57,9 +57,9 @@ class Yielding(NamedTuple):
 
 
 class ConnectionFacts(msgspec.Struct, kw_only=True):
-    """What the rules ask about one connection."""
+    """What the rules need of one connection."""
 
-    id: str
+    draft: ConnectionDraft
     turn_weight: int
     """0 straight, 1 a turn to the near side, 2 across oncoming traffic, 3 a U-turn."""
     on_the_spot: bool
@@ -73,7 +73,6 @@ class ConnectionFacts(msgspec.Struct, kw_only=True):
     """The road into the junction that lies straight ahead."""
     on_ring: bool
     standing: Standing
-    signalled: bool
     sign: Standing | None
     """A sign inside the junction, on a slip road or in a median, from `sign_m` on."""
     sign_m: float
@@ -81,7 +80,6 @@ class ConnectionFacts(msgspec.Struct, kw_only=True):
     """Two who pass the same sign do not wait for each other by it."""
     slip: bool
     """Turns to the near side; a sign inside is not that of its whole road, but a slip road's."""
-    centerline: Array
     on_main: bool
     """Has run along the main road between the two mouths of a staggered junction."""
     mini: bool
@@ -95,7 +93,7 @@ def right_of_way(
     signs: SignsInside,
     driving_side: DrivingSide,
 ) -> tuple[tuple[Conflict, ...], Meetings]:
-    """Return every conflict with its answer, and fill what the connections say of them.
+    """Return every conflict with its answer, and enter them into the connections.
 
     Each of `connections` belongs to a junction that lies whole in the World.
     """
@@ -107,8 +105,8 @@ def right_of_way(
     conflicts = []
     conflicting: list[list[str]] = [[] for _ in ways]
     waiting: list[list[str]] = [[] for _ in ways]
-    told = (column.tolist() for column in (met.first, met.second, met.merging, met.apart_m, angle))
-    rows = zip(*told, met.points, met.areas, strict=True)
+    values = (met.first, met.second, met.merging, met.apart_m, angle)
+    rows = zip(*(column.tolist() for column in values), met.points, met.areas, strict=True)
     for i, j, merging, apart_m, from_first, point, area in rows:
         a, b = ways[i], ways[j]
         standing = a.standing, b.standing
@@ -117,17 +115,17 @@ def right_of_way(
             standing = own, other
         answer = _answer(a, b, standing, from_first, apart_m < 0.01, driving_side)
         loser, winner = (i, j) if answer.first_waits else (j, i)
-        conflicting[i].append(b.id)
-        conflicting[j].append(a.id)
-        waiting[loser].append(ways[winner].id)
+        conflicting[i].append(b.draft.id)
+        conflicting[j].append(a.draft.id)
+        waiting[loser].append(connections[winner].id)
         conflicts.append(
             Conflict(
-                first_id=a.id,
-                second_id=b.id,
+                first_id=a.draft.id,
+                second_id=b.draft.id,
                 kind="merging" if merging else "crossing",
                 point=point,
                 area=area,
-                yields_id=ways[loser].id,
+                yields_id=connections[loser].id,
                 rule=answer.rule,
                 source=answer.source,
             )
@@ -159,34 +157,32 @@ def _ways(
     ahead = np.arctan2(gap[:, 1], gap[:, 0])
     start, end = ahead[paths.first[:-1]], ahead[paths.first[1:] - 2]
     bend = np.abs(wrap_angle(end - start))
-    told = (column.tolist() for column in (start, end, bend, paths.length_m))
-    rows = zip(connections, *told, strict=True)
+    columns = (column.tolist() for column in (start, end, bend, paths.length_m))
+    rows = zip(connections, *columns, strict=True)
     ways = []
     for c, heading, exit_heading, bend_rad, length_m in rows:
         toward = c.movement.toward
-        mine = by_road.get((toward.edge.index, toward.reverse))
+        mine = by_road.get(toward.key)
         junction = c.cluster.junction
         name = junction.summary.id if junction is not None else ""
         kind = junction.summary.kind if junction is not None else "other"
         sign = next(iter(signs.get(c.id, ())), None)
         ways.append(
             ConnectionFacts(
-                id=c.id,
+                draft=c,
                 turn_weight=weight.get(c.turn, 2),
                 on_the_spot=c.turn == "u_turn" and not c.movement.inside,
                 heading=heading,
                 bend_rad=bend_rad,
                 length_m=length_m,
-                road=(toward.edge.index, toward.reverse),
+                road=toward.key,
                 opposite=None if mine is None else mine.opposite,
                 on_ring=c.start.role == "ring",
                 standing=plain if mine is None or mine.signed_inside else mine.standing,
-                signalled=c.control == "signal",
                 sign=None if sign is None else Standing(Rank.MINOR, sign.rule, "tagged"),
                 sign_m=math.inf if sign is None else sign.at_m,
                 sign_node=None if sign is None else sign.node,
                 slip=c.turn == near and not (mine is not None and mine.signed_inside),
-                centerline=c.centerline,
                 on_main=kind == "staggered" and _runs_along_main(c, tops, classes, name),
                 fast=toward.edge.road_class in _FAST,
                 mini=kind == "mini_roundabout",
@@ -216,7 +212,7 @@ def _answer(
 ) -> Yielding:
     """Return who of two waits; `angle` turns a's first heading into b's, positive to the left.
 
-    `crossing` tells that the middles of their paths cross.
+    `crossing` is whether the middles of their paths cross.
     """
     if a.on_the_spot != b.on_the_spot:
         return Yielding(a.on_the_spot, "u_turn", "inferred")
@@ -233,20 +229,19 @@ def _answer(
     oncoming = a.opposite == b.road and b.opposite == a.road
     if oncoming and a.turn_weight == b.turn_weight == 0 and crossing:
         oncoming = False  # two bent roads that cross at a sharp angle
-    if oncoming and a.signalled and b.signalled:
+    if oncoming and a.draft.control == b.draft.control == "signal":
         return _across(a, b)
     first, second = standing
-    a_slips, b_slips = (
-        way.slip and way.sign is at for way, at in zip((a, b), standing, strict=True)
-    )
+    sides = zip((a, b), standing, strict=True)
+    a_slips, b_slips = (way.slip and way.sign is at for way, at in sides)
     if a_slips and second is not b.sign:
         return Yielding(True, first.rule, first.source)
     if b_slips and first is not a.sign:
         return Yielding(False, second.rule, second.source)
     if first.rank != second.rank:
         loser, winner = sorted((first, second))
-        told = loser if loser.rank < Rank.PLAIN else winner
-        return Yielding(loser is first, told.rule, told.source)
+        decisive = loser if loser.rank < Rank.PLAIN else winner
+        return Yielding(loser is first, decisive.rule, decisive.source)
     if a.on_main != b.on_main and first.rank < Rank.PLAIN:
         return Yielding(b.on_main, first.rule if b.on_main else second.rule, "inferred")
     if oncoming:
@@ -261,7 +256,7 @@ def _standing_at(way: ConnectionFacts, area: Array, point: Array, merging: bool)
     """Return the standing with which a path comes to the ground that it shares with another."""
     if way.sign is None or way.standing.rank < way.sign.rank:
         return way.standing
-    xy = way.centerline
+    xy = way.draft.centerline
     gaps = np.hypot(*(area[:, None] - xy[None]).transpose(2, 0, 1))
     reached_m = float(arc_lengths(xy)[gaps.argmin(axis=1)].min())
     # Where paths merge their middles may meet well behind the first ground that they share.
@@ -281,7 +276,7 @@ def _passes(mover: ConnectionFacts, waiting: ConnectionFacts, driving_side: Driv
 def _across(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
     if a.turn_weight != b.turn_weight:
         return Yielding(a.turn_weight > b.turn_weight, "turn_across", "inferred")
-    return Yielding(a.id > b.id, "turn_across" if a.turn_weight else "order", "default")
+    return Yielding(a.draft.id > b.draft.id, "turn_across" if a.turn_weight else "order", "default")
 
 
 def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
@@ -291,4 +286,4 @@ def _beside(a: ConnectionFacts, b: ConnectionFacts) -> Yielding:
         return Yielding(a.bend_rad > b.bend_rad, "merge_order", "inferred")
     if abs(a.length_m - b.length_m) > 0.05:
         return Yielding(a.length_m > b.length_m, "merge_order", "default")
-    return Yielding(a.id > b.id, "merge_order", "default")
+    return Yielding(a.draft.id > b.draft.id, "merge_order", "default")

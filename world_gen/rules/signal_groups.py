@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import compress
 
 import msgspec
+import numpy as np
 
 from foretwin.contracts.signals import SignalGroup
 from foretwin.contracts.world import Crossing
@@ -42,8 +43,8 @@ def lane_groups(
     around: Surroundings,
     lanes: LaneSet,
     connections: Sequence[ConnectionDraft],
-) -> list[LaneGroup]:
-    """Return the groups of all signalled approaches; connections learn their group.
+) -> dict[str, list[LaneGroup]]:
+    """Return by junction the groups of signalled approaches; connections get the name of theirs.
 
     Lanes that the map tags for the turn across oncoming traffic alone have lights of their own.
     Groups of a junction are numbered in the order of their ways, so that every World that holds
@@ -55,25 +56,15 @@ def lane_groups(
         mine = entering(approach, around, lanes)
         if approach.control.value != "signal" or not mine:
             continue
-        own = [
-            lane
-            for lane in mine
-            if lane.plan.turns_source == "tagged"
-            and across in lane.turns
-            and set(lane.turns) <= {across, "u_turn"}
-        ]
+        tagged = [lane for lane in mine if lane.plan.turns_source == "tagged"]
+        own = [n for n in tagged if across in n.turns and set(n.turns) <= {across, "u_turn"}]
         rest = [lane for lane in mine if lane not in own]
         groups = by_junction.setdefault(approach.junction_id, [])
         for part in (rest, own):
             if part:
-                groups.append(
-                    LaneGroup(
-                        id="",
-                        approach=approach,
-                        lanes=tuple(part),
-                        turning=part is own and bool(rest),
-                    )
-                )
+                turning = part is own and bool(rest)
+                group = LaneGroup(id="", approach=approach, lanes=tuple(part), turning=turning)
+                groups.append(group)
     of_lane: dict[str, LaneGroup] = {}
     for name, groups in by_junction.items():
         groups.sort(key=LaneGroup.order)
@@ -85,7 +76,7 @@ def lane_groups(
         if known is not None and c.control == "signal":
             known.connections.append(c)
             c.signal_group_id = known.id
-    return [group for groups in by_junction.values() for group in groups]
+    return by_junction
 
 
 class WalkGroup(msgspec.Struct, frozen=True, kw_only=True):
@@ -101,44 +92,25 @@ class WalkGroup(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def walk_groups(
-    groups: Sequence[LaneGroup], crossings: Sequence[Crossing], around: Surroundings
+    groups: Mapping[str, Sequence[LaneGroup]], crossings: Sequence[Crossing], around: Surroundings
 ) -> dict[str, list[WalkGroup]]:
-    """Return the groups of signalled crossings by junction.
+    """Return the groups of signalled crossings by junction; `groups` are those of its lanes.
 
     Who enters by the crossed road may not drive meanwhile, nor who leaves by it straight on;
     who turns into it waits for those on foot (StVO §9 (3), RiLSA 2015 2.3.1).
     """
     lit = {c.osm_node: c for c in crossings if c.kind.value == "traffic_signals" and c.osm_node}
     found: dict[str, list[WalkGroup]] = {}
-    by_junction: dict[str, list[LaneGroup]] = {}
-    for group in groups:
-        by_junction.setdefault(group.approach.junction_id, []).append(group)
-    for name, mine in by_junction.items():
-        against: dict[int, set[str]] = {}
-        for cluster in around.clusters:
-            if cluster.junction is None or cluster.junction.summary.id != name:
-                continue
-            for leg in cluster.legs:
-                nodes = leg.edge.node_ids[::-1] if leg.reverse else leg.edge.node_ids
-                for node in nodes:
-                    if node in lit:
-                        at = leg.edge.xy_m[leg.edge.node_ids.index(node)]
-                        if math.hypot(*(at - leg.xy_m[0])) <= CROSSING_WITHIN_M:
-                            against.setdefault(node, set())
-            for index in sorted(cluster.inner):
-                edge = around.edges.get(index)
-                for node in edge.node_ids if edge is not None else ():
-                    if node in lit:
-                        against.setdefault(node, set())
+    for name, mine in groups.items():
+        signalled = lit.keys() & set(_nodes_at(name, around))
+        against: dict[int, set[str]] = {node: set() for node in signalled}
         for group in mine:
             for c in group.connections:
                 way = [c.movement.toward, *c.movement.inside]
                 if c.turn == "straight":
                     way.append(c.movement.away)
-                for part in way:
-                    for node in part.edge.node_ids:
-                        if node in against:
-                            against[node].add(group.id)
+                for node in against.keys() & {node for part in way for node in part.edge.node_ids}:
+                    against[node].add(group.id)
         found[name] = [
             WalkGroup(
                 id=f"{name}:g{len(mine) + i}", crossing=lit[node], against=frozenset(against[node])
@@ -146,3 +118,15 @@ def walk_groups(
             for i, node in enumerate(sorted(against))
         ]
     return found
+
+
+def _nodes_at(junction_id: str, around: Surroundings) -> Iterator[int]:
+    """Yield the nodes of the roads in a junction, and those of its legs that are near."""
+    for cluster in around.clusters:
+        if cluster.junction is None or cluster.junction.summary.id != junction_id:
+            continue
+        for leg in cluster.legs:
+            away_m = np.hypot(*(leg.xy_m - leg.xy_m[0]).T)
+            yield from compress(leg.node_ids, away_m <= CROSSING_WITHIN_M)
+        for index in cluster.inner & around.edges.keys():
+            yield from around.edges[index].node_ids

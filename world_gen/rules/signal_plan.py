@@ -1,6 +1,6 @@
 """A fixed-time plan for each signalised junction: phases, greens, amber and clearing times.
 
-The map does not know the real plan. This one is a default after RiLSA 2015: a cycle of 90 s, of
+The map does not have the real plan. This one is a default after RiLSA 2015: a cycle of 90 s, of
 120 s with more than three phases (2.7.3: at most 120 s), amber 3 s up to 50 km/h, 4 s at 60, 5 s
 at 70 (2.4), at least 5 s of green (2.7.4), all red for as long as the last car needs to clear the
 ground it shares with the first one of the next phase (2.5): clearing 6 m of car and the way there
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -44,14 +45,14 @@ class Between(NamedTuple):
 
 
 def signal_plans(
-    groups: Sequence[LaneGroup],
+    groups: Mapping[str, Sequence[LaneGroup]],
     walks: Mapping[str, Sequence[WalkGroup]],
     connections: Sequence[ConnectionDraft],
     conflicts: Sequence[Conflict],
     met: Meetings,
 ) -> dict[str, SignalPlan]:
     """Return a plan for each junction with groups, by its id; `met` are the conflicts' places."""
-    of = {c.id: g for g in groups for c in g.connections}
+    of = {c.id: g for mine in groups.values() for g in mine for c in g.connections}
     pairs: dict[tuple[str, str], Between] = {}
     rows = zip(conflicts, met.first_m.tolist(), met.second_m.tolist(), strict=True)
     for conflict, first_m, second_m in rows:
@@ -63,10 +64,7 @@ def signal_plans(
         old = pairs.get(key, Between(False, False, 0.0))
         clear_s = max(_clear_s(first_m, second_m), _clear_s(second_m, first_m), old.clear_s)
         pairs[key] = Between(old.crossing or not waits, old.waiting or waits, clear_s)
-    by_junction: dict[str, list[LaneGroup]] = {}
-    for group in groups:
-        by_junction.setdefault(group.approach.junction_id, []).append(group)
-    return {name: _plan(mine, walks.get(name, ()), pairs) for name, mine in by_junction.items()}
+    return {name: _plan(mine, walks.get(name, ()), pairs) for name, mine in groups.items()}
 
 
 def oncoming(a: LaneGroup, b: LaneGroup) -> bool:
@@ -120,12 +118,7 @@ def _plan(
 
 def _within(groups: Sequence[LaneGroup], pairs: Mapping[tuple[str, str], Between]) -> list[Between]:
     names = sorted(group.id for group in groups)
-    return [
-        found
-        for i, a in enumerate(names)
-        for b in names[i + 1 :]
-        if (found := pairs.get((a, b))) is not None
-    ]
+    return [pairs[pair] for pair in combinations(names, 2) if pair in pairs]
 
 
 def _phases(
@@ -136,11 +129,8 @@ def _phases(
     Where two roads that face each other both have lanes of their own for the turn across, these
     go in a phase of theirs; else who turns across waits.
     """
-    protected = {
-        g.id
-        for g in groups
-        if g.turning and any(other.turning and oncoming(g, other) for other in groups)
-    }
+    turning = [group for group in groups if group.turning]
+    protected = {g.id for g in turning if any(oncoming(g, other) for other in turning)}
 
     def together(a: LaneGroup, b: LaneGroup) -> bool:
         between = pairs.get((a.id, b.id) if a.id < b.id else (b.id, a.id))
@@ -169,9 +159,8 @@ def _amber_s(groups: Sequence[LaneGroup]) -> float:
 
 
 def _walking_s(walk: WalkGroup) -> float:
-    return math.ceil(
-        float(np.hypot(*(walk.crossing.line[1] - walk.crossing.line[0]))) / _WALKING_MPS
-    )
+    begin, end = walk.crossing.line
+    return math.ceil(float(np.hypot(*(end - begin))) / _WALKING_MPS)
 
 
 def share_green(weights: Sequence[float], least_s: Sequence[float], total_s: float) -> list[float]:

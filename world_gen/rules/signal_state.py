@@ -39,9 +39,7 @@ def parts_of_cycle(plan: SignalPlan, time_s: Array) -> npt.NDArray[np.intp]:
 
 
 def colours_at(
-    plan: SignalPlan,
-    time_s: float,
-    live: Mapping[str, LiveColour] | None = None,
+    plan: SignalPlan, time_s: float, live: Mapping[str, LiveColour] | None = None
 ) -> dict[str, SignalColour]:
     """Return the colour of each group of a plan at a drive time; cycles begin at time 0.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import DrivingSide, YieldRule
 from foretwin.geometry.polyline import arc_lengths, locate, points_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
-from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
+from foretwin.world_gen.lanes.legs import Cluster
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from foretwin.world_gen.rules.control_devices import NodeTags, faces, sign_of
 
@@ -23,7 +24,7 @@ _BESIDE_M = 1.0
 class SignInside(NamedTuple):
     """A sign that a connection passes, `at_m` along its path.
 
-    `on_path` tells that the path keeps to the sign's road there, and cuts no corner.
+    `on_path` means that the path keeps to the sign's road there, and cuts no corner.
     """
 
     node: int
@@ -75,21 +76,15 @@ def shared_signs(
     for c in connections:
         if not c.cluster.whole or c.turn == "u_turn":
             continue
-        road = c.movement.toward.edge.index, c.movement.toward.reverse
+        road = c.movement.toward.key
         mine = {sign.node: sign for sign in signs.get(c.id, ())}
         known = passed.get(road)
         passed[road] = mine if known is None else {n: s for n, s in known.items() if n in mine}
         if c.turn == driving_side:
             near.add(road)
-    return {
-        road: min(mine.values(), key=_place).rule
-        for road, mine in passed.items()
-        if road in near and mine
-    }
-
-
-def _place(sign: SignInside) -> float:
-    return sign.at_m
+    first = attrgetter("at_m")
+    shared = {road: mine for road, mine in passed.items() if road in near and mine}
+    return {road: min(mine.values(), key=first).rule for road, mine in shared.items()}
 
 
 def _is_signed(part: DirectedEdge, node_tags: NodeTags) -> bool:
@@ -111,24 +106,22 @@ def _met(
 ) -> Iterator[tuple[int, DirectedEdge, Array]]:
     """Yield the signs that face who drives along `inside`: node, road and place (2,).
 
-    One that does not say whom it faces counts on a one-way road, and on another for those who
-    come to the nearer of the two nodes at which roads meet; on such a node it cannot tell.
+    One without a tagged direction counts on a one-way road, and on another for those who
+    come to the nearer of the two nodes at which roads meet; on such a node it does not count.
     """
     for run in _runs(inside, ends):
         total_m = sum(part.edge.length_m for part in run)
         first, last = run[0].start_node, run[-1].end_node
         gone_m = 0.0
         for part in run:
-            xy_m = part.xy_m
-            nodes = part.edge.node_ids[::-1] if part.reverse else part.edge.node_ids
-            along_m = arc_lengths(xy_m)
-            for node, place_m, at_m in zip(nodes, xy_m, (gone_m + along_m).tolist(), strict=True):
+            along_m = arc_lengths(part.xy_m)
+            rows = zip(part.node_ids, part.xy_m, (gone_m + along_m).tolist(), strict=True)
+            for node, place_m, at_m in rows:
                 if node not in node_tags or not sign_of(node_tags[node]):
                     continue
                 facing = faces(node_tags[node], not part.reverse)
                 if facing is None and node not in (first, last):
-                    one_way = part.edge.forward != part.edge.backward
-                    facing = one_way or at_m >= total_m / 2.0
+                    facing = part.edge.one_way or at_m >= total_m / 2.0
                 if facing:
                     yield node, part, place_m
             gone_m += float(along_m[-1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.provenance import Choice
 from foretwin.contracts.world import LineControl, StopLine
 from foretwin.geometry.polyline import left_of
-from foretwin.geometry.polyline_batch import Polylines
+from foretwin.geometry.polyline_batch import Polylines, segments_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
@@ -28,43 +29,41 @@ def stop_lines(
     All lanes of a road stop at one line: where the map has the sign or light, before a crossing
     that waiting cars would block, else where lanes end.
     """
-    mine = [
-        (lane, _line_back_m(approach, around), approach.control)
-        for approach in found
-        for lane in entering(approach, around, lanes)
-    ]
-    drawn, back_m = [lane for lane, _, _ in mine], [away_m for _, away_m, _ in mine]
-    return lines_across(drawn, back_m, [control for _, _, control in mine])
+    return lines_across(
+        [
+            (lane, _line_back_m(approach, around), approach.control)
+            for approach in found
+            for lane in entering(approach, around, lanes)
+        ]
+    )
 
 
 def entering(approach: Approach, around: Surroundings, lanes: LaneSet) -> list[LaneDraft]:
     """Return the lanes of an approach from the left."""
     toward = approach.toward
-    return lanes.incoming(toward, around.section(toward).driven(reverse=toward.reverse))
+    return lanes.incoming(toward, around.lanes_along(toward).driven)
 
 
 def _line_back_m(approach: Approach, around: Surroundings) -> float:
     """Return how far before the ends of its lanes an approach's line lies."""
     if approach.line_m is None:
         return LINE_SETBACK_M
-    trim = around.trims_m.get((approach.toward.edge.index, not approach.toward.reverse), 0.0)
+    trim = around.trims_m.get(approach.toward.back.key, 0.0)
     return max(LINE_SETBACK_M, approach.line_m - trim)
 
 
 def lines_across(
-    lanes: Sequence[LaneDraft],
-    back_m: Sequence[float],
-    controls: Sequence[Choice],
-    name: str = "stop",
+    stopped: Sequence[tuple[LaneDraft, float, Choice]], name: str = "stop"
 ) -> tuple[StopLine, ...]:
-    """Return a line across each lane, so many metres before its end but within the lane."""
-    paths = Polylines.of([lane.centerline for lane in lanes])
-    total = paths.length_m
-    at_m = np.maximum(total - np.array(back_m), np.minimum(0.5, 0.5 * total))
-    ends = _ends_across(paths, at_m, [lane.width_m.value for lane in lanes])
+    """Return a line across each lane, so many metres before its end but within the lane, and with
+    its control."""
+    paths = Polylines.of([lane.centerline for lane, _, _ in stopped])
+    total, back_m = paths.length_m, np.array([away_m for _, away_m, _ in stopped])
+    at_m = np.maximum(total - back_m, np.minimum(0.5, 0.5 * total))
+    ends = _ends_across(paths, at_m, [lane.width_m.value for lane, _, _ in stopped])
     return tuple(
         StopLine(id=f"{lane.id}:{name}", lane_id=lane.id, ends=mine, control=control)
-        for lane, mine, control in zip(lanes, ends, controls, strict=True)
+        for (lane, _, control), mine in zip(stopped, ends, strict=True)
     )
 
 
@@ -93,10 +92,7 @@ def lines_at_signs(
 def _ends_across(paths: Polylines, at_m: Array, width_m: Sequence[float]) -> Array:
     """Return (L, 2, 2) the ends, left and right, of a line across each of L paths at `at_m`."""
     half_m = np.array(width_m) / 2.0
-    # A key that grows along each lane and from lane to lane finds all segments in one search.
-    room = np.concatenate([[0.0], np.cumsum(paths.length_m + 1.0)])
-    i = np.searchsorted(paths.arc_m + room[paths.line], at_m + room[:-1], side="right") - 1
-    i = np.clip(i, paths.first[:-1], paths.first[1:] - 2)
+    i = segments_at(paths, np.arange(len(paths)), at_m)
     ahead = paths.steps[0][i] / np.maximum(paths.steps[1][i], 1e-9)[:, None]
     centre = paths.xy_m[i] + ahead * (at_m - paths.arc_m[i])[:, None]
     left = left_of(ahead) * half_m[:, None]
@@ -105,10 +101,4 @@ def _ends_across(paths: Polylines, at_m: Array, width_m: Sequence[float]) -> Arr
 
 def line_controls(lines: Sequence[StopLine]) -> dict[str, LineControl]:
     """Return the control of each lane that has a stop line."""
-    known: dict[str, LineControl] = {
-        "signal": "signal",
-        "stop": "stop",
-        "give_way": "give_way",
-        "none": "none",
-    }
-    return {line.lane_id: known[line.control.value] for line in lines}
+    return {line.lane_id: cast(LineControl, line.control.value) for line in lines}

@@ -16,7 +16,7 @@ from foretwin.orchestrator.config import ConfigError, DriveConfig
 from foretwin.orchestrator.drive.plan import make_plan, read_inputs
 from foretwin.orchestrator.embedded import MAP_FILE
 from foretwin.orchestrator.worlds.opening import open_map
-from foretwin.world_gen.junctions.route_junctions import junctions_on_route
+from foretwin.world_gen.junctions.intersections import junctions_on_route
 from tests.orchestrator.trip import NOW, town, town_line, town_plan
 from tests.world_gen.sketch import Sketch
 

@@ -15,7 +15,7 @@ from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
 from foretwin.orchestrator.other_vehicles import recorded
 from foretwin.orchestrator.other_vehicles.recorded import LogBeside
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.telemetry.logs.log import Declared, Log, Sample
+from foretwin.telemetry.logs.log import Log, Sample
 
 START_NS = 1_700_000_000_000_000_000
 CAR = load_vehicle(None)
@@ -66,10 +66,7 @@ def ground(monkeypatch: pytest.MonkeyPatch) -> Iterator[Ground]:
     def read(_skipped: Counter[str]) -> Iterator[Sample]:
         return found.read()
 
-    declared = Declared(units="", frame="", time_base="", reference_point="")
-    monkeypatch.setattr(
-        recorded, "open_log", lambda _: Log(info=INFO, declared=declared, read=read)
-    )
+    monkeypatch.setattr(recorded, "open_log", lambda _: Log(info=INFO, read=read))
     yield found
     for log in found.opened:
         log.close()

@@ -12,12 +12,14 @@ from foretwin.contracts.drive import RoadUserKind
 from foretwin.geometry.rectangles import Rectangles, separations
 from foretwin.sim_worker.batch.accident import Accidents, run_accidents
 from foretwin.sim_worker.batch.accident_bodies import accident_bodies
-from foretwin.sim_worker.batch.accident_model import Impact
+from foretwin.sim_worker.batch.accident_model import ContactLaw
 from foretwin.sim_worker.batch.collision_detection import Touches, ego_rectangles, first_touches
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.sim_worker.vehicle.reference_points import cog_from_base
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from tests.sim_worker.rigid_impact import Body, impact
+
+COVERS = ("foretwin.sim_worker.batch.accident_bodies", "foretwin.sim_worker.batch.accident_model")
 
 CAR = load_vehicle()
 TICK_S = 0.05
@@ -63,9 +65,7 @@ def touches(*meetings: Meeting) -> Touches:
 
 
 def bodies(touch: Touches, meeting: Meeting) -> tuple[Body, Body]:
-    described = accident_bodies(
-        CAR, touch, kinds=[meeting.kind], friction_factor=np.ones(1), user_decel_mps2=np.zeros(1)
-    )
+    described = accident_bodies(CAR, touch, kinds=[meeting.kind], friction_factor=np.ones(1))
     positions, velocities = cog_from_base(CAR, touch.ego_states)
     ego, other = (
         Body(mass, inertia, place[:2], motion[:3])
@@ -84,9 +84,11 @@ def velocities(accidents: Accidents) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize("name", MEETINGS)
-@pytest.mark.parametrize("material", [Impact(0.1, 0.5), Impact(0.3, 0.1), Impact(0.5, 0.3)])
+@pytest.mark.parametrize(
+    "material", [ContactLaw(0.1, 0.5), ContactLaw(0.3, 0.1), ContactLaw(0.5, 0.3)]
+)
 def test_velocities_after_an_impact_are_those_of_the_closed_form(
-    name: str, material: Impact
+    name: str, material: ContactLaw
 ) -> None:
     meeting = MEETINGS[name]
     touch = touches(meeting)
@@ -174,7 +176,7 @@ def test_a_braking_ego_goes_on_braking() -> None:
     states = touch.ego_states.copy()
     states[:, 7] = -6.0
     rolling, braking = (
-        run_accidents(CAR, touch._replace(ego_states=s), kinds=["car"], impact=Impact(0.3, 0.5))
+        run_accidents(CAR, touch._replace(ego_states=s), kinds=["car"], impact=ContactLaw(0.3, 0.5))
         for s in (touch.ego_states, states)
     )
     lost = rolling.ego_states[0, -1, 3] - braking.ego_states[0, -1, 3]
@@ -208,7 +210,7 @@ def test_a_kind_for_each_touch_is_asked_for() -> None:
 
 def test_a_restitution_that_no_contact_has_is_refused() -> None:
     with pytest.raises(ValueError, match=r"restitution 0\.0 must be within"):
-        run_accidents(CAR, touches(MEETINGS["head-on"]), kinds=["car"], impact=Impact(0.0))
+        run_accidents(CAR, touches(MEETINGS["head-on"]), kinds=["car"], impact=ContactLaw(0.0))
 
 
 def test_a_duration_that_is_no_whole_number_of_steps_is_refused() -> None:

@@ -9,6 +9,12 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.driving import altered, drive, seed, states
 from tests.sim_worker.places import box, crossroads
 
+COVERS = (
+    "foretwin.sim_worker.batch.model",
+    "foretwin.sim_worker.batch.physics",
+    "foretwin.sim_worker.vehicle.clock",
+)
+
 CAR = load_vehicle()
 
 

@@ -8,25 +8,36 @@ import numpy as np
 import pytest
 
 from foretwin.geometry.rectangles import clearance
+from foretwin.sim_worker.batch.batch_simulation import Stage
 from foretwin.sim_worker.futures.case_picture import told, write_case_picture
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
-from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.futures.future_mix import plan_futures
+from foretwin.sim_worker.futures.future_picture import write_future_picture
+from foretwin.sim_worker.futures.run_job import run_job
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from tests.sim_worker.places import crossroads, job
 from tests.sim_worker.scenarios.draw_sheets import SHEETS
 from tests.sim_worker.scenarios.worlds import cross
 
+COVERS = (
+    "foretwin.sim_worker.futures.case_picture_runs",
+    "foretwin.sim_worker.futures.future_picture",
+)
+
 VEHICLE = load_vehicle()
+PAIR = plan_futures(count=2, seed=0, planners=("pure_pursuit_idm",))
 WORLD = cross()
 
 
-def first_case(id_: str) -> Cast:
+def first_case(id_: str) -> StagedCase:
     scenario = catalogue()[id_]
     place = places(scenario, WORLD, vehicle=VEHICLE, most=1).places[0]
     found = cast(scenario, draw_cases(scenario)[0], place, vehicle=VEHICLE)
-    assert isinstance(found, Cast)
+    assert isinstance(found, StagedCase)
     return found
 
 
@@ -37,7 +48,7 @@ def test_the_heedless_run_ends_with_the_planned_impact(id_: str) -> None:
     assert run.collision_with == played.impact_with
     assert run.time_s[run.moment] == pytest.approx(played.impact_time_s)
     names = [actor.name for actor in played.actors]
-    gaps = [float(clearance(run.ego_at(run.moment), box)[0]) for box in run.others_at(run.moment)]
+    gaps = [float(clearance(run.ego, other)[run.moment]) for other in run.others]
     assert gaps[names.index(played.impact_with)] <= 0.05
     assert all(gap > 0.1 for name, gap in zip(names, gaps, strict=True)
                if name != played.impact_with)  # fmt: skip
@@ -47,9 +58,9 @@ def test_a_planner_drives_the_case_from_the_same_start() -> None:
     played, scenario = first_case("lead_stopping"), catalogue()["lead_stopping"]
     heedless = heedless_run(played, VEHICLE, horizon_s=scenario.horizon_s)
     run = planned_run(played, scenario, WORLD, VEHICLE, planner="pure_pursuit_idm")
-    np.testing.assert_allclose(run.ego_at(0).centre_m, heedless.ego_at(0).centre_m, atol=0.01)
-    for mine, theirs in zip(run.others_at(0), heedless.others_at(0), strict=True):
-        np.testing.assert_allclose(mine.centre_m, theirs.centre_m, atol=0.01)
+    np.testing.assert_allclose(run.ego.centre_m[0], heedless.ego.centre_m[0], atol=0.01)
+    for mine, theirs in zip(run.others, heedless.others, strict=True):
+        np.testing.assert_allclose(mine.centre_m[0], theirs.centre_m[0], atol=0.01)
     assert run.collision_with == ""
     assert run.clearance_m > 0.5
     assert "hits lead" in told(played, heedless, run, "pure_pursuit_idm")
@@ -64,6 +75,16 @@ def test_a_case_is_drawn_with_the_name_of_its_map(tmp_path: Path) -> None:
         write_case_picture(file, played, scenario, WORLD, heedless, None, planner="")
     assert files[0].read_bytes() == files[1].read_bytes()
     assert b"OpenStreetMap contributors" in files[0].read_bytes()
+
+
+def test_a_future_is_drawn_as_it_was_driven_with_the_name_of_its_map(tmp_path: Path) -> None:
+    stage, question = Stage(crossroads(), VEHICLE, nsim=2), job(PAIR, horizon_s=2.0)
+    result, file = run_job(question, stage), tmp_path / "one" / "future.png"
+    write_future_picture(file, question, result, 1, crossroads(), VEHICLE)
+    first = file.read_bytes()
+    assert b"OpenStreetMap contributors" in first
+    write_future_picture(file, question, result, 0, crossroads(), VEHICLE)
+    assert file.read_bytes() != first
 
 
 def test_every_scenario_is_on_a_sheet() -> None:

@@ -24,10 +24,16 @@ from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.sim_worker.scenarios.roles import Cast
+from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.test_real_junctions import SMALL, worlds_of
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
+
+COVERS = (
+    "foretwin.sim_worker.futures.driven_line",
+    "foretwin.sim_worker.futures.planned_impacts",
+    "foretwin.sim_worker.scenarios.staged",
+)
 
 CAR = load_vehicle()
 NEAR_M = 0.1
@@ -41,7 +47,7 @@ HEALTHY = (
 class Played(NamedTuple):
     """A scenario played at its first place in a World: cases, result, and the job."""
 
-    cases: list[Cast]
+    cases: list[StagedCase]
     result: FuturesResult
     job: Job
 
@@ -85,7 +91,7 @@ def play(world: World, scenario_id: str, planner: str = "constant_speed") -> Pla
         scenarios=(scenario,), accidents=True,
     )  # fmt: skip
     cases = list(staged_cases(job, stage, maker).values())
-    assert all(isinstance(case, Cast) for case in cases)
+    assert all(isinstance(case, StagedCase) for case in cases)
     return Played(cases, run_job(job, stage, scenes=maker), job)  # type: ignore[arg-type]
 
 
@@ -109,7 +115,7 @@ def _moved(state: Array, since_s: float) -> Array:
     return np.array([x, y, yaw + rate * since_s])
 
 
-def _front(case: Cast, pose: Array) -> Array:
+def _front(case: StagedCase, pose: Array) -> Array:
     ahead = CAR.length_m.value - CAR.rear_overhang_m.value
     left = case.place.near_sign * (case.impact_share - 0.5) * CAR.width_m.value
     cos, sin = np.cos(pose[2]), np.sin(pose[2])

@@ -27,6 +27,13 @@ from tests.sim_worker.places import (
     turning_path,
 )
 
+COVERS = (
+    "foretwin.sim_worker.futures.closed_loop",
+    "foretwin.sim_worker.futures.outcomes",
+    "foretwin.sim_worker.scenarios.live",
+    "foretwin.sim_worker.vehicle.seeding",
+)
+
 CAR = load_vehicle()
 PLANNERS = ("pure_pursuit_idm",)
 NOMINAL = (Future(index=0, name="nominal"),)

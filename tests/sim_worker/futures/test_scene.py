@@ -17,6 +17,8 @@ from tests.sim_worker.places import crossroads, happening, job, state_at
 from tests.sim_worker.road_users.crossroads import crossroads as mapped_crossroads
 from tests.sim_worker.road_users.crossroads import straight_on
 
+COVERS = ("foretwin.sim_worker.futures.measuring", "foretwin.sim_worker.futures.play")
+
 CAR = load_vehicle()
 STANDING_LEAD = {"lead__speed_mps": 0.0, "lead__gap_m": 30.0}
 

@@ -24,6 +24,11 @@ from tests.sim_worker.planners.driven import (
     walker,
 )
 
+COVERS = (
+    "foretwin.sim_worker.planners.lattice_choice",
+    "foretwin.sim_worker.planners.lattice_rating",
+)
+
 VEHICLE = load_vehicle()
 ALONG = np.array([[0.0, 0.0], [300.0, 0.0]])
 

@@ -23,6 +23,8 @@ from tests.sim_worker.planners.driven import (
     walker,
 )
 
+COVERS = ("foretwin.sim_worker.planners.giving_way",)
+
 VEHICLE = load_vehicle()
 MEETS_M = 50.0
 SOUTHBOUND = np.array([[MEETS_M, 300.0], [MEETS_M, -300.0]])

@@ -23,6 +23,12 @@ from tests.sim_worker.planners.driven import Other, at_rest_on, see, straight, v
 from tests.sim_worker.planners.installed import install
 from tests.starvation import kept_waiting
 
+COVERS = (
+    "foretwin.sim_worker.planners.host_link",
+    "foretwin.sim_worker.planners.host_process",
+    "foretwin.sim_worker.planners.one_at_a_time",
+)
+
 VEHICLE = load_vehicle()
 
 CODE = """

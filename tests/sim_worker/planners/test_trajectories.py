@@ -16,6 +16,12 @@ from foretwin.sim_worker.planners.reverse_pursuit import ReversePursuit
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.planners.driven import Other, at_rest_on, drive, straight, view_of, walker
 
+COVERS = (
+    "foretwin.sim_worker.planners.as_planned",
+    "foretwin.sim_worker.planners.reverse_pursuit",
+    "foretwin.sim_worker.planners.trajectory_tracking",
+)
+
 VEHICLE = load_vehicle()
 
 

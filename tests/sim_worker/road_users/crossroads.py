@@ -86,6 +86,9 @@ def traffic(
         decel_mps2=3.0 * row,
         brakes_at_s=brakes_at_s * row,
         brakes_by_mps2=4.0 * row,
+        walks=row < 0,
+        kinds=np.zeros(row.shape, np.intp),
+        hidden_by=np.full(row.shape, -1),
     )
     return Traffic(crowd, PathTable(paths), rules.between([rules.taken(p) for p in paths]))
 

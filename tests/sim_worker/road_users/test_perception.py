@@ -14,6 +14,8 @@ from foretwin.sim_worker.road_users.right_of_way import JunctionRules
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
+COVERS = ("foretwin.sim_worker.road_users.cast",)
+
 CAR = load_vehicle()
 EGO_PATH = FrenetPath(np.array([[0.0, 0.0], [100.0, 0.0]]))
 BESIDE = FrenetPath(np.array([[0.0, 3.0], [100.0, 3.0]]))
@@ -30,10 +32,8 @@ def sight(*players: Player, **faults: float) -> tuple[Sight, Traffic]:
     traffic = Traffic(cast.crowd, table, rules)
     columns = {name: np.zeros(1) for name in PerceptionFaults._fields}
     columns |= {name: np.array([value]) for name, value in faults.items()}
-    eyes = Sight(
-        traffic, table.along(EGO_PATH), CAR, PerceptionFaults(**columns),
-        hidden_by=cast.hidden_by, walks=cast.walks, tick_s=0.05,
-    )  # fmt: skip
+    faulty = PerceptionFaults(**columns)
+    eyes = Sight(traffic, table.along(EGO_PATH), CAR, faulty, tick_s=0.05)
     return eyes, traffic
 
 

@@ -116,10 +116,7 @@ def test_it_is_seen_while_it_is_there_and_only_then() -> None:
     )  # fmt: skip
     traffic = _traffic(ahead, futures=1)
     nothing = PerceptionFaults(np.zeros(1), np.zeros(1), np.zeros(1))
-    sight = Sight(
-        traffic, traffic.table.along(EGO_PATH), car, nothing,
-        hidden_by=np.full((1, 2), -1), walks=np.zeros((1, 2), dtype=bool), tick_s=TICK_S,
-    )  # fmt: skip
+    sight = Sight(traffic, traffic.table.along(EGO_PATH), car, nothing, tick_s=TICK_S)
     ego = FrenetPoint(np.array([50.0]), np.array([0.0]))
     gaps = []
     for tick in range(60):

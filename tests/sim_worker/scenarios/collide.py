@@ -14,7 +14,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import Rectangles, clearance, overlapping
-from foretwin.sim_worker.scenarios.casting import Cast, CastActor
+from foretwin.sim_worker.scenarios.casting import StagedActor, StagedCase
 
 TICK_S = 0.002
 
@@ -29,12 +29,12 @@ class Collision(NamedTuple):
 
 
 def first_collision(
-    played: Cast, vehicle: VehicleParameters, *, until_s: float
+    played: StagedCase, vehicle: VehicleParameters, *, until_s: float
 ) -> Collision | None:
     """Return what an ego that keeps its speed along its path touches first."""
     time = np.arange(0.0, until_s, TICK_S)
     ego = ego_boxes(played, vehicle, time)
-    found: list[tuple[float, int, CastActor]] = []
+    found: list[tuple[float, int, StagedActor]] = []
     for actor in played.actors:
         hit = np.flatnonzero(overlapping(ego, actor_boxes(actor, time)))
         if len(hit):
@@ -48,35 +48,35 @@ def first_collision(
     return Collision(actor.name, when, point[0], float(clearance(dot, other)[0]))
 
 
-def ego_boxes(played: Cast, vehicle: VehicleParameters, time_s: Array) -> Rectangles:
+def ego_boxes(played: StagedCase, vehicle: VehicleParameters, time_s: Array) -> Rectangles:
     xy, yaw = ego_pose(played, time_s)
     length, rear = vehicle.length_m.value, vehicle.rear_overhang_m.value
     ahead = (length / 2.0 - rear) * np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
     return Rectangles(xy + ahead, yaw, length, vehicle.width_m.value)
 
 
-def ego_pose(played: Cast, time_s: Array) -> tuple[Array, Array]:
+def ego_pose(played: StagedCase, time_s: Array) -> tuple[Array, Array]:
     """Return base_link's places and where the car's nose points; in reverse, backwards."""
-    path = FrenetPath(played.ego_xy_m)
+    path = FrenetPath(played.place.ego.xy_m)
     arc = played.ego_arc_m + played.ego_speed_mps * time_s
     pose = path.pose_at(arc, played.ego_lateral_m)
-    return pose.xy_m, pose.yaw_rad + (np.pi if played.reverse else 0.0)
+    return pose.xy_m, pose.yaw_rad + (np.pi if played.place.reverse else 0.0)
 
 
-def front_point(played: Cast, vehicle: VehicleParameters, time_s: Array) -> Array:
+def front_point(played: StagedCase, vehicle: VehicleParameters, time_s: Array) -> Array:
     """Return the point of the leading end that the cast says is hit."""
     xy, yaw = ego_pose(played, time_s)
     length, rear = vehicle.length_m.value, vehicle.rear_overhang_m.value
     to_left = (played.impact_share - 0.5) * vehicle.width_m.value * played.place.near_sign
     ahead = length - rear
-    if played.reverse:
+    if played.place.reverse:
         ahead, to_left = -rear, -to_left
     forward = np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
     left = np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1)
     return xy + ahead * forward + to_left * left
 
 
-def actor_boxes(actor: CastActor, time_s: Array) -> Rectangles:
+def actor_boxes(actor: StagedActor, time_s: Array) -> Rectangles:
     travelled = actor.speed_mps * time_s
     if actor.conduct == "stops":
         braking = np.clip(time_s - actor.acts_after_s, 0.0, actor.speed_mps / actor.decel_mps2)

@@ -35,7 +35,7 @@ from foretwin.sim_worker.futures.case_picture import (
     told,
 )
 from foretwin.sim_worker.futures.case_picture_runs import heedless_run, planned_run
-from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
@@ -93,7 +93,7 @@ class Tile(NamedTuple):
 
     where: str
     world: World
-    played: Cast
+    played: StagedCase
 
 
 def worlds_of(file: Path) -> Iterator[World]:
@@ -160,7 +160,7 @@ def tile_of(scenario: Scenario, world: World, where: str) -> Tile | None:
         case
         for place in found
         for case in [cast(scenario, cases[len(cases) // 2], place, vehicle=vehicle)]
-        if isinstance(case, Cast)
+        if isinstance(case, StagedCase)
     ]
     best = min(played, key=lambda case: round(case.off_lanes_m / 5.0), default=None)
     if best is None or best.off_lanes_m > MOST_OFF_M:
@@ -170,7 +170,7 @@ def tile_of(scenario: Scenario, world: World, where: str) -> Tile | None:
 
 
 def whole_lap(tile: Tile, aspect: float) -> View:
-    low, high = tile.played.ego_xy_m.min(axis=0), tile.played.ego_xy_m.max(axis=0)
+    low, high = tile.played.place.ego.xy_m.min(axis=0), tile.played.place.ego.xy_m.max(axis=0)
     half_m = max(high[1] - low[1], (high[0] - low[0]) / aspect) / 2.0 + 10.0
     return view_around((low + high) / 2.0, half_m, aspect, close=False)
 

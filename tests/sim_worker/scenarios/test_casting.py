@@ -13,15 +13,21 @@ from hypothesis import strategies as st
 from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import clearance
-from foretwin.sim_worker.scenarios.casting import Cast, cast, cast_all
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast, cast_all
 from foretwin.sim_worker.scenarios.drawing import Values, draw_cases
 from foretwin.sim_worker.scenarios.placement import places
-from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.ways import lengthened
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.collide import actor_boxes, ego_boxes, first_collision
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
+
+COVERS = (
+    "foretwin.sim_worker.scenarios.alongside",
+    "foretwin.sim_worker.scenarios.meeting",
+    "foretwin.sim_worker.scenarios.roles",
+)
 
 VEHICLE = load_vehicle()
 WORLDS = {
@@ -34,13 +40,13 @@ WITHOUT_IMPACT = {"steering_fault", "gnss_offset"}
 """Nobody is met there: the ego is alone, or the other comes seconds later."""
 
 
-def played(scenario: Scenario, values: Values, place: Place) -> Cast:
+def played(scenario: Scenario, values: Values, place: ScenarioPlace) -> StagedCase:
     found = cast(scenario, values, place, vehicle=VEHICLE)
-    assert isinstance(found, Cast), found
+    assert isinstance(found, StagedCase), found
     return found
 
 
-def check_impact(found: Cast) -> None:
+def check_impact(found: StagedCase) -> None:
     """Assert that who is planned is touched first, when, where and on the front as planned."""
     hit = first_collision(found, VEHICLE, until_s=found.impact_time_s + 0.3)
     assert hit is not None
@@ -95,8 +101,8 @@ def test_impacts_happen_at_crossings_of_any_angle(
         f"{name}.impact_share": share,
     }
     case = cast(scenario, values, found[0], vehicle=VEHICLE)
-    assume(isinstance(case, Cast))
-    assert isinstance(case, Cast)
+    assume(isinstance(case, StagedCase))
+    assert isinstance(case, StagedCase)
     check_impact(case)
 
 
@@ -107,7 +113,7 @@ def test_cases_are_cast_together_as_they_are_one_by_one() -> None:
     together = cast_all(scenario, cases, place, vehicle=VEHICLE)
     for case, values in zip(together, cases, strict=True):
         alone = played(scenario, values, place)
-        assert isinstance(case, Cast)
+        assert isinstance(case, StagedCase)
         assert case.values == values
         assert (case.ego_arc_m, case.impact_time_s) == (alone.ego_arc_m, alone.impact_time_s)
         assert [a.start_arc_m for a in case.actors] == [a.start_arc_m for a in alone.actors]
@@ -222,7 +228,7 @@ def test_a_standing_car_is_taken_to_set_off() -> None:
         scenario, values, place, vehicle=VEHICLE, ego_arc_m=place.ego.entry_m - 8.0,
         ego_speed_mps=0.0,
     )  # fmt: skip
-    assert isinstance(near, Cast)
+    assert isinstance(near, StagedCase)
     assert near.ego_speed_mps == 2.0
     check_impact(near)
 

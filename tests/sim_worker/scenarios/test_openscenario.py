@@ -14,7 +14,7 @@ from lxml import etree
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.rectangles import overlapping, separations
-from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.openscenario import openscenario_element, write_openscenario
 from foretwin.sim_worker.scenarios.openscenario_entities import AXLES
@@ -29,6 +29,11 @@ from tests.world_gen.export.judged_sample import sample_worlds
 from tests.world_gen.export.judges import judges_python
 from tests.world_gen.export.read_opendrive import OpenDriveFile
 
+COVERS = (
+    "foretwin.sim_worker.scenarios.openscenario_entities",
+    "foretwin.sim_worker.scenarios.openscenario_motion",
+)
+
 VEHICLE = load_vehicle()
 WORLDS = {
     "cross": cross(signals=True), "left-hand": cross(left_hand=True, signals=True), "ring": ring(),
@@ -36,7 +41,7 @@ WORLDS = {
 }  # fmt: skip
 
 
-def cases_in(id_: str, world: World, *, most: int = 1) -> list[Cast]:
+def cases_in(id_: str, world: World, *, most: int = 1) -> list[StagedCase]:
     """Return cases of a scenario at its first place in a World, evenly chosen of all."""
     scenario = catalogue()[id_]
     cases = draw_cases(scenario)
@@ -45,11 +50,11 @@ def cases_in(id_: str, world: World, *, most: int = 1) -> list[Cast]:
         for place in places(scenario, world, vehicle=VEHICLE, most=1).places
         for values in cases[:: -(-len(cases) // most)]
     )
-    return [played for played in found if isinstance(played, Cast)]
+    return [played for played in found if isinstance(played, StagedCase)]
 
 
-def written(played: Cast, world: World, file: Path) -> ScenarioFile:
-    write_openscenario(played, catalogue()[played.scenario_id], world, file, vehicle=VEHICLE)
+def written(played: StagedCase, world: World, file: Path) -> ScenarioFile:
+    write_openscenario(played, catalogue()[played.place.scenario_id], world, file, vehicle=VEHICLE)
     return ScenarioFile.read(file)
 
 
@@ -65,14 +70,14 @@ def first_touch(file: ScenarioFile, *, tick_s: float = 0.002) -> tuple[str, floa
     return min(found, key=lambda item: item[1])
 
 
-def off_m(file: ScenarioFile, played: Cast) -> float:
+def off_m(file: ScenarioFile, played: StagedCase) -> float:
     """Return how far apart, or how deep in each other, boxes are as their impact is planned."""
     time = np.array([played.impact_time_s])
     ego, other = (file.entities[name].boxes(time) for name in ("ego", played.impact_with))
     return abs(float(separations(ego, other).max()))
 
 
-def may_be_off_m(played: Cast) -> float:
+def may_be_off_m(played: StagedCase) -> float:
     """Who brakes has its rear axle's speed, not its box's, which differ in bends."""
     return 0.4 if any(actor.conduct == "stops" for actor in played.actors) else 0.1
 
@@ -106,7 +111,7 @@ def test_entities_are_boxes_of_their_kind_about_their_rear_axle(tmp_path: Path) 
     front = float(van.element.find("Axles/FrontAxle").get("positionX"))
     assert rear < 0.0 < front < rear + van.length_m
     assert van.speed_mps == 0.0
-    centre = FrenetPath(played.ego_xy_m).locate(van.boxes(np.zeros(1)).centre_m)
+    centre = FrenetPath(played.place.ego.xy_m).locate(van.boxes(np.zeros(1)).centre_m)
     actor = next(a for a in played.actors if a.name == "parked_van")
     assert centre.offset_m[0] == pytest.approx(actor.lateral_m, abs=0.01)
 

@@ -13,10 +13,10 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.contracts.scenario import ActorPart, EgoPart, Scenario, Where
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
-from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import passage_on_path, places
-from foretwin.sim_worker.scenarios.places import Place, Unplaced
+from foretwin.sim_worker.scenarios.places import ScenarioPlace, Unplaced
 from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import unlike_its_turn
@@ -27,10 +27,17 @@ from tests.sim_worker.places import box
 from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring, tee
 from tests.world_gen.drawn_maps import drawn_map
 
+COVERS = (
+    "foretwin.sim_worker.scenarios.beyond_junctions",
+    "foretwin.sim_worker.scenarios.places",
+    "foretwin.sim_worker.scenarios.relations",
+    "foretwin.sim_worker.scenarios.walls",
+)
+
 VEHICLE = load_vehicle()
 
 
-def placed(id_: str, world: World) -> tuple[Place, ...]:
+def placed(id_: str, world: World) -> tuple[ScenarioPlace, ...]:
     result = places(catalogue()[id_], world, vehicle=VEHICLE)
     assert not result.unplaced, result.unplaced
     return result.places
@@ -42,7 +49,7 @@ def why_not(id_: str, world: World) -> Unplaced:
     return result.unplaced[0]
 
 
-def relative_heading_deg(place: Place, *, at_m: float = 20.0) -> float:
+def relative_heading_deg(place: ScenarioPlace, *, at_m: float = 20.0) -> float:
     """Return how far the first actor's heading is turned left of the ego's, before the junction."""
     ego, way = place.ego, place.actor_ways[0][0]
     own = ego.path.pose_at(np.array([ego.entry_m - at_m])).yaw_rad
@@ -176,7 +183,7 @@ def test_who_cannot_come_through_a_house_comes_along_the_road() -> None:
     for place in found:
         for values in draw_cases(scenario)[::3]:
             case = cast(scenario, values, place, vehicle=VEHICLE)
-            assert isinstance(case, Cast)
+            assert isinstance(case, StagedCase)
             (bicycle,) = case.actors
             walked = bicycle.speed_mps * np.linspace(0.0, case.impact_time_s, 40)
             line = FrenetPath(bicycle.xy_m).point_at(bicycle.start_arc_m + walked)

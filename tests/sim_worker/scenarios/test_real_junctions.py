@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.world import World
-from foretwin.sim_worker.scenarios.casting import Cast, cast
+from foretwin.sim_worker.scenarios.casting import StagedCase, cast
 from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.placement import places
 from foretwin.sim_worker.scenarios.reading import catalogue
@@ -72,8 +72,8 @@ def count(
             for values in cases[:: -(-len(cases) // most_cases)]:
                 case = cast(scenario, values, place, vehicle=vehicle)
                 counts[id_]["cases"] += 1
-                counts[id_]["cast"] += isinstance(case, Cast)
-                if isinstance(case, Cast) and case.impact_with:
+                counts[id_]["cast"] += isinstance(case, StagedCase)
+                if isinstance(case, StagedCase) and case.impact_with:
                     check_impact(case)
 
 

@@ -14,6 +14,8 @@ from foretwin.sim_worker.scenarios.roads import RoadNetwork
 from foretwin.sim_worker.scenarios.ways import APPROACH_M, DEPARTURE_M, traffic_turn
 from tests.sim_worker.scenarios.worlds import cross, motorway, ring, tee
 
+COVERS = ("foretwin.sim_worker.scenarios.ways",)
+
 
 def network(world: World) -> tuple[RoadNetwork, str]:
     return RoadNetwork(world), world.intersection.id

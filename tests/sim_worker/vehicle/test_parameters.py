@@ -10,6 +10,9 @@ from foretwin.sim_worker.vehicle.parameters import (
     load_vehicle,
     understeer_gradient,
 )
+from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE, check_plausible
+
+COVERS = ("foretwin.sim_worker.vehicle.plausible",)
 
 
 def test_bundled_vehicle_is_commonroads_vehicle_2() -> None:
@@ -101,3 +104,14 @@ def test_cars_of_commonroad_have_its_numbers(name: str, number: int) -> None:
 def test_an_unknown_name_is_answered_with_those_there_are() -> None:
     with pytest.raises(FileNotFoundError, match="bmw_320i, city_bus, ford_escort"):
         load_vehicle("trabant")
+
+
+@pytest.mark.parametrize("name", bundled_vehicles())
+def test_bundled_vehicles_are_plausible(name: str) -> None:
+    vehicle = load_vehicle(name)
+    assert all(check_plausible(key, getattr(vehicle, key).value) > -1.0 for key in PLAUSIBLE)
+
+
+def test_what_no_vehicle_has_is_refused_with_what_would_be_right() -> None:
+    with pytest.raises(ValueError, match=r"mass_kg 20 is implausible; it must be 150 to 60000"):
+        check_plausible("mass_kg", 20.0)

@@ -8,6 +8,8 @@ from foretwin.sim_worker.vehicle.parameters import load_vehicle, understeer_grad
 from foretwin.sim_worker.vehicle.reference_points import base_from_cog, cog_from_base
 from tests.sim_worker.driving import altered, drive, seed, states
 
+COVERS = ("foretwin.sim_worker.vehicle.actuation", "foretwin.sim_worker.vehicle.reference_points")
+
 CAR = load_vehicle()
 UNDERSTEERING = altered(
     CAR, front_cornering_stiffness_npr=90_000.0, rear_cornering_stiffness_npr=130_000.0

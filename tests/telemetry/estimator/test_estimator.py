@@ -23,6 +23,12 @@ from tests.telemetry.position_track import (
 )
 from tests.telemetry.standin_drive import whole_drive
 
+COVERS = (
+    "foretwin.telemetry.estimator.motion_track",
+    "foretwin.telemetry.estimator.reported_state",
+    "foretwin.telemetry.estimator.local_place",
+)
+
 
 def test_positions_alone_give_the_motion_on_a_circle() -> None:
     states = states_of(along(circle, 12.0))
@@ -33,8 +39,12 @@ def test_positions_alone_give_the_motion_on_a_circle() -> None:
         assert abs(wrap_angle(yaw(state) - expected)) < 0.02
     assert states[-1].tire_angle_rad == pytest.approx(math.atan(2.7 / 15.0), abs=0.01)
     assert set(states[-1].estimated) == {
-        "yaw_rad", "speed_mps", "yaw_rate_radps", "accel_mps2", "tire_angle_rad",
-    }  # fmt: skip
+        "yaw_rad",
+        "speed_mps",
+        "yaw_rate_radps",
+        "accel_mps2",
+        "tire_angle_rad",
+    }
 
 
 def test_a_position_without_stated_noise_leaves_as_it_came() -> None:

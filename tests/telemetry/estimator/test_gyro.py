@@ -19,9 +19,14 @@ MS = 1_000_000
 
 
 def watched(
-    *, std_radps: float, period_ms: int = 10, loss: float = 0.0, bias_radps: float = 0.0,
-    standing: bool = False, seconds: float = 20.0,
-) -> Gyro:  # fmt: skip
+    *,
+    std_radps: float,
+    period_ms: int = 10,
+    loss: float = 0.0,
+    bias_radps: float = 0.0,
+    standing: bool = False,
+    seconds: float = 20.0,
+) -> Gyro:
     """Return a gyro that was watched while the car wound its way, or stood."""
     random = np.random.default_rng(7)
     gyro = Gyro()

@@ -150,8 +150,14 @@ def street(std_m: float | None, *, seconds: float = 20.0) -> list[Sample]:
     samples: list[Sample] = []
     for k in range(round(20 * seconds)):
         stamp_ns = k * 50_000_000
-        samples.append(("imu", ImuSample(stamp_ns=stamp_ns, accel_mps2=(0.0, 0.0, 9.8),
-                                         rate_radps=(0.0, 0.0, 0.0))))  # fmt: skip
+        samples.append(
+            (
+                "imu",
+                ImuSample(
+                    stamp_ns=stamp_ns, accel_mps2=(0.0, 0.0, 9.8), rate_radps=(0.0, 0.0, 0.0)
+                ),
+            )
+        )
         samples.append(("speed", SpeedSample(stamp_ns=stamp_ns, speed_mps=10.0)))
         if k % 20 == 0:
             samples.append(fix(k / 20, 0.5 * k, 4.0, std_m))

@@ -55,9 +55,14 @@ def recorder(
         run_id="r1", process_id="recorder", vehicle_id="car", bus=BusSetup(endpoint=""), log_file=""
     )
     return RecorderProcess(
-        recording, bus=bus, life=ProcessLife(setup, bus, mono_s=mono_s), run_id="r1",
-        vehicle_id="car", lossless=lossless, mono_s=mono_s,
-    )  # fmt: skip
+        recording,
+        bus=bus,
+        life=ProcessLife(setup, bus, mono_s=mono_s),
+        run_id="r1",
+        vehicle_id="car",
+        lossless=lossless,
+        mono_s=mono_s,
+    )
 
 
 def publish_all(bus: MemoryBus | ZenohBus) -> None:
@@ -196,10 +201,13 @@ def test_losses_are_told_again_when_there_are_twice_as_many_and_at_the_end(tmp_p
 def started(tmp_path: Path) -> Iterator[tuple[ZenohBus, Mailbox, Any]]:
     """A router with an orchestrator's token, what lands there, and a recorder that is ready."""
     setup = RecorderSetup(
-        run_id="r1", process_id="recorder", vehicle_id="car",
+        run_id="r1",
+        process_id="recorder",
+        vehicle_id="car",
         bus=BusSetup(endpoint=free_endpoint(), lossless=True),
-        log_file=str(tmp_path / "log"), file=str(tmp_path / "drive.mcap"),
-    )  # fmt: skip
+        log_file=str(tmp_path / "log"),
+        file=str(tmp_path / "drive.mcap"),
+    )
     write_setup(setup, tmp_path / "setup.json")
     with ZenohBus(setup.bus, router=True) as bus:
         bus.declare_alive(ORCHESTRATOR)
@@ -242,10 +250,18 @@ def test_the_process_ends_within_a_second_with_a_whole_file(
 def test_a_wrong_setup_is_told_without_a_traceback(tmp_path: Path) -> None:
     (tmp_path / "setup.json").write_text('{"run_id": 5}')
     done = subprocess.run(
-        [sys.executable, "-m", "foretwin.telemetry.processes.recorder", "--setup",
-         str(tmp_path / "setup.json")],
-        capture_output=True, text=True, timeout=DEADLINE_S, check=False,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "foretwin.telemetry.processes.recorder",
+            "--setup",
+            str(tmp_path / "setup.json"),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+    )
     assert done.returncode == 2
     assert "setup.json: Expected `str`, got `int` - at `$.run_id`" in done.stderr
     assert "Traceback" not in done.stderr

@@ -19,7 +19,7 @@ from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.processes.replay import ReplaySource
 from foretwin.telemetry.processes.vehicle_process import VehicleProcess
 from tests.contracts.memory_bus import MemoryBus
-from tests.telemetry.processes.test_replay import SECOND_NS, START_NS, RecordedMinute
+from tests.telemetry.processes.test_replay import SECOND_NS, START_NS, recorded_minute
 
 ORCHESTRATOR = alive_key(run="r", process="orchestrator")
 
@@ -33,11 +33,14 @@ class Rig:
         self.inbox = Mailbox(1000)
         for channel in ("gnss", "speed", "end"):
             self.bus.subscribe(channel, self.inbox, vehicle="car")
-        source = ReplaySource(RecordedMinute(), vehicle_id="car", end_s=end_s)
+        source = ReplaySource(recorded_minute(), vehicle_id="car", end_s=end_s)
         setup = ProcessSetup(
-            run_id="r", process_id="vehicle", vehicle_id="car", bus=BusSetup(endpoint=""),
+            run_id="r",
+            process_id="vehicle",
+            vehicle_id="car",
+            bus=BusSetup(endpoint=""),
             log_file="",
-        )  # fmt: skip
+        )
         self.process = VehicleProcess(
             source,
             bus=self.bus,

@@ -14,7 +14,7 @@ from foretwin.contracts.foreign_bus import Arrived
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.mailbox import Mailbox
 from foretwin.contracts.setup import BusSetup, Ros2Setup, write_setup
-from foretwin.telemetry.ros_messages.parts import typestore
+from foretwin.telemetry.ros_messages.parts import ros_message, typestore
 
 ROOT = Path(__file__).resolve().parents[3]
 FRAME = LocalFrame(GeoPoint(52.5, 13.4))
@@ -90,7 +90,7 @@ def attached(seq: int) -> bytes:
 
 
 def cdr(kind: str, **fields: Any) -> bytes:
-    return bytes(typestore().serialize_cdr(typestore().types[kind](**fields), kind))
+    return bytes(typestore().serialize_cdr(ros_message(kind, **fields), kind))
 
 
 def ros_time(stamp_ns: int) -> Any:
@@ -176,10 +176,16 @@ def gateway_process(
 ) -> Iterator[subprocess.Popen[str]]:
     file = folder / "ros2.json"
     setup = Ros2Setup(
-        run_id="r", process_id="ros2", vehicle_id="ego", bus=BusSetup(endpoint=run_endpoint),
-        log_file=str(folder / "log.jsonl"), mapping=mapping, mapping_name="m.toml",
-        drive_frame=FRAME, towards_vehicle=flag,
-    )  # fmt: skip
+        run_id="r",
+        process_id="ros2",
+        vehicle_id="ego",
+        bus=BusSetup(endpoint=run_endpoint),
+        log_file=str(folder / "log.jsonl"),
+        mapping=mapping,
+        mapping_name="m.toml",
+        drive_frame=FRAME,
+        towards_vehicle=flag,
+    )
     write_setup(setup, file)
     command = [sys.executable, "-m", "foretwin.telemetry.ros2", "--setup", str(file)]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:

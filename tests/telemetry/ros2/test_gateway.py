@@ -28,6 +28,14 @@ from tests.telemetry.ros2.gateway_ground import (
     steering,
 )
 
+COVERS = (
+    "foretwin.telemetry.ros2.introduction",
+    "foretwin.telemetry.ros2.inwards",
+    "foretwin.telemetry.ros2.outwards",
+    "foretwin.telemetry.ros2.sender",
+    "foretwin.telemetry.ros2.diagnostics",
+)
+
 S = 10**9
 TOWARDS = ("/control/cmd", "/perception/objects", "/clock")
 
@@ -43,10 +51,15 @@ class Ground:
             self.bus.subscribe(channel, self.inbox, vehicle="ego")
         self.gateway = Gateway(
             parse_mapping(mapping_text(enabled=enabled), name="m.toml"),
-            bus=self.bus, foreign=self.foreign, run_id="r", vehicle_id="ego",
-            drive_frame=FRAME, flag_on=flag,
-            mono_ns=lambda: self.now_ns, wall_ns=lambda: 10**18 + self.now_ns,
-        )  # fmt: skip
+            bus=self.bus,
+            foreign=self.foreign,
+            run_id="r",
+            vehicle_id="ego",
+            drive_frame=FRAME,
+            flag_on=flag,
+            mono_ns=lambda: self.now_ns,
+            wall_ns=lambda: 10**18 + self.now_ns,
+        )
 
     def arrive(self, key: str, payload: bytes, seq: int = 1) -> None:
         self.foreign.arrive(key, payload, mono_ns=self.now_ns, seq=seq)
@@ -66,15 +79,26 @@ class Ground:
         )
         self.bus.publish("vehicle_command", command, run="r")
         user = RoadUser(
-            user_id="u", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=1.0,
-            length_m=4.0, width_m=2.0, virtual=True,
-        )  # fmt: skip
+            user_id="u",
+            kind="car",
+            position=GeoPoint(52.5, 13.4),
+            yaw_rad=0.0,
+            speed_mps=1.0,
+            length_m=4.0,
+            width_m=2.0,
+            virtual=True,
+        )
         users = RoadUsers(stamp_ns=5 * S, users=(user,))
         self.bus.publish("virtual_objects", users, run="r")
         state = VehicleState(
-            vehicle_id="ego", stamp_ns=5 * S, position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
-            speed_mps=1.0, yaw_rate_radps=0.0, accel_mps2=0.0,
-        )  # fmt: skip
+            vehicle_id="ego",
+            stamp_ns=5 * S,
+            position=GeoPoint(52.5, 13.4),
+            yaw_rad=0.0,
+            speed_mps=1.0,
+            yaw_rate_radps=0.0,
+            accel_mps2=0.0,
+        )
         self.bus.publish("state", state, vehicle="ego")
         self.step()
 
@@ -137,10 +161,21 @@ def test_the_twin_goes_out_as_odometry() -> None:
     ground = Ground(enabled=False, flag=False)
     car = PlaneState(100.0, -50.0, 0.5, 7.0)
     mirror = MirrorSample(
-        stamp_ns=5 * S, world_id=None, real=car, twin=car, shadow=car, ghost=car, gap_m=0.0,
-        gap_along_m=0.0, gap_across_m=0.0, gap_yaw_rad=0.0, gap_speed_mps=0.0, since_reset_s=0.0,
-        independent=True, twin_yaw_rate_radps=0.3,
-    )  # fmt: skip
+        stamp_ns=5 * S,
+        world_id=None,
+        real=car,
+        twin=car,
+        shadow=car,
+        ghost=car,
+        gap_m=0.0,
+        gap_along_m=0.0,
+        gap_across_m=0.0,
+        gap_yaw_rad=0.0,
+        gap_speed_mps=0.0,
+        since_reset_s=0.0,
+        independent=True,
+        twin_yaw_rate_radps=0.3,
+    )
     ground.bus.publish("mirror", mirror, run="r")
     ground.step()
     (data,) = ground.foreign.on("/foretwin/twin")
@@ -168,9 +203,14 @@ def test_real_road_users_never_go_out_as_virtual_ones() -> None:
     ground = Ground(enabled=True, flag=True)
     ground.say_everything()
     user = RoadUser(
-        user_id="r", kind="car", position=GeoPoint(52.5, 13.4), yaw_rad=0.0, speed_mps=1.0,
-        length_m=4.0, width_m=2.0,
-    )  # fmt: skip
+        user_id="r",
+        kind="car",
+        position=GeoPoint(52.5, 13.4),
+        yaw_rad=0.0,
+        speed_mps=1.0,
+        length_m=4.0,
+        width_m=2.0,
+    )
     ground.bus.publish("virtual_objects", RoadUsers(stamp_ns=6 * S, users=(user,)), run="r")
     ground.step(50.0)
     assert len(ground.foreign.on("/perception/objects")) == 1

@@ -36,6 +36,11 @@ from tests.telemetry.ros2.gateway_ground import (
     steering,
 )
 
+COVERS = (
+    "foretwin.telemetry.ros2.__main__",
+    "foretwin.contracts.foreign_bus",
+)
+
 ATTEMPTS = 5
 ROOT = Path(__file__).resolve().parents[3]
 ODOMETRY_HASH = "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"
@@ -123,10 +128,20 @@ def test_a_peer_of_rmw_zenoh_talks_to_it_both_ways(tmp_path: Path) -> None:
             assert info.body_from_antenna_m == pytest.approx((1.5, -0.1, 1.8))
             car = PlaneState(1.0, 2.0, 0.0, 3.0)
             mirror = MirrorSample(
-                stamp_ns=10**18, world_id=None, real=car, twin=car, shadow=car, ghost=car,
-                gap_m=0.0, gap_along_m=0.0, gap_across_m=0.0, gap_yaw_rad=0.0, gap_speed_mps=0.0,
-                since_reset_s=0.0, independent=True,
-            )  # fmt: skip
+                stamp_ns=10**18,
+                world_id=None,
+                real=car,
+                twin=car,
+                shadow=car,
+                ghost=car,
+                gap_m=0.0,
+                gap_along_m=0.0,
+                gap_across_m=0.0,
+                gap_yaw_rad=0.0,
+                gap_speed_mps=0.0,
+                since_reset_s=0.0,
+                independent=True,
+            )
             bus.publish("mirror", mirror, run="r")
             assert peer.stdout is not None
             said = json.loads(peer.stdout.readline())

@@ -24,8 +24,16 @@ source = "twin"
 def test_the_mapping_for_autoware() -> None:
     mapping = read_mapping(Path("autoware")).mapping
     assert {row.channel for row in mapping.inwards} >= {
-        "gnss", "imu", "speed", "steering", "control", "plan", "status", "objects", "signals"
-    }  # fmt: skip
+        "gnss",
+        "imu",
+        "speed",
+        "steering",
+        "control",
+        "plan",
+        "status",
+        "objects",
+        "signals",
+    }
     assert not mapping.towards_vehicle.enabled
     assert not [row.topic for row in mapping.outwards if row.towards_vehicle]
 

@@ -55,19 +55,36 @@ NORTH_M, EAST_M = 111.26, 135.8
 
 def vehicle(name: str, role: Role, *, x_m: float, yaw_rad: float = 0.0) -> MirroredVehicle:
     return MirroredVehicle(
-        vehicle_id=name, role=role, real=PlaneState(999.0, 0.0, 0.0, 0.0),
-        shown=PlaneState(x_m, 0.0, yaw_rad, 5.0), length_m=6.0, width_m=2.0, height_m=2.0,
+        vehicle_id=name,
+        role=role,
+        real=PlaneState(999.0, 0.0, 0.0, 0.0),
+        shown=PlaneState(x_m, 0.0, yaw_rad, 5.0),
+        length_m=6.0,
+        width_m=2.0,
+        height_m=2.0,
         rear_overhang_m=1.0,
-    )  # fmt: skip
+    )
 
 
 def mirror(stamp_ns: int, *others: MirroredVehicle, role: Role = "all") -> MirrorSample:
     car = PlaneState(0.0, 0.0, 0.0, 7.0)
     return MirrorSample(
-        stamp_ns=stamp_ns, world_id=None, real=car, twin=PlaneState(0.5, 0.0, 0.0, 7.0),
-        shadow=car, ghost=car, gap_m=0.5, gap_along_m=0.5, gap_across_m=0.0, gap_yaw_rad=0.0,
-        gap_speed_mps=0.0, since_reset_s=0.0, independent=True, role=role, others=others,
-    )  # fmt: skip
+        stamp_ns=stamp_ns,
+        world_id=None,
+        real=car,
+        twin=PlaneState(0.5, 0.0, 0.0, 7.0),
+        shadow=car,
+        ghost=car,
+        gap_m=0.5,
+        gap_along_m=0.5,
+        gap_across_m=0.0,
+        gap_yaw_rad=0.0,
+        gap_speed_mps=0.0,
+        since_reset_s=0.0,
+        independent=True,
+        role=role,
+        others=others,
+    )
 
 
 class Ground:
@@ -78,16 +95,27 @@ class Ground:
         self.bus, self.foreign = MemoryBus(), RecordingForeign()
         self.gateway = Gateway(
             parse_mapping(TEXT.format(dialect=dialect), name="m.toml"),
-            bus=self.bus, foreign=self.foreign, run_id="r", vehicle_id="ego",
-            drive_frame=DRIVE_FRAME, flag_on=flag, car=CAR,
-            mono_ns=lambda: self.now_ns, wall_ns=lambda: 10**18 + self.now_ns,
-        )  # fmt: skip
+            bus=self.bus,
+            foreign=self.foreign,
+            run_id="r",
+            vehicle_id="ego",
+            drive_frame=DRIVE_FRAME,
+            flag_on=flag,
+            car=CAR,
+            mono_ns=lambda: self.now_ns,
+            wall_ns=lambda: 10**18 + self.now_ns,
+        )
 
     def drive_to(self, stamp_ns: int) -> None:
         state = VehicleState(
-            vehicle_id="ego", stamp_ns=stamp_ns, position=GeoPoint(52.5, 13.4), yaw_rad=0.0,
-            speed_mps=7.0, yaw_rate_radps=0.0, accel_mps2=0.0,
-        )  # fmt: skip
+            vehicle_id="ego",
+            stamp_ns=stamp_ns,
+            position=GeoPoint(52.5, 13.4),
+            yaw_rad=0.0,
+            speed_mps=7.0,
+            yaw_rate_radps=0.0,
+            accel_mps2=0.0,
+        )
         self.bus.publish("state", state, vehicle="ego")
 
     def say(self, sample: MirrorSample, *, passed_s: float = 0.1) -> None:
@@ -121,8 +149,9 @@ def test_a_twin_beside_goes_out_in_the_map_with_the_cars_stamp(dialect: str) -> 
     at = van.kinematics.initial_pose_with_covariance.pose
     # Its middle lies 2 m ahead of the rear axle, to the north.
     assert (at.position.x, at.position.y) == (
-        pytest.approx(EAST_M + 30.0, abs=0.2), pytest.approx(NORTH_M + 2.0, abs=0.2),
-    )  # fmt: skip
+        pytest.approx(EAST_M + 30.0, abs=0.2),
+        pytest.approx(NORTH_M + 2.0, abs=0.2),
+    )
     assert yaw_of(at.orientation) == pytest.approx(math.pi / 2, abs=1e-3)
     assert van.kinematics.initial_twist_with_covariance.twist.linear.x == 5.0
     assert (van.shape.dimensions.x, van.shape.dimensions.y) == (6.0, 2.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from foretwin.contracts.bus import Mailbox
@@ -15,9 +14,8 @@ from foretwin.telemetry.ros2.mapping import parse_mapping
 from foretwin.telemetry.ros_messages.parts import (
     LANELET_ROUTE,
     header_from,
-    point_from,
-    ros_type,
-    turn_from,
+    pose_from,
+    ros_message,
 )
 from tests.contracts.memory_bus import MemoryBus
 from tests.telemetry.ros2.gateway_ground import FRAME, RecordingForeign, cdr
@@ -38,16 +36,12 @@ channel = "route"
 
 
 def lanelet_route(*, frame: str = "map", goal_x_m: float = 900.0) -> bytes:
-    pose, segment = ros_type("geometry_msgs/msg/Pose"), "autoware_planning_msgs/msg/LaneletSegment"
-    primitive = ros_type("autoware_planning_msgs/msg/LaneletPrimitive")(id=7, primitive_type="lane")
     return cdr(
         LANELET_ROUTE,
         header=header_from(5 * S, frame),
-        start_pose=pose(position=point_from(10.0, -5.0, 0.0), orientation=turn_from(0.5)),
-        goal_pose=pose(position=point_from(goal_x_m, 40.0, 0.0), orientation=turn_from(-2.0)),
-        segments=[ros_type(segment)(preferred_primitive=primitive, primitives=[primitive])] * 3,
-        uuid=ros_type("unique_identifier_msgs/msg/UUID")(uuid=np.zeros(16, dtype=np.uint8)),
-        allow_modification=False,
+        start_pose=pose_from(10.0, -5.0, 0.0, 0.5),
+        goal_pose=pose_from(goal_x_m, 40.0, 0.0, -2.0),
+        segments=[ros_message("autoware_planning_msgs/msg/LaneletSegment")] * 3,
     )
 
 
@@ -60,9 +54,15 @@ class Ground:
         self.bus.subscribe("route", self.box, vehicle="ego")
         self.gateway = Gateway(
             parse_mapping(TEXT.format(map=MAP if placed else ""), name="m.toml"),
-            bus=self.bus, foreign=self.foreign, run_id="r", vehicle_id="ego", drive_frame=FRAME,
-            flag_on=False, mono_ns=lambda: self.now_ns, wall_ns=lambda: 10**18,
-        )  # fmt: skip
+            bus=self.bus,
+            foreign=self.foreign,
+            run_id="r",
+            vehicle_id="ego",
+            drive_frame=FRAME,
+            flag_on=False,
+            mono_ns=lambda: self.now_ns,
+            wall_ns=lambda: 10**18,
+        )
 
     def step(self, *payloads: bytes, passed_s: float = 0.0) -> list[RouteToGoal]:
         self.now_ns += round(passed_s * S)

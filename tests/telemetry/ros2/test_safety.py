@@ -31,14 +31,14 @@ def admit(gate: VehicleGate, wished: VehicleCommand, now_ns: int, link_up: bool 
 
 def open_gate(now_ns: int = 0) -> VehicleGate:
     gate = VehicleGate(LIMITS, config_on=True, flag_on=True)
-    gate.hear(now_ns, now_ns=now_ns)
+    gate.heartbeat(now_ns, now_ns=now_ns)
     return gate
 
 
 @pytest.mark.parametrize(("config_on", "flag_on"), [(False, False), (True, False), (False, True)])
 def test_nothing_without_both_switches(config_on: bool, flag_on: bool) -> None:
     gate = VehicleGate(LIMITS, config_on=config_on, flag_on=flag_on)
-    gate.hear(0, now_ns=0)
+    gate.heartbeat(0, now_ns=0)
     assert gate.state == "off"
     assert admit(gate, command(0), 0) is None
     assert "--towards-vehicle" in gate.why or "enabled" in gate.why
@@ -47,7 +47,7 @@ def test_nothing_without_both_switches(config_on: bool, flag_on: bool) -> None:
 def test_nothing_before_the_first_word() -> None:
     gate = VehicleGate(LIMITS, config_on=True, flag_on=True)
     assert admit(gate, command(0), 0) is None
-    gate.hear(0, now_ns=0)
+    gate.heartbeat(0, now_ns=0)
     assert admit(gate, command(0), 0) is not None
 
 
@@ -56,7 +56,7 @@ def test_what_has_shut_stays_shut() -> None:
     late = DEAD_MAN_NS + 1
     assert gate.look(now_ns=DEAD_MAN_NS, link_up=True) == "open"
     assert gate.look(now_ns=late, link_up=True) == "shut"
-    gate.hear(late, now_ns=late)
+    gate.heartbeat(late, now_ns=late)
     assert admit(gate, command(late), late) is None
     assert "150 ms" in gate.why
 
@@ -64,7 +64,7 @@ def test_what_has_shut_stays_shut() -> None:
 def test_a_word_that_comes_late_does_not_bridge_the_gap() -> None:
     """A gateway that was stopped finds words in its mailbox that were in time when sent."""
     gate = open_gate()
-    gate.hear(100 * MS, now_ns=400 * MS)
+    gate.heartbeat(100 * MS, now_ns=400 * MS)
     assert gate.state == "shut"
 
 
@@ -101,15 +101,19 @@ NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-2.0, 2.0)
 STEPS = st.tuples(
     st.integers(0, 200 * MS),  # passes first
     st.sampled_from(["word", "stale word", "command", "link down", "command", "word"]),
-    NUMBERS, NUMBERS, NUMBERS,
-)  # fmt: skip
+    NUMBERS,
+    NUMBERS,
+    NUMBERS,
+)
 
 
 @settings(max_examples=300, deadline=None)
 @given(
-    st.booleans(), st.booleans(), st.floats(-0.5, 0.5),
+    st.booleans(),
+    st.booleans(),
+    st.floats(-0.5, 0.5),
     st.lists(st.tuples(st.integers(0, 60 * MS), STEPS), max_size=40),
-)  # fmt: skip
+)
 def test_never_outside_the_bounds_and_never_after_the_dead_mans_time(
     config_on: bool,
     flag_on: bool,
@@ -124,10 +128,10 @@ def test_never_outside_the_bounds_and_never_after_the_dead_mans_time(
         now += long if tire > 1.0 else short
         silent = silent or (word is not None and now - word > DEAD_MAN_NS)
         if what == "word":
-            gate.hear(now, now_ns=now)
+            gate.heartbeat(now, now_ns=now)
             word = now
         elif what == "stale word":
-            gate.hear(now - DEAD_MAN_NS - 1, now_ns=now)
+            gate.heartbeat(now - DEAD_MAN_NS - 1, now_ns=now)
         elif what == "link down" and accel > 1.0:
             gate.look(now_ns=now, link_up=False)
             down = down or word is not None

@@ -37,9 +37,15 @@ lon_deg = 13.4
 
 def user(name: str, *, virtual: bool = True, speed_mps: float = 0.0, lat: float = 52.5) -> RoadUser:
     return RoadUser(
-        user_id=name, kind="car", position=GeoPoint(lat, 13.4), yaw_rad=0.0, speed_mps=speed_mps,
-        length_m=4.0, width_m=2.0, virtual=virtual,
-    )  # fmt: skip
+        user_id=name,
+        kind="car",
+        position=GeoPoint(lat, 13.4),
+        yaw_rad=0.0,
+        speed_mps=speed_mps,
+        length_m=4.0,
+        width_m=2.0,
+        virtual=virtual,
+    )
 
 
 def said(stamp_ns: int, *users: RoadUser) -> RoadUsers:
@@ -86,9 +92,14 @@ def test_what_goes_to_and_fro_stays_on_its_way(
     speed_mps: float, way_m: float, yaw_deg: float, time_s: float
 ) -> None:
     placed = PlacedObject(
-        user_id="p", kind="pedestrian", lat_deg=52.5, lon_deg=13.4, yaw_deg=yaw_deg,
-        speed_mps=speed_mps, way_m=way_m,
-    )  # fmt: skip
+        user_id="p",
+        kind="pedestrian",
+        lat_deg=52.5,
+        lon_deg=13.4,
+        yaw_deg=yaw_deg,
+        speed_mps=speed_mps,
+        way_m=way_m,
+    )
     placed.validate()
     one = placed.at(time_s)
     along = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))

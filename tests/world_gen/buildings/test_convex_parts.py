@@ -17,6 +17,8 @@ from foretwin.world_gen.buildings.convex_parts import (
     convex_cover,
 )
 
+COVERS = ("foretwin.geometry.reflex_cuts",)
+
 L_SHAPE = np.array([[0, 0], [20, 0], [20, 6], [6, 6], [6, 20], [0, 20]], dtype=np.float64)
 
 

@@ -69,8 +69,16 @@ def test_a_ramp_merges_into_the_lanes_on_its_side(lanes, main, ramp):
 def _parting(name: str) -> World:
     """Return a crossing in whose middle a street parts into two carriageways to the east."""
     street = {"highway": "secondary", "name": "Street"}
-    nodes = {0: (0.0, 0.0), 1: (-90.0, 0.0), 2: (0.0, 90.0), 3: (0.0, -90.0),
-             4: (20.0, 5.0), 5: (120.0, 5.0), 6: (20.0, -5.0), 7: (120.0, -5.0)}  # fmt: skip
+    nodes = {
+        0: (0.0, 0.0),
+        1: (-90.0, 0.0),
+        2: (0.0, 90.0),
+        3: (0.0, -90.0),
+        4: (20.0, 5.0),
+        5: (120.0, 5.0),
+        6: (20.0, -5.0),
+        7: (120.0, -5.0),
+    }
     return world_of(
         drawn_map(
             nodes,
@@ -91,8 +99,11 @@ def test_nobody_turns_back_into_the_other_carriageway():
 def test_back_along_a_parting_carriageway_is_a_u_turn():
     world = _parting("Ramp")
     way_of = {lane.id: lane.osm_way for lane in world.lanes}
-    back = {c.turn for c in world.connections
-            if (way_of[c.from_lane_id], way_of[c.to_lane_id]) == (20, 21)}  # fmt: skip
+    back = {
+        c.turn
+        for c in world.connections
+        if (way_of[c.from_lane_id], way_of[c.to_lane_id]) == (20, 21)
+    }
     assert back == {"u_turn"}
 
 
@@ -102,9 +113,12 @@ def _street() -> Surroundings:
     nodes = {0: (0.0, 0.0), 1: (-90.0, 0.0), 2: (60.0, 0.0), 3: (120.0, 0.0), 4: (0.0, 90.0)}
     osm = drawn_map(
         nodes,
-        [(1, [1, 0, 2], tags), (2, [2, 3], tags),
-         (3, [0, 4], {"highway": "residential", "name": "Avenue"})],
-    )  # fmt: skip
+        [
+            (1, [1, 0, 2], tags),
+            (2, [2, 3], tags),
+            (3, [0, 4], {"highway": "residential", "name": "Avenue"}),
+        ],
+    )
     graph = build_road_graph(osm)
     (junction,) = find_intersections(osm, graph)
     index = index_map(osm, graph, (junction,))
@@ -118,17 +132,28 @@ def test_a_lane_too_short_to_be_drawn_does_not_shift_its_neighbours():
     (second,) = {lane.key.edge for lane in lanes.begins.values() if lane.id.startswith("w2.")}
     begins = {key: lane for key, lane in lanes.begins.items() if key != LaneKey(second, False, 0)}
     assert join_straight_on(plain, around, msgspec.structs.replace(lanes, begins=begins))
-    (first,) = {lane.key.edge for lane in lanes.lanes.values()
-                if lane.id.startswith("w1.") and LaneKey(lane.key.edge, False, 0) in lanes.ends
-                and any(leg.edge.index == lane.key.edge for leg in plain.legs)}  # fmt: skip
+    (first,) = {
+        lane.key.edge
+        for lane in lanes.lanes.values()
+        if lane.id.startswith("w1.")
+        and LaneKey(lane.key.edge, False, 0) in lanes.ends
+        and any(leg.edge.index == lane.key.edge for leg in plain.legs)
+    }
     onto = [lanes.ends[LaneKey(first, False, n)].successors for n in range(3)]
     assert onto == [[], *([lanes.begins[LaneKey(second, False, n)].id] for n in (1, 2))]
 
 
 def test_a_place_beyond_the_worlds_edge_is_none():
     one_way = {"highway": "secondary", "name": "Street", "oneway": "yes"}
-    nodes = {0: (0.0, 0.0), 1: (-90.0, 0.0), 2: (0.0, 90.0), 3: (146.0, 0.0),
-             4: (300.0, 8.0), 5: (300.0, -8.0), 6: (30.0, 0.0)}  # fmt: skip
+    nodes = {
+        0: (0.0, 0.0),
+        1: (-90.0, 0.0),
+        2: (0.0, 90.0),
+        3: (146.0, 0.0),
+        4: (300.0, 8.0),
+        5: (300.0, -8.0),
+        6: (30.0, 0.0),
+    }
     world = world_of(
         drawn_map(
             nodes,

@@ -26,9 +26,8 @@ def _path(name: str, first: str, last: str) -> Array:
     world = build_world(osm, graph, junction)
     road = {lane.id: lane.name for lane in world.lanes}
     (found,) = (
-        c for c in world.connections
-        if (road[c.from_lane_id], road[c.to_lane_id]) == (first, last)
-    )  # fmt: skip
+        c for c in world.connections if (road[c.from_lane_id], road[c.to_lane_id]) == (first, last)
+    )
     return found.centerline
 
 
@@ -55,21 +54,39 @@ def test_lanes_that_turn_side_by_side_stay_apart_on_a_single_lane_inside(turn):
     street, avenue = plain | {"name": "Street"}, plain | {"name": "Avenue"}
     wide = {"lanes": "2", "turn:lanes": f"{turn}|{turn}"}
     nodes = {
-        1: (-12.0, -12.0), 2: (12.0, -12.0), 3: (12.0, 12.0), 4: (-12.0, 12.0),
-        11: (-120.0, -12.0), 12: (120.0, -12.0), 13: (120.0, 12.0), 14: (-120.0, 12.0),
-        21: (12.0, -120.0), 22: (12.0, 120.0), 23: (-12.0, 120.0), 24: (-12.0, -120.0),
-    }  # fmt: skip
+        1: (-12.0, -12.0),
+        2: (12.0, -12.0),
+        3: (12.0, 12.0),
+        4: (-12.0, 12.0),
+        11: (-120.0, -12.0),
+        12: (120.0, -12.0),
+        13: (120.0, 12.0),
+        14: (-120.0, 12.0),
+        21: (12.0, -120.0),
+        22: (12.0, 120.0),
+        23: (-12.0, 120.0),
+        24: (-12.0, -120.0),
+    }
     lights = {node: {"highway": "traffic_signals"} for node in (1, 2, 3, 4)}
     legs = [
-        (30, [11, 1], street), (31, [1, 2], street), (32, [2, 12], street | {"lanes": "2"}),
-        (33, [13, 3], street), (34, [3, 4], street), (35, [4, 14], street | {"lanes": "2"}),
-        (40, [21, 2], avenue | wide), (41, [2, 3], avenue), (42, [3, 22], avenue | {"lanes": "2"}),
-        (43, [23, 4], avenue), (44, [4, 1], avenue), (45, [1, 24], avenue),
-    ]  # fmt: skip
+        (30, [11, 1], street),
+        (31, [1, 2], street),
+        (32, [2, 12], street | {"lanes": "2"}),
+        (33, [13, 3], street),
+        (34, [3, 4], street),
+        (35, [4, 14], street | {"lanes": "2"}),
+        (40, [21, 2], avenue | wide),
+        (41, [2, 3], avenue),
+        (42, [3, 22], avenue | {"lanes": "2"}),
+        (43, [23, 4], avenue),
+        (44, [4, 1], avenue),
+        (45, [1, 24], avenue),
+    ]
     world = world_of(drawn_map(nodes, legs, node_tags=lights))
     turns = "straight" if turn == "through" else turn
     first, second = (
-        LineString(c.centerline) for c in world.connections
+        LineString(c.centerline)
+        for c in world.connections
         if c.from_lane_id.startswith("w40.") and c.turn == turns
-    )  # fmt: skip
+    )
     assert first.distance(second) > 2.4

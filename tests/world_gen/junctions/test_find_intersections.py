@@ -9,6 +9,14 @@ import pytest
 
 from tests.world_gen.sketch import MANCHESTER, Sketch, off_centre_m, only, star
 
+COVERS = (
+    "foretwin.world_gen.junctions.chains",
+    "foretwin.world_gen.junctions.grouping",
+    "foretwin.world_gen.junctions.junction_arms",
+    "foretwin.world_gen.junctions.junction_clusters",
+    "foretwin.world_gen.junctions.slip_roads",
+)
+
 
 def dual_carriageway(sketch: Sketch, gap_m: float = 14.0) -> None:
     """An east-west street of two carriageways; nodes 11..13 eastward, 21..23 westward."""
@@ -70,10 +78,19 @@ def test_a_bridge_makes_none(tmp_path: Path) -> None:
 def test_two_dual_carriageways_cross_in_one_junction(tmp_path: Path) -> None:
     sketch = Sketch()
     for node, x_m, y_m in (
-        (1, -7, -7), (2, 7, -7), (3, 7, 7), (4, -7, 7),
-        (5, -150, -7), (6, 150, -7), (7, 150, 7), (8, -150, 7),
-        (9, 7, -150), (10, 7, 150), (11, -7, 150), (12, -7, -150),
-    ):  # fmt: skip
+        (1, -7, -7),
+        (2, 7, -7),
+        (3, 7, 7),
+        (4, -7, 7),
+        (5, -150, -7),
+        (6, 150, -7),
+        (7, 150, 7),
+        (8, -150, 7),
+        (9, 7, -150),
+        (10, 7, 150),
+        (11, -7, 150),
+        (12, -7, -150),
+    ):
         sketch.node(node, x_m, y_m)
     sketch.road(100, [5, 1, 2, 6], "Ost", oneway="yes")
     sketch.road(101, [7, 3, 4, 8], "Ost", oneway="yes")
@@ -111,9 +128,15 @@ def test_a_turning_place_in_the_median_is_none(tmp_path: Path) -> None:
 def test_a_street_that_parts_into_its_carriageways_is_none(tmp_path: Path) -> None:
     sketch = Sketch()
     for node, x_m, y_m in (
-        (1, -200, 0), (2, -60, 0), (3, -45, -8), (4, 45, -8), (5, 60, 0), (6, 200, 0),
-        (7, 45, 8), (8, -45, 8),
-    ):  # fmt: skip
+        (1, -200, 0),
+        (2, -60, 0),
+        (3, -45, -8),
+        (4, 45, -8),
+        (5, 60, 0),
+        (6, 200, 0),
+        (7, 45, 8),
+        (8, -45, 8),
+    ):
         sketch.node(node, x_m, y_m)
     sketch.road(100, [1, 2], "Mohrenstraße")
     sketch.road(101, [2, 3, 4, 5], "Mohrenstraße", oneway="yes")
@@ -148,8 +171,13 @@ def test_a_side_street_with_a_traffic_island_is_one_junction(tmp_path: Path) -> 
 def test_offset_side_streets(offset_m: float, kinds: list[str], tmp_path: Path) -> None:
     sketch = Sketch()
     for node, x_m, y_m in (
-        (1, -200, 0), (2, 0, 0), (3, offset_m, 0), (4, 200, 0), (5, 0, 150), (6, offset_m, -150),
-    ):  # fmt: skip
+        (1, -200, 0),
+        (2, 0, 0),
+        (3, offset_m, 0),
+        (4, 200, 0),
+        (5, 0, 150),
+        (6, offset_m, -150),
+    ):
         sketch.node(node, x_m, y_m)
     sketch.road(100, [1, 2, 3, 4], "Haupt")
     sketch.road(101, [5, 2], "Links")
@@ -208,8 +236,13 @@ def test_an_edit_elsewhere_changes_no_id(tmp_path: Path) -> None:
 def test_side_streets_on_the_same_side_stay_two_junctions(tmp_path: Path) -> None:
     sketch = Sketch()
     for node, x_m, y_m in (
-        (1, -200, 0), (2, 0, 0), (3, 27, 0), (4, 200, 0), (5, 0, 150), (6, 27, 150),
-    ):  # fmt: skip
+        (1, -200, 0),
+        (2, 0, 0),
+        (3, 27, 0),
+        (4, 200, 0),
+        (5, 0, 150),
+        (6, 27, 150),
+    ):
         sketch.node(node, x_m, y_m)
     sketch.road(100, [1, 2, 3, 4], "Haupt")
     sketch.road(101, [5, 2], "Erste")
@@ -221,9 +254,16 @@ def test_the_start_of_a_slip_road_stays_with_its_corner(tmp_path: Path) -> None:
     """Another side street 15 m before a slip road parts makes a junction of its own."""
     sketch = Sketch()
     for node, x_m, y_m in (
-        (1, -150, 0), (2, -55, 0), (3, -40, 0), (4, 0, 0), (5, 150, 0),
-        (6, -55, 120), (7, 0, -35), (8, 0, -150), (9, -12, -8),
-    ):  # fmt: skip
+        (1, -150, 0),
+        (2, -55, 0),
+        (3, -40, 0),
+        (4, 0, 0),
+        (5, 150, 0),
+        (6, -55, 120),
+        (7, 0, -35),
+        (8, 0, -150),
+        (9, -12, -8),
+    ):
         sketch.node(node, x_m, y_m)
     sketch.node(50, -18.0, 0.0, highway="traffic_signals", traffic_signals__direction="forward")
     sketch.road(100, [1, 2, 3, 50, 4, 5], "Haupt", highway="secondary")

@@ -7,8 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.provenance import Quantity
-from foretwin.world_gen.lanes.cross_section import cross_section, metres
+from foretwin.world_gen.lanes.cross_section import cross_section
+from foretwin.world_gen.lanes.lane_plans import metres
 from tests.world_gen.road_edges import road as _road
+
+COVERS = (
+    "foretwin.world_gen.lanes.lane_plans",
+    "foretwin.world_gen.lanes.lane_tags",
+    "foretwin.world_gen.lanes.side_lanes",
+)
 
 
 def test_two_way_road_keeps_right_around_its_way():
@@ -24,11 +31,11 @@ def test_two_way_road_keeps_left_around_its_way():
 
 def test_lanes_are_numbered_from_the_left_as_their_driver_sees_them():
     section = cross_section(_road(forward=2, backward=2), "right")
-    assert [lane.left_m for lane in section.driven(reverse=False)] == [-1.5, -4.5]
-    assert [lane.left_m for lane in section.driven(reverse=True)] == [1.5, 4.5]
+    assert [lane.left_m for lane in section.along(reverse=False).driven] == [-1.5, -4.5]
+    assert [lane.left_m for lane in section.along(reverse=True).driven] == [1.5, 4.5]
     section = cross_section(_road(forward=2, backward=2), "left")
-    assert [lane.left_m for lane in section.driven(reverse=False)] == [4.5, 1.5]
-    assert [lane.left_m for lane in section.driven(reverse=True)] == [-4.5, -1.5]
+    assert [lane.left_m for lane in section.along(reverse=False).driven] == [4.5, 1.5]
+    assert [lane.left_m for lane in section.along(reverse=True).driven] == [-4.5, -1.5]
 
 
 def test_widths_are_tagged_or_inferred_or_default():
@@ -44,15 +51,15 @@ def test_widths_are_tagged_or_inferred_or_default():
 def test_turn_lanes_of_one_direction():
     tags = {"turn:lanes:forward": "left|through;right|none", "turn:backward": "slight_right"}
     section = cross_section(_road(tags, forward=3, backward=1), "right")
-    ahead = section.driven(reverse=False)
+    ahead = section.along(reverse=False).driven
     assert [lane.turns for lane in ahead] == [("left",), ("straight", "right"), ()]
     assert [lane.turns_source for lane in ahead] == ["tagged", "tagged", "inferred"]
-    assert section.driven(reverse=True)[0].turns == ("right",)
+    assert section.along(reverse=True).driven[0].turns == ("right",)
 
 
 def test_bicycle_lanes_take_no_part_in_the_count():
     tags = {"bicycle:lanes": "|designated|", "turn:lanes": "left|through|right"}
-    lanes = cross_section(_road(tags, forward=2, backward=0), "right").driven(reverse=False)
+    lanes = cross_section(_road(tags, forward=2, backward=0), "right").along(reverse=False).driven
     assert [lane.turns for lane in lanes] == [("left",), ("right",)]
 
 
@@ -63,9 +70,11 @@ def test_turn_lanes_that_do_not_fit_are_named_and_ignored():
 
 
 def test_bus_lane():
-    lanes = cross_section(
-        _road({"bus:lanes": "yes|designated"}, forward=2, backward=0), "right"
-    ).driven(reverse=False)
+    lanes = (
+        cross_section(_road({"bus:lanes": "yes|designated"}, forward=2, backward=0), "right")
+        .along(reverse=False)
+        .driven
+    )
     assert [lane.kind for lane in lanes] == ["driving", "bus"]
 
 

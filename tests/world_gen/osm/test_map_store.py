@@ -25,6 +25,15 @@ from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.large_map import write_large_map
 from tests.world_gen.sketch import Sketch, star
 
+COVERS = (
+    "foretwin.world_gen.osm.build_map_store",
+    "foretwin.world_gen.osm.clip",
+    "foretwin.world_gen.osm.map_cells",
+    "foretwin.world_gen.osm.map_tables",
+    "foretwin.world_gen.osm.node_spool",
+    "foretwin.world_gen.osm.opl_stream",
+)
+
 EVERYWHERE = LatLonBounds(-90.0, -180.0, 90.0, 180.0)
 
 
@@ -208,9 +217,11 @@ def test_a_gigabyte_needs_less_than_one_of_memory(tmp_path: Path) -> None:
 @pytest.mark.real_data
 @pytest.mark.parametrize(
     ("name", "every"),
-    [("osm-badhersfeld/badhersfeld.osm.xml.gz", 400),
-     ("osm-liechtenstein/liechtenstein-latest.osm.pbf", 700)],
-)  # fmt: skip
+    [
+        ("osm-badhersfeld/badhersfeld.osm.xml.gz", 400),
+        ("osm-liechtenstein/liechtenstein-latest.osm.pbf", 700),
+    ],
+)
 def test_worlds_of_a_clip_are_those_of_the_whole_map(
     data_dir: Path, tmp_path: Path, name: str, every: int
 ) -> None:

@@ -15,6 +15,13 @@ from foretwin.world_gen.osm.osm_map import MapError
 from foretwin.world_gen.osm.read_osm import read_map
 from tests.world_gen.sketch import Sketch
 
+COVERS = (
+    "foretwin.world_gen.osm.map_file",
+    "foretwin.world_gen.osm.opl",
+    "foretwin.world_gen.osm.opl_filter",
+    "foretwin.world_gen.osm.osm_map",
+)
+
 
 @pytest.fixture
 def street() -> Sketch:

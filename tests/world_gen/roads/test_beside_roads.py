@@ -69,10 +69,18 @@ def test_a_way_that_crosses_a_road_is_a_crossing():
         extra_nodes={30: (40.0, 12.0), 31: (40.0, 0.0), 32: (40.0, -12.0)},
         extra_ways=[
             (15, [0, 31], STREET),
-            (30, [30, 31, 32], {"highway": "footway", "footway": "crossing",
-                                "crossing": "zebra", "crossing:island": "yes"}),
+            (
+                30,
+                [30, 31, 32],
+                {
+                    "highway": "footway",
+                    "footway": "crossing",
+                    "crossing": "zebra",
+                    "crossing:island": "yes",
+                },
+            ),
         ],
-    )  # fmt: skip
+    )
     (found,) = world_of(osm).crossings
     assert (found.osm_node, found.kind.value, found.kind.source) == (31, "zebra", "tagged")
     assert found.island

@@ -12,6 +12,8 @@ from foretwin.world_gen.osm.osm_map import MapError
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.sketch import MANCHESTER, Sketch
 
+COVERS = ("foretwin.world_gen.roads.road_graph",)
+
 
 @pytest.fixture
 def crossing() -> Sketch:
@@ -40,8 +42,11 @@ def test_ways_are_cut_where_they_meet_alone(crossing: Sketch, tmp_path: Path) ->
 def test_all_leave_from_a_node_allowed_or_not(crossing: Sketch, tmp_path: Path) -> None:
     leaving = crossing.graph(tmp_path).at_node(2)
     assert [(item.edge.name, item.end_node, item.allowed) for item in leaving] == [
-        ("Ost", 1, False), ("Ost", 3, True), ("Nord", 4, True), ("Nord", 5, True),
-    ]  # fmt: skip
+        ("Ost", 1, False),
+        ("Ost", 3, True),
+        ("Nord", 4, True),
+        ("Nord", 5, True),
+    ]
 
 
 def test_ways_that_a_car_might_use_are_kept_but_no_car_roads(tmp_path: Path) -> None:
@@ -55,8 +60,12 @@ def test_ways_that_a_car_might_use_are_kept_but_no_car_roads(tmp_path: Path) -> 
     sketch.way(22, [7, 8], highway="pedestrian", area="yes")
     edges = {edge.way_id: edge for edge in sketch.graph(tmp_path).edges}
     assert {way: edge.car for way, edge in edges.items()} == {
-        10: True, 11: False, 12: False, 13: False, 21: False,
-    }  # fmt: skip
+        10: True,
+        11: False,
+        12: False,
+        13: False,
+        21: False,
+    }
     assert edges[12].forward
     assert not edges[11].forward
     assert not edges[21].backward

@@ -21,8 +21,16 @@ DRIVEWAY = {"highway": "service", "service": "driveway", "access": "private"}
 @pytest.fixture
 def place():
     osm = drawn_map(
-        {0: (0.0, 0.0), 1: (90.0, 0.0), 2: (0.0, 90.0), 3: (-90.0, 0.0), 5: (50.0, 0.0),
-         6: (50.0, 30.0), 7: (-50.0, 0.0), 8: (-50.0, 30.0)},
+        {
+            0: (0.0, 0.0),
+            1: (90.0, 0.0),
+            2: (0.0, 90.0),
+            3: (-90.0, 0.0),
+            5: (50.0, 0.0),
+            6: (50.0, 30.0),
+            7: (-50.0, 0.0),
+            8: (-50.0, 30.0),
+        },
         [
             (11, [0, 5, 1], STREET),
             (12, [0, 2], AVENUE),
@@ -30,7 +38,7 @@ def place():
             (20, [5, 6], DRIVEWAY),
             (21, [7, 8], {"highway": "service", "service": "parking_aisle", "oneway": "yes"}),
         ],
-    )  # fmt: skip
+    )
     return osm, build_road_graph(osm)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from foretwin.contracts.frames import geo_from_local
 from foretwin.contracts.world import World
-from foretwin.world_gen.osm.osm_map import OsmMap
+from foretwin.world_gen.osm.osm_map import NodeLocations, OsmMap
 from tests.world_gen.connections.test_conflicts import conflict_of
 from tests.world_gen.drawn_maps import (
     AVENUE,
@@ -21,6 +21,11 @@ from tests.world_gen.drawn_maps import (
 )
 from tests.world_gen.junction_truth import worlds_of
 from tests.world_gen.truth_sheet import true_maps
+
+COVERS = (
+    "foretwin.world_gen.rules.approaches",
+    "foretwin.world_gen.rules.right_of_way",
+)
 
 MAIN = {"highway": "tertiary", "name": "Street"}
 
@@ -175,9 +180,15 @@ def test_a_stop_sign_on_the_very_node_is_for_the_lesser_road():
 
 def test_a_sign_on_a_node_of_a_dual_carriageway_is_not_for_those_who_drive_through():
     nodes = {
-        0: (0.0, 0.0), 6: (0.0, 14.0), 1: (90.0, 0.0), 3: (-90.0, 0.0), 4: (0.0, -90.0),
-        2: (0.0, 104.0), 7: (90.0, 14.0), 8: (-90.0, 14.0),
-    }  # fmt: skip
+        0: (0.0, 0.0),
+        6: (0.0, 14.0),
+        1: (90.0, 0.0),
+        3: (-90.0, 0.0),
+        4: (0.0, -90.0),
+        2: (0.0, 104.0),
+        7: (90.0, 14.0),
+        8: (-90.0, 14.0),
+    }
     one_way = {**MAIN, "oneway": "yes"}
     ways = [
         (11, [3, 0, 1], one_way),
@@ -228,10 +239,14 @@ def test_lanes_that_merge_let_the_straight_one_go_first():
 def test_a_circular_place_with_signs_at_its_entries_is_driven_like_a_roundabout():
     osm = roundabout()
     ring = osm.ways[10]
-    nodes = {**osm.locations, 9: local_to_geo(osm, 25.0, 0.0)}
+    node = local_to_geo(osm, 25.0, 0.0)
+    before = osm.locations
+    at = np.searchsorted(before.ids, 9)
     osm = msgspec.structs.replace(
         osm,
-        locations=nodes,
+        locations=NodeLocations(
+            np.insert(before.ids, at, 9), np.insert(before.lat_lon_deg, at, node, axis=0)
+        ),
         ways={
             **osm.ways,
             10: ring._replace(tags={**ring.tags, "junction": "circular", "oneway": "yes"}),

@@ -14,6 +14,8 @@ from foretwin.world_gen.rules.signal_plan import share_green
 from tests.world_gen.drawn_maps import AVENUE, CROSS, STREET, crossing, drawn_map, world_of
 from tests.world_gen.plan_checks import check_plans, plan_of
 
+COVERS = ("foretwin.world_gen.rules.signal_groups",)
+
 LIGHT = {"highway": "traffic_signals"}
 
 
@@ -21,9 +23,11 @@ def with_turn_lanes(*letters: str) -> OsmMap:
     """Return a crossing whose roads in from these sides have a lane for left turns alone."""
     ends = {"E": 1, "N": 2, "W": 3, "S": 4}
     wide: Mapping[str, str] = {
-        "lanes": "3", "lanes:forward": "2", "lanes:backward": "1",
+        "lanes": "3",
+        "lanes:forward": "2",
+        "lanes:backward": "1",
         "turn:lanes:forward": "left|through;right",
-    }  # fmt: skip
+    }
     ways = [
         (
             10 + end,

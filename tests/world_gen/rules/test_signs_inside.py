@@ -20,6 +20,11 @@ from tests.world_gen.slip_roads import (
     slip_world,
 )
 
+COVERS = (
+    "foretwin.world_gen.rules.junction_rules",
+    "foretwin.world_gen.rules.stop_lines",
+)
+
 GIVE_WAY = {"highway": "give_way"}
 
 
@@ -74,10 +79,11 @@ def test_a_slip_road_waits_for_those_who_turn_into_its_road_across_oncoming_traf
     ((_, slip),) = lines_inside(world)
     by_id = {c.id: c for c in world.connections}
     left = [
-        c for c in world.conflicts
+        c
+        for c in world.conflicts
         if slip.id in (c.first_id, c.second_id)
         and "left" in (by_id[c.first_id].turn, by_id[c.second_id].turn)
-    ]  # fmt: skip
+    ]
     assert [(c.yields_id, c.rule, c.kind) for c in left] == [(slip.id, "give_way", "merging")]
 
 
@@ -88,9 +94,16 @@ def node_at_origin(osm: OsmMap, node: int) -> tuple[float, float]:
 
 
 MOUTH = {
-    0: (0.0, 0.0), 1: (120.0, 0.0), 3: (-120.0, 0.0), 4: (0.0, -120.0), 6: (0.0, -24.0),
-    7: (-10.0, 0.0), 8: (10.0, 0.0), 9: (-9.0, -8.0), 10: (9.0, -8.0),
-}  # fmt: skip
+    0: (0.0, 0.0),
+    1: (120.0, 0.0),
+    3: (-120.0, 0.0),
+    4: (0.0, -120.0),
+    6: (0.0, -24.0),
+    7: (-10.0, 0.0),
+    8: (10.0, 0.0),
+    9: (-9.0, -8.0),
+    10: (9.0, -8.0),
+}
 
 
 def split_mouth(**sign: str) -> OsmMap:
@@ -121,10 +134,11 @@ def test_a_sign_in_a_split_mouth_is_the_road_s_own():
     assert line.control == Choice("none", "inferred")
     by_id = {c.id: c for c in world.connections}
     main = [
-        c for c in world.conflicts
+        c
+        for c in world.conflicts
         if {name[by_id[i].from_lane_id] for i in (c.first_id, c.second_id)}
         == {"Main Street", "Stem"}
-    ]  # fmt: skip
+    ]
     assert main
     assert {(name[by_id[c.yields_id].from_lane_id], c.rule) for c in main} == {("Stem", "stop")}
 
@@ -132,19 +146,26 @@ def test_a_sign_in_a_split_mouth_is_the_road_s_own():
 def test_on_a_road_of_both_ways_a_sign_is_for_those_who_come_to_the_nearer_end():
     """Inside a staggered junction: the sign stands nearer to the western of its two mouths."""
     nodes = {
-        0: (-12.0, 0.0), 1: (12.0, 0.0), 2: (-6.0, 0.0), 3: (-120.0, 0.0), 4: (120.0, 0.0),
-        5: (-12.0, -120.0), 6: (12.0, 120.0),
-    }  # fmt: skip
+        0: (-12.0, 0.0),
+        1: (12.0, 0.0),
+        2: (-6.0, 0.0),
+        3: (-120.0, 0.0),
+        4: (120.0, 0.0),
+        5: (-12.0, -120.0),
+        6: (12.0, 120.0),
+    }
     main = {"highway": "tertiary", "name": "Main Street"}
     osm = drawn_map(
         nodes,
         [
-            (11, [3, 0], main), (12, [0, 2, 1], main), (13, [1, 4], main),
+            (11, [3, 0], main),
+            (12, [0, 2, 1], main),
+            (13, [1, 4], main),
             (14, [5, 0], {"highway": "tertiary", "name": "South"}),
             (15, [6, 1], {"highway": "tertiary", "name": "North"}),
         ],
         node_tags={2: GIVE_WAY},
-    )  # fmt: skip
+    )
     world = world_of(osm)
     found = lines_inside(world)
     assert check_lines(world) > 0
@@ -191,9 +212,10 @@ def test_a_way_past_a_roundabout_has_the_line_of_its_sign():
     assert np.hypot(*(lines[0].ends.mean(axis=0) - node_at(osm, world, 53))) < 6.0
     by_id = {c.id: c for c in world.connections}
     met = [
-        c for c in world.conflicts
+        c
+        for c in world.conflicts
         if 14 in {way_of[by_id[i].from_lane_id] for i in (c.first_id, c.second_id)}
-    ]  # fmt: skip
+    ]
     assert met
     assert {(way_of[by_id[c.yields_id].from_lane_id], c.rule) for c in met} == {(14, "give_way")}
 

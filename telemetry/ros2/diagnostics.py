@@ -1,4 +1,4 @@
-"""What is told in /foretwin/diagnostics: the newest of each kind, and the gateway's own counts."""
+"""Levels of /foretwin/diagnostics: the newest of each kind, and the gateway's own counts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from foretwin.telemetry.ros2.outwards import Level
 from foretwin.telemetry.ros2.safety import VehicleGate
 
 
-class Told:
+class DiagnosticLevels:
     """Keeps the last warning, alarm of each quantity, and verdict."""
 
     def __init__(self) -> None:

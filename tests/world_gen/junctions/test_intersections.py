@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from foretwin.world_gen.junctions.find_intersections import find_intersections
-from foretwin.world_gen.junctions.route_junctions import junctions_on_route
+from foretwin.world_gen.junctions.intersections import junctions_on_route
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 from tests.world_gen.sketch import Sketch
@@ -23,9 +23,19 @@ def two_crossings() -> Sketch:
     """A dual carriageway crosses a street; farther north a T-junction closes a block."""
     sketch = Sketch()
     for node, x_m, y_m in (
-        (11, -150, -7), (12, 0, -7), (13, 150, -7), (21, 150, 7), (22, 0, 7), (23, -150, 7),
-        (30, 0, 200), (31, 0, -150), (32, 100, 200), (33, -100, 200), (40, -75, 7), (41, -75, 90),
-    ):  # fmt: skip
+        (11, -150, -7),
+        (12, 0, -7),
+        (13, 150, -7),
+        (21, 150, 7),
+        (22, 0, 7),
+        (23, -150, 7),
+        (30, 0, 200),
+        (31, 0, -150),
+        (32, 100, 200),
+        (33, -100, 200),
+        (40, -75, 7),
+        (41, -75, 90),
+    ):
         sketch.node(node, x_m, y_m)
     sketch.road(110, [11, 12, 13], "Allee", oneway="yes")
     sketch.road(120, [21, 22, 40, 23], "Allee", oneway="yes")
